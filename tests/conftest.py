@@ -1,0 +1,23 @@
+"""Shared fixtures: where real recordings lie, and a folder of this clone's own files."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def project_root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real recordings made by others; skips where it is absent."""
+    named = os.environ.get("VALIDATE_SHARED_DATA")
+    folder = Path(named) if named else ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"real data absent: {folder} (set VALIDATE_SHARED_DATA)")
+    return folder

@@ -1,0 +1,234 @@
+"""The modulus from force-displacement logs: exact on synthetic ones, published on real ones."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.identify.modulus import (
+    Cylinder,
+    ModulusFit,
+    ModulusSummary,
+    apparent_to_material,
+    cylinder_of,
+    fit_modulus,
+    gent_correction,
+    identify_modulus,
+    load_noise,
+    summarise,
+)
+from validate.recording.instron import read_instron
+from validate.recording.types import Recording, Signal, Source
+
+DISC = Cylinder(0.05, 0.03)
+E = 60e3  # Pa
+SPEED = 10e-3 / 60  # m/s, sampled at 10 Hz as the real logs are
+
+
+def log(d: Floats, force: Floats, name: str = "synthetic") -> Recording:
+    t = np.arange(len(d)) * 0.1
+    return Recording(
+        name=name,
+        source=Source("none", "", 0, "made in a test"),
+        t0_ns=0,
+        signals={
+            "displacement": Signal(t, d[:, None], "m", 0.0, "machine"),
+            "force": Signal(t, force[:, None], "N", 0.0, "machine"),
+        },
+        metadata={"specimen": {"diameter_m": "0.05", "height_m": "0.03"}},
+    )
+
+
+def linear(slack: float = 0.0, offset: float = 0.0, modulus: float = E) -> tuple[Floats, Floats]:
+    """Displacement (m) and force (N) of an ideal disc; the plate meets it at `slack` m."""
+    d = np.arange(200) * SPEED * 0.1
+    return d, modulus * DISC.area / DISC.height * np.maximum(d - slack, 0.0) + offset
+
+
+def test_a_linear_log_gives_its_modulus_exactly() -> None:
+    fit = fit_modulus(log(*linear()))
+    assert fit.E_apparent == pytest.approx(E, rel=1e-12)
+    assert fit.sd == pytest.approx(0.0, abs=1e-6 * E)
+    assert fit.offset == pytest.approx(0.0, abs=1e-12)
+    assert fit.contact == 0.0
+    assert fit.residual_rms < 1e-12
+    assert fit.r_squared == pytest.approx(1.0, abs=1e-12)
+    assert (fit.name, fit.window) == ("synthetic", (0.005, 0.05))
+    inside = fit_modulus(log(*linear()), window=(0.0051, 0.0499))
+    assert inside.count == 80  # 0.153 to 1.497 mm at 1/60 mm a sample: 9.18 to 89.82, so 10..89
+
+
+@pytest.mark.parametrize("offset", [-0.7, 0.04, 12.0])
+def test_the_cell_offset_is_removed_and_reported(offset: float) -> None:
+    fit = fit_modulus(log(*linear(offset=offset)))
+    assert fit.E_apparent == pytest.approx(E, rel=1e-11)
+    assert fit.offset == pytest.approx(offset, rel=1e-9)
+
+
+def test_an_approach_before_contact_is_found() -> None:
+    slack = 40.5 * SPEED * 0.1
+    fit = fit_modulus(log(*linear(slack=slack, offset=0.3)))
+    assert fit.contact == pytest.approx(slack, rel=1e-9)
+    assert fit.offset == pytest.approx(0.3, rel=1e-12)
+    assert fit.E_apparent == pytest.approx(E, rel=1e-11)
+
+
+def test_an_approach_is_found_in_noise() -> None:
+    d, force = linear(slack=40.5 * SPEED * 0.1, offset=0.3)
+    noisy = force + np.random.default_rng(3).normal(0, 0.02, len(force))
+    fit = fit_modulus(log(d, noisy))
+    assert fit.contact == pytest.approx(40.5 * SPEED * 0.1, abs=3 * 0.02 * 0.03 / (E * DISC.area))
+    assert fit.offset == pytest.approx(0.3, abs=3 * 0.02 / math.sqrt(35))
+
+
+def test_noise_is_within_three_standard_errors_and_the_standard_error_is_right() -> None:
+    d, force = linear(offset=-0.03)
+    rng = np.random.default_rng(11)
+    fits = [fit_modulus(log(d, force + rng.normal(0, 0.02, len(d)))) for _ in range(200)]
+    off = np.array([(fit.E_apparent - E) / fit.sd for fit in fits])
+    assert np.mean(np.abs(off) < 3) > 0.98  # 0.9963 expected with 79 degrees of freedom
+    assert off.std() == pytest.approx(1.0, abs=0.15)  # sd of an sd over 200: 0.05
+    assert abs(off.mean()) < 3 / math.sqrt(200)
+    assert np.mean([fit.noise for fit in fits]) == pytest.approx(0.02, rel=0.03)
+    assert np.mean([fit.residual_rms for fit in fits]) == pytest.approx(0.02, rel=0.03)
+
+
+def test_the_standard_error_is_that_of_a_straight_line_fit() -> None:
+    d, force = linear()
+    noisy = force + np.random.default_rng(2).normal(0, 0.02, len(force))
+    fit = fit_modulus(log(d, noisy), window=(0.0051, 0.0499))
+    inside = slice(10, 90)
+    (slope, _), cov = np.polyfit(d[inside] / DISC.height, noisy[inside] / DISC.area, 1, cov=True)
+    assert fit.E_apparent == pytest.approx(slope, rel=1e-10)
+    assert fit.sd == pytest.approx(math.sqrt(cov[0, 0]), rel=1e-8)
+
+
+def test_unloading_is_not_fitted() -> None:
+    d, force = linear()
+    softer = log(np.append(d, d[::-1]), np.append(force, 0.5 * force[::-1]))
+    assert fit_modulus(softer).E_apparent == pytest.approx(E, rel=1e-12)
+    assert fit_modulus(softer).count == fit_modulus(log(d, force)).count
+
+
+def test_definition_is_the_mean_slope_with_free_intercept() -> None:
+    """F = A0 (a e + b e^2) densely sampled: slope a + b (low + high), by hand."""
+    e = np.linspace(0, 0.06, 60001)
+    force = DISC.area * (50e3 * e + 400e3 * e**2)
+    fit = fit_modulus(log(e * DISC.height, force), window=(0.01, 0.05))
+    assert fit.E_apparent == pytest.approx(50e3 + 400e3 * 0.06, rel=1e-6)
+
+
+@given(
+    stiff=st.floats(1e3, 1e6),
+    size=st.floats(0.5, 3.0),
+    offset=st.floats(-5, 5),
+)
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_scale_invariance(stiff: float, size: float, offset: float) -> None:
+    """Geometrically similar discs of one material have one modulus."""
+    d, force = linear(modulus=stiff)
+    disc = Cylinder(DISC.diameter * size, DISC.height * size)
+    fit = fit_modulus(log(d * size, force * size**2 + offset), disc)
+    assert fit.E_apparent == pytest.approx(stiff, rel=1e-8)
+
+
+def test_noise_of_a_known_series() -> None:
+    rng = np.random.default_rng(0)
+    smooth = np.linspace(0, 10, 4000) ** 2
+    assert load_noise(smooth + rng.normal(0, 0.02, 4000)) == pytest.approx(0.02, rel=0.05)
+    assert load_noise(np.arange(20) * 1.5) == 0.0
+    with pytest.raises(RecordingError, match="9 forces for a noise estimate"):
+        load_noise(np.zeros(9))
+
+
+def some_fit(modulus: float) -> ModulusFit:
+    return ModulusFit("x", modulus, 2.0, 0.0, 0.0, 0.01, (0.005, 0.05), 81, 0.02, 1.0)
+
+
+def test_summary_of_three_by_hand() -> None:
+    summary = summarise([some_fit(m) for m in (1.0, 2.0, 6.0)])
+    assert summary.mean == pytest.approx(3.0)
+    assert summary.sd_repeats == pytest.approx(math.sqrt(7.0))  # (4 + 1 + 9) / 2
+    assert summary.sd_mean == pytest.approx(math.sqrt(7.0 / 3))
+    single = summarise([some_fit(5.0)])
+    assert (single.sd_repeats, single.sd_mean) == (None, 2.0)
+    with pytest.raises(UsageError, match="no fits"):
+        summarise([])
+    other = fit_modulus(log(*linear()), window=(0.01, 0.04))
+    with pytest.raises(UsageError, match="different strain windows"):
+        summarise([some_fit(5.0), other])
+
+
+def test_gent_and_the_bracket() -> None:
+    assert gent_correction(0.05, 0.03) == pytest.approx(1 + 2 * (5 / 12) ** 2, rel=1e-14)
+    assert gent_correction(0.05, 0.03) == pytest.approx(1.35, abs=0.005)  # data README
+    ends = apparent_to_material(ModulusSummary(108e3, None, 1e3, ()), 1.35)
+    assert (ends.slip, ends.slip_sd) == (108e3, 1e3)
+    assert ends.bonded == pytest.approx(80e3)
+    assert ends.bonded_sd == pytest.approx(1e3 / 1.35)
+    for wrong in (0.9, math.nan):
+        with pytest.raises(UsageError, match="expected >= 1"):
+            apparent_to_material(ModulusSummary(1.0, None, 1.0, ()), wrong)
+
+
+def test_refusals_hold_the_numbers() -> None:
+    d, force = linear()
+    with pytest.raises(RecordingError, match=r"strain from 0.0000 to 0.0272 with 41 samples"):
+        fit_modulus(log(d[:50], force[:50]))
+    with pytest.raises(RecordingError, match="with 9 samples in the window"):
+        fit_modulus(log(d, force), window=(0.005, 0.0099))
+    with pytest.raises(UsageError, match="expected 0 <= low < high"):
+        fit_modulus(log(d, force), window=(0.05, 0.005))
+    with pytest.raises(RecordingError, match="not a size above 0"):
+        Cylinder(0.05, -0.03)
+    unknown = Recording("bare", Source("none", "", 0, ""), 0, metadata={"specimen": {}})
+    with pytest.raises(RecordingError, match="no number 'diameter_m'"):
+        cylinder_of(unknown)
+
+
+def real(folder: Path, name: str) -> Recording:
+    return read_instron(folder / "force" / "ecoflex-compression" / f"{name}.csv")
+
+
+def test_ecoflex_00_30_five_repeats(shared_data: Path) -> None:
+    """Data README: E over 0.5-5 % 107.7 kPa, sd 1.1 kPa; noise 0.017-0.021 N, offset 0.04 N."""
+    summary = identify_modulus([real(shared_data, f"EF30_0T_A{i}") for i in range(1, 6)])
+    assert summary.mean == pytest.approx(107.7e3, abs=50)  # printed with one decimal of kPa
+    assert summary.sd_repeats == pytest.approx(1.1e3, abs=50)
+    assert summary.sd_mean == pytest.approx(1.1e3 / math.sqrt(5), abs=25)
+    for fit in summary.fits:
+        assert 0.0165 <= fit.noise < 0.0215  # the README's range, to its last digit
+        assert abs(fit.offset) <= 0.045
+        assert fit.contact == 0.0
+        assert fit.count == 81  # counted in the five files
+        assert fit.residual_rms > 2 * fit.noise  # curvature, in spite of
+        assert fit.r_squared > 0.998
+    ends = apparent_to_material(summary, gent_correction(0.05, 0.03))
+    assert ends.bonded == pytest.approx(107.7e3 / 1.3472, rel=1e-3)
+
+
+def test_modulus_does_not_depend_on_how_the_file_is_written(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    """The same log with decimal commas, kN and negative compression: the same modulus."""
+    source = shared_data / "force" / "ecoflex-compression" / "EF30_0T_A1.csv"
+    rows = [line.split(",")[:3] for line in source.read_text().splitlines()[8:]]
+    flipped = [[float(t), -float(d), -float(f) / 1e3] for t, d, f in rows]
+    lines = [";".join(f"{x:.9f}".replace(".", ",") for x in row) for row in flipped]
+    head = [
+        "Durchmesser: 50mm",
+        "Diameter: 5,0 cm",
+        "Height: 30mm",
+        "Time;Extension;Load",
+        "s;mm;kN",
+    ]
+    path = tmp_path / "same.csv"
+    path.write_text("\r\n".join(head + lines), encoding="utf-16")
+    here, there = fit_modulus(real(shared_data, "EF30_0T_A1")), fit_modulus(read_instron(path))
+    assert there.E_apparent == pytest.approx(here.E_apparent, rel=1e-7)
+    assert there.noise == pytest.approx(here.noise, rel=1e-4)

@@ -1,0 +1,81 @@
+"""Recordings made by others, each beside what must be found in it."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from validate.errors import RecordingError
+from validate.recording.inspect import Inspection, inspect_recording
+from validate.recording.mcap_read import read_recording
+
+ROS2 = {
+    "talker": 20,
+    "cdr_test_0": 7,
+    "multiple_files_0": 1324,
+    "topics_and_services": 13,
+    "wrong_rmw_test_0": 7,
+}
+
+
+def _expected(path: Path) -> list[tuple[str, dict[str, object]]]:
+    records = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["records"]
+    return [(r["type"], dict(r["fields"])) for r in records]
+
+
+def _check(got: Inspection, expected: list[tuple[str, dict[str, object]]]) -> None:
+    kinds = Counter(kind for kind, _ in expected)
+    assert (got.messages, got.attachments) == (kinds["Message"], kinds["Attachment"])
+    assert len(got.metadata) == kinds["Metadata"]
+    assert [got.library, got.profile] == [expected[0][1]["library"], expected[0][1]["profile"]]
+    channels = {str(f["topic"]) for kind, f in expected if kind == "Channel"}
+    assert {t.name for t in got.topics} == channels
+    for kind, fields in expected:
+        if kind == "Message":
+            assert str(got.topics[0].first_ns) == fields["publish_time"]
+        if kind == "DataEnd":
+            assert (got.source.integrity == "verified") == (fields["data_section_crc"] != "0")
+
+
+def test_every_conformance_file_holds_what_its_json_says(shared_data: Path) -> None:
+    files = sorted((shared_data / "mcap" / "conformance").rglob("*.mcap"))
+    assert len(files) == 174
+    total = 0
+    for path in files:
+        got = inspect_recording(path)
+        _check(got, _expected(path))
+        json.dumps(got.to_dict(), allow_nan=False)
+        total += got.messages
+    assert total > 100
+
+
+def test_no_conformance_file_holds_a_topic_of_ours(shared_data: Path) -> None:
+    for path in (shared_data / "mcap" / "conformance").rglob("*.mcap"):
+        with pytest.raises(RecordingError, match="no topic with markers, signals or contours"):
+            read_recording(path)
+
+
+@pytest.mark.parametrize(("name", "count"), ROS2.items())
+def test_ros2_recordings_are_listed_whole(shared_data: Path, name: str, count: int) -> None:
+    got = inspect_recording(shared_data / "mcap" / "ros2" / f"{name}.mcap")
+    assert got.messages == sum(t.count for t in got.topics) == count
+    assert got.profile == "ros2"
+    assert {t.kind for t in got.topics} == {"foreign"}
+    assert got.source.integrity == "integrity not provable: no data CRC"
+
+
+def test_channels_without_messages_and_repeated_metadata_are_defects(shared_data: Path) -> None:
+    got = inspect_recording(shared_data / "mcap" / "ros2" / "topics_and_services.mcap")
+    assert len([d for d in got.defects if d.endswith("no messages")]) == 3
+    assert "metadata 'rosbag2' occurs 2 times" in got.defects
+
+
+def test_a_dds_recording_is_listed(shared_data: Path) -> None:
+    got = inspect_recording(shared_data / "mcap" / "dds" / "configuration_type.mcap")
+    assert (got.messages, got.attachments, got.metadata) == (12, 1, ("version",))
+    assert {t.name: t.count for t in got.topics} == {
+        "/ddsrecorder/status": 2,
+        "configuration_topic": 10,
+    }
+    assert {t.schema_encoding for t in got.topics} == {"omgidl"}

@@ -1,0 +1,86 @@
+"""Units of foreign files to SI: exact factors, refusals that name unit and quantity."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from validate.errors import RecordingError
+from validate.recording.units import is_unit, si_factor, to_si
+
+EXACT = [
+    ("N", "force", 1.0),
+    ("kN", "force", 1e3),
+    ("mN", "force", 1e-3),
+    ("kgf", "force", 9.80665),
+    ("gf", "force", 9.80665e-3),
+    ("lbf", "force", 4.4482216152605),
+    ("mm", "length", 1e-3),
+    ("cm", "length", 1e-2),
+    ("um", "length", 1e-6),
+    ("µm", "length", 1e-6),
+    ("μm", "length", 1e-6),
+    ("m", "length", 1.0),
+    ("in", "length", 0.0254),
+    ("s", "time", 1.0),
+    ("sec", "time", 1.0),
+    ("ms", "time", 1e-3),
+    ("min", "time", 60.0),
+    ("Pa", "stress", 1.0),
+    ("kPa", "stress", 1e3),
+    ("MPa", "stress", 1e6),
+    ("N/mm^2", "stress", 1e6),
+    ("N/mm2", "stress", 1e6),
+    ("N/mm²", "stress", 1e6),
+    ("psi", "stress", 6894.757293168),
+    ("%", "strain", 0.01),
+    ("mm/mm", "strain", 1.0),
+    ("-", "strain", 1.0),
+    ("mm/min", "speed", 1e-3 / 60),
+    ("in/min", "speed", 0.0254 / 60),
+    ("mm^2", "area", 1e-6),
+]
+
+
+@pytest.mark.parametrize(("unit", "quantity", "factor"), EXACT)
+def test_factor_is_the_defined_one(unit: str, quantity: str, factor: float) -> None:
+    assert si_factor(f" {unit} ", quantity) == pytest.approx(factor, rel=1e-12)
+    assert is_unit(unit)
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "says"),
+    [
+        ("mm", "force", "measures length"),
+        ("kg", "force", "not known"),
+        ("furlongs per N", "length", "not known"),
+        ("cycle", "strain", "not known"),
+        ("", "time", "not known"),
+        ("10 mm", "length", "not known"),
+        ("mm**999999999", "length", "not known"),
+        ("-", "length", "measures strain"),
+    ],
+)
+def test_refusal_names_unit_and_quantity(unit: str, quantity: str, says: str) -> None:
+    with pytest.raises(RecordingError, match=says) as caught:
+        si_factor(unit, quantity)
+    assert f"'{unit}'" in str(caught.value)
+    assert quantity in str(caught.value)
+
+
+@given(st.floats(-1e6, 1e6), st.sampled_from(EXACT))
+@settings(max_examples=50, deadline=None)
+def test_numbers_and_arrays_scale_alike(value: float, known: tuple[str, str, float]) -> None:
+    unit, quantity, factor = known
+    assert to_si(value, unit, quantity) == pytest.approx(value * factor, rel=1e-12)
+    many = to_si(np.array([value, -value]), unit, quantity)
+    assert np.array_equal(many, [to_si(value, unit, quantity), -to_si(value, unit, quantity)])
+
+
+def test_pint_is_imported_only_when_a_unit_is_read() -> None:
+    code = "import sys, validate.recording.instron; print('pint' in sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "False"

@@ -1,0 +1,61 @@
+"""The door through which arrays enter: shape, type and finiteness are checked here, once."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from validate.errors import ValidateError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def checked(
+    value: ArrayLike,
+    name: str,
+    shape: Sequence[int | None],
+    *,
+    nan: bool = False,
+    error: type[ValidateError] = ValidateError,
+) -> Floats:
+    """A read-only float copy of `value` with the given shape; `None` stands for any length.
+
+    `nan=True` admits NaN ("not seen"), never infinity. Raises `error` with the shapes or counts.
+    """
+    array = np.array(value, dtype=np.float64)
+    _check_shape(array.shape, name, shape, error)
+    bad = np.isinf(array) if nan else ~np.isfinite(array)
+    if bad.any():
+        first = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise error(f"{name}: {int(bad.sum())} of {array.size} values not finite, first at {first}")
+    array.setflags(write=False)
+    return array
+
+
+def checked_indices(
+    value: ArrayLike,
+    name: str,
+    shape: Sequence[int | None],
+    below: int,
+    *,
+    error: type[ValidateError] = ValidateError,
+) -> Ints:
+    """A read-only integer copy of `value` with the given shape and 0 <= entries < `below`."""
+    array = np.array(value, dtype=np.int64)
+    _check_shape(array.shape, name, shape, error)
+    if array.size and (array.min() < 0 or array.max() >= below):
+        raise error(f"{name}: entries {array.min()}..{array.max()} outside 0..{below - 1}")
+    array.setflags(write=False)
+    return array
+
+
+def _check_shape(
+    got: tuple[int, ...], name: str, want: Sequence[int | None], error: type[ValidateError]
+) -> None:
+    fits = len(got) == len(want) and all(
+        w is None or w == g for g, w in zip(got, want, strict=True)
+    )
+    if not fits:
+        pattern = ", ".join("any" if w is None else str(w) for w in want)
+        raise error(f"{name}: shape {got}, expected ({pattern})")

@@ -1,0 +1,70 @@
+"""The whole comparison of an experiment: what the report shows and the exit code rests on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from validate.compare.effects import Effect
+from validate.compare.residual import Residual
+from validate.compare.score import Score
+from validate.compare.verdict import Check, Published
+from validate.parameters import Parameter
+from validate.recording.types import Recording
+from validate.register.observe import Registered
+from validate.scene.scene import Scene
+from validate.solve.types import Run
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """One method: its scene, one run per recording, scores against them, checks if accepted."""
+
+    name: str
+    label: str
+    accepted: bool
+    scene: Scene
+    runs: tuple[Run, ...]
+    residuals: Mapping[str, Residual]
+    scores: tuple[Score, ...]
+    checks: tuple[Check, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "residuals", MappingProxyType(dict(self.residuals)))
+
+    @property
+    def run(self) -> Run:
+        """The run of the first recording."""
+        return self.runs[0]
+
+
+@dataclass(frozen=True)
+class Result:
+    """An experiment compared: all that a report needs."""
+
+    name: str
+    title: str
+    source: str
+    sentence: str
+    parameters: tuple[Parameter, ...]
+    methods: tuple[MethodResult, ...]
+    recordings: tuple[Recording, ...]
+    registered: tuple[Registered, ...]
+    rest: tuple[Residual, ...]
+    effects: tuple[Effect, ...]
+    published: tuple[Published, ...]
+    identified: tuple[Score, ...] = ()
+    notes: tuple[str, ...] = ()
+    quick: bool = False
+    same_model: bool = False
+    seed: int | None = None
+    twin_notice: str = ""
+    inputs: tuple[str, ...] = field(default=())
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        return tuple(c for m in self.methods for c in m.checks)
+
+    @property
+    def passed(self) -> bool:
+        """All checks hold, and there is at least one: a run that compares nothing has failed."""
+        return bool(self.checks) and all(c.holds for c in self.checks)

@@ -1,0 +1,100 @@
+"""Scores: a residual's statistics, each with unit, count and definition; never averaged RMSEs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.residual import Residual
+from validate.solve.types import Run
+
+
+@dataclass(frozen=True)
+class Score:
+    """A number, its SI unit, how many points it rests on, against what, and what it means."""
+
+    name: str
+    value: float
+    unit: str
+    count: int
+    against: str
+    definition: str
+
+
+def rms(values: Floats) -> float:
+    """Root of the mean squared length of the rows (k, c)."""
+    return float(np.sqrt((values**2).sum(axis=1).mean()))
+
+
+def mean_length(values: Floats) -> float:
+    """Mean length of the rows (k, c)."""
+    return float(np.linalg.norm(values, axis=1).mean())
+
+
+def max_length(values: Floats) -> float:
+    """Largest length of the rows (k, c)."""
+    return float(np.linalg.norm(values, axis=1).max())
+
+
+def bias(values: Floats) -> float:
+    """Length of the mean row of (k, c); the signed mean when c = 1."""
+    mean = values.mean(axis=0)
+    return float(mean[0]) if len(mean) == 1 else float(np.linalg.norm(mean))
+
+
+METRICS: tuple[tuple[str, Callable[[Floats], float], str], ...] = (
+    ("rms", rms, "root mean square over the points"),
+    ("mean", mean_length, "mean absolute distance over the points"),
+    ("max", max_length, "largest distance over the points"),
+    ("bias", bias, "mean over the points, sign kept"),
+)
+
+
+def scores_of(residual: Residual, against: str) -> tuple[Score, ...]:
+    """Scores named `<quantity>.<statistic>@<load>`; a scalar gives error, simulated, measured."""
+    if residual.count == 1 and residual.values.shape[1] == 1:
+        return _scalar_scores(residual, against)
+    return tuple(
+        Score(
+            f"{residual.quantity}.{name}@{residual.load}",
+            statistic(residual.values),
+            residual.unit,
+            residual.count,
+            against,
+            f"{residual.definition}; {words}",
+        )
+        for name, statistic, words in METRICS
+    )
+
+
+def _scalar_scores(residual: Residual, against: str) -> tuple[Score, ...]:
+    q, load = residual.quantity, residual.load
+    rows = [
+        (f"{q}@{load}", float(residual.values[0, 0]), "simulated less measured"),
+        (f"{q}.simulated@{load}", residual.simulated, "simulated"),
+        (f"{q}.measured@{load}", residual.measured, "measured (or reference)"),
+    ]
+    return tuple(
+        Score(name, value, residual.unit, 1, against, f"{residual.definition}; {words}")
+        for name, value, words in rows
+        if value is not None
+    )
+
+
+def run_scores(run: Run) -> tuple[Score, ...]:
+    """What a run cost: step times, set-up time and the most pressure updates of any step."""
+    rows: list[tuple[str, float, str, int, str]] = [
+        ("setup", run.setup_s, "s", 1, "mesh, assembly, factorisation and response columns"),
+    ]
+    if run.step_s is not None:
+        n = run.step_s.n
+        rows += [
+            ("step.p50", run.step_s.p50, "s", n, "median time of one condensed step"),
+            ("step.p99", run.step_s.p99, "s", n, "99 % quantile of the time of one step"),
+        ]
+    updates = run.traces["updates"].y
+    if len(updates):
+        words = "most pressure updates of one step"
+        rows.append(("updates.max", float(updates.max()), "1", len(updates), words))
+    return tuple(Score(name, v, unit, n, "none", words) for name, v, unit, n, words in rows)

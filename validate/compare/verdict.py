@@ -1,0 +1,136 @@
+"""Verdicts after ASME V&V 20: is the error within the uncertainty of the comparison?
+
+E = simulation - measurement, u_val^2 = u_D^2 + u_num^2 + u_input^2 (standard uncertainties).
+|E| > 2 u_val: differs; else 2 u_val above the accepted limit: cannot decide; else agrees.
+
+An rms over many noisy points is not zero for a perfect model. E is then the part that noise does
+not explain, sqrt(rms^2 - noise^2), and u_D half of the smallest such part that noise alone reaches
+in 5 % of repetitions (chi-square with one degree of freedom per number compared).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from validate.compare.residual import Residual
+from validate.compare.score import rms
+from validate.errors import ComparisonError
+
+Verdict = Literal["agrees", "differs", "cannot decide"]
+PublishedVerdict = Literal[
+    "reproduced", "not reproduced", "not reproducible as printed", "not comparable"
+]
+
+# Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
+SAFETY = 3.0 / 2
+
+
+@dataclass(frozen=True)
+class Accept:
+    """A quantity the accepted methods must predict, to within `limit` (SI); where that is from."""
+
+    quantity: str
+    loads: tuple[str, ...]
+    limit: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """A verdict: error `value`, `limit`, `u_val` and its parts, in `unit`; points compared."""
+
+    name: str
+    value: float
+    limit: float
+    u_val: float
+    u_D: float
+    u_num: float
+    u_input: float
+    unit: str
+    count: int
+    verdict: Verdict
+    why: str
+
+    @property
+    def holds(self) -> bool:
+        return self.verdict == "agrees"
+
+
+@dataclass(frozen=True)
+class Published:
+    """A printed figure beside ours: `verdict` says whether it reproduces and `reason` why not."""
+
+    name: str
+    ours: float | None
+    theirs: float | None
+    tolerance: float | None
+    unit: str
+    verdict: PublishedVerdict
+    reason: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What one input does to a residual: `change`, times `scale` one standard uncertainty."""
+
+    name: str
+    change: Residual
+    scale: float
+
+
+def judge(
+    residual: Residual,
+    limit: float,
+    finer: Residual | None,
+    refinement: float,
+    inputs: Sequence[Sensitivity],
+) -> Check:
+    """The verdict on one residual.
+
+    `finer` is the same residual on a finer mesh, `refinement` = r^p - 1 with the ratio r of the
+    cell sizes and the formal order p. Raises `ComparisonError` when there is no second mesh.
+    """
+    if finer is None:
+        raise ComparisonError(f"{residual.name}: no second mesh, so no u_num; set a finer mesh")
+    E, u_D = error_and_noise(residual)
+    u_num = SAFETY * rms(finer.values - residual.values) / refinement
+    parts = {s.name: abs(s.scale) * rms(s.change.values) for s in inputs}
+    u_input = float(np.sqrt(sum(p**2 for p in parts.values())))
+    u_val = float(np.sqrt(u_D**2 + u_num**2 + u_input**2))
+    named = {"measurement": u_D, "mesh": u_num} | parts
+    verdict, why = _verdict(E, u_val, limit, named)
+    name = residual.name if _scalar(residual) else f"{residual.quantity}.rms@{residual.load}"
+    return Check(
+        name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why
+    )
+
+
+def error_and_noise(residual: Residual) -> tuple[float, float]:
+    """E and u_D of a residual; see the module's head for E of many points."""
+    k, c = residual.values.shape
+    if k == 1 and c == 1:
+        return float(residual.values[0, 0]), float(np.hypot(residual.sd, residual.systematic))
+    noise = c * residual.sd**2
+    E = np.sqrt(max(rms(residual.values) ** 2 - noise, 0.0))
+    reach = np.sqrt(max(noise * (float(chi2.ppf(0.95, k * c)) / (k * c) - 1), 0.0))
+    return float(E), float(np.hypot(reach / 2, np.sqrt(c) * residual.systematic))
+
+
+def _verdict(E: float, u_val: float, limit: float, parts: dict[str, float]) -> tuple[Verdict, str]:
+    largest = max(parts, key=lambda name: parts[name])
+    if abs(E) > 2 * u_val:
+        return "differs", f"|E| is {abs(E) / u_val:.1f} u_val" if u_val else "u_val is zero"
+    if 2 * u_val > limit:
+        return "cannot decide", (
+            f"2 u_val = {2 * u_val:.3g} exceeds the limit {limit:.3g}; a better measurement of "
+            f"'{largest}' would decide"
+        )
+    return "agrees", f"|E| is {abs(E) / u_val:.1f} u_val; largest part: {largest}"
+
+
+def _scalar(residual: Residual) -> bool:
+    return residual.values.shape == (1, 1)

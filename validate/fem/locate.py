@@ -1,0 +1,101 @@
+"""Interpolation rows: the displacement at any point as a weighted sum of nodal displacements."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from validate.arrays import Floats, Ints
+from validate.errors import RegistrationError
+from validate.scene.mesh import EDGES, Mesh
+
+_CANDIDATES = 24  # nearest cell centres tried per point
+
+
+@dataclass(frozen=True)
+class Rows:
+    """weights (k, n): value at a point = row @ nodal values; `outside` (k,) m from the mesh."""
+
+    weights: sparse.csr_array
+    outside: Floats
+
+    def apply(self, nodal: Floats) -> Floats:
+        """Values (k, d) at the points from nodal values (n, d)."""
+        return np.asarray(self.weights @ nodal)
+
+
+def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
+    """Rows of the cell that holds each point (k, d), or of the nearest cell, clipped to it."""
+    L, cell = _barycentric(mesh, points)
+    clipped = np.clip(L, 0, None)
+    clipped /= clipped.sum(axis=1, keepdims=True)
+    corners = mesh.nodes[mesh.corners[cell]]
+    feet = np.einsum("ka,kad->kd", clipped, corners)
+    weights = _shape_values(clipped, mesh.order)
+    return Rows(_csr(mesh.cells[cell], weights, mesh), np.linalg.norm(points - feet, axis=1))
+
+
+def nearest_node_rows(mesh: Mesh, points: Floats, among: Ints | None = None) -> Rows:
+    """Rows that read the node nearest to each point, of all or `among` some (paper 000, 4.5)."""
+    nodes = np.arange(len(mesh.nodes)) if among is None else among
+    distance, nearest = cKDTree(mesh.nodes[nodes]).query(points)
+    ones = np.ones((len(points), 1))
+    return Rows(_csr(nodes[np.asarray(nearest)][:, None], ones, mesh), np.asarray(distance))
+
+
+def facet_samples(mesh: Mesh, facets: Ints, parts: int) -> tuple[Rows, Ints]:
+    """Every facet split into parts^2 triangles: rows of the sample points and triangles (t, 3)."""
+    grid = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
+    number = {ij: k for k, ij in enumerate(grid)}
+    xi = np.array(grid) / parts
+    L = np.stack([1 - xi.sum(axis=1), xi[:, 0], xi[:, 1]], axis=1)
+    small = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in grid if i + j < parts]
+    small += [
+        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1])
+        for i, j in grid
+        if i + j < parts - 1
+    ]
+    values = np.tile(_shape_values(L, mesh.order), (len(facets), 1))
+    nodes = np.repeat(facets, len(grid), axis=0)
+    first = len(grid) * np.arange(len(facets))[:, None, None]
+    triangles = (first + np.array(small)[None]).reshape(-1, 3)
+    return Rows(_csr(nodes, values, mesh), np.zeros(len(nodes))), triangles
+
+
+def _barycentric(mesh: Mesh, points: Floats) -> tuple[Floats, Ints]:
+    x = mesh.nodes[mesh.corners]
+    near = min(_CANDIDATES, len(x))
+    _, cells = cKDTree(x.mean(axis=1)).query(points, k=near)
+    cells = np.asarray(cells).reshape(len(points), near)
+    edges = np.swapaxes(x[cells, 1:] - x[cells, :1], -1, -2)
+    rest = np.linalg.solve(edges, (points[:, None] - x[cells, 0])[..., None])[..., 0]
+    L = np.concatenate([1 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)
+    best = np.argmax(L.min(axis=-1), axis=1)
+    pick = np.arange(len(points))
+    return L[pick, best], cells[pick, best]
+
+
+def _shape_values(L: Floats, order: int) -> Floats:
+    """N (k, m) from barycentric coordinates L (k, 3 or 4)."""
+    if order == 1:
+        return L
+    i, j = np.array(EDGES[L.shape[1] - 1]).T
+    return np.hstack([L * (2 * L - 1), 4 * L[:, i] * L[:, j]])
+
+
+def _csr(nodes: Ints, weights: Floats, mesh: Mesh) -> sparse.csr_array:
+    rows = np.repeat(np.arange(len(nodes)), nodes.shape[1])
+    shape = (len(nodes), len(mesh.nodes))
+    return sparse.csr_array((weights.ravel(), (rows, nodes.ravel())), shape=shape)
+
+
+def require_inside(rows: Rows, names: tuple[str, ...], limit: float) -> None:
+    """Raises `RegistrationError` naming the points further than `limit` m from the mesh."""
+    far = np.flatnonzero(rows.outside > limit)
+    if len(far):
+        worst = far[int(np.argmax(rows.outside[far]))]
+        raise RegistrationError(
+            f"{len(far)} of {len(names)} points lie outside the mesh, '{names[worst]}' by "
+            f"{1e3 * rows.outside[worst]:.2f} mm; check the frame and the units"
+        )

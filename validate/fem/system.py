@@ -1,0 +1,123 @@
+"""The system of a scene: stiffness, held unknowns, factorisation, and its response columns.
+
+A linear scene driven by plates and cavity pressures is the sum of fixed fields: u = sum_j q_j u_j
++ sum_i P_i u_i. They are solved for once; every later step is a short product (the columns of the
+condensed inverse of paper 000, eqs 18-20, for just the inputs that the scene has).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.assemble import stiffness
+from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
+from validate.fem.factor import Factor, factorise
+from validate.scene.scene import Drive, Scene
+
+
+@dataclass(frozen=True)
+class System:
+    """K (N, N) N/m, `held` and `free` unknowns, moves (N, drives) of a unit drive, cavities."""
+
+    scene: Scene
+    K: sparse.csr_array
+    free: Ints
+    moves: Floats
+    cavities: tuple[CavitySurface, ...]
+
+    def factor(self) -> Factor:
+        """Factorisation of K over the free unknowns; `SceneError` if not positive definite."""
+        d = self.scene.mesh.dimension
+        free = self.K[self.free][:, self.free]
+        return factorise(free, self.free // d, self.scene.mesh.nodes)
+
+
+@dataclass(frozen=True)
+class Responses:
+    """Fields (m, n, d) m per unit input: drives (m per m) first, then cavities (m per Pa).
+
+    `reactions` (drives, m): plate force per unit input, N/m and N/Pa, compression positive.
+    `volumes` (cavities, m + 1, m + 1, m + 1): see `volume_form`; the first slot is the rest shape.
+    """
+
+    scene: Scene
+    fields: Floats
+    reactions: Floats
+    volumes: Floats
+
+    @property
+    def drives(self) -> int:
+        return len(self.scene.drives)
+
+    @property
+    def rest_volumes(self) -> Floats:
+        """Volume m^3 of every cavity at rest."""
+        return np.asarray(self.volumes[:, 0, 0, 0])
+
+
+def build(scene: Scene) -> System:
+    """Assembles the scene; raises `SceneError` for elements, supports or cavities that fail."""
+    mesh = scene.mesh
+    N = mesh.nodes.size
+    held = np.zeros(N, dtype=bool)
+    for support in scene.supports:
+        held[_unknowns(scene, support.facets, support.components)] = True
+    for pin in scene.pins:
+        node = mesh.nearest_node(np.array(pin.point))
+        held[[node * mesh.dimension + c for c in pin.components]] = True
+    moves = np.zeros((N, len(scene.drives)))
+    for j, drive in enumerate(scene.drives):
+        driven = _driven(scene, drive)
+        held[driven] = True
+        moves[driven, j] = sum(drive.direction)
+    cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
+    return System(scene, stiffness(scene), np.flatnonzero(~held), moves, cavities)
+
+
+def responses(system: System) -> Responses:
+    """Solves for every response column: one factorisation, one solve per input."""
+    mesh, factor = system.scene.mesh, system.factor()
+    loads = [pressure_load(c, mesh.nodes).ravel() for c in system.cavities]
+    columns = [_driven_field(system, factor, move) for move in system.moves.T]
+    columns += [_loaded_field(system, factor, load) for load in loads]
+    fields = np.array(columns).reshape(-1, *mesh.nodes.shape)
+    shapes = np.concatenate([mesh.nodes[None], fields])
+    volumes = np.array([volume_form(c, shapes) for c in system.cavities])
+    return Responses(system.scene, fields, _reactions(system, columns, loads), volumes)
+
+
+def _driven_field(system: System, factor: Factor, move: Floats) -> Floats:
+    u = move.copy()
+    u[system.free] = factor.solve(-(system.K @ move)[system.free])
+    return u
+
+
+def _loaded_field(system: System, factor: Factor, load: Floats) -> Floats:
+    u = np.zeros_like(load)
+    u[system.free] = factor.solve(load[system.free])
+    return u
+
+
+def _reactions(system: System, columns: list[Floats], loads: list[Floats]) -> Floats:
+    """Force of the plates on the body along each drive: residual K u - f of every column."""
+    drives = len(system.scene.drives)
+    residuals = [system.K @ u for u in columns]
+    for i, load in enumerate(loads):
+        residuals[drives + i] = residuals[drives + i] - load
+    return np.array([[float(move @ r) for r in residuals] for move in system.moves.T])
+
+
+def _driven(scene: Scene, drive: Drive) -> Ints:
+    axes = np.flatnonzero(drive.direction)
+    if len(axes) != 1:
+        raise SceneError(f"drive '{drive.name}' must move along one axis, got {drive.direction}")
+    return _unknowns(scene, drive.facets, (int(axes[0]),))
+
+
+def _unknowns(scene: Scene, facets: str, components: tuple[int, ...]) -> Ints:
+    nodes = scene.mesh.facet_nodes(facets)
+    unknowns: Ints = (nodes[:, None] * scene.mesh.dimension + np.array(components)).ravel()
+    return unknowns

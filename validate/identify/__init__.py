@@ -1,0 +1,1 @@
+"""Parameters from recordings, each with its uncertainty and the samples it came from."""

@@ -1,0 +1,292 @@
+"""The apparent compressive modulus of a cylinder from force-displacement logs.
+
+Definition. Stress is F / A0 and strain (d - d_contact) / h0 (engineering, on the undeformed
+cylinder). E_apparent is the least-squares slope of stress over strain, with free intercept, over
+the samples of the first loading whose strain lies in the window (0.5-5 % unless told otherwise).
+
+Departures. The free intercept takes out the load cell's zero offset, where a chord or a line
+through the origin would not. Curvature inside the window stays: for a material that stiffens,
+E_apparent is a mean tangent and grows with the window.
+
+Compression of a cylinder between plates it cannot slip on is stiffer than its material:
+E_apparent = E * correction. Whether plates slip is seldom recorded, so `apparent_to_material`
+gives both ends.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.types import Recording
+
+WINDOW = (0.005, 0.05)
+MIN_SAMPLES = 10
+PLATEAU = 5  # samples of unloaded approach from which a contact point is told from noise
+BEYOND_NOISE = 5.0  # a force this many noise sd off the unloaded one is contact
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """An undeformed cylinder compressed along its axis; diameter and height in m."""
+
+    diameter: float
+    height: float
+
+    def __post_init__(self) -> None:
+        for name, size in (("diameter", self.diameter), ("height", self.height)):
+            if not (math.isfinite(size) and size > 0):
+                raise RecordingError(f"cylinder {name} {size} m is not a size above 0")
+
+    @property
+    def area(self) -> float:
+        """Undeformed cross-section, m2."""
+        return math.pi * self.diameter**2 / 4
+
+
+@dataclass(frozen=True)
+class ModulusFit:
+    """One log's apparent modulus and what it rests on.
+
+    `sd` is the standard error of the slope from the scatter of the residuals, taken as independent:
+    with curvature in the window they are not, and `residual_rms` exceeds `noise`. `r_squared` is
+    given because it is asked for; it proves nothing: it nears 1 for any steady rise, whatever the
+    window, offset or curvature.
+    """
+
+    name: str
+    E_apparent: float  # Pa
+    sd: float  # Pa
+    offset: float  # N, force of the unloaded cell
+    contact: float  # m, displacement at which the plate meets the cylinder
+    noise: float  # N, sd of the load cell's noise
+    window: tuple[float, float]  # strain
+    count: int  # samples in the window
+    residual_rms: float  # N
+    r_squared: float
+
+
+@dataclass(frozen=True)
+class ModulusSummary:
+    """Mean over repeats, Pa. The scatter of repeats on one specimen understates that of specimens.
+
+    `sd_repeats` is None for a single log; `sd_mean` is then that fit's own standard error.
+    """
+
+    mean: float
+    sd_repeats: float | None
+    sd_mean: float
+    fits: tuple[ModulusFit, ...]
+
+
+@dataclass(frozen=True)
+class MaterialBracket:
+    """Young's modulus (Pa) and its sd (Pa) at the two ends: plates that slip, plates that bond."""
+
+    slip: float
+    slip_sd: float
+    bonded: float
+    bonded_sd: float
+
+
+def cylinder_of(recording: Recording) -> Cylinder:
+    """The cylinder in the recording's `specimen` record (`diameter_m`, `height_m`).
+
+    Raises `RecordingError` when one of them is absent or not a number.
+    """
+    record = recording.record("specimen")
+    sizes = []
+    for name in ("diameter_m", "height_m"):
+        try:
+            sizes.append(float(record[name]))
+        except (KeyError, ValueError) as error:
+            raise RecordingError(
+                f"{recording.name}: no number '{name}' in its specimen record {dict(record)}; "
+                "state the cylinder"
+            ) from error
+    return Cylinder(*sizes)
+
+
+def fit_modulus(
+    recording: Recording,
+    cylinder: Cylinder | None = None,
+    window: tuple[float, float] = WINDOW,
+) -> ModulusFit:
+    """E over a strain window of one log with signals `displacement` (m) and `force` (N).
+
+    Compression positive. `cylinder` None: the one in the recording. Raises `UsageError` for an
+    empty window and `RecordingError` when the log does not cover it with 10 samples.
+    """
+    low, high = window
+    if not (math.isfinite(high) and 0 <= low < high):
+        raise UsageError(f"strain window {window}: expected 0 <= low < high, e.g. {WINDOW}")
+    cylinder = cylinder or cylinder_of(recording)
+    d, force = (_samples(recording, *s) for s in (("displacement", "m"), ("force", "N")))
+    if len(d) != len(force):
+        raise RecordingError(f"{recording.name}: {len(d)} displacements, {len(force)} forces")
+    noise = _first_noise(d, force, cylinder.height * high)
+    offset, contact = _zero(d, force, noise, cylinder.height * low)
+    strain = (d - contact) / cylinder.height
+    used = _loading(strain, high)
+    used &= (strain >= low) & (strain <= high)
+    _check_cover(recording.name, strain, used, window)
+    return _fit(recording.name, strain[used], force[used], cylinder.area, offset, contact, window)
+
+
+def summarise(fits: Sequence[ModulusFit]) -> ModulusSummary:
+    """Mean, scatter over repeats (n - 1) and sd of the mean; raises `UsageError` without fits."""
+    if not fits:
+        raise UsageError("no fits to summarise: give at least one force-displacement log")
+    values = np.array([fit.E_apparent for fit in fits])
+    windows = {fit.window for fit in fits}
+    if len(windows) > 1:
+        raise UsageError(f"fits over different strain windows {sorted(windows)}: use one")
+    scatter = float(values.std(ddof=1)) if len(fits) > 1 else None
+    sd_mean = fits[0].sd if scatter is None else scatter / math.sqrt(len(fits))
+    return ModulusSummary(float(values.mean()), scatter, sd_mean, tuple(fits))
+
+
+def identify_modulus(
+    recordings: Sequence[Recording],
+    cylinder: Cylinder | None = None,
+    window: tuple[float, float] = WINDOW,
+) -> ModulusSummary:
+    """`fit_modulus` of each recording, summarised."""
+    return summarise([fit_modulus(recording, cylinder, window) for recording in recordings])
+
+
+def gent_correction(diameter: float, height: float) -> float:
+    """E_apparent / E = 1 + 2 S^2 of a bonded incompressible disc, shape factor S = D / 4h.
+
+    Gent and Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111-122. Sizes in m; small strains, nu 0.5.
+    For a squat cylinder (S below about 1) it is low: a finite-element factor is the better one.
+    """
+    cylinder = Cylinder(diameter, height)
+    return 1 + 2 * (cylinder.diameter / (4 * cylinder.height)) ** 2
+
+
+def apparent_to_material(summary: ModulusSummary, correction: float) -> MaterialBracket:
+    """Young's modulus between slipping plates (E_apparent) and bonded (E_apparent / correction).
+
+    `correction` >= 1 comes from `gent_correction` or a finite-element run. Raises `UsageError`.
+    """
+    if not (math.isfinite(correction) and correction >= 1):
+        raise UsageError(f"correction {correction}: bonded plates stiffen, expected >= 1")
+    E, sd = summary.mean, summary.sd_mean
+    return MaterialBracket(E, sd, E / correction, sd / correction)
+
+
+def load_noise(force: Floats) -> float:
+    """Noise sd (N) of a smooth force (n,) with independent noise, from its second differences.
+
+    The second difference of white noise of variance s^2 has variance 6 s^2; a smooth curve sampled
+    finely adds next to nothing. Raises `RecordingError` for fewer than 10 samples.
+    """
+    if len(force) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{len(force)} forces for a noise estimate, at least {MIN_SAMPLES} needed"
+        )
+    return float(np.sqrt(np.mean(np.diff(force, 2) ** 2) / 6))
+
+
+def _samples(recording: Recording, topic: str, unit: str) -> Floats:
+    y = recording.signal(topic, unit).y
+    if y.shape[1] != 1:
+        raise RecordingError(f"{recording.name}: '{topic}' has {y.shape[1]} columns, expected 1")
+    return np.asarray(y[:, 0])
+
+
+def _first_noise(d: Floats, force: Floats, reach: float) -> float:
+    """Noise of the log's first part, up to `reach` (m) from its first displacement."""
+    beyond = d - d[0] > reach
+    count = int(np.argmax(beyond)) if beyond.any() else len(d)
+    return load_noise(force[: max(count, MIN_SAMPLES)])
+
+
+def _zero(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, float]:
+    """Force offset (N) and contact displacement (m).
+
+    With an unloaded approach the offset is its mean and contact where the line through the toe
+    (m) behind it meets that mean. Without one the first displacement is contact, and the offset the
+    value there of a parabola through the toe.
+    """
+    loaded = np.flatnonzero(np.abs(force - np.median(force[:PLATEAU])) > _threshold(force, noise))
+    start = int(loaded[0]) if len(loaded) else len(d)
+    if start < 2 * PLATEAU:
+        return _parabola_start(d, force, toe), float(d[0])
+    offset = float(force[: start - 1].mean())
+    near = slice(start, start + max(PLATEAU, int(np.sum(d[start:] - d[start] <= toe))))
+    if np.ptp(d[near]) == 0:
+        return offset, float(d[start])
+    slope, at_zero = np.polyfit(d[near], force[near], 1)
+    contact = (offset - at_zero) / slope if slope > 0 else d[start]
+    return offset, float(np.clip(contact, d[0], d[start]))
+
+
+def _threshold(force: Floats, noise: float) -> float:
+    """How far off the unloaded force contact is; above rounding where there is no noise."""
+    return BEYOND_NOISE * noise + 1e-9 * float(np.ptp(force))
+
+
+def _parabola_start(d: Floats, force: Floats, toe: float) -> float:
+    count = max(PLATEAU, int(np.argmax(d - d[0] > toe)))
+    if np.ptp(d[:count]) == 0:
+        return float(force[:count].mean())
+    x = (d[:count] - d[0]) / np.ptp(d[:count])
+    return float(np.polyfit(x, force[:count], 2)[-1])
+
+
+def _loading(strain: Floats, high: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """The first loading: samples before the first beyond the window, else to the largest strain."""
+    beyond = strain > high
+    end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
+    return np.arange(len(strain)) < end
+
+
+def _check_cover(
+    name: str,
+    strain: Floats,
+    used: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    window: tuple[float, float],
+) -> None:
+    low, high = window
+    count = int(used.sum())
+    if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
+        raise RecordingError(
+            f"{name}: strain from {strain.min():.4f} to {strain.max():.4f} with {count} samples in "
+            f"the window {low}-{high}; expected to cover it with {MIN_SAMPLES}: choose another"
+        )
+
+
+def _fit(
+    name: str,
+    strain: Floats,
+    force: Floats,
+    area: float,
+    offset: float,
+    contact: float,
+    window: tuple[float, float],
+) -> ModulusFit:
+    """E = sum (e - e_mean) F / (A0 sum (e - e_mean)^2), its sd from n - 2 degrees of freedom."""
+    e = strain - strain.mean()
+    spread = float(e @ e)
+    if spread == 0:
+        raise RecordingError(f"{name}: {len(strain)} samples at one strain {strain[0]:.6f}")
+    slope = float(e @ force) / spread
+    rest = force - force.mean() - slope * e
+    left, whole = float(rest @ rest), float(np.sum((force - force.mean()) ** 2))
+    return ModulusFit(
+        name=name,
+        E_apparent=slope / area,
+        sd=math.sqrt(left / (len(e) - 2) / spread) / area,
+        offset=offset,
+        contact=contact,
+        noise=load_noise(force),
+        window=window,
+        count=len(e),
+        residual_rms=math.sqrt(left / len(e)),
+        r_squared=1 - left / whole if whole > 0 else 0.0,
+    )

@@ -1,0 +1,125 @@
+"""Parameters of an experiment: nested frozen dataclasses whose fields carry a unit and a sentence.
+
+One grammar of paths reaches them all: `material.E`, `methods.p2_fluid.tolerance`. Values given as
+text are checked against the field's type; an unknown path is an error naming the nearest ones.
+"""
+
+import difflib
+import math
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from validate.errors import UsageError
+
+
+def quantity(default: Any, unit: str, doc: str) -> Any:
+    """A dataclass field with default, SI unit ("1" for none) and what it is."""
+    return field(default=default, metadata={"unit": unit, "doc": doc})
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One settable value, as `validate list NAME` shows it."""
+
+    path: str
+    type: str
+    unit: str
+    default: Any
+    doc: str
+
+
+def describe(settings: Any, prefix: str = "") -> tuple[Parameter, ...]:
+    """Every parameter of a nested dataclass (or mapping of dataclasses), in order."""
+    found: list[Parameter] = []
+    for name, value, hint, meta in _members(settings):
+        path = f"{prefix}{name}"
+        if is_dataclass(value) or isinstance(value, Mapping):
+            found += describe(value, f"{path}.")
+        else:
+            unit, doc = meta.get("unit", "1"), meta.get("doc", "")
+            found.append(Parameter(path, _type_name(hint), unit, _plain(value), doc))
+    return tuple(found)
+
+
+def with_values(settings: Any, values: Mapping[str, str]) -> Any:
+    """A copy with the texts parsed into the fields at their paths.
+
+    Raises `UsageError` for an unknown path (naming the nearest) or a value of another type.
+    """
+    known = {p.path for p in describe(settings)}
+    for path, text in values.items():
+        if path not in known:
+            raise UsageError(f"unknown parameter '{path}'; {_nearest(path, known)}")
+        settings = _set(settings, path.split("."), path, text)
+    return settings
+
+
+def nearest_names(name: str, known: set[str]) -> str:
+    """A hint naming the known ones nearest to `name`."""
+    return _nearest(name, known)
+
+
+def _nearest(name: str, known: set[str]) -> str:
+    near = difflib.get_close_matches(name, sorted(known), n=3, cutoff=0.4)
+    return "nearest: " + ", ".join(near) if near else "known: " + ", ".join(sorted(known)[:8])
+
+
+def _members(settings: Any) -> list[tuple[str, Any, Any, Mapping[str, Any]]]:
+    if isinstance(settings, Mapping):
+        return [(str(k), v, type(v), {}) for k, v in settings.items()]
+    hints = get_type_hints(type(settings))
+    return [
+        (f.name, getattr(settings, f.name), hints[f.name], f.metadata) for f in fields(settings)
+    ]
+
+
+def _set(settings: Any, names: list[str], path: str, text: str) -> Any:
+    head, rest = names[0], names[1:]
+    inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
+    if rest:
+        value = _set(inner, rest, path, text)
+    else:
+        value = _parse(get_type_hints(type(settings))[head], path, text)
+    if isinstance(settings, Mapping):
+        return types.MappingProxyType({**settings, head: value})
+    return replace(settings, **{head: value})
+
+
+def _parse(hint: Any, path: str, text: str) -> Any:
+    if get_origin(hint) in (Union, types.UnionType):
+        options = [a for a in get_args(hint) if a is not type(None)]
+        return None if text.lower() in ("none", "null") else _parse(options[0], path, text)
+    if get_origin(hint) is Literal:
+        if text not in get_args(hint):
+            raise UsageError(f"{path}={text}: one of {', '.join(map(str, get_args(hint)))}")
+        return text
+    if get_origin(hint) is tuple:
+        return tuple(_parse(get_args(hint)[0], path, part) for part in text.split(","))
+    if hint is bool:
+        if text.lower() not in ("true", "false"):
+            raise UsageError(f"{path}={text}: true or false")
+        return text.lower() == "true"
+    return _number(hint, path, text) if hint in (int, float) else text
+
+
+def _number(hint: type[int] | type[float], path: str, text: str) -> int | float:
+    try:
+        value = hint(text)
+    except ValueError:
+        kind = "a whole number" if hint is int else "a number in SI units"
+        raise UsageError(f"{path}={text}: not {kind}") from None
+    if not math.isfinite(value):
+        raise UsageError(f"{path}={text}: not finite")
+    return value
+
+
+def _type_name(hint: Any) -> str:
+    if get_origin(hint) is Literal:
+        return "|".join(map(str, get_args(hint)))
+    return hint.__name__ if isinstance(hint, type) else str(hint).replace("typing.", "")
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

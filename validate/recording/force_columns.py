@@ -1,0 +1,194 @@
+"""Which columns of a force-displacement table are time, displacement and force; what the user says.
+
+`SYNONYMS` is the only place that knows words. A column has a role when its name holds one of the
+role's words and none of the words that make it something else; rows are tried from the top.
+"""
+
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.table import Column, Table
+from validate.recording.units import si_factor
+
+# (role, words that give it, words that take it away)
+SYNONYMS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
+    ("stress", ("stress",), ("true", "cauchy", "rate", "max", "maximum", "yield")),
+    ("strain", ("strain",), ("true", "log", "logarithmic", "rate", "max", "maximum", "plastic")),
+    ("time", ("time", "t"), ("cycle", "date", "start", "step")),
+    ("force", ("force", "load", "f"), ("rate", "max", "maximum", "peak", "temperature")),
+    (
+        "displacement",
+        (
+            "displacement",
+            "disp",
+            "compression",
+            "extension",
+            "crosshead",
+            "position",
+            "stroke",
+            "travel",
+            "deflection",
+            "deformation",
+            "closing",
+            "indentation",
+        ),
+        ("rate", "speed", "velocity", "max", "maximum", "corrected"),
+    ),
+)
+NEEDED = ("time", "displacement", "force")
+QUANTITY = {
+    "time": "time",
+    "displacement": "length",
+    "force": "force",
+    "strain": "strain",
+    "stress": "stress",
+}
+_SIGNS = {":-": -1, ":+": 1}
+
+
+@dataclass(frozen=True)
+class Said:
+    """One mapping entry: column text, unit that overrides the declared one, explicit sign."""
+
+    column: str
+    unit: str | None
+    sign: int | None
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A column in a role, its values in SI; `said`: what the user gave for it, None: found here."""
+
+    role: str
+    column: Column
+    unit: str
+    factor: float
+    values: Floats
+    said: Said | None
+
+    @property
+    def unit_is_said(self) -> bool:
+        return self.said is not None and self.said.unit is not None
+
+
+def parse_mapping(mapping: Mapping[str, str], table: Table) -> dict[str, Said]:
+    """The mapping's entries by role, see `read_instron`; raises `UsageError` naming the nearest."""
+    for key in mapping:
+        if key not in NEEDED:
+            near = difflib.get_close_matches(key, NEEDED, n=1, cutoff=0.3)
+            hint = f"did you mean '{near[0]}'? " if near else ""
+            raise UsageError(f"--map {key}=...: no such key; {hint}known: {', '.join(NEEDED)}")
+    return {key: _said(key, text, table) for key, text in mapping.items()}
+
+
+def _said(key: str, text: str, table: Table) -> Said:
+    sign = _SIGNS.get(text[-2:])
+    body = text[:-2] if sign else text
+    if key == "time" and (sign or body.startswith("every:")):
+        if sign:
+            raise UsageError(f"--map time={text}: time has no sign to set")
+        return Said("every", body.removeprefix("every:"), None)
+    if _named(body, table):
+        return Said(body, None, sign)
+    column, colon, unit = body.rpartition(":")
+    if colon and _named(column, table):
+        return Said(column, unit, sign)
+    raise UsageError(f"--map {key}={text}: no column '{column or body}'; {_nearest(body, table)}")
+
+
+def _named(text: str, table: Table) -> list[Column]:
+    """Columns of that label, else of that name (any case); `#3` is the third column."""
+    numbered = re.fullmatch(r"#([1-9][0-9]{0,3})", text.strip())
+    if numbered:
+        return list(table.columns[int(numbered[1]) - 1 : int(numbered[1])])
+    wanted = text.strip().casefold()
+    labels = [c for c in table.columns if c.label.casefold() == wanted]
+    return labels or [c for c in table.columns if c.name and c.name.casefold() == wanted]
+
+
+def _nearest(text: str, table: Table) -> str:
+    labels = [c.label for c in table.columns]
+    near = difflib.get_close_matches(text, labels, n=1, cutoff=0.3)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}the file has {', '.join(repr(label) for label in labels)}"
+
+
+def role_of(column: Column) -> str | None:
+    """The role that the column's name gives it, None for a column of no interest here."""
+    words = set(re.findall(r"[^\W\d_]+", column.name.casefold()))
+    for role, given, taken in SYNONYMS:
+        if words & set(given):
+            return None if words & set(taken) else role
+    return None
+
+
+def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
+    """The column of a needed role in SI.
+
+    Raises `RecordingError` when no column has the role, several differ, the unit is missing or of
+    another kind, or a cell is not a number; `UsageError` when the mapping names two columns.
+    """
+    if said is not None:
+        named = _named(said.column, table)
+        if len(named) != 1:
+            raise UsageError(
+                f"--map {role}: {len(named)} columns are called '{said.column}'; give the column's "
+                "number instead, as #3"
+            )
+        return _pick(role, named[0], table, said)
+    found = [column for column in table.columns if role_of(column) == role]
+    if not found:
+        labels = ", ".join(repr(c.label) for c in table.columns)
+        synthetic = " or, at a constant rate, --map time=every:0.1s" if role == "time" else ""
+        raise RecordingError(
+            f"no {role} column among {labels}; name it with --map {role}=COLUMN{synthetic}"
+        )
+    return _one_of([_pick(role, column, table, None) for column in found], role)
+
+
+def derived_pick(role: str, table: Table) -> Pick | None:
+    """The strain or stress column that checks the others; None when there is no single sure one."""
+    found = [c for c in table.columns if role_of(c) == role and c.unit]
+    if len(found) > 1:
+        found = [c for c in found if re.search(r"engineering|nominal", c.name, re.IGNORECASE)]
+    return _pick(role, found[0], table, None) if len(found) == 1 else None
+
+
+def _pick(role: str, column: Column, table: Table, said: Said | None) -> Pick:
+    unit = (said.unit if said else None) or column.unit
+    if not unit:
+        raise RecordingError(
+            f"column '{column.label}': no unit for {role}; give it with --map "
+            f"'{role}={column.label}:UNIT'"
+        )
+    try:
+        factor = si_factor(unit, QUANTITY[role])
+    except RecordingError as error:
+        raise RecordingError(
+            f"column '{column.label}' as {role}: {error}; if columns are swapped or the unit is "
+            f"wrong say so with --map '{role}=COLUMN:UNIT'"
+        ) from error
+    return Pick(role, column, unit, factor, table.numbers(column) * factor, said)
+
+
+def _one_of(picks: list[Pick], role: str) -> Pick:
+    """Several columns are one when they hold the same motion up to sign and zero."""
+    first = min(picks, key=lambda pick: "compress" not in pick.column.name.casefold())
+    for other in picks:
+        if not _same(first.values, other.values):
+            raise RecordingError(
+                f"{len(picks)} different columns may be {role}: "
+                f"{', '.join(repr(p.column.label) for p in picks)}; choose with --map {role}=COLUMN"
+            )
+    return first
+
+
+def _same(a: Floats, b: Floats) -> bool:
+    limit = 1e-3 * np.ptp(a)
+    return bool(min(np.ptp(a - b), np.ptp(a + b)) <= limit)

@@ -1,0 +1,189 @@
+"""What an MCAP file holds and what is wrong with it, whoever wrote it: the pre-flight check.
+
+Encodings of others are listed, not decoded. Every defect is one line in `Inspection.defects`; only
+a file that cannot be read to its end is a `RecordingError`.
+"""
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Ints
+from validate.errors import RecordingError
+from validate.recording.clocks import GAP_FACTOR, clock_of
+from validate.recording.integrity import verify
+from validate.recording.mcap_file import Verified, messages_of, opened
+from validate.recording.mcap_read import metadata_records, stream_of
+from validate.recording.mcap_records import Channel
+from validate.recording.mcap_streams import Collected, fill, ours
+from validate.recording.schemas import CONTOUR, MARKERS, MIRROR, MIRROR_OF, SIGNAL
+from validate.recording.types import Clock, Source
+
+DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
+_KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours"}
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One channel: kind is markers, signal, contours, mirror or foreign; times in ns, None: empty.
+
+    first_ns and last_ns are the earliest and latest time of measurement; `unit` is empty where the
+    schema says none. `clock` holds rate, gaps and duplicates.
+    """
+
+    name: str
+    kind: str
+    schema: str
+    schema_encoding: str
+    message_encoding: str
+    count: int
+    first_ns: int | None
+    last_ns: int | None
+    unit: str
+    frame: str
+    clock: Clock | None
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """A whole file: counts, topics in order of their channels, defects in one line each."""
+
+    source: Source
+    profile: str
+    library: str
+    compressions: tuple[str, ...]
+    chunks: int
+    messages: int
+    attachments: int
+    metadata: tuple[str, ...]
+    topics: tuple[Topic, ...]
+    defects: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain dicts, lists, texts and finite numbers for JSON; None where nothing is known."""
+        plain = asdict(self)
+        for name in ("compressions", "metadata", "topics", "defects"):
+            plain[name] = list(plain[name])
+        return plain
+
+
+def inspect_recording(path: Path) -> Inspection:
+    """Inspect any MCAP file; raises `RecordingError` for one that is damaged or no MCAP.
+
+    The error counts the chunks and messages that can be read before the damage.
+    """
+    with opened(path) as stream:
+        verified = verify(stream, path)
+        collected = ours(verified)
+        defects = _file_defects(verified)
+        try:
+            fill(collected, messages_of(stream, verified, collected.keys()))
+        except RecordingError as error:
+            defects.append(str(error))
+    topics: list[Topic] = []
+    for number, channel in verified.channels.items():
+        topic, found = _topic(verified, number, channel, collected.get(number))
+        topics.append(topic)
+        defects += found
+    return Inspection(
+        source=verified.source,
+        profile=verified.header.profile,
+        library=verified.header.library,
+        compressions=verified.compressions,
+        chunks=verified.chunks,
+        messages=verified.messages,
+        attachments=verified.attachments,
+        metadata=tuple(record.name for record in verified.metadata),
+        topics=tuple(topics),
+        defects=tuple(defects),
+    )
+
+
+def _topic(
+    verified: Verified, number: int, channel: Channel, raw: Collected | None
+) -> tuple[Topic, list[str]]:
+    schema = verified.schemas.get(channel.schema_id)
+    log, publish = verified.log_ns[number], verified.publish_ns[number]
+    stamps, defects = _content(verified, raw)
+    times = publish if stamps is None else stamps
+    clock = clock_of(channel.topic, stamps, publish, log) if len(publish) else None
+    samples = raw.samples if raw else []
+    topic = Topic(
+        name=channel.topic,
+        kind=_kind(channel, schema.name if schema else ""),
+        schema=schema.name if schema else "",
+        schema_encoding=schema.encoding if schema else "",
+        message_encoding=channel.encoding,
+        count=len(publish),
+        first_ns=int(times.min()) if len(times) else None,
+        last_ns=int(times.max()) if len(times) else None,
+        unit=_unit(raw) if raw and samples else "",
+        frame=samples[0].frame if samples else "",
+        clock=clock,
+    )
+    return topic, [*defects, *_clock_defects(channel.topic, clock, log)]
+
+
+def _unit(raw: Collected) -> str:
+    return raw.samples[0].unit if raw.schema == SIGNAL else "m"
+
+
+def _kind(channel: Channel, schema: str) -> str:
+    if schema == MIRROR and MIRROR_OF in channel.metadata:
+        return "mirror"
+    return _KINDS.get(schema, "foreign")
+
+
+def _content(verified: Verified, raw: Collected | None) -> tuple[Ints | None, list[str]]:
+    """Stamps of a channel of ours where all its messages can be read, and what is wrong in them."""
+    if raw is None or not len(raw.publish_ns):
+        return None, []
+    stamps: Ints | None = None
+    try:
+        raw.checked()
+        stamps = raw.stamps_ns
+        if len(raw.samples) != len(raw.publish_ns):
+            return None, []  # stopped at a limit, which the file's defects name
+        stream_of(raw, int(raw.times_ns.min()), metadata_records(verified))
+    except RecordingError as error:
+        return stamps, [str(error)]
+    return stamps, []
+
+
+def _file_defects(verified: Verified) -> list[str]:
+    found: list[str] = []
+    if verified.claimed_messages not in (None, verified.messages):
+        found.append(
+            f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
+        )
+    if verified.misindexed:
+        found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
+    if verified.unknown_records:
+        found.append(f"{verified.unknown_records} records of unknown kind")
+    topics = Counter(c.topic for c in verified.channels.values())
+    found += [f"{topic!r} is on {n} channels" for topic, n in topics.items() if n > 1]
+    names = Counter(m.name for m in verified.metadata)
+    found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
+    return found
+
+
+def _clock_defects(topic: str, clock: Clock | None, log_ns: Ints) -> list[str]:
+    if clock is None:
+        return [f"{topic!r}: no messages"]
+    log_backward = int((np.diff(log_ns) < 0).sum())
+    stamp = clock.stamp_minus_publish
+    lines = {
+        f"{clock.gaps} gaps over {GAP_FACTOR:g} x the median step, longest "
+        f"{clock.longest_gap:.6f} s": clock.gaps,
+        f"{clock.duplicates} samples repeat the time before them": clock.duplicates,
+        f"time runs backward {clock.backward} times": clock.backward,
+        f"log time runs backward {log_backward} times": log_backward,
+        f"stamp and publish time differ by up to {stamp or 0:.6f} s": (stamp or 0) > DISAGREEMENT,
+        f"publish and log time differ by up to {clock.publish_minus_log:.6f} s": (
+            clock.publish_minus_log > DISAGREEMENT
+        ),
+    }
+    return [f"{topic!r}: {line}" for line, true in lines.items() if true]

@@ -1,0 +1,182 @@
+"""Instron / Bluehill force-displacement exports (CSV text) into a `Recording`."""
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.clocks import clock_of
+from validate.recording.force_checks import (
+    MIN_SAMPLES,
+    check_derived,
+    check_height,
+    check_speed,
+    check_swapped,
+    check_time,
+)
+from validate.recording.force_columns import (
+    NEEDED,
+    Pick,
+    Said,
+    derived_pick,
+    needed_pick,
+    parse_mapping,
+)
+from validate.recording.force_signs import Signs, kind_of_test, signs
+from validate.recording.specimen import loaded_area, specimen_of
+from validate.recording.table import MAX_BYTES, Column, Table, parse_table
+from validate.recording.types import Record, Recording, Signal, Source
+from validate.recording.units import si_factor
+
+KINDS = ("instron",)
+_SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+
+def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Recording:
+    """Read a force-displacement test exported as CSV text.
+
+    Returns signals `displacement` (nt, 1) m and `force` (nt, 1) N, compression positive, on the
+    file's own time in s (sd 0: not stated), and the records `header` (as written), `specimen`
+    (`diameter_m`, `height_m`, ..., in SI; `test`: compression, tension or not stated) and
+    `provenance` (columns, unit factors, sign flips, what was compared). Strain and stress columns
+    only check the others.
+
+    `mapping` overrides what the file says (`--map KEY=VALUE` of the command line):
+
+        force=COLUMN[:UNIT][:-]          UNIT replaces the declared unit, `:-` flips the sign,
+        displacement=COLUMN[:UNIT][:-]   `:+` keeps it; COLUMN is the header text, with or without
+        time=COLUMN[:UNIT]               its unit, or #3 for the third column
+        time=every:STEP UNIT             no or useless time column: constant step, `every:0.1s`
+
+    A column or unit given so is believed: checks of it are reported in `provenance`, not raised.
+    Raises `UsageError` for a missing file and an unknown key or column, `RecordingError` for a file
+    that is no such table, is damaged or contradicts itself; nothing is ever returned in part.
+    """
+    data = _bytes(path)
+    try:
+        return _recording(path, data, mapping or {})
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise RecordingError(f"{path.name}: {size} bytes, the limit is {MAX_BYTES}")
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from error
+
+
+def _recording(path: Path, data: bytes, mapping: Mapping[str, str]) -> Recording:
+    table = parse_table(data)
+    said = parse_mapping(mapping, table)
+    if len(table.lines) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{len(table.lines)} samples, at least {MIN_SAMPLES} are needed; export the whole test"
+        )
+    picks = {role: _needed(role, table, said.get(role)) for role in NEEDED}
+    specimen = specimen_of(table.header, table.decimal)
+    kind = kind_of_test(table.header, tuple(picks[r].column.label for r in NEEDED))
+    flips, notes = _checked(table, picks, specimen, kind)
+    time, signals = _signals(picks, flips)
+    stamps = np.round(time * 1e9).astype(np.int64)
+    digest = hashlib.sha256(data).hexdigest()
+    return Recording(
+        name=path.stem,
+        source=Source(path.name, digest, len(data), "text file: integrity not provable"),
+        t0_ns=0,
+        signals=signals,
+        clock={topic: clock_of(topic, None, stamps, stamps) for topic in signals},
+        metadata={
+            "header": dict(table.header),
+            "specimen": {**{k: repr(v) for k, v in specimen.items()}, "test": kind or "not stated"},
+            "provenance": {
+                "file": path.name,
+                "sha256": digest,
+                **_provenance(table, picks, flips, notes),
+            },
+        },
+    )
+
+
+def _needed(role: str, table: Table, said: Said | None) -> Pick:
+    if said is None or said.column != "every":
+        return needed_pick(role, table, said)
+    step, unit = _step(said)
+    values = np.arange(len(table.lines), dtype=np.float64) * step
+    factor = si_factor(unit, "time")
+    return Pick(
+        role, Column(f"every {said.unit}", "", unit, ()), unit, factor, values * factor, said
+    )
+
+
+def _step(said: Said) -> tuple[float, str]:
+    text = (said.unit or "").strip()
+    digits = text.rstrip("abcdefghijklmnopqrstuvwxyz ")
+    try:
+        step = float(digits)
+    except ValueError:
+        step = 0.0
+    if not (np.isfinite(step) and step > 0) or digits == text:
+        raise UsageError(f"--map time=every:{text}: expected a step with its unit, as every:0.1s")
+    return step, text[len(digits) :].strip()
+
+
+def _checked(
+    table: Table, picks: Mapping[str, Pick], specimen: Mapping[str, float], kind: str | None
+) -> tuple[Signs, list[str]]:
+    """All checks; the flips and what the derived columns said."""
+    time, displacement, force = (picks[role] for role in NEEDED)
+    strain, stress = derived_pick("strain", table), derived_pick("stress", table)
+    check_time(time, table.lines)
+    check_swapped(time, displacement, force, strain, stress)
+    pairs = (
+        (displacement, strain, specimen.get("height_m")),
+        (force, stress, loaded_area(specimen)),
+    )
+    notes = [
+        check_derived(base, derived, size, table.lines)
+        for base, derived, size in pairs
+        if derived is not None and size is not None
+    ]
+    if "speed_m_per_s" in specimen:
+        check_speed(time, displacement, specimen["speed_m_per_s"])
+    flips = signs(displacement, force, kind, strain, stress)
+    if "height_m" in specimen:
+        check_height(displacement, displacement.values * flips.displacement, specimen["height_m"])
+    return flips, notes
+
+
+def _signals(picks: Mapping[str, Pick], flips: Signs) -> tuple[Floats, dict[str, Signal]]:
+    t = picks["time"].values
+    d, f = picks["displacement"].values, picks["force"].values
+    return t, {
+        "displacement": Signal(t, _column(d * flips.displacement), "m", 0.0, "machine"),
+        "force": Signal(t, _column(f * flips.force), "N", 0.0, "machine"),
+    }
+
+
+def _column(x: Floats) -> Floats:
+    """(n,) as (n, 1); adding 0 turns the negative zeros of such exports into zeros."""
+    return x[:, None] + 0.0
+
+
+def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: list[str]) -> Record:
+    used = {picks[role].column.label for role in NEEDED}
+    flipped = [role for role in ("displacement", "force") if getattr(flips, role) < 0]
+    return {
+        **{f"{role} column": picks[role].column.label for role in NEEDED},
+        **{f"{role} unit": f"{p.unit} x {p.factor!r}" for role, p in picks.items()},
+        "signs flipped": ", ".join(flipped) or "none",
+        "signs because": flips.why,
+        "given by the user": ", ".join(role for role in NEEDED if picks[role].said) or "nothing",
+        "compared": "; ".join(notes) or "nothing: no strain or stress with known geometry",
+        "columns not used": ", ".join(c.label for c in table.columns if c.label not in used),
+        "text": f"{table.encoding}, {_SEPARATOR_NAMES[table.separator]} separated, "
+        f"decimal sign {table.decimal}, {len(table.lines)} rows",
+    }

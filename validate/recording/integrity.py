@@ -1,0 +1,271 @@
+"""The front-to-back check of an MCAP file that precedes every use of it.
+
+One pass reads each byte once: magic at both ends, every record's length, chunk, attachment,
+data-section and summary CRCs (the `mcap` package never checks the last), ids that are used before
+they are declared, and nothing after the closing magic. The same pass makes the index by which the
+file is then read, so a summary that is absent, partial or wrong cannot hide a message. A data CRC
+of 0 means "none": the file is read, and its integrity is called not provable.
+"""
+
+import hashlib
+import os
+import zlib
+from array import array
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from types import MappingProxyType
+from typing import BinaryIO
+
+import numpy as np
+
+from validate.arrays import Ints
+from validate.errors import RecordingError
+from validate.recording.mcap_file import Span, Verified
+from validate.recording.mcap_records import (
+    HEAD,
+    MAGIC,
+    MAX_RECORD,
+    MESSAGE_HEAD,
+    Channel,
+    Chunk,
+    Footer,
+    Header,
+    Metadata,
+    Op,
+    Schema,
+    check_attachment,
+    chunk_index_place,
+    records_in,
+    statistics_messages,
+)
+from validate.recording.types import Source
+
+MAX_MESSAGES = 10_000_000
+NOT_PROVABLE = "integrity not provable: no data CRC"
+_KNOWN = frozenset(int(op) for op in Op)
+
+
+def verify(stream: BinaryIO, path: Path) -> Verified:
+    """Check the whole open file; `RecordingError` names the byte and counts what precedes it."""
+    walk = _Walk(stream)
+    try:
+        walk.run()
+    except RecordingError as error:
+        raise RecordingError(
+            f"{path.name}: at byte {walk.record_at} of {walk.size}: {error}; readable before it: "
+            f"{walk.chunks} chunks, {walk.messages} messages; copy the file again from its source"
+        ) from None
+    try:
+        return walk.found(path)
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from None
+
+
+class _Walk:
+    """The state of one pass over a file; `found` freezes it."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self.size = os.fstat(stream.fileno()).st_size
+        self.record_at = self.chunks = self.messages = 0
+        self._stream = stream
+        self._at = self._crc = self._attachments = 0
+        self._sha = hashlib.sha256()
+        self._header: Header | None = None
+        self._data_crc: int | None = None  # None: still in the data section
+        self._summary_at = 0
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._log: dict[int, array[int]] = {}
+        self._publish: dict[int, array[int]] = {}
+        self._metadata: list[Metadata] = []
+        self._compressions: Counter[str] = Counter()
+        self._claimed: int | None = None
+        self._misindexed = self._unknown = 0
+        self._chunk_places: set[tuple[int, int]] = set()
+        self._indexed_places: list[tuple[int, int]] = []
+        self._spans: list[Span] = []
+
+    def run(self) -> None:
+        if self.size == 0:
+            raise RecordingError("the file is empty")
+        self._magic("first")
+        while self._record() != Op.FOOTER:
+            pass
+        self.record_at = self._at
+        self._magic("last")
+        if self._at != self.size:
+            raise RecordingError(f"{self.size - self._at} bytes after the closing magic")
+
+    def _read(self, count: int) -> bytes:
+        got = self._stream.read(min(count, self.size - self._at))
+        if len(got) < count:
+            raise RecordingError(f"the file ends {count - len(got)} bytes too early")
+        self._at += count
+        self._sha.update(got)
+        return got
+
+    def _magic(self, which: str) -> None:
+        got = self._read(min(len(MAGIC), self.size - self._at))
+        if got != MAGIC:
+            raise RecordingError(f"the {which} 8 bytes are no MCAP magic ({got.hex()})")
+        self._crc = zlib.crc32(got)
+
+    def _record(self) -> int:
+        self.record_at = self._at
+        head = self._read(HEAD.size)
+        opcode, length = HEAD.unpack(head)
+        if length > self.size - self._at:
+            left = self.size - self._at
+            raise RecordingError(f"a record declares {length} bytes where the file has {left} left")
+        if length > MAX_RECORD:
+            raise RecordingError(f"a record of {length} bytes, the limit is {MAX_RECORD}")
+        content = self._read(length)
+        self._take(opcode, head, content)
+        return int(opcode)
+
+    def _take(self, opcode: int, head: bytes, content: bytes) -> None:
+        if (opcode == Op.HEADER) != (self._header is None):
+            raise RecordingError("the first record, and only the first, must be the header")
+        if opcode == Op.DATA_END:
+            self._data_end(content)
+        elif opcode == Op.FOOTER:
+            self._footer(head, content)
+        else:
+            self._crc = zlib.crc32(content, zlib.crc32(head, self._crc))
+            self._dispatch(opcode, content)
+
+    def _dispatch(self, opcode: int, content: bytes) -> None:
+        in_data: dict[int, Callable[[bytes], None]] = {
+            Op.HEADER: self._take_header,
+            Op.MESSAGE: self._take_message,
+            Op.CHUNK: self._take_chunk,
+            Op.ATTACHMENT: self._take_attachment,
+            Op.METADATA: lambda c: self._metadata.append(Metadata.read(c)),
+        }
+        anywhere: dict[int, Callable[[bytes], None]] = {
+            Op.SCHEMA: self._take_schema,
+            Op.CHANNEL: self._take_channel,
+            Op.STATISTICS: self._take_statistics,
+            Op.CHUNK_INDEX: lambda c: self._indexed_places.append(chunk_index_place(c)),
+        }
+        if opcode in in_data and self._data_crc is not None:
+            raise RecordingError(f"a {Op(opcode).name} record after the end of the data")
+        take = in_data.get(opcode) or anywhere.get(opcode)
+        if take:
+            take(content)
+        elif opcode not in _KNOWN:
+            self._unknown += 1
+
+    def _take_header(self, content: bytes) -> None:
+        self._header = Header.read(content)
+
+    def _take_schema(self, content: bytes) -> None:
+        schema = Schema.read(content)
+        if self._schemas.setdefault(schema.id, schema) != schema:
+            raise RecordingError(f"schema {schema.id} declared twice, differently")
+
+    def _take_channel(self, content: bytes) -> None:
+        channel = Channel.read(content)
+        if channel.schema_id and channel.schema_id not in self._schemas:
+            raise RecordingError(f"{channel.topic!r} uses schema {channel.schema_id}, undeclared")
+        if self._channels.setdefault(channel.id, channel) != channel:
+            raise RecordingError(f"channel {channel.id} declared twice, differently")
+
+    def _take_message(self, content: bytes) -> None:
+        span = Span(self._at - len(content), len(content), False, frozenset([self._count(content)]))
+        self._spans.append(span)
+
+    def _count(self, content: bytes) -> int:
+        if len(content) < MESSAGE_HEAD.size:
+            raise RecordingError(f"a message record of {len(content)} bytes, at least 22 needed")
+        channel, _, log, publish = MESSAGE_HEAD.unpack_from(content)
+        if channel not in self._channels:
+            raise RecordingError(f"a message of channel {channel}, undeclared")
+        if self.messages >= MAX_MESSAGES:
+            raise RecordingError(f"more than {MAX_MESSAGES} messages, the limit; split the file")
+        self._log.setdefault(channel, array("Q")).append(log)
+        self._publish.setdefault(channel, array("Q")).append(publish)
+        self.messages += 1
+        return int(channel)
+
+    def _take_chunk(self, content: bytes) -> None:
+        chunk = Chunk.read(content)
+        channels: set[int] = set()
+        inner: dict[int, Callable[[bytes], object]] = {
+            Op.SCHEMA: self._take_schema,
+            Op.CHANNEL: self._take_channel,
+            Op.MESSAGE: lambda c: channels.add(self._count(c)),
+        }
+        for opcode, body in records_in(chunk.data):
+            if opcode in inner:
+                inner[opcode](body)
+            elif opcode in _KNOWN:
+                raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
+        self.chunks += 1
+        self._compressions[chunk.compression or "none"] += 1
+        self._chunk_places.add((self.record_at, HEAD.size + len(content)))
+        at = self._at - len(content)
+        self._spans.append(Span(at, len(content), True, frozenset(channels)))
+
+    def _take_attachment(self, content: bytes) -> None:
+        check_attachment(content)
+        self._attachments += 1
+
+    def _take_statistics(self, content: bytes) -> None:
+        self._claimed = statistics_messages(content)
+
+    def _data_end(self, content: bytes) -> None:
+        if self._data_crc is not None:
+            raise RecordingError("a second end of the data section")
+        declared = int.from_bytes(content[:4], "little")
+        if len(content) < 4 or declared not in (0, self._crc):
+            raise RecordingError(f"data section CRC {self._crc:#010x}, declared {declared:#010x}")
+        self._data_crc = declared
+        self._summary_at, self._crc = self._at, 0
+
+    def _footer(self, head: bytes, content: bytes) -> None:
+        footer = Footer.read(content)
+        if self._data_crc is None:
+            raise RecordingError("a footer without an end of the data section before it")
+        actual = zlib.crc32(content[:16], zlib.crc32(head, self._crc))
+        if footer.summary_crc not in (0, actual):
+            raise RecordingError(f"summary CRC {actual:#010x}, declared {footer.summary_crc:#010x}")
+        empty = self._summary_at == self.record_at
+        if footer.summary_start not in ((0,) if empty else (self._summary_at,)):
+            raise RecordingError(
+                f"footer: summary at byte {footer.summary_start}, found at {self._summary_at}"
+            )
+        if self._indexed_places:
+            self._misindexed = len(set(self._indexed_places) ^ self._chunk_places)
+
+    def found(self, path: Path) -> Verified:
+        if self._header is None:
+            raise RecordingError("no header record")
+        integrity = "verified" if self._data_crc else NOT_PROVABLE
+        return Verified(
+            source=Source(path.name, self._sha.hexdigest(), self.size, integrity),
+            header=self._header,
+            schemas=MappingProxyType(self._schemas),
+            channels=MappingProxyType(self._channels),
+            log_ns={i: _int64(self._log.get(i), "log") for i in self._channels},
+            publish_ns={i: _int64(self._publish.get(i), "publish") for i in self._channels},
+            metadata=tuple(self._metadata),
+            attachments=self._attachments,
+            chunks=self.chunks,
+            messages=self.messages,
+            compressions=tuple(sorted(self._compressions)),
+            claimed_messages=self._claimed,
+            misindexed=self._misindexed,
+            unknown_records=self._unknown,
+            spans=tuple(self._spans),
+        )
+
+
+def _int64(times: "array[int] | None", which: str) -> Ints:
+    unsigned = np.array(times if times is not None else [], dtype=np.uint64)
+    if unsigned.size and unsigned.max() > np.iinfo(np.int64).max:
+        raise RecordingError(f"{which} time {unsigned.max()} ns is beyond int64; re-record it")
+    signed = unsigned.astype(np.int64)
+    signed.setflags(write=False)
+    return signed

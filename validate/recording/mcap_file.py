@@ -1,0 +1,82 @@
+"""A verified MCAP file: what it holds, and its messages by the index the verification made."""
+
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from validate.arrays import Ints
+from validate.errors import RecordingError
+from validate.recording.mcap_records import (
+    Channel,
+    Chunk,
+    Header,
+    Message,
+    Metadata,
+    Op,
+    Schema,
+    records_in,
+)
+from validate.recording.types import Source
+
+
+@dataclass(frozen=True)
+class Span:
+    """A chunk or a lone message: first byte and length of its content, channels it speaks of."""
+
+    at: int
+    length: int
+    chunked: bool
+    channels: frozenset[int]
+
+
+@dataclass(frozen=True)
+class Verified:
+    """What the check found in a file; times are int64 ns, in file order, by channel id."""
+
+    source: Source
+    header: Header
+    schemas: Mapping[int, Schema]
+    channels: Mapping[int, Channel]
+    log_ns: Mapping[int, Ints]
+    publish_ns: Mapping[int, Ints]
+    metadata: tuple[Metadata, ...]
+    attachments: int
+    chunks: int
+    messages: int
+    compressions: tuple[str, ...]
+    claimed_messages: int | None  # by the file's statistics record, None: it has none
+    misindexed: int  # chunks that the file's own index misses, or places where none is
+    unknown_records: int  # kinds outside the specification, skipped
+    spans: tuple[Span, ...]
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """The file for reading; every failure of the disk is a `RecordingError`."""
+    try:
+        with path.open("rb") as stream:
+            yield stream
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def messages_of(stream: BinaryIO, verified: Verified, wanted: Set[int]) -> Iterator[Message]:
+    """The messages of the channels in `wanted`, in file order, read by the verified index."""
+    for span in verified.spans:
+        if not span.channels.isdisjoint(wanted):
+            stream.seek(span.at)
+            content = stream.read(span.length)
+            for message in _messages(content, span.chunked):
+                if message.channel_id in wanted:
+                    yield message
+
+
+def _messages(content: bytes, chunked: bool) -> Iterator[Message]:
+    if not chunked:
+        yield Message.read(content)
+        return
+    for opcode, inner in records_in(Chunk.read(content).data):
+        if opcode == Op.MESSAGE:
+            yield Message.read(inner)

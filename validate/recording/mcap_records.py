@@ -1,0 +1,253 @@
+"""The records of an MCAP file, read strictly: no field reaches past its record, nothing unbounded.
+
+Layout after the MCAP specification (mcap.dev/spec): opcode u8, length u64, content; all integers
+little-endian, strings and maps with a u32 byte length before them. Unlike the `mcap` package's own
+reader a string cut short by the end of its record is an error here, and sizes are checked before
+memory is taken. Errors are `RecordingError` without a place; the caller knows the byte.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from types import MappingProxyType
+
+import lz4.frame  # type: ignore[import-untyped]
+import zstandard
+
+from validate.errors import RecordingError
+
+MAGIC = bytes.fromhex("894d434150300d0a")
+HEAD = struct.Struct("<BQ")  # opcode, length
+MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+MAX_RECORD = 512 * 2**20  # bytes of one record, or of one chunk unpacked
+
+
+class Op(IntEnum):
+    HEADER = 0x01
+    FOOTER = 0x02
+    SCHEMA = 0x03
+    CHANNEL = 0x04
+    MESSAGE = 0x05
+    CHUNK = 0x06
+    MESSAGE_INDEX = 0x07
+    CHUNK_INDEX = 0x08
+    ATTACHMENT = 0x09
+    ATTACHMENT_INDEX = 0x0A
+    STATISTICS = 0x0B
+    METADATA = 0x0C
+    METADATA_INDEX = 0x0D
+    SUMMARY_OFFSET = 0x0E
+    DATA_END = 0x0F
+
+
+class Cursor:
+    """Reads the fields of one record in order; raises `RecordingError` at the record's end."""
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+        self.at = 0
+
+    def take(self, count: int) -> bytes:
+        left = len(self._content) - self.at
+        if count > left:
+            raise RecordingError(f"a field of {count} bytes where its record has {left} left")
+        self.at += count
+        return self._content[self.at - count : self.at]
+
+    def integer(self, width: int) -> int:
+        return int.from_bytes(self.take(width), "little")
+
+    def text(self) -> str:
+        raw = self.take(self.integer(4))
+        try:
+            return raw.decode()
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"a text field is not UTF-8 ({error.reason})") from None
+
+    def texts(self) -> Mapping[str, str]:
+        inner = Cursor(self.take(self.integer(4)))
+        found: dict[str, str] = {}
+        while inner.at < len(inner._content):
+            key = inner.text()
+            if key in found:
+                raise RecordingError(f"key {key!r} twice in one map")
+            found[key] = inner.text()
+        return MappingProxyType(found)
+
+
+@dataclass(frozen=True)
+class Header:
+    profile: str
+    library: str
+
+    @staticmethod
+    def read(content: bytes) -> "Header":
+        fields = Cursor(content)
+        return Header(fields.text(), fields.text())
+
+
+@dataclass(frozen=True)
+class Schema:
+    id: int
+    name: str
+    encoding: str
+    data: bytes
+
+    @staticmethod
+    def read(content: bytes) -> "Schema":
+        fields = Cursor(content)
+        number, name, encoding = fields.integer(2), fields.text(), fields.text()
+        if number == 0:
+            raise RecordingError("a schema with id 0, which means 'no schema'")
+        return Schema(number, name, encoding, fields.take(fields.integer(4)))
+
+
+@dataclass(frozen=True)
+class Channel:
+    id: int
+    schema_id: int  # 0: no schema
+    topic: str
+    encoding: str
+    metadata: Mapping[str, str]
+
+    @staticmethod
+    def read(content: bytes) -> "Channel":
+        fields = Cursor(content)
+        number, schema_id = fields.integer(2), fields.integer(2)
+        return Channel(number, schema_id, fields.text(), fields.text(), fields.texts())
+
+
+@dataclass(frozen=True)
+class Message:
+    channel_id: int
+    log_ns: int
+    publish_ns: int
+    data: bytes
+
+    @staticmethod
+    def read(content: bytes) -> "Message":
+        if len(content) < MESSAGE_HEAD.size:
+            raise RecordingError(f"a message record of {len(content)} bytes, at least 22 needed")
+        channel, _, log, publish = MESSAGE_HEAD.unpack_from(content)
+        return Message(channel, log, publish, content[MESSAGE_HEAD.size :])
+
+
+@dataclass(frozen=True)
+class Metadata:
+    name: str
+    values: Mapping[str, str]
+
+    @staticmethod
+    def read(content: bytes) -> "Metadata":
+        fields = Cursor(content)
+        return Metadata(fields.text(), fields.texts())
+
+
+@dataclass(frozen=True)
+class Footer:
+    summary_start: int
+    summary_offset_start: int
+    summary_crc: int
+
+    @staticmethod
+    def read(content: bytes) -> "Footer":
+        fields = Cursor(content)
+        return Footer(fields.integer(8), fields.integer(8), fields.integer(4))
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A chunk unpacked: its compression's name and its records' bytes, length and CRC checked."""
+
+    compression: str
+    has_crc: bool
+    data: bytes
+
+    @staticmethod
+    def read(content: bytes) -> "Chunk":
+        fields = Cursor(content)
+        fields.take(16)  # first and last log time: repeated in the messages
+        size, crc, compression = fields.integer(8), fields.integer(4), fields.text()
+        data = unpack(compression, fields.take(fields.integer(8)), size)
+        if crc and zlib.crc32(data) != crc:
+            raise RecordingError(f"chunk CRC {zlib.crc32(data):#010x}, declared {crc:#010x}")
+        return Chunk(compression, bool(crc), data)
+
+
+def check_attachment(content: bytes) -> None:
+    """Raises `RecordingError` unless the attachment's fields fit and its CRC (0: none) is right."""
+    fields = Cursor(content)
+    fields.take(16)  # log and creation time
+    fields.text(), fields.text()  # name and media type: never used as a path
+    fields.take(fields.integer(8))
+    actual = zlib.crc32(content[: fields.at])
+    declared = fields.integer(4)
+    if declared and declared != actual:
+        raise RecordingError(f"attachment CRC {actual:#010x}, declared {declared:#010x}")
+
+
+def statistics_messages(content: bytes) -> int:
+    """The message count a statistics record claims."""
+    return Cursor(content).integer(8)
+
+
+def chunk_index_place(content: bytes) -> tuple[int, int]:
+    """Where a chunk index says its chunk lies: first byte and length in bytes."""
+    fields = Cursor(content)
+    fields.take(16)
+    return fields.integer(8), fields.integer(8)
+
+
+def unpack(compression: str, data: bytes, size: int) -> bytes:
+    """The `size` bytes packed in `data`; refuses sizes over `MAX_RECORD` before allocating."""
+    if size > MAX_RECORD:
+        raise RecordingError(f"a chunk of {size} bytes unpacked, the limit is {MAX_RECORD}")
+    unpackers = {"": _stored, "zstd": _zstd, "lz4": _lz4}
+    if compression not in unpackers:
+        raise RecordingError(f"chunk compression {compression!r}, readable: none, zstd, lz4")
+    plain = unpackers[compression](data, size)
+    if len(plain) != size:
+        raise RecordingError(f"a chunk of {len(plain)} bytes unpacked, declared {size}")
+    return plain
+
+
+def _stored(data: bytes, size: int) -> bytes:
+    return data
+
+
+def _zstd(data: bytes, size: int) -> bytes:
+    try:
+        # A frame that names its own size is unpacked to that size, whatever limit is given.
+        framed = zstandard.frame_content_size(data)
+        if framed not in (-1, size):
+            raise RecordingError(f"a zstd frame of {framed} bytes unpacked, declared {size}")
+        if size == 0:
+            return b""
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+    except zstandard.ZstdError as error:
+        raise RecordingError(f"chunk is no valid zstd ({error})") from None
+
+
+def _lz4(data: bytes, size: int) -> bytes:
+    unpacker = lz4.frame.LZ4FrameDecompressor()
+    try:
+        plain: bytes = unpacker.decompress(data, max_length=size + 1)
+    except (RuntimeError, EOFError) as error:
+        raise RecordingError(f"chunk is no valid lz4 ({error})") from None
+    return plain
+
+
+def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of every record inside an unpacked chunk."""
+    at = 0
+    while at < len(data):
+        if at + HEAD.size > len(data):
+            raise RecordingError(f"{len(data) - at} stray bytes at the end of a chunk")
+        opcode, length = HEAD.unpack_from(data, at)
+        at += HEAD.size
+        if length > len(data) - at:
+            raise RecordingError(f"a record of {length} bytes where its chunk has {len(data) - at}")
+        yield opcode, data[at : at + length]
+        at += length

@@ -1,0 +1,195 @@
+"""From verified messages to streams: decoding, one clock, names and units that stay.
+
+A stream is what one channel of ours holds. Everything that would have to be guessed is refused:
+samples out of order, a unit, frame, spread or set of names that changes on the way, stamps in some
+messages only. Markers whose names are the same in another order are put in the first message's.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import RecordingError
+from validate.recording.mcap_file import Verified
+from validate.recording.mcap_records import Channel, Message
+from validate.recording.schemas import (
+    CONTOUR,
+    MARKERS,
+    MESSAGE_ENCODING,
+    SCHEMA_ENCODING,
+    SIGNAL,
+    Sample,
+    decode,
+)
+from validate.recording.types import Contours, Markers, Signal
+
+OURS = (MARKERS, SIGNAL, CONTOUR)
+MAX_NUMBERS = 50_000_000  # decoded numbers of one file: 400 MB
+
+T = TypeVar("T")
+
+
+@dataclass
+class Collected:
+    """The samples of one channel while they are read; `error` is the first that was wrong."""
+
+    channel: Channel
+    schema: str
+    publish_ns: Ints
+    log_ns: Ints
+    samples: list[Sample] = field(default_factory=list)
+    error: str = ""
+
+    def add(self, message: Message) -> int:
+        """Decode and keep one message; returns how many numbers it held."""
+        if self.error:
+            return 0
+        try:
+            self.samples.append(decode(self.schema, message.data))
+        except RecordingError as error:
+            self.error = f"{self.channel.topic!r} message {len(self.samples)}: {error}"
+            return 0
+        return int(self.samples[-1].values.size)
+
+    def checked(self) -> "Collected":
+        """Itself; raises `RecordingError` when a message was wrong or there is none."""
+        if self.error:
+            raise RecordingError(self.error)
+        if not self.samples:
+            raise RecordingError(f"{self.channel.topic!r}: zero messages")
+        return self
+
+    @property
+    def stamps_ns(self) -> Ints | None:
+        """int64 ns (n,), None when no message has a stamp; mixtures raise `RecordingError`."""
+        stamps = [s.stamp_ns for s in self.samples if s.stamp_ns is not None]
+        if not stamps:
+            return None
+        if len(stamps) != len(self.samples):
+            raise RecordingError(
+                f"{self.channel.topic!r}: {len(stamps)} of {len(self.samples)} messages are "
+                "stamped; stamp all or none"
+            )
+        return np.array(stamps, dtype=np.int64)
+
+    @property
+    def times_ns(self) -> Ints:
+        """When the samples were measured: stamps, else publish times; int64 ns (n,)."""
+        stamps = self.stamps_ns
+        return self.publish_ns if stamps is None else stamps
+
+
+def ours(verified: Verified) -> dict[int, Collected]:
+    """An empty collector for every channel with a schema of ours."""
+    found: dict[int, Collected] = {}
+    for number, channel in verified.channels.items():
+        schema = verified.schemas.get(channel.schema_id)
+        if schema is not None and schema.name in OURS:
+            log, publish = verified.log_ns[number], verified.publish_ns[number]
+            found[number] = Collected(channel, schema.name, publish, log)
+            if (schema.encoding, channel.encoding) != (SCHEMA_ENCODING, MESSAGE_ENCODING):
+                encodings = f"{schema.encoding}/{channel.encoding}"
+                found[number].error = (
+                    f"{channel.topic!r}: {schema.name} in {encodings!r}, "
+                    f"expected '{SCHEMA_ENCODING}/{MESSAGE_ENCODING}'"
+                )
+    return found
+
+
+def fill(collected: dict[int, Collected], messages: Iterable[Message]) -> None:
+    """Decode `messages` into their collectors; raises `RecordingError` over `MAX_NUMBERS`."""
+    total = 0
+    for message in messages:
+        total += collected[message.channel_id].add(message)
+        if total > MAX_NUMBERS:
+            raise RecordingError(f"more than {MAX_NUMBERS} numbers, the limit; split the file")
+
+
+def markers(raw: Collected, t0_ns: int) -> Markers:
+    """The stream of a `validate.Markers` channel, times from `t0_ns`."""
+    t, first = _times(raw, t0_ns), raw.samples[0]
+    x = np.stack([_in_order(raw, i, first) for i in range(len(raw.samples))])
+    sd, frame = _sd(raw), _frame(raw)
+    return _named(raw, lambda: Markers(t=t, names=first.names, x=x, sd=sd, frame=frame))
+
+
+def signal(raw: Collected, t0_ns: int) -> Signal:
+    """The stream of a `validate.Signal` channel, times from `t0_ns`."""
+    t, unit = _times(raw, t0_ns), _constant(raw, "unit", [s.unit for s in raw.samples])
+    sd, frame = _sd(raw), _frame(raw)
+    y = np.stack([_like_first(raw, i) for i in range(len(raw.samples))])
+    return _named(raw, lambda: Signal(t=t, y=y, unit=unit, sd=sd, frame=frame))
+
+
+def contours(raw: Collected, t0_ns: int, pose: Floats) -> Contours:
+    """The stream of a `validate.Contour` channel, times from `t0_ns`."""
+    t, outlines = _times(raw, t0_ns), tuple(s.values for s in raw.samples)
+    sd, frame = _sd(raw), _frame(raw)
+    return _named(raw, lambda: Contours(t=t, outlines=outlines, sd=sd, pose=pose, frame=frame))
+
+
+def _named(raw: Collected, make: Callable[[], T]) -> T:
+    try:
+        return make()
+    except RecordingError as error:
+        raise RecordingError(f"{raw.channel.topic!r}: {error}") from None
+
+
+def _times(raw: Collected, t0_ns: int) -> Floats:
+    ns = raw.times_ns
+    t: Floats = (ns - t0_ns) / 1e9
+    backward = np.flatnonzero(np.diff(ns) < 0)
+    if len(backward):
+        i = int(backward[0]) + 1
+        raise RecordingError(
+            f"{raw.channel.topic!r}: time runs backward at sample {i} "
+            f"({t[i - 1]:.9f} s -> {t[i]:.9f} s), {len(backward)} times in all; "
+            "write the messages in order of their stamps"
+        )
+    return t
+
+
+def _sd(raw: Collected) -> float:
+    return _constant(raw, "sd", [s.sd for s in raw.samples])
+
+
+def _frame(raw: Collected) -> str:
+    return _constant(raw, "frame", [s.frame for s in raw.samples])
+
+
+def _constant(raw: Collected, what: str, values: list[T]) -> T:
+    for i, value in enumerate(values):
+        if value != values[0]:
+            raise RecordingError(
+                f"{raw.channel.topic!r}: {what} changes at message {i}, {values[0]!r} -> {value!r}"
+            )
+    return values[0]
+
+
+def _in_order(raw: Collected, i: int, first: Sample) -> Floats:
+    """Sample i with its points in the order of the first sample's names."""
+    values, names = _like_first(raw, i), raw.samples[i].names
+    if names == first.names:
+        return values
+    if sorted(names) != sorted(first.names):
+        differ = sorted(set(names) ^ set(first.names))
+        raise RecordingError(
+            f"{raw.channel.topic!r}: names change at message {i}, not in both: {differ}; "
+            "write null for a point that is not seen"
+        )
+    place = {name: k for k, name in enumerate(names)}
+    return values[[place[name] for name in first.names]]
+
+
+def _like_first(raw: Collected, i: int) -> Floats:
+    got, want = raw.samples[i].values, raw.samples[0].values
+    if raw.schema == MARKERS and got.shape[0] != want.shape[0]:
+        return got  # the names say which point came or went
+    if got.shape != want.shape:
+        raise RecordingError(
+            f"{raw.channel.topic!r}: message {i} holds {got.shape} numbers, the first {want.shape}"
+        )
+    return got

@@ -1,0 +1,275 @@
+"""The JSON messages of our own recordings: their schemas, how they are written and read.
+
+    validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
+                                                           z null as a whole: points in a plane
+    validate.Signal    {stamp, frame, unit, values, sd}     in `unit`
+    validate.Contour   {stamp, frame, x, y, sd}             m, image plane, closed
+    foxglove.PosesInFrame                                   mirror of markers, for viewing only
+
+`stamp` is {sec, nsec}; a foreign writer may leave it out, then publish time counts. Numbers are
+written in their shortest exact form, so they return bit for bit. Own schemas because the
+well-known pose list has no names and JSON has no NaN.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+
+MARKERS, SIGNAL, CONTOUR = "validate.Markers", "validate.Signal", "validate.Contour"
+MIRROR = "foxglove.PosesInFrame"
+MIRROR_OF = "validate.mirror_of"  # key in a mirror channel's metadata: the topic it repeats
+SCHEMA_ENCODING, MESSAGE_ENCODING = "jsonschema", "json"
+MAX_MESSAGE = 16 * 2**20  # bytes of one JSON message: Python objects take some 10 x as much
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One decoded message; `names` of markers only, `unit` of signals only.
+
+    values: markers (k, 2 or 3) m with NaN = not seen, signal (c,) in `unit`, contour (k, 2) m.
+    """
+
+    stamp_ns: int | None
+    frame: str
+    sd: float
+    names: tuple[str, ...]
+    unit: str
+    values: Floats
+
+
+def _object(title: str, required: str, **properties: Json) -> Json:
+    names = required.split()
+    return {"title": title, "type": "object", "properties": properties, "required": names}
+
+
+def _list(items: Json) -> Json:
+    return {"type": "array", "items": items}
+
+
+_NUMBER: Json = {"type": "number"}
+_TEXT: Json = {"type": "string"}
+_SEEN: Json = _list({"type": ["number", "null"]})
+_COUNT: Json = {"type": "integer", "minimum": 0}
+_STAMP = _object("time", "sec nsec", sec=_COUNT, nsec=_COUNT | {"maximum": 999_999_999})
+_SPREAD: Json = {"type": "number", "minimum": 0}
+_POINT = _object("foxglove.Vector3", "x y z", x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_TURN = _object("foxglove.Quaternion", "x y z w", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE = _object("foxglove.Pose", "position orientation", position=_POINT, orientation=_TURN)
+
+SCHEMAS: Mapping[str, Json] = {
+    MARKERS: _object(
+        MARKERS,
+        "stamp frame names x y z sd",
+        stamp=_STAMP,
+        frame=_TEXT,
+        names=_list(_TEXT),
+        x=_SEEN,
+        y=_SEEN,
+        z=_SEEN | {"type": ["array", "null"]},
+        sd=_SPREAD,
+    ),
+    SIGNAL: _object(
+        SIGNAL,
+        "stamp frame unit values sd",
+        stamp=_STAMP,
+        frame=_TEXT,
+        unit=_TEXT,
+        values=_list(_NUMBER),
+        sd=_SPREAD,
+    ),
+    CONTOUR: _object(
+        CONTOUR,
+        "stamp frame x y sd",
+        stamp=_STAMP,
+        frame=_TEXT,
+        x=_list(_NUMBER),
+        y=_list(_NUMBER),
+        sd=_SPREAD,
+    ),
+    MIRROR: _object(
+        MIRROR,
+        "timestamp frame_id poses",
+        timestamp=_STAMP,
+        frame_id=_TEXT,
+        poses=_list(_POSE),
+    ),
+}
+
+
+def to_bytes(value: Json) -> bytes:
+    """Compact ASCII JSON with keys in the order given; NaN and infinity are refused."""
+    return json.dumps(value, allow_nan=False, separators=(",", ":")).encode("ascii")
+
+
+def stamp(ns: int) -> Json:
+    """int64 nanoseconds as {sec, nsec}."""
+    return {"sec": ns // 10**9, "nsec": ns % 10**9}
+
+
+def _nullable(column: Floats) -> list[float | None]:
+    return [None if v != v else v for v in column.tolist()]
+
+
+def markers_message(ns: int, frame: str, names: Sequence[str], x: Floats, sd: float) -> Json:
+    """The message of one instant; x (k, 2 or 3) m, NaN becomes null."""
+    axes = [_nullable(x[:, axis]) for axis in range(x.shape[1])]
+    return {
+        "stamp": stamp(ns),
+        "frame": frame,
+        "names": list(names),
+        "x": axes[0],
+        "y": axes[1],
+        "z": axes[2] if len(axes) == 3 else None,
+        "sd": sd,
+    }
+
+
+def mirror_message(ns: int, frame: str, x: Floats) -> Json:
+    """The points seen at one instant as unturned poses; points in a plane get z = 0."""
+    seen = x[~np.isnan(x).any(axis=1)]
+    turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    poses = [
+        {"position": dict(zip("xyz", [*point, 0.0][:3], strict=True)), "orientation": turn}
+        for point in seen.tolist()
+    ]
+    return {"timestamp": stamp(ns), "frame_id": frame, "poses": poses}
+
+
+def signal_message(ns: int, frame: str, unit: str, values: Floats, sd: float) -> Json:
+    """The message of one instant; values (c,) in `unit`."""
+    return {
+        "stamp": stamp(ns),
+        "frame": frame,
+        "unit": unit,
+        "values": values.tolist(),
+        "sd": sd,
+    }
+
+
+def contour_message(ns: int, frame: str, outline: Floats, sd: float) -> Json:
+    """The message of one instant; outline (k, 2) m in the image plane."""
+    x, y = outline.T.tolist()
+    return {"stamp": stamp(ns), "frame": frame, "x": x, "y": y, "sd": sd}
+
+
+def decode(schema: str, data: bytes) -> Sample:
+    """The sample in a message of one of our schemas.
+
+    Raises `RecordingError` for what is no JSON object, for NaN and infinity, for a field that is
+    missing, of a wrong type or of another length than its neighbours.
+    """
+    message = _parse(data)
+    names: tuple[str, ...] = ()
+    unit = ""
+    if schema == MARKERS:
+        names, values = _names(message), _points(message)
+        if len(names) != len(values):
+            raise RecordingError(f"{len(names)} names for {len(values)} points")
+    elif schema == SIGNAL:
+        unit, values = _text(message, "unit"), _numbers(message, "values")
+    else:
+        values = _columns([_numbers(message, "x"), _numbers(message, "y")])
+    ns = _stamp_ns(message) if "stamp" in message else None
+    return Sample(ns, _text(message, "frame"), _sd(message), names, unit, values)
+
+
+def _parse(data: bytes) -> Json:
+    if len(data) > MAX_MESSAGE:
+        raise RecordingError(f"a JSON message of {len(data)} bytes, the limit is {MAX_MESSAGE}")
+    try:
+        message = json.loads(
+            data.decode("utf-8"), parse_constant=_no_constant, object_pairs_hook=_once
+        )
+    except (ValueError, RecursionError) as error:  # no JSON, no UTF-8, or nested without end
+        raise RecordingError(f"no readable JSON ({error})") from None
+    if not isinstance(message, dict):
+        raise RecordingError(f"JSON {type(message).__name__}, expected an object")
+    return message
+
+
+def _no_constant(token: str) -> float:
+    raise RecordingError(f"{token} is no JSON number; write null for 'not seen'")
+
+
+def _once(pairs: list[tuple[str, Any]]) -> Json:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        raise RecordingError("a field occurs twice")
+    return found
+
+
+def _field(message: Json, name: str) -> Any:
+    if name not in message:
+        raise RecordingError(f"field '{name}' is missing; found {sorted(message)}")
+    return message[name]
+
+
+def _text(message: Json, name: str) -> str:
+    value = _field(message, name)
+    if not isinstance(value, str):
+        raise RecordingError(f"field '{name}' is {type(value).__name__}, expected text")
+    return value
+
+
+def _names(message: Json) -> tuple[str, ...]:
+    names = _field(message, "names")
+    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+        raise RecordingError("field 'names' is not a list of texts")
+    return tuple(names)
+
+
+def _stamp_ns(message: Json) -> int:
+    value = message["stamp"]
+    parts = (value.get("sec"), value.get("nsec")) if isinstance(value, dict) else (None, None)
+    sec, nsec = (p if type(p) is int else -1 for p in parts)
+    if not (0 <= sec < 2**63 // 10**9 and 0 <= nsec < 10**9):
+        raise RecordingError(f"stamp sec {parts[0]}, nsec {parts[1]}: no int64 nanoseconds")
+    return sec * 10**9 + nsec
+
+
+def _sd(message: Json) -> float:
+    value = _field(message, "sd")
+    return float(_array("sd", [value], {int, float})[0])
+
+
+def _numbers(message: Json, name: str, *, null: bool = False) -> Floats:
+    values = _field(message, name)
+    if not isinstance(values, list):
+        raise RecordingError(f"field '{name}' is {type(values).__name__}, expected a list")
+    return _array(name, values, {int, float, type(None)} if null else {int, float})
+
+
+def _array(name: str, values: list[Any], allowed: set[type]) -> Floats:
+    wrong = {type(v) for v in values} - allowed
+    if wrong:
+        found = sorted(t.__name__ for t in wrong)
+        raise RecordingError(f"field '{name}' holds {', '.join(found)}, expected numbers")
+    try:
+        array = np.array([np.nan if v is None else float(v) for v in values], dtype=np.float64)
+    except OverflowError:
+        raise RecordingError(f"field '{name}' holds a number beyond float64") from None
+    if np.isinf(array).any():
+        raise RecordingError(f"field '{name}' holds a number beyond float64")
+    return array
+
+
+def _points(message: Json) -> Floats:
+    columns = [_numbers(message, axis, null=True) for axis in "xy"]
+    if _field(message, "z") is not None:
+        columns.append(_numbers(message, "z", null=True))
+    return _columns(columns)
+
+
+def _columns(columns: list[Floats]) -> Floats:
+    lengths = [len(c) for c in columns]
+    if len(set(lengths)) != 1:
+        raise RecordingError(f"lengths of x, y, z differ: {lengths}")
+    return np.stack(columns, axis=1)

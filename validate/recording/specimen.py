@@ -1,0 +1,92 @@
+"""Specimen and test settings in a header block, as SI numbers."""
+
+import math
+import re
+from collections.abc import Mapping
+
+from validate.errors import RecordingError
+from validate.recording.numerals import number
+from validate.recording.table import split_unit
+from validate.recording.units import is_unit, si_factor
+
+# (name in the record, quantity, words of the header's key, words that make it something else)
+_OTHER = ("platen", "plate", "anvil", "probe", "plunger", "indenter", "grip", "final", "cell")
+GEOMETRY: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
+    ("diameter_m", "length", ("diameter",), _OTHER),
+    ("height_m", "length", ("height",), _OTHER),
+    ("width_m", "length", ("width",), _OTHER),
+    ("thickness_m", "length", ("thickness",), _OTHER),
+    ("length_m", "length", ("length",), _OTHER),
+    ("area_m2", "area", ("area",), _OTHER),
+    ("speed_m_per_s", "speed", ("speed", "rate"), (*_OTHER, "jog", "return", "preload", "data")),
+)
+_GLUED = re.compile(r"(?P<number>[-+]?[0-9.,' ]*[0-9][.,]?(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D.*)?")
+
+
+def specimen_of(header: Mapping[str, str], decimal: str) -> dict[str, float]:
+    """SI numbers by name (`diameter_m`, `height_m`, ..., `speed_m_per_s`) of the header block.
+
+    Only values with a unit, glued to them or in the key, are used. Raises `RecordingError` when two
+    lines, or key and value, contradict each other, and for sizes that are not positive.
+    """
+    found: dict[str, tuple[float, str]] = {}
+    for key, text in header.items():
+        for name, quantity, given, taken in GEOMETRY:
+            value = _value(key, text, quantity, given, taken, decimal)
+            if value is None:
+                continue
+            before, by = found.setdefault(name, (value, key))
+            if not math.isclose(before, value, rel_tol=1e-6):
+                raise RecordingError(
+                    f"header: '{by}' gives {name} = {before:.6g}, '{key}' {value:.6g}; keep one"
+                )
+    return {name: value for name, (value, _) in found.items()}
+
+
+def loaded_area(specimen: Mapping[str, float]) -> float | None:
+    """The area (m2) under nominal stress: given, of a disc, or of a rectangle; None: not known."""
+    if "area_m2" in specimen:
+        return specimen["area_m2"]
+    if "diameter_m" in specimen:
+        return math.pi * specimen["diameter_m"] ** 2 / 4
+    sides = [specimen[k] for k in ("width_m", "thickness_m", "length_m") if k in specimen]
+    return sides[0] * sides[1] if len(sides) == 2 and "height_m" in specimen else None
+
+
+def _value(
+    key: str, text: str, quantity: str, given: tuple[str, ...], taken: tuple[str, ...], decimal: str
+) -> float | None:
+    words = set(re.findall(r"[^\W\d_]+", key.casefold()))
+    if not words & set(given) or words & set(taken):
+        return None
+    parts = _GLUED.fullmatch(text.strip())
+    if parts is None:
+        return None
+    unit = _unit(key, (parts["unit"] or "").strip("()[] "))
+    if unit is None or not is_unit(unit):
+        return None
+    value = _number(key, parts["number"].strip(), decimal) * si_factor(unit, quantity)
+    if value <= 0:
+        raise RecordingError(f"header: '{key}' is {text}, expected a size above 0")
+    return value
+
+
+def _unit(key: str, glued: str) -> str | None:
+    _, in_key = split_unit(key)
+    if glued and in_key and is_unit(in_key) and glued != in_key:
+        raise RecordingError(f"header: '{key}' is given in {glued}; keep one unit")
+    return glued or in_key
+
+
+def _number(key: str, text: str, decimal: str) -> float:
+    """A header number; its decimal sign may differ from the table's where it cannot be grouping."""
+    other = "," if decimal == "." else "."
+    grouping = re.fullmatch(rf"[1-9][0-9]{{0,2}}\{other}[0-9]{{3}}", text)
+    value = None if grouping else number(text, decimal)
+    if value is None and not grouping:
+        value = number(text, other)
+    if value is None:
+        raise RecordingError(
+            f"header: '{key}' is '{text}', no plain number; write it without thousands separators"
+        )
+    return value

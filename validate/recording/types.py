@@ -1,0 +1,205 @@
+"""What a recording holds. Every type is frozen and checks itself once, when it is made.
+
+Times are float seconds from the recording's first message; the int64 nanoseconds of that moment
+are kept in `Recording.t0_ns`. Positions are metres, one named frame per stream.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats, checked
+from validate.errors import RecordingError
+
+Record = Mapping[str, str]
+T = TypeVar("T")
+
+
+def _set(instance: object, name: str, value: object) -> None:
+    object.__setattr__(instance, name, value)
+
+
+def _times(t: Floats, stream: str) -> Floats:
+    t = checked(t, f"{stream} t [s]", (None,), error=RecordingError)
+    if len(t) == 0:
+        raise RecordingError(f"{stream}: no samples")
+    steps = np.diff(t)
+    if (steps < 0).any():
+        at = int(np.argmax(steps < 0)) + 1
+        raise RecordingError(
+            f"{stream}: time runs backward at sample {at} ({t[at - 1]:.6f} s -> {t[at]:.6f} s)"
+        )
+    return t
+
+
+def _spread(sd: float, stream: str) -> float:
+    if not (np.isfinite(sd) and sd >= 0):
+        raise RecordingError(f"{stream}: standard deviation {sd} is not a number >= 0")
+    return float(sd)
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Named points over time: t (nt,) s, x (nt, k, d) m with NaN = not seen, sd m per axis."""
+
+    t: Floats
+    names: tuple[str, ...]
+    x: Floats
+    sd: float
+    frame: str
+
+    def __post_init__(self) -> None:
+        _set(self, "t", _times(self.t, "markers"))
+        k = len(self.names)
+        if len(set(self.names)) != k or k == 0:
+            raise RecordingError(f"markers: {k} names, {len(set(self.names))} different ones")
+        x = checked(self.x, "markers x [m]", (len(self.t), k, None), nan=True, error=RecordingError)
+        if x.shape[2] not in (2, 3):
+            raise RecordingError(f"markers: {x.shape[2]} coordinates per point, expected 2 or 3")
+        _set(self, "x", x)
+        _set(self, "sd", _spread(self.sd, "markers"))
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Numbers over time in one unit: t (nt,) s, y (nt, c) in `unit`, sd in `unit`."""
+
+    t: Floats
+    y: Floats
+    unit: str
+    sd: float
+    frame: str
+
+    def __post_init__(self) -> None:
+        _set(self, "t", _times(self.t, "signal"))
+        _set(self, "y", checked(self.y, "signal y", (len(self.t), None), error=RecordingError))
+        if not self.unit:
+            raise RecordingError("signal: no unit declared")
+        _set(self, "sd", _spread(self.sd, "signal"))
+
+
+@dataclass(frozen=True)
+class Contours:
+    """Closed outlines in an image plane: outlines nt x (k_i, 2) m, sd m along the normal.
+
+    `pose` is T_frame_from_image (4, 4): image x, y in metres become `frame` coordinates.
+    """
+
+    t: Floats
+    outlines: tuple[Floats, ...]
+    sd: float
+    pose: Floats
+    frame: str
+
+    def __post_init__(self) -> None:
+        _set(self, "t", _times(self.t, "contours"))
+        if len(self.outlines) != len(self.t):
+            raise RecordingError(f"contours: {len(self.outlines)} outlines, {len(self.t)} times")
+        outlines = tuple(
+            checked(o, f"outline {i} [m]", (None, 2), error=RecordingError)
+            for i, o in enumerate(self.outlines)
+        )
+        short = [i for i, o in enumerate(outlines) if len(o) < 3]
+        if short:
+            raise RecordingError(f"contours: outline {short[0]} has fewer than 3 points")
+        _set(self, "outlines", outlines)
+        _set(self, "sd", _spread(self.sd, "contours"))
+        _set(self, "pose", checked(self.pose, "contours pose", (4, 4), error=RecordingError))
+
+
+@dataclass(frozen=True)
+class Frames:
+    """B-mode images over time: images nt x (h, w) uint8, m_per_px (x, y), pose T_frame_from_image.
+
+    The place for ultrasound frames; no reader fills it yet.
+    """
+
+    t: Floats
+    images: tuple[NDArray[np.uint8], ...]
+    m_per_px: tuple[float, float]
+    pose: Floats
+    frame: str
+
+    def __post_init__(self) -> None:
+        _set(self, "t", _times(self.t, "frames"))
+        if len(self.images) != len(self.t):
+            raise RecordingError(f"frames: {len(self.images)} images, {len(self.t)} times")
+        _set(self, "pose", checked(self.pose, "frames pose", (4, 4), error=RecordingError))
+
+
+@dataclass(frozen=True)
+class Clock:
+    """What a stream's times look like, s; `gaps` counts steps over 3 x the median step."""
+
+    topic: str
+    count: int
+    duration: float
+    rate_hz: float | None
+    gaps: int
+    longest_gap: float
+    duplicates: int
+    backward: int
+    stamp_minus_publish: (
+        float | None
+    )  # largest absolute difference, s; None: messages have no stamp
+    publish_minus_log: float  # largest absolute difference, s
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a recording came from: file name, its SHA-256 and size, and what its bytes prove."""
+
+    path: str
+    sha256: str
+    bytes: int
+    integrity: str  # "verified" or "integrity not provable: ..."
+
+
+@dataclass(frozen=True)
+class Recording:
+    """All streams of one experiment by topic, with metadata records (calibration, provenance)."""
+
+    name: str
+    source: Source
+    t0_ns: int
+    markers: Mapping[str, Markers] = field(default_factory=dict)
+    signals: Mapping[str, Signal] = field(default_factory=dict)
+    contours: Mapping[str, Contours] = field(default_factory=dict)
+    frames: Mapping[str, Frames] = field(default_factory=dict)
+    clock: Mapping[str, Clock] = field(default_factory=dict)
+    metadata: Mapping[str, Record] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("markers", "signals", "contours", "frames", "clock", "metadata"):
+            _set(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def signal(self, topic: str, unit: str) -> Signal:
+        """The signal of that topic; raises `RecordingError` when absent or in another unit."""
+        found = _present(self.signals, topic, f"{self.name}: no signal")
+        if found.unit != unit:
+            raise RecordingError(f"{self.name}: '{topic}' is in {found.unit}, expected {unit}")
+        return found
+
+    def marker(self, topic: str) -> Markers:
+        """The markers of that topic; raises `RecordingError` when absent."""
+        return _present(self.markers, topic, f"{self.name}: no markers")
+
+    def contour(self, topic: str) -> Contours:
+        """The contours of that topic; raises `RecordingError` when absent."""
+        return _present(self.contours, topic, f"{self.name}: no outlines")
+
+    def record(self, name: str) -> Record:
+        """The metadata record of that name; raises `RecordingError` when absent."""
+        return _present(self.metadata, name, f"{self.name}: no record")
+
+
+def _present(streams: Mapping[str, T], topic: str, missing: str) -> T:
+    if topic not in streams:
+        raise RecordingError(
+            f"{missing} '{topic}'; it has {sorted(streams)}; see `validate inspect`"
+        )
+    return streams[topic]

@@ -1,0 +1,122 @@
+"""Units as foreign files write them, turned into SI factors. The only file that imports pint.
+
+Pint is imported when the first unit is read: the import costs more than reading a small file.
+"""
+
+import re
+import unicodedata
+from functools import cache
+from typing import Any, overload
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+
+QUANTITIES: tuple[tuple[str, str], ...] = (
+    ("force", "newton"),
+    ("length", "metre"),
+    ("time", "second"),
+    ("stress", "pascal"),
+    ("strain", ""),
+    ("speed", "metre / second"),
+    ("area", "metre ** 2"),
+)
+_SI = dict(QUANTITIES)
+
+_NUMBERS = {"-": 1.0, "1": 1.0, "%": 0.01, "percent": 0.01}
+_SPELLED = {"in": "inch", "sec": "second", "secs": "second", "msec": "millisecond"}
+
+# A product of powers and nothing else: text from a file is never given to a parser unchecked.
+_FACTOR = r"[A-Za-z]{1,12}(?:\^-?[1-4])?"
+_PRODUCT = re.compile(rf"{_FACTOR}(?:\s*[*/.·]\s*{_FACTOR}){{0,3}}")
+
+
+def si_factor(unit: str, quantity: str) -> float:
+    """The number of SI units in one `unit`, e.g. ("kN", "force") -> 1000.0.
+
+    `quantity` is one of `QUANTITIES`. Raises `RecordingError` naming unit and quantity when the
+    unit is unknown or measures something else.
+    """
+    factor = _factor(unit.strip(), quantity)
+    if factor is None:
+        kinds = [name for name, _ in QUANTITIES if _factor(unit.strip(), name) is not None]
+        meant = f"it measures {kinds[0]}" if kinds else "it is not known"
+        raise RecordingError(
+            f"unit '{unit}' is no unit of {quantity}: {meant}; examples: {_EXAMPLES[quantity]}"
+        )
+    return factor
+
+
+@overload
+def to_si(value: Floats, unit: str, quantity: str) -> Floats: ...
+@overload
+def to_si(value: float, unit: str, quantity: str) -> float: ...
+def to_si(value: Floats | float, unit: str, quantity: str) -> Floats | float:
+    """`value` in `unit` as SI numbers of the same shape; raises as `si_factor` does."""
+    factor = si_factor(unit, quantity)
+    return np.asarray(value) * factor if isinstance(value, np.ndarray) else float(value) * factor
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` is a unit of any of `QUANTITIES`."""
+    return any(_factor(text.strip(), name) is not None for name, _ in QUANTITIES)
+
+
+_EXAMPLES = {
+    "force": "N, kN, mN, kgf, lbf",
+    "length": "mm, cm, um, m, in",
+    "time": "s, ms, min",
+    "stress": "Pa, kPa, MPa, N/mm^2, psi",
+    "strain": "-, %, mm/mm",
+    "speed": "mm/min, mm/s",
+    "area": "mm^2, m^2",
+}
+
+
+@cache
+def _factor(unit: str, quantity: str) -> float | None:
+    if quantity not in _SI:
+        raise ValueError(f"quantity {quantity!r} is none of {sorted(_SI)}")
+    text = _spelling(unit)
+    if text in _NUMBERS:
+        return _NUMBERS[text] if quantity == "strain" else None
+    if _PRODUCT.fullmatch(text) is None:
+        return None
+    if quantity == "strain":
+        return _ratio(text)
+    return _convert(text, _SI[quantity])
+
+
+def _ratio(text: str) -> float | None:
+    """mm/mm and its like; pint's other numbers (turn, count, ppm) are no strain."""
+    over, slash, under = text.partition("/")
+    top, bottom = _convert(over.strip(), "metre"), _convert(under.strip(), "metre")
+    return top / bottom if slash and top is not None and bottom is not None else None
+
+
+def _spelling(unit: str) -> str:
+    text = unicodedata.normalize("NFKC", unit.strip()).replace("μ", "u").replace("**", "^")
+    text = re.sub(r"(?<=[A-Za-z])(-?[1-4])(?![0-9])", r"^\1", text)
+    return re.sub(r"[A-Za-z]+", lambda word: _SPELLED.get(word[0], word[0]), text)
+
+
+def _convert(text: str, target: str) -> float | None:
+    import pint
+
+    registry = _registry()
+    try:
+        found = registry.parse_units(text.replace("·", "*").replace(".", "*"))
+        wanted = registry.parse_units(target)
+    except (pint.errors.PintError, ValueError, AttributeError):
+        return None
+    if found.dimensionality != wanted.dimensionality:
+        return None
+    return float(registry.Quantity(1.0, found).to(wanted).magnitude)
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()

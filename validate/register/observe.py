@@ -1,0 +1,169 @@
+"""What was measured, in the scene's frame, with the rows that read the same from a simulation.
+
+Departure from the design's single Observation type: markers, outlines and signals are compared
+differently, so each is its own small type; `Registered` holds them together.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import ComparisonError, RegistrationError
+from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
+from validate.recording.types import Contours, Markers, Signal
+from validate.register.plane import SurfaceSampler, require_rigid, section
+from validate.register.quality import Registration, register_points
+from validate.scene.mesh import Mesh
+
+Sampling = Literal["barycentric", "nearest_node"]
+
+
+@dataclass(frozen=True)
+class MarkerObservation:
+    """Markers in the scene's frame: x (nt, k, 3) m with NaN = not seen, rest layout (k, 3) m.
+
+    `sd` m per axis; `tre` (k,) m, the predicted registration error at every marker.
+    """
+
+    t: Floats
+    names: tuple[str, ...]
+    x: Floats
+    rest: Floats
+    rows: Rows
+    sd: float
+    tre: Floats
+    registration: Registration
+
+    def simulated(self, u: Floats) -> Floats:
+        """Marker positions (k, 3) m under nodal displacements u (n, 3) m."""
+        return self.rest + self.rows.apply(u)
+
+
+@dataclass(frozen=True)
+class OutlineObservation:
+    """Outlines (k_i, 2) m in image coordinates, and the wall that the simulation moves."""
+
+    t: Floats
+    outlines: tuple[Floats, ...]
+    pose: Floats
+    sd: float
+    wall: SurfaceSampler
+
+    def simulated(self, u: Floats) -> Floats:
+        """The section (k, 2) m of the deformed wall with the image plane."""
+        return section(self.wall.deformed(u), self.wall.triangles, self.pose)
+
+
+@dataclass(frozen=True)
+class SignalObservation:
+    """A scalar signal y (nt,) in `unit` that the run's trace of that name predicts."""
+
+    quantity: str
+    trace: str
+    t: Floats
+    y: Floats
+    unit: str
+    sd: float
+
+    def at(self, t: float) -> float:
+        """The sample nearest in time; raises `ComparisonError` when none is within a second."""
+        return float(self.y[nearest_sample(self.t, t, f"signal '{self.quantity}'")])
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A load at which everything was measured: label such as "3mm", stage m, time s."""
+
+    label: str
+    stage: float
+    t: float
+
+
+@dataclass(frozen=True)
+class Registered:
+    """All observations of a recording in the scene's frame, and the drive that was measured."""
+
+    stage: Signal
+    holds: tuple[Hold, ...]
+    markers: MarkerObservation | None
+    outline: OutlineObservation | None
+    signals: tuple[SignalObservation, ...]
+
+    def steps_at_holds(self) -> Ints:
+        """Indices (h,) into the stage's samples at the holds."""
+        return np.array([nearest_sample(self.stage.t, h.t, "stage") for h in self.holds])
+
+
+def nearest_sample(times: Floats, t: float, name: str, within: float = 1.0) -> int:
+    """Index of the sample nearest to t s; `ComparisonError` beyond `within` s: nothing matches."""
+    index = int(np.argmin(np.abs(times - t)))
+    off = abs(float(times[index]) - t)
+    if off > within:
+        raise ComparisonError(
+            f"{name} has no sample within {within:g} s of t = {t:.3f} s (nearest {off:.3f} s off): "
+            "0 matched samples; check the clocks with `validate inspect`"
+        )
+    return index
+
+
+def find_holds(
+    stage: Signal, t: Floats, loads: tuple[float, ...], within: float
+) -> tuple[Hold, ...]:
+    """The measurement times t (nt,) s whose stage position is a load, rest first.
+
+    Raises `ComparisonError` when a load has no measurement within `within` m of it.
+    """
+    reached = [float(stage.y[nearest_sample(stage.t, ti, "stage"), 0]) for ti in t]
+    holds = []
+    for load in (0.0, *loads):
+        off = np.abs(np.array(reached) - load)
+        if off.min() > within:
+            seen = ", ".join(f"{1e3 * r:.2f}" for r in reached)
+            raise ComparisonError(
+                f"no measurement at {1e3 * load:g} mm: 0 matched samples, the stage was at {seen} "
+                "mm; set the loads to those"
+            )
+        i = int(off.argmin())
+        holds.append(Hold(f"{1e3 * load:g}mm", reached[i], float(t[i])))
+    return tuple(holds)
+
+
+def observe_markers(
+    markers: Markers,
+    layout: dict[str, Floats],
+    mesh: Mesh,
+    *,
+    method: Literal["rigid", "similarity", "two_step"],
+    sampling: Sampling,
+    up: tuple[Floats, Floats] | None = None,
+) -> MarkerObservation:
+    """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
+
+    `up` is one direction in the markers' frame and in the scene's: without it a planar set that
+    was mirrored within its plane could not be told from the true one.
+    Raises `RegistrationError` for names that the layout lacks, for markers outside the mesh, and
+    for whatever `register_points` finds.
+    """
+    unknown = [name for name in markers.names if name not in layout]
+    if unknown:
+        raise RegistrationError(
+            f"{len(unknown)} of {len(markers.names)} markers are not in the layout: {unknown[:5]}"
+        )
+    rest = np.array([layout[name] for name in markers.names])
+    registration = register_points(
+        markers.names, markers.x[0], rest, method=method, expected_sd=markers.sd, up=up
+    )
+    rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, rest)
+    if sampling == "barycentric":
+        require_inside(rows, markers.names, 1e-4)
+    x = np.array([registration.transform.apply(frame) for frame in markers.x])
+    tre = registration.tre_at(rest)
+    return MarkerObservation(markers.t, markers.names, x, rest, rows, markers.sd, tre, registration)
+
+
+def observe_outlines(contours: Contours, wall: SurfaceSampler) -> OutlineObservation:
+    """Outlines with their pose checked; raises `RegistrationError` for an improper pose."""
+    require_rigid(contours.pose, "outline")
+    return OutlineObservation(contours.t, contours.outlines, contours.pose, contours.sd, wall)

@@ -1,0 +1,1 @@
+"""An experiment and the road from its recording to a comparison."""

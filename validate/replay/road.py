@@ -1,0 +1,290 @@
+"""The road: recording -> scene -> registration -> system -> run -> comparison."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from validate.compare.effects import Effect, effect
+from validate.compare.residual import Residual, rest_residuals
+from validate.compare.result import MethodResult, Result
+from validate.compare.score import rms, run_scores, scores_of
+from validate.compare.verdict import SAFETY, Check, Sensitivity, judge
+from validate.errors import ComparisonError, UsageError
+from validate.fem.system import build, responses
+from validate.parameters import describe, nearest_names, with_values
+from validate.recording.types import Recording
+from validate.register.observe import Registered
+from validate.replay.experiment import EffectSpec, Experiment, Variant
+from validate.replay.sentence import verdict_sentence
+from validate.scene.scene import Scene
+from validate.solve.march import march
+from validate.solve.types import Run
+
+Report = Callable[[int, int, str], None]  # done, total, what comes next
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user changed: values by path, methods to run (none: all), quick."""
+
+    values: Mapping[str, str]
+    methods: tuple[str, ...] = ()
+    quick: bool = False
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One method with one set of parameters, run on every recording."""
+
+    scene: Scene
+    registered: tuple[Registered, ...]
+    runs: tuple[Run, ...]
+    residuals: Mapping[str, Residual]
+
+
+def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Any]]:
+    """Parameters and chosen methods with the user's values; `UsageError` names the nearest."""
+    known = set(experiment.methods)
+    for name in options.methods:
+        if name not in known:
+            raise UsageError(f"unknown method '{name}'; {nearest_names(name, known)}")
+    parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
+    mine = {k: v for k, v in options.values.items() if not k.startswith("methods.")}
+    theirs = {k[8:]: v for k, v in options.values.items() if k.startswith("methods.")}
+    methods = dict(with_values(experiment.methods, theirs))
+    chosen = options.methods or tuple(methods)
+    return with_values(parameters, mine), {name: methods[name] for name in chosen}
+
+
+def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
+    """Runs the road and judges it. Raises children of `ValidateError` for bad input."""
+    parameters, methods = configure(experiment, options)
+    recordings = experiment.load(parameters, _folder(experiment))
+    identified = experiment.identify(recordings, parameters) if experiment.identify else None
+    used = identified.parameters if identified else parameters
+    road = _Road(experiment, methods, recordings, used, report)
+    road.plan(_variants(experiment, methods, options.quick))
+    results = tuple(_method(road, name, options.quick) for name in methods)
+    first = road.solved(Variant(next(iter(methods))))
+    values = {m.name: {s.name: s.value for s in m.scores} for m in results}
+    printed = experiment.published(values) if experiment.published and not options.quick else ()
+    effects = _effects(road, results, _shown(experiment, methods, options.quick))
+    return Result(
+        name=experiment.name,
+        title=experiment.title,
+        source=experiment.source,
+        sentence=verdict_sentence(results, quick=options.quick),
+        parameters=describe(used) + describe(methods, "methods."),
+        methods=results,
+        recordings=recordings,
+        registered=first.registered,
+        rest=rest_residuals(first.registered[0], first.runs[0]),
+        effects=effects,
+        published=printed,
+        identified=identified.scores if identified else (),
+        notes=identified.notes if identified else (),
+        quick=options.quick,
+        same_model=experiment.same_model,
+        seed=experiment.seed,
+        twin_notice=experiment.twin_notice,
+        inputs=tuple(f"{i.name}: {i.doc}" for i in experiment.uncertainty.inputs),
+    )
+
+
+class _Road:
+    """Solves each variant once and counts them for the progress bar."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        methods: Mapping[str, Any],
+        recordings: tuple[Recording, ...],
+        parameters: Any,
+        report: Report | None,
+    ) -> None:
+        self.experiment, self.recordings, self.parameters = experiment, recordings, parameters
+        self.settings = {**experiment.methods, **methods}
+        self._report, self._total = report, 0
+        self._done: dict[tuple[Any, Any], Solved] = {}
+
+    def plan(self, variants: list[Variant]) -> None:
+        self._total = len({self._key(v) for v in variants})
+
+    def solved(self, variant: Variant) -> Solved:
+        key = self._key(variant)
+        if key not in self._done:
+            if self._report:
+                self._report(len(self._done), self._total, variant.method)
+            self._done[key] = self._solve(variant.method, *key)
+        return self._done[key]
+
+    def _key(self, variant: Variant) -> tuple[Any, Any]:
+        return self.settings[variant.method], variant.change(self.parameters)
+
+    def _solve(self, name: str, settings: Any, parameters: Any) -> Solved:
+        start = perf_counter()
+        scene = self.experiment.build(self.recordings[0], parameters, settings)
+        stepper = self.experiment.scheme(settings).prepare(responses(build(scene)))
+        setup = perf_counter() - start
+        seen = tuple(self.experiment.place(r, parameters, scene) for r in self.recordings)
+        runs = tuple(
+            march(name, stepper, r.stage.t, r.stage.y, r.steps_at_holds(), setup) for r in seen
+        )
+        found = [
+            self.experiment.residuals(*pair)
+            for pair in zip(seen, runs, strict=True)
+            if pair[1].finished
+        ]
+        return Solved(scene, seen, runs, _merged(found))
+
+
+def _merged(found: list[tuple[Residual, ...]]) -> dict[str, Residual]:
+    """Residuals of all recordings by name; repeats of one quantity are stacked."""
+    merged: dict[str, Residual] = {}
+    for residual in (r for rs in found for r in rs):
+        other = merged.get(residual.name)
+        if other is not None:
+            values = np.vstack([other.values, residual.values])
+            residual = Residual(
+                residual.quantity, residual.load, values, residual.sd, residual.systematic,
+                residual.unit, residual.definition,
+            )  # fmt: skip
+        merged[residual.name] = residual
+    return merged
+
+
+def _variants(experiment: Experiment, methods: Mapping[str, Any], quick: bool) -> list[Variant]:
+    wanted = [Variant(name) for name in methods]
+    accepted = [name for name in experiment.accepted if name in methods]
+    uncertainty = experiment.uncertainty
+    wanted += [Variant(name, uncertainty.finer) for name in accepted]
+    if accepted:
+        wanted += [Variant(uncertainty.surrogate)]
+        wanted += [Variant(uncertainty.surrogate, i.change) for i in uncertainty.inputs]
+    return wanted + [v for e in _shown(experiment, methods, quick) for v in (e.one, e.other)]
+
+
+def _shown(
+    experiment: Experiment, methods: Mapping[str, Any], quick: bool
+) -> tuple[EffectSpec, ...]:
+    """The effects whose methods the user runs anyway; none in a quick run."""
+    if quick:
+        return ()
+    return tuple(e for e in experiment.effects if {e.one.method, e.other.method} <= set(methods))
+
+
+def _method(road: _Road, name: str, quick: bool) -> MethodResult:
+    solved = road.solved(Variant(name))
+    accepted = name in road.experiment.accepted
+    return MethodResult(
+        name=name,
+        label=road.settings[name].label,
+        accepted=accepted,
+        scene=solved.scene,
+        runs=solved.runs,
+        residuals=solved.residuals,
+        scores=(
+            *(s for r in solved.residuals.values() for s in scores_of(r, "measured recording")),
+            *run_scores(solved.runs[0]),
+        ),
+        checks=_checks(road, name, solved) if accepted else (),
+    )
+
+
+def _checks(road: _Road, name: str, solved: Solved) -> tuple[Check, ...]:
+    uncertainty = road.experiment.uncertainty
+    finer = road.solved(Variant(name, uncertainty.finer)).residuals
+    inputs = _sensitivities(road)
+    found = []
+    for accept in road.experiment.accept:
+        for load in accept.loads:
+            key = f"{accept.quantity}@{load}"
+            found.append(
+                judge(
+                    solved.residuals[key],
+                    accept.limit,
+                    finer.get(key),
+                    uncertainty.refinement(road.parameters),
+                    inputs.get(key, []),
+                )
+                if key in solved.residuals
+                else _nothing(key, accept.limit, solved.runs)
+            )
+    return tuple(found)
+
+
+def _nothing(key: str, limit: float, runs: tuple[Run, ...]) -> Check:
+    ends = "; ".join(f"{r.outcome.state}: {r.outcome.why}" for r in runs if not r.finished)
+    why = f"compared nothing: {ends or 'no such quantity in the recording'}"
+    return Check(key, 0.0, limit, 0.0, 0.0, 0.0, 0.0, "1", 0, "cannot decide", why)
+
+
+def _sensitivities(road: _Road) -> dict[str, list[Sensitivity]]:
+    """Per residual name: what one standard uncertainty of each input does, by the surrogate."""
+    uncertainty = road.experiment.uncertainty
+    base = road.solved(Variant(uncertainty.surrogate)).residuals
+    found: dict[str, list[Sensitivity]] = {}
+    for source in uncertainty.inputs:
+        moved = road.solved(Variant(uncertainty.surrogate, source.change)).residuals
+        for key in base.keys() & moved.keys():
+            step = Residual(
+                base[key].quantity, base[key].load, moved[key].values - base[key].values,
+                0.0, 0.0, base[key].unit, source.doc,
+            )  # fmt: skip
+            found.setdefault(key, []).append(
+                Sensitivity(source.name, step, source.scale(road.parameters))
+            )
+    return found
+
+
+def _effects(
+    road: _Road, results: tuple[MethodResult, ...], shown: tuple[EffectSpec, ...]
+) -> tuple[Effect, ...]:
+    accepted = [m for m in results if m.accepted]
+    inputs = _sensitivities(road) if accepted and shown else {}
+    meshes = [_mesh_errors(road, m) for m in accepted] if shown else []
+    return tuple(
+        effect(
+            e.name,
+            e.doc,
+            road.solved(e.one).residuals,
+            road.solved(e.other).residuals,
+            _shared(inputs, meshes, e.itself),
+            road.experiment.sensors,
+        )
+        for e in shown
+    )
+
+
+def _mesh_errors(road: _Road, method: MethodResult) -> dict[str, float]:
+    """u_num of every residual of an accepted method, SI."""
+    uncertainty = road.experiment.uncertainty
+    finer = road.solved(Variant(method.name, uncertainty.finer)).residuals
+    scale = SAFETY / uncertainty.refinement(road.parameters)
+    return {
+        key: scale * rms(finer[key].values - method.residuals[key].values)
+        for key in method.residuals.keys() & finer.keys()
+    }
+
+
+def _shared(
+    inputs: Mapping[str, list[Sensitivity]], meshes: list[dict[str, float]], itself: str
+) -> dict[str, float]:
+    """u_num and u_input of every residual, SI: what no averaging over points removes."""
+    squares: dict[str, float] = {}
+    for key, parts in inputs.items():
+        squares[key] = sum((p.scale * rms(p.change.values)) ** 2 for p in parts if p.name != itself)
+    for errors in meshes:
+        for key, u_num in errors.items():
+            squares[key] = squares.get(key, 0.0) + u_num**2
+    return {key: float(np.sqrt(square)) for key, square in squares.items()}
+
+
+def _folder(experiment: Experiment) -> Path:
+    if experiment.path is None:
+        raise ComparisonError(f"experiment '{experiment.name}' was not loaded from a file")
+    return experiment.path.parent

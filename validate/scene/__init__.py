@@ -1,0 +1,1 @@
+"""What is simulated, declared: mesh, materials, supports, drives, cavities. No matrices."""

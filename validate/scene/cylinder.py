@@ -1,0 +1,47 @@
+"""A quarter of an upright cylinder, for compression between plates."""
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_positive_cells
+
+
+def quarter_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:
+    """Linear tetrahedra of x, y >= 0, axis z; `radial`, `axial` count elements.
+
+    A square grid is mapped onto the quarter disc ring by ring (the concentric map); Kuhn's diagonal
+    runs from the axis to the rim, so no cell is flat. Facet sets: "lower_plate" (z = 0),
+    "upper_plate" (z = height), "symmetry_x", "symmetry_y", "rim".
+    """
+    if min(diameter, height) <= 0 or min(radial, axial) < 1:
+        raise SceneError(
+            f"cylinder {1e3 * diameter:g} x {1e3 * height:g} mm with {radial} x {axial} elements: "
+            "all must be positive"
+        )
+    i, j, k = np.meshgrid(
+        np.arange(radial + 1), np.arange(radial + 1), np.arange(axial + 1), indexing="ij"
+    )
+    ring = np.maximum(i, j)
+    angle = np.pi / 4 * _ratio(np.where(i >= j, j, i), ring)
+    angle = np.where(i >= j, angle, np.pi / 2 - angle)
+    r = diameter / 2 * ring / radial
+    nodes = np.stack([r * np.cos(angle), r * np.sin(angle), height * k / axial], axis=-1)
+    cells = kuhn_cells((radial + 1, radial + 1, axial + 1))
+    place = np.stack([i, j, k], axis=-1).reshape(-1, 3)
+    outside = boundary_facets(cells, 3)
+    on = {
+        "lower_plate": place[:, 2] == 0,
+        "upper_plate": place[:, 2] == axial,
+        "symmetry_x": place[:, 0] == 0,
+        "symmetry_y": place[:, 1] == 0,
+        "rim": place[:, :2].max(axis=1) == radial,
+    }
+    facets = {name: outside[nodes_on[outside].all(axis=1)] for name, nodes_on in on.items()}
+    mesh = Mesh(nodes.reshape(-1, 3), cells, "tet4", facets)
+    require_positive_cells(mesh)
+    return mesh
+
+
+def _ratio(part: Floats, whole: Floats) -> Floats:
+    return np.asarray(np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0))

@@ -1,0 +1,148 @@
+"""A block with a capsule-shaped hole: tetrahedra inside are removed, the wall is projected.
+
+The construction of paper 000, section 4.4: a regular mesh of the block, elements with a node in
+the inclusion removed, the nodes of the hole moved onto the measured shape. Departures: the grid
+lines are graded so that the inclusion's centre keeps its place in the grid wherever it lies in the
+block (a centred one gives the regular grid), which keeps the projection free of inverted cells.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_positive_cells
+
+FACES = ("probe_plate", "stage_plate", "bottom", "top", "side_low", "side_high")
+
+
+@dataclass(frozen=True)
+class Block:
+    """x compression (probe plate at 0, stage at size_x), y vertical, z lateral; sizes in m."""
+
+    size_x: float
+    size_y: float
+    size_z: float
+
+    @property
+    def sizes(self) -> Floats:
+        return np.array([self.size_x, self.size_y, self.size_z])
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """Cylinder with half-spheres at its ends, axis along y: centre (3,) m, radius m, length m."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        if not (self.radius > 0 and self.length >= 2 * self.radius):
+            raise SceneError(
+                f"inclusion: radius {1e3 * self.radius:g} mm, length {1e3 * self.length:g} mm; "
+                "the radius must be positive and the length at least two radii"
+            )
+
+    def foot(self, points: Floats) -> Floats:
+        """The nearest point of the axis segment for every point (n, 3)."""
+        half = self.length / 2 - self.radius
+        foot = np.tile(np.array(self.centre), (len(points), 1))
+        foot[:, 1] += np.clip(points[:, 1] - self.centre[1], -half, half)
+        return foot
+
+    def distance(self, points: Floats) -> Floats:
+        """Signed distance (n,) m, negative inside."""
+        return np.asarray(np.linalg.norm(points - self.foot(points), axis=1) - self.radius)
+
+    def project(self, points: Floats) -> Floats:
+        """Points (n, 3) moved radially onto the surface."""
+        foot = self.foot(points)
+        away = points - foot
+        return np.asarray(foot + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
+
+    @property
+    def volume(self) -> float:
+        cylinder = np.pi * self.radius**2 * (self.length - 2 * self.radius)
+        return float(cylinder + 4 / 3 * np.pi * self.radius**3)
+
+
+def block_with_inclusion(block: Block, grid: tuple[int, int, int], capsule: Capsule) -> Mesh:
+    """Linear tetrahedra around the capsule; `grid` counts the nodes along x, y, z.
+
+    Facet sets: the six faces and "cavity". Raises `SceneError` when the inclusion touches a face,
+    is smaller than an element, or when the projection inverts a cell.
+    """
+    if min(grid) < 4:
+        raise SceneError(f"mesh of {grid} nodes: at least 4 along each side are needed")
+    _require_inside(block, capsule)
+    nodes = _graded_grid(block, grid, capsule)
+    cells = kuhn_cells(grid)
+    removed = (capsule.distance(nodes)[cells] < -1e-9).any(axis=1)
+    if not removed.any():
+        raise SceneError(
+            f"no node of the {grid} mesh lies inside the inclusion of radius "
+            f"{1e3 * capsule.radius:g} mm; refine the mesh"
+        )
+    kept = cells[~removed]
+    facets = _named_facets(nodes, kept, block, grid)
+    wall = np.unique(facets["cavity"])
+    nodes[wall] = capsule.project(nodes[wall])
+    mesh = _compact(nodes, kept, facets)
+    require_positive_cells(mesh)
+    return mesh
+
+
+def _require_inside(block: Block, capsule: Capsule) -> None:
+    reach = np.array([capsule.radius, capsule.length / 2, capsule.radius])
+    centre = np.array(capsule.centre)
+    gaps = np.concatenate([centre - reach, block.sizes - centre - reach])
+    faces = ("x = 0", "y = 0", "z = 0", "x = max", "y = max", "z = max")
+    if gaps.min() <= 0:
+        raise SceneError(
+            f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
+            f"{faces[int(gaps.argmin())]} of the block; move or shrink it"
+        )
+
+
+def _graded_grid(block: Block, grid: tuple[int, int, int], capsule: Capsule) -> Floats:
+    lines = []
+    for count, size, centre in zip(grid, block.sizes, capsule.centre, strict=True):
+        s = np.linspace(0, 1, count)
+        lines.append(np.where(s <= 0.5, 2 * s * centre, centre + (2 * s - 1) * (size - centre)))
+    return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _named_facets(
+    nodes: Floats, cells: Ints, block: Block, grid: tuple[int, int, int]
+) -> dict[str, Ints]:
+    outside = boundary_facets(cells, 3)
+    place = np.stack(np.unravel_index(np.arange(len(nodes)), grid), axis=-1)
+    last = np.array(grid) - 1
+    named, taken = {}, np.zeros(len(outside), dtype=bool)
+    for name, (axis, end) in zip(
+        FACES, ((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)), strict=True
+    ):
+        on = (place[outside, axis] == last[axis] * end).all(axis=1)
+        named[name], taken = outside[on], taken | on
+    named["cavity"] = outside[~taken]
+    _require_apart(named, place, last)
+    return named
+
+
+def _require_apart(named: dict[str, Ints], place: Ints, last: Ints) -> None:
+    wall = np.unique(named["cavity"])
+    on_face = ((place[wall] == 0) | (place[wall] == last)).any(axis=1)
+    if on_face.any():
+        raise SceneError(
+            f"the removed inclusion shares {int(on_face.sum())} nodes with the outer faces; "
+            "refine the mesh or move the inclusion inward"
+        )
+
+
+def _compact(nodes: Floats, cells: Ints, facets: dict[str, Ints]) -> Mesh:
+    used = np.unique(cells)
+    number = np.full(len(nodes), -1)
+    number[used] = np.arange(len(used))
+    return Mesh(nodes[used], number[cells], "tet4", {k: number[f] for k, f in facets.items()})

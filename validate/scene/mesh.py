@@ -1,0 +1,147 @@
+"""Meshes: nodes, cells and named facet sets, linear or quadratic.
+
+Conventions: cells are positively oriented; facets are oriented outward from the solid; quadratic
+meshes list the vertices first, then one node per edge at its midpoint (straight edges), in the
+local order of `EDGES`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import permutations
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats, Ints, checked, checked_indices
+from validate.errors import SceneError
+
+Kind = Literal["tri3", "tri6", "tet4", "tet10"]
+DIMENSION: Mapping[str, int] = {"tri3": 2, "tri6": 2, "tet4": 3, "tet10": 3}
+ORDER: Mapping[str, int] = {"tri3": 1, "tri6": 2, "tet4": 1, "tet10": 2}
+EDGES: Mapping[int, tuple[tuple[int, int], ...]] = {
+    2: ((0, 1), (1, 2), (0, 2)),
+    3: ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
+}
+_FACETS: Mapping[int, tuple[tuple[int, ...], ...]] = {
+    2: ((0, 1), (1, 2), (2, 0)),
+    3: ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
+}
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """nodes (n, d) m, cells (e, k), facets by set name (f, m)."""
+
+    nodes: Floats
+    cells: Ints
+    kind: Kind
+    facets: Mapping[str, Ints] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        d, order = DIMENSION[self.kind], ORDER[self.kind]
+        per_cell = {1: d + 1, 2: d + 1 + len(EDGES[d])}[order]
+        per_facet = {1: d, 2: d + len(EDGES[d - 1]) if d == 3 else 3}[order]
+        nodes = checked(self.nodes, "mesh nodes [m]", (None, d), error=SceneError)
+        n = len(nodes)
+        cells = checked_indices(self.cells, "cells", (None, per_cell), n, error=SceneError)
+        facets = {
+            name: checked_indices(f, f"facets '{name}'", (None, per_facet), n, error=SceneError)
+            for name, f in self.facets.items()
+        }
+        object.__setattr__(self, "nodes", nodes)
+        object.__setattr__(self, "cells", cells)
+        object.__setattr__(self, "facets", MappingProxyType(facets))
+
+    @property
+    def dimension(self) -> int:
+        return DIMENSION[self.kind]
+
+    @property
+    def order(self) -> int:
+        return ORDER[self.kind]
+
+    @property
+    def corners(self) -> Ints:
+        """The vertices of every cell (e, d + 1)."""
+        return self.cells[:, : self.dimension + 1]
+
+    def facet_nodes(self, name: str) -> Ints:
+        """Sorted node numbers of a facet set; raises `SceneError` when it is absent or empty."""
+        facets = self.facets.get(name)
+        if facets is None or len(facets) == 0:
+            raise SceneError(f"mesh has no facets '{name}'; it has {sorted(self.facets)}")
+        return np.unique(facets)
+
+    def nearest_node(self, point: Floats) -> int:
+        return int(np.argmin(np.linalg.norm(self.nodes - point, axis=1)))
+
+
+def cell_volumes(mesh: Mesh) -> Floats:
+    """Signed volume (area in 2-D) of every cell (e,), from its vertices."""
+    x = mesh.nodes[mesh.corners]
+    size = {2: 2.0, 3: 6.0}[mesh.dimension]
+    return np.asarray(np.linalg.det(x[:, 1:] - x[:, :1]) / size)
+
+
+def require_positive_cells(mesh: Mesh) -> None:
+    """Raises `SceneError` naming the worst cell when any volume is not clearly positive."""
+    volumes = cell_volumes(mesh)
+    bad = volumes <= 1e-9 * np.abs(volumes).mean()
+    if bad.any():
+        worst = int(np.argmin(volumes))
+        centre = mesh.nodes[mesh.corners[worst]].mean(axis=0)
+        at = ", ".join(f"{1e3 * c:.2f}" for c in centre)
+        raise SceneError(
+            f"{int(bad.sum())} of {len(volumes)} elements inverted or flat, worst element {worst} "
+            f"with {1e9 * volumes[worst]:.4g} mm3 at ({at}) mm; refine the mesh or move the "
+            "inclusion"
+        )
+
+
+def kuhn_cells(shape: tuple[int, ...]) -> Ints:
+    """Simplices of a structured grid of `shape` nodes, all along one diagonal: 2 triangles or
+    6 tetrahedra per box (Kuhn's split), node (i, j, k) numbered with the last index fastest."""
+    numbers = np.arange(np.prod(shape)).reshape(shape)
+    base = numbers[tuple(slice(0, -1) for _ in shape)].ravel()
+    strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
+    cells = []
+    for order in permutations(range(len(shape))):
+        steps = np.cumsum([0, *(strides[axis] for axis in order)])
+        corners = base[:, None] + steps
+        if np.linalg.det(np.eye(len(shape))[list(order)]) < 0:
+            corners[:, [-2, -1]] = corners[:, [-1, -2]]
+        cells.append(corners)
+    return np.vstack(cells)
+
+
+def boundary_facets(corners: Ints, dimension: int) -> Ints:
+    """Facets (f, d) that belong to one cell only, oriented outward."""
+    facets = np.vstack([corners[:, list(local)] for local in _FACETS[dimension]])
+    _, first, count = np.unique(
+        np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    outside: Ints = facets[first[count == 1]]
+    return outside
+
+
+def quadratic(mesh: Mesh) -> Mesh:
+    """The mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10)."""
+    if mesh.order == 2:
+        return mesh
+    d, n = mesh.dimension, len(mesh.nodes)
+    ends = np.sort(mesh.cells[:, list(EDGES[d])].reshape(-1, 2), axis=1)
+    edges, number = np.unique(ends, axis=0, return_inverse=True)
+    middle = mesh.nodes[edges].mean(axis=1)
+    cells = np.hstack([mesh.cells, n + number.reshape(len(mesh.cells), -1)])
+    key = edges[:, 0] * n + edges[:, 1]
+    facets = {name: _with_middles(f, key, n) for name, f in mesh.facets.items()}
+    kind: Kind = "tri6" if d == 2 else "tet10"
+    return Mesh(np.vstack([mesh.nodes, middle]), cells, kind, facets)
+
+
+def _with_middles(facets: Ints, key: Ints, n: int) -> Ints:
+    local = ((0, 1),) if facets.shape[1] == 2 else EDGES[2]
+    ends = np.sort(facets[:, list(local)], axis=2)
+    middles = n + np.searchsorted(key, ends[..., 0] * n + ends[..., 1])
+    return np.hstack([facets, middles])

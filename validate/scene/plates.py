@@ -1,0 +1,32 @@
+"""A block compressed between plates, as in paper 000, section 4.4."""
+
+from typing import Literal
+
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Cavity, Dilatation, Drive, Material, Pin, Scene, Support
+
+Contact = Literal["slip", "bonded"]
+
+
+def between_plates(
+    mesh: Mesh, material: Material, contact: Contact, dilatation: Dilatation = "pointwise"
+) -> Scene:
+    """The plates hold x, the floor y, one node z; bonded plates hold every component.
+
+    The paper does not say whether its plates slip: an explicit choice here. The mesh needs the
+    facet sets of `block_with_inclusion`.
+    """
+    held = (0,) if contact == "slip" else (0, 1, 2)
+    supports = [Support("probe_plate", held), Support("bottom", (1,))]
+    if contact == "bonded":
+        supports.append(Support("stage_plate", (1, 2)))
+    middle = float(mesh.nodes[:, 2].max()) / 2
+    return Scene(
+        mesh,
+        material,
+        tuple(supports),
+        (Pin((0.0, 0.0, middle), (2,)),),
+        (Drive("stage", "stage_plate", (-1.0, 0.0, 0.0)),),
+        (Cavity("inclusion", "cavity"),),
+        dilatation,
+    )

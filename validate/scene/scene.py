@@ -1,0 +1,95 @@
+"""The scene: a mesh, what it is made of, how it is held and driven, and the fluid in it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from validate.errors import SceneError
+from validate.scene.mesh import Mesh
+
+Dilatation = Literal["pointwise", "nodal_mean"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elasticity: E Pa, nu -."""
+
+    E: float
+    nu: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.E) and self.E > 0):
+            raise SceneError(f"modulus E = {self.E:g} Pa: it must be positive")
+        if not -1 < self.nu < 0.5:
+            raise SceneError(
+                f"Poisson ratio nu = {self.nu:g}: displacement elements need -1 < nu < 0.5 "
+                "(1/(1 - 2 nu) is infinite at 0.5); use at most 0.4999"
+            )
+
+    @property
+    def shear_modulus(self) -> float:
+        """mu Pa."""
+        return self.E / (2 * (1 + self.nu))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """kappa Pa."""
+        return self.E / (3 * (1 - 2 * self.nu))
+
+
+@dataclass(frozen=True)
+class Support:
+    """Displacement components held at zero on a facet set."""
+
+    facets: str
+    components: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Pin:
+    """One node, the nearest to `point` m, held in some components."""
+
+    point: tuple[float, ...]
+    components: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A facet set moved along `direction` (d,), a unit vector along an axis, by a named input in m.
+
+    The reported force is that on the plate against the motion: compression positive.
+    """
+
+    name: str
+    facets: str
+    direction: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Cavity:
+    """A closed facet set filled with fluid at one gauge pressure Pa."""
+
+    name: str
+    facets: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is simulated. Parts that are absent cost nothing."""
+
+    mesh: Mesh
+    material: Material
+    supports: tuple[Support, ...] = ()
+    pins: tuple[Pin, ...] = ()
+    drives: tuple[Drive, ...] = ()
+    cavities: tuple[Cavity, ...] = ()
+    dilatation: Dilatation = "pointwise"
+
+    def __post_init__(self) -> None:
+        if self.dilatation == "nodal_mean" and self.mesh.order != 1:
+            raise SceneError("nodal mean dilatation is for linear elements; use order 1")
+        named = [s.facets for s in self.supports]
+        named += [d.facets for d in self.drives] + [c.facets for c in self.cavities]
+        for facets in named:
+            self.mesh.facet_nodes(facets)

@@ -1,0 +1,1 @@
+"""Schemes: settings, preparation and step apart; `march` walks the steps."""

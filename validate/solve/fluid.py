@@ -1,0 +1,176 @@
+"""The pressure of an incompressible fluid in linear elastic cavities, three ways.
+
+All work on the response columns: u = sum_a z_a u_a with z = (drives, pressures), so a cavity's
+volume is a cubic polynomial in z (fixed normals: exact, not a series) and needs no facets.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.system import Responses
+from validate.solve.types import Ending, Scheme, State, Stepper
+
+_NEWTON_STEPS = 30
+_ROUNDING = 4e-15  # relative volume error that rounding alone leaves
+
+
+@dataclass(frozen=True)
+class NoFluid:
+    """The cavity is empty: gauge pressure zero, its volume changes freely."""
+
+    def prepare(self, responses: Responses) -> Stepper:
+        return DryStepper(responses, _kept(responses))
+
+
+@dataclass(frozen=True)
+class ExactPressure:
+    """The root of the volume polynomial: V(drives, P) = volume_ratio V0, by Newton.
+
+    Departures from paper 000: eq 10 is replaced by the root it tends to; no tolerance, no gain.
+    """
+
+    volume_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.volume_ratio > 0:
+            raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
+
+    def prepare(self, responses: Responses) -> Stepper:
+        return ExactStepper(responses, _kept(responses), self.volume_ratio)
+
+
+@dataclass(frozen=True)
+class PressureLoop:
+    """The paper's proportional law, P <- P + Kp (1 - V/V0) until |1 - V/V0| <= tolerance.
+
+    Source: paper 000, eqs 9 and 10, section 5.2. `gain` Pa; None tunes it as section 3.3 does.
+    `warm_start` begins each step at the last pressure, as the haptic loop does.
+    """
+
+    gain: float | None = None
+    tolerance: float = 0.01
+    max_updates: int = 100
+    warm_start: bool = True
+
+    def prepare(self, responses: Responses) -> Stepper:
+        cavities = range(len(responses.volumes))
+        gains = [tuned_gain(responses, i) if self.gain is None else self.gain for i in cavities]
+        return LoopStepper(responses, _kept(responses), np.array(gains), self)
+
+
+def tuned_gain(responses: Responses, cavity: int = 0) -> float:
+    """Kp Pa: least-squares slope of P over V/V0, 61 points uniform in V/V0 from 0.7 to 1.3."""
+    ratios = np.linspace(0.7, 1.3, 61)
+    pressures = pressure_at_volume(responses, ratios, cavity)
+    return float(np.polyfit(ratios, pressures, 1)[0])
+
+
+def pressure_at_volume(responses: Responses, ratios: Floats, cavity: int = 0) -> Floats:
+    """P (k,) Pa that gives V/V0 = ratios (k,) with drives and other cavities at zero (Fig. 4a).
+
+    Raises `SceneError` when no pressure does: a ratio of zero or less, or below the smallest.
+    """
+    form = responses.volumes[cavity]
+    p = responses.drives + 1 + cavity
+    cubic = np.array([form[p, p, p], 3 * form[0, p, p], 3 * form[0, 0, p], form[0, 0, 0]])
+    return np.array([_cubic_root(cubic, float(ratio)) for ratio in ratios])
+
+
+def _cubic_root(cubic: Floats, ratio: float) -> float:
+    """The root nearest to zero on the branch where volume grows with pressure."""
+    shifted = cubic.copy()
+    shifted[3] -= ratio * cubic[3]
+    roots = np.roots(shifted)
+    real = roots.real[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))]
+    rising = real[np.polyval(np.polyder(cubic), real) > 0]
+    if ratio <= 0 or len(rising) == 0:
+        raise SceneError(f"no pressure gives V/V0 = {ratio:g}; ask for a ratio nearer to 1")
+    return float(rising[np.argmin(np.abs(rising))])
+
+
+@dataclass(frozen=True)
+class _Base:
+    responses: Responses
+    kept: Floats  # (s, d, m): response columns at the cavity and plate nodes
+
+    def rest(self) -> State:
+        zeros = np.zeros(self.kept.shape[2])
+        k = self.responses.drives
+        return State(zeros[:k], zeros[k:], 0, np.zeros(self.kept.shape[:2]))
+
+    def _state(
+        self, inputs: Floats, updates: int, failure: tuple[Ending, str] | None = None
+    ) -> State:
+        k = self.responses.drives
+        return State(inputs[:k], inputs[k:], updates, self.kept @ inputs, failure)
+
+
+@dataclass(frozen=True)
+class DryStepper(_Base):
+    def step(self, state: State, drives: Floats) -> State:
+        return self._state(np.concatenate([drives, np.zeros_like(state.pressures)]), 0)
+
+
+@dataclass(frozen=True)
+class ExactStepper(_Base):
+    volume_ratio: float
+
+    def step(self, state: State, drives: Floats) -> State:
+        forms, k = self.responses.volumes, self.responses.drives
+        target = self.volume_ratio * self.responses.rest_volumes
+        z = np.concatenate([[1.0], drives, state.pressures])
+        for updates in range(_NEWTON_STEPS):
+            slopes = forms @ z @ z
+            error = slopes @ z - target
+            if np.abs(error / target).max(initial=0.0) <= _ROUNDING:
+                return self._state(z[1:], updates)
+            step = np.linalg.solve(3 * slopes[:, k + 1 :], error)
+            z[k + 1 :] -= step
+            if np.abs(step).max() <= 1e-14 * np.abs(z[k + 1 :]).max():
+                return self._state(z[1:], updates + 1)
+        worst = float(np.abs(error / target).max())
+        why = f"no pressure keeps the volume: error {worst:.2%} after {_NEWTON_STEPS} Newton steps"
+        return self._state(z[1:], _NEWTON_STEPS, ("not_converged", why))
+
+
+@dataclass(frozen=True)
+class LoopStepper(_Base):
+    gains: Floats
+    settings: PressureLoop
+
+    def step(self, state: State, drives: Floats) -> State:
+        k, V0 = self.responses.drives, self.responses.rest_volumes
+        start = state.pressures if self.settings.warm_start else np.zeros_like(state.pressures)
+        z = np.concatenate([[1.0], drives, start])
+        last = np.inf
+        for updates in range(self.settings.max_updates + 1):
+            error = 1 - (self.responses.volumes @ z @ z @ z) / V0
+            worst = float(np.abs(error).max(initial=0.0))
+            if worst <= self.settings.tolerance or last <= worst <= _ROUNDING:
+                return self._state(z[1:], updates)
+            if not worst < 1e3:
+                why = f"volume error {worst:.1e} after {updates} updates, gain too large"
+                return self._state(state.inputs, updates, ("diverged", why))
+            z[k + 1 :] += self.gains * error
+            last = worst
+        why = (
+            f"volume error {worst:.2%} after {self.settings.max_updates} updates, tolerance "
+            f"{self.settings.tolerance:.2%}, gain {self.gains.tolist()} Pa"
+        )
+        return self._state(z[1:], self.settings.max_updates, ("not_converged", why))
+
+
+def _kept(responses: Responses) -> Floats:
+    """Columns at the nodes of the cavities and driven plates: the condensed model."""
+    scene = responses.scene
+    sets = [c.facets for c in scene.cavities] + [d.facets for d in scene.drives]
+    if not sets:
+        raise SceneError("scene without drive and cavity: nothing moves")
+    nodes = np.unique(np.concatenate([scene.mesh.facet_nodes(name) for name in sets]))
+    return np.ascontiguousarray(responses.fields[:, nodes].transpose(1, 2, 0))
+
+
+SCHEMES: tuple[type[Scheme], ...] = (NoFluid, ExactPressure, PressureLoop)

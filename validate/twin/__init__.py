@@ -1,0 +1,1 @@
+"""Twins: simulated experiments recorded as if measured; scene + scheme + sensors + seed."""

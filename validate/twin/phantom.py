@@ -1,0 +1,127 @@
+"""The twin of paper 000's phantom: finer quadratic elements, exact volume, slipping plates.
+
+Gosline, Salcudean, Yan (2004), section 4. The image plane is horizontal through the inclusion's
+middle, image x is the phantom's z, image y (depth) its x. Departures from the paper: the inclusion
+is off-centre, so that a mirrored image cannot pass; a pressure transducer sits in the cavity.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.fem.system import build, responses
+from validate.parameters import quantity
+from validate.recording.types import Recording, Source
+from validate.register.plane import cavity_sampler
+from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.mesh import quadratic
+from validate.scene.plates import between_plates
+from validate.scene.scene import Material
+from validate.solve.fluid import ExactPressure
+from validate.solve.march import march
+from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
+
+IMAGE_POSE = np.array(
+    [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0225], [1.0, 0.0, 0.0, 0.015], [0.0, 0.0, 0.0, 1.0]]
+)
+PROFILE = StageProfile((0.0, 0.003, 0.006, 0.009), speed=1e-3, hold=7.0, rate=10.0)
+PEN_TURN, PEN_SHIFT = (62.0, -17.0, 128.0), (0.412, -0.236, -1.137)
+SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers")
+
+
+@dataclass(frozen=True)
+class TwinSettings:
+    """What `validate record` makes: mesh, true inclusion, seed and the noise of every sensor."""
+
+    nodes_x: int = quantity(13, "1", "nodes along x of the twin's quadratic mesh (by vertices)")
+    nodes_y: int = quantity(15, "1", "nodes along y")
+    nodes_z: int = quantity(23, "1", "nodes along z")
+    centre_x: float = quantity(0.0284, "m", "true centre of the inclusion")
+    centre_y: float = quantity(0.0225, "m", "true centre of the inclusion")
+    centre_z: float = quantity(0.0356, "m", "true centre of the inclusion")
+    radius: float = quantity(0.0085, "m", "true radius")
+    length: float = quantity(0.028, "m", "true length")
+    seed: int = quantity(20040327, "1", "seed of every sensor's noise")
+    sd_outline: float = quantity(0.15e-3, "m", "noise of the outline along its normal")
+    sd_tip: float = quantity(0.2e-3, "m", "pen tip, per axis")
+    sd_hand: float = quantity(0.577e-3, "m", "placing by hand, per axis (1 mm rms)")
+    sd_force: float = quantity(0.02, "N", "load cell noise")
+    sd_pressure: float = quantity(10.0, "Pa", "pressure transducer noise")
+    sd_stage: float = quantity(2e-6, "m", "stage encoder noise")
+
+
+def record_phantom(
+    twin: TwinSettings, size: Block, material: Material, progress: Callable[[str], None]
+) -> Recording:
+    """The twin's recording: seeded, the same on every machine to 1e-9."""
+    capsule = Capsule((twin.centre_x, twin.centre_y, twin.centre_z), twin.radius, twin.length)
+    progress("mesh")
+    grid = (twin.nodes_x, twin.nodes_y, twin.nodes_z)
+    mesh = quadratic(block_with_inclusion(size, grid, capsule))
+    scene = between_plates(mesh, material, "slip")
+    progress(f"factorise {mesh.nodes.size} unknowns")
+    stepper = ExactPressure().prepare(responses(build(scene)))
+    t, stage, middles = PROFILE.positions()
+    at = np.searchsorted(t, middles)
+    run = march("twin", stepper, t, stage[:, None], at, 0.0)
+    progress("measure")
+    rng = streams(twin.seed, SENSORS)
+    layout = marker_layout(size, rng["layout"])
+    pen = Pen(twin.sd_tip, twin.sd_hand, PEN_TURN, PEN_SHIFT)
+    outline = OutlineSensor(IMAGE_POSE, points=72, sd=twin.sd_outline)
+    wall = cavity_sampler(mesh, "cavity", capsule)
+    force, pressure = (run.traces[n].y for n in ("stage.force", "inclusion.pressure"))
+    return Recording(
+        "fluid_phantom",
+        Source("fluid_phantom", "", 0, "made in memory"),
+        1_080_345_600_000_000_000,
+        markers={"markers": pen.measure(middles, run.u, mesh, layout, rng["markers"])},
+        signals={
+            "stage": signal(t, stage, "m", twin.sd_stage, "phantom", rng["stage"]),
+            "load_cell": signal(t, force, "N", twin.sd_force, "phantom", rng["load_cell"]),
+            "pressure": signal(t, pressure, "Pa", twin.sd_pressure, "phantom", rng["pressure"]),
+        },
+        contours={"outline": outline.measure(middles, run.u, wall, rng["outline"])},
+        metadata={
+            "inclusion": _declared(capsule),
+            "marker_layout": {k: " ".join(repr(float(c)) for c in v) for k, v in layout.items()},
+            "pen": {"up": " ".join(repr(float(c)) for c in pen.direction((0.0, 1.0, 0.0)))},
+            "provenance": _provenance(twin, material, mesh.nodes.size),
+        },
+    )
+
+
+def marker_layout(size: Block, rng: np.random.Generator) -> dict[str, Floats]:
+    """42 markers drawn by hand on the top face: 7 x 6, each 0.8 mm off the regular grid."""
+    x, z = np.linspace(0.006, size.size_x - 0.006, 7), np.linspace(0.008, size.size_z - 0.008, 6)
+    places = np.array([(a, size.size_y, b) for a in x for b in z])
+    places[:, [0, 2]] += 0.8e-3 * rng.standard_normal((len(places), 2))
+    return {f"m{i + 1:02d}": place for i, place in enumerate(np.round(places, 5))}
+
+
+def _declared(capsule: Capsule) -> dict[str, str]:
+    x, y, z = capsule.centre
+    return {
+        "centre_x_m": repr(x),
+        "centre_y_m": repr(y),
+        "centre_z_m": repr(z),
+        "radius_m": repr(capsule.radius),
+        "length_m": repr(capsule.length),
+        "sd_centre_m": "0.0002",
+        "source": "parallel images at 2 mm steps, hand segmented (declared)",
+    }
+
+
+def _provenance(twin: TwinSettings, material: Material, unknowns: int) -> dict[str, str]:
+    return {
+        "kind": "twin",
+        "law": "linear elasticity, small strain",
+        "element": f"P2 tetrahedra, {unknowns} unknowns",
+        "plates": "slip",
+        "fluid": "constant volume, exact",
+        "E_Pa": repr(material.E),
+        "nu": repr(material.nu),
+        "seed": str(twin.seed),
+    }
