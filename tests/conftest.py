@@ -5,6 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from validate.compare.result import Result
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.road import Options, compare
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -21,3 +26,14 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real data absent: {folder} (set VALIDATE_SHARED_DATA)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def phantom(project_root: Path) -> Experiment:
+    return load_file(project_root / "experiments" / "fluid_phantom.py")
+
+
+@pytest.fixture(scope="session")
+def phantom_result(phantom: Experiment) -> Result:
+    """The whole fluid phantom, all methods, as `validate run fluid_phantom` compares it."""
+    return compare(phantom, Options({}))

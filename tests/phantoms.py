@@ -56,6 +56,46 @@ def phantom_responses(
     dilatation: Dilatation = "pointwise",
 ) -> Responses:
     mesh = phantom_mesh(grid, order)
-    return responses(
-        build(phantom_scene(mesh, E=E, nu=nu, bonded=bonded, dilatation=dilatation))
+    return responses(build(phantom_scene(mesh, E=E, nu=nu, bonded=bonded, dilatation=dilatation)))
+
+
+def grid_mesh(
+    shape: tuple[int, int, int],
+    sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    holes: tuple[tuple[slice, slice, slice], ...] = (),
+    kind: Kind = "tet4",
+) -> Mesh:
+    """A Kuhn grid of `shape` nodes with boxes of cells removed: sets "x0".."z1", "hole0", ..."""
+    lines = [np.linspace(0, size, n) for n, size in zip(shape, sizes, strict=True)]
+    nodes = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+    boxes = np.full(np.array(shape) - 1, -1)
+    for number, hole in enumerate(holes):
+        boxes[hole] = number
+    kept = np.tile(boxes.ravel() < 0, 6)
+    cells = kuhn_cells(shape)
+    facets = _grid_facets(cells, np.tile(boxes.ravel(), 6), nodes, np.array(sizes))
+    used, number_of = np.unique(cells[kept], return_inverse=True)
+    local = np.full(len(nodes), -1)
+    local[used] = np.arange(len(used))
+    mesh = Mesh(
+        nodes[used],
+        number_of.reshape(-1, 4),
+        "tet4",
+        {name: local[f] for name, f in facets.items()},
     )
+    return quadratic(mesh) if kind == "tet10" else mesh
+
+
+def _grid_facets(
+    cells: np.ndarray, box: np.ndarray, nodes: Floats, sizes: Floats
+) -> dict[str, np.ndarray]:
+    outside = boundary_facets(cells, 3)
+    facets = {}
+    for axis, letter in enumerate("xyz"):
+        for end in (0, 1):
+            on = np.abs(nodes[outside, axis] - end * sizes[axis]).max(axis=1) < 1e-12 * sizes[axis]
+            facets[f"{letter}{end}"] = outside[on]
+    for number in range(int(box.max()) + 1):
+        # The hole's own boundary, seen from the solid: its orientation turned round.
+        facets[f"hole{number}"] = boundary_facets(cells[box == number], 3)[:, [0, 2, 1]]
+    return facets

@@ -70,6 +70,22 @@ def test_the_cell_offset_is_removed_and_reported(offset: float) -> None:
     assert fit.offset == pytest.approx(offset, rel=1e-9)
 
 
+def test_a_toe_is_where_the_fitted_line_reaches_zero_force() -> None:
+    d, force = linear()
+    assert fit_modulus(log(d, force)).toe == pytest.approx(0.0, abs=1e-9)
+    soft = 0.0002  # m of seating with a third of the stiffness, then the full one
+    k = E * DISC.area / DISC.height
+    seated = np.where(d < soft, k / 3 * d, k * (d - soft) + k / 3 * soft)
+    fit = fit_modulus(log(d, seated), window=(0.01, 0.05))
+    assert fit.toe * DISC.height == pytest.approx(2 / 3 * soft, rel=0.1)
+
+
+def test_a_force_that_falls_is_refused() -> None:
+    d, force = linear()
+    with pytest.raises(RecordingError, match="force falls with strain"):
+        fit_modulus(log(d, -force))
+
+
 def test_an_approach_before_contact_is_found() -> None:
     slack = 40.5 * SPEED * 0.1
     fit = fit_modulus(log(*linear(slack=slack, offset=0.3)))
@@ -147,7 +163,7 @@ def test_noise_of_a_known_series() -> None:
 
 
 def some_fit(modulus: float) -> ModulusFit:
-    return ModulusFit("x", modulus, 2.0, 0.0, 0.0, 0.01, (0.005, 0.05), 81, 0.02, 1.0)
+    return ModulusFit("x", modulus, 2.0, 0.0, 0.0, 0.0, 0.01, (0.005, 0.05), 81, 0.02, 1.0)
 
 
 def test_summary_of_three_by_hand() -> None:

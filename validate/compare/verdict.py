@@ -30,10 +30,9 @@ SAFETY = 3.0 / 2
 
 @dataclass(frozen=True)
 class Accept:
-    """A quantity the accepted methods must predict, to within `limit` (SI); where that is from."""
+    """A quantity the accepted methods must predict at every load, to within `limit` (SI)."""
 
     quantity: str
-    loads: tuple[str, ...]
     limit: float
     source: str
 
@@ -109,6 +108,25 @@ def judge(
     )
 
 
+def printed(
+    name: str,
+    ours: float,
+    theirs: float,
+    unit: str,
+    source: str,
+    *,
+    tolerance: float | None,
+    reason: str,
+    otherwise: PublishedVerdict = "not comparable",
+) -> Published:
+    """A printed figure: with a tolerance it is reproduced or not, without one `otherwise`."""
+    if tolerance is None:
+        verdict = otherwise
+    else:
+        verdict = "reproduced" if abs(ours - theirs) <= tolerance else "not reproduced"
+    return Published(name, ours, theirs, tolerance, unit, verdict, reason, source)
+
+
 def error_and_noise(residual: Residual) -> tuple[float, float]:
     """E and u_D of a residual; see the module's head for E of many points."""
     k, c = residual.values.shape
@@ -129,6 +147,8 @@ def _verdict(E: float, u_val: float, limit: float, parts: dict[str, float]) -> t
             f"2 u_val = {2 * u_val:.3g} exceeds the limit {limit:.3g}; a better measurement of "
             f"'{largest}' would decide"
         )
+    if u_val == 0:
+        return "agrees", "the error is exactly zero, and so is u_val"
     return "agrees", f"|E| is {abs(E) / u_val:.1f} u_val; largest part: {largest}"
 
 

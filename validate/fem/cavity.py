@@ -40,13 +40,17 @@ class CavitySurface:
 
 
 def cavity_surface(mesh: Mesh, name: str, facets: str) -> CavitySurface:
-    """The named facet set as a cavity; raises `SceneError` when it is open or inside out."""
+    """The named facet set as a cavity; raises `SceneError` when open, flipped or inside out."""
     surface = CavitySurface(name, mesh.facets[facets], mesh.facet_nodes(facets))
     corners = surface.facets[:, :3]
-    edges = np.sort(corners[:, list(EDGES[2])].reshape(-1, 2), axis=1)
-    _, uses = np.unique(edges, axis=0, return_counts=True)
+    edges = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     if (uses != 2).any():
         raise SceneError(f"cavity '{name}' is open: {int((uses != 2).sum())} edges without partner")
+    _, same_way = np.unique(edges, axis=0, return_counts=True)
+    if (same_way != 1).any():
+        count = int((same_way != 1).sum())
+        raise SceneError(f"cavity '{name}': at {count} edges two facets face opposite ways")
     volume = volume_of(surface, mesh.nodes)
     if volume <= 0:
         raise SceneError(f"cavity '{name}' is inside out: volume {1e9 * volume:.4g} mm3")

@@ -85,7 +85,8 @@ def responses(system: System) -> Responses:
     columns += [_loaded_field(system, factor, load) for load in loads]
     fields = np.array(columns).reshape(-1, *mesh.nodes.shape)
     shapes = np.concatenate([mesh.nodes[None], fields])
-    volumes = np.array([volume_form(c, shapes) for c in system.cavities])
+    forms = [volume_form(c, shapes) for c in system.cavities]
+    volumes = np.array(forms).reshape(-1, *(3 * [len(shapes)]))  # also without cavities
     return Responses(system.scene, fields, _reactions(system, columns, loads), volumes)
 
 
@@ -107,7 +108,8 @@ def _reactions(system: System, columns: list[Floats], loads: list[Floats]) -> Fl
     residuals = [system.K @ u for u in columns]
     for i, load in enumerate(loads):
         residuals[drives + i] = residuals[drives + i] - load
-    return np.array([[float(move @ r) for r in residuals] for move in system.moves.T])
+    copies = system.scene.copies
+    return np.array([[copies * float(move @ r) for r in residuals] for move in system.moves.T])
 
 
 def _driven(scene: Scene, drive: Drive) -> Ints:

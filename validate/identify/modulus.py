@@ -62,6 +62,7 @@ class ModulusFit:
     sd: float  # Pa
     offset: float  # N, force of the unloaded cell
     contact: float  # m, displacement at which the plate meets the cylinder
+    toe: float  # strain from contact at which the fitted line reaches the unloaded force
     noise: float  # N, sd of the load cell's noise
     window: tuple[float, float]  # strain
     count: int  # samples in the window
@@ -276,6 +277,11 @@ def _fit(
     if spread == 0:
         raise RecordingError(f"{name}: {len(strain)} samples at one strain {strain[0]:.6f}")
     slope = float(e @ force) / spread
+    if slope <= 0:
+        raise RecordingError(
+            f"{name}: force falls with strain ({slope:.3g} N per unit strain) in the window "
+            f"{window}; check sign and columns"
+        )
     rest = force - force.mean() - slope * e
     left, whole = float(rest @ rest), float(np.sum((force - force.mean()) ** 2))
     return ModulusFit(
@@ -284,6 +290,7 @@ def _fit(
         sd=math.sqrt(left / (len(e) - 2) / spread) / area,
         offset=offset,
         contact=contact,
+        toe=float(strain.mean() - (force.mean() - offset) / slope),
         noise=load_noise(force),
         window=window,
         count=len(e),

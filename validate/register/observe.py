@@ -4,7 +4,9 @@ Departure from the design's single Observation type: markers, outlines and signa
 differently, so each is its own small type; `Registered` holds them together.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -83,13 +85,20 @@ class Hold:
 
 @dataclass(frozen=True)
 class Registered:
-    """All observations of a recording in the scene's frame, and the drive that was measured."""
+    """All observations of a recording in the scene's frame, and the drive that was measured.
+
+    `windows` are ranges (from, to] m of the stage by label, for curves without holds.
+    """
 
     stage: Signal
     holds: tuple[Hold, ...]
     markers: MarkerObservation | None
     outline: OutlineObservation | None
     signals: tuple[SignalObservation, ...]
+    windows: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "windows", MappingProxyType(dict(self.windows)))
 
     def steps_at_holds(self) -> Ints:
         """Indices (h,) into the stage's samples at the holds."""

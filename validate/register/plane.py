@@ -89,9 +89,9 @@ def section(points: Floats, triangles: Ints, pose: Floats) -> Floats:
 
 def _segments(local: Floats, crossed: Ints) -> shapely.MultiLineString:
     pairs = np.sort(crossed[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
-    start, end = local[pairs[..., 0]], local[pairs[..., 1]]
-    cut = (start[..., 2] >= 0) != (end[..., 2] >= 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = start[..., 2] / (start[..., 2] - end[..., 2])
-    places = start[..., :2] + s[..., None] * (end - start)[..., :2]
-    return shapely.multilinestrings(shapely.linestrings(places[cut].reshape(-1, 2, 2)))
+    above = local[:, 2] >= 0
+    cut = pairs[above[pairs[..., 0]] != above[pairs[..., 1]]]  # two edges of every triangle
+    start, end = local[cut[:, 0]], local[cut[:, 1]]
+    s = start[:, 2] / (start[:, 2] - end[:, 2])
+    places = start[:, :2] + s[:, None] * (end - start)[:, :2]
+    return shapely.multilinestrings(shapely.linestrings(places.reshape(-1, 2, 2)))

@@ -71,6 +71,7 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     results = tuple(_method(road, name, options.quick) for name in methods)
     first = road.solved(Variant(next(iter(methods))))
     values = {m.name: {s.name: s.value for s in m.scores} for m in results}
+    values["identified"] = {s.name: s.value for s in (identified.scores if identified else ())}
     printed = experiment.published(values) if experiment.published and not options.quick else ()
     effects = _effects(road, results, _shown(experiment, methods, options.quick))
     return Result(
@@ -201,19 +202,17 @@ def _checks(road: _Road, name: str, solved: Solved) -> tuple[Check, ...]:
     inputs = _sensitivities(road)
     found = []
     for accept in road.experiment.accept:
-        for load in accept.loads:
-            key = f"{accept.quantity}@{load}"
-            found.append(
-                judge(
-                    solved.residuals[key],
-                    accept.limit,
-                    finer.get(key),
-                    uncertainty.refinement(road.parameters),
-                    inputs.get(key, []),
-                )
-                if key in solved.residuals
-                else _nothing(key, accept.limit, solved.runs)
+        keys = [k for k, r in solved.residuals.items() if r.quantity == accept.quantity]
+        found += [
+            judge(
+                solved.residuals[key],
+                accept.limit,
+                finer.get(key),
+                uncertainty.refinement(road.parameters),
+                inputs.get(key, []),
             )
+            for key in keys
+        ] or [_nothing(accept.quantity, accept.limit, solved.runs)]
     return tuple(found)
 
 

@@ -77,6 +77,7 @@ def block_with_inclusion(block: Block, grid: tuple[int, int, int], capsule: Caps
     if min(grid) < 4:
         raise SceneError(f"mesh of {grid} nodes: at least 4 along each side are needed")
     _require_inside(block, capsule)
+    _require_resolved(block, grid, capsule)
     nodes = _graded_grid(block, grid, capsule)
     cells = kuhn_cells(grid)
     removed = (capsule.distance(nodes)[cells] < -1e-9).any(axis=1)
@@ -103,6 +104,16 @@ def _require_inside(block: Block, capsule: Capsule) -> None:
         raise SceneError(
             f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
             f"{faces[int(gaps.argmin())]} of the block; move or shrink it"
+        )
+
+
+def _require_resolved(block: Block, grid: tuple[int, int, int], capsule: Capsule) -> None:
+    centre = np.array(capsule.centre)
+    h = float((np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1))[[0, 2]].max())
+    if 2 * capsule.radius < h:
+        raise SceneError(
+            f"the inclusion's diameter {2e3 * capsule.radius:.3g} mm is smaller than an element of "
+            f"{1e3 * h:.3g} mm; refine the mesh"
         )
 
 

@@ -76,7 +76,11 @@ class Cavity:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is simulated. Parts that are absent cost nothing."""
+    """What is simulated. Parts that are absent cost nothing.
+
+    `copies`: planes of symmetry leave this many equal parts, of which the mesh is one; the force
+    of a drive is that on the whole body.
+    """
 
     mesh: Mesh
     material: Material
@@ -85,6 +89,7 @@ class Scene:
     drives: tuple[Drive, ...] = ()
     cavities: tuple[Cavity, ...] = ()
     dilatation: Dilatation = "pointwise"
+    copies: int = 1
 
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:

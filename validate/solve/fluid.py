@@ -80,15 +80,21 @@ def pressure_at_volume(responses: Responses, ratios: Floats, cavity: int = 0) ->
 
 
 def _cubic_root(cubic: Floats, ratio: float) -> float:
-    """The root nearest to zero on the branch where volume grows with pressure."""
+    """The root on the branch through zero: no turning point of the cubic lies in between."""
     shifted = cubic.copy()
     shifted[3] -= ratio * cubic[3]
-    roots = np.roots(shifted)
-    real = roots.real[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))]
-    rising = real[np.polyval(np.polyder(cubic), real) > 0]
-    if ratio <= 0 or len(rising) == 0:
+    turns = _real_roots(np.asarray(np.polyder(cubic), dtype=np.float64))
+    roots = [
+        p for p in _real_roots(shifted) if not ((turns > min(p, 0.0)) & (turns < max(p, 0.0))).any()
+    ]
+    if ratio <= 0 or not roots:
         raise SceneError(f"no pressure gives V/V0 = {ratio:g}; ask for a ratio nearer to 1")
-    return float(rising[np.argmin(np.abs(rising))])
+    return float(min(roots, key=abs))
+
+
+def _real_roots(polynomial: Floats) -> Floats:
+    roots = np.roots(polynomial)
+    return np.asarray(roots.real[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))])
 
 
 @dataclass(frozen=True)
@@ -106,6 +112,30 @@ class _Base:
     ) -> State:
         k = self.responses.drives
         return State(inputs[:k], inputs[k:], updates, self.kept @ inputs, failure)
+
+    def _settled(self, z: Floats, updates: int) -> State:
+        """The state of a root z; a failure when it is not on the branch that begins at P = 0."""
+        if _least_slope(self.responses.volumes, z, self.responses.drives) > 0:
+            return self._state(z[1:], updates)
+        why = (
+            f"pressures {z[self.responses.drives + 1 :].tolist()} Pa are a spurious root: between "
+            "zero and there the volume falls as pressure grows; check the gain's sign and the load"
+        )
+        return self._state(z[1:], updates, ("not_converged", why))
+
+
+def _least_slope(forms: Floats, z: Floats, drives: int) -> float:
+    """The least dV_i/dP_i of any cavity on the way t P, 0 <= t <= 1: a quadratic in t, exactly."""
+    empty = z.copy()
+    empty[drives + 1 :] = 0
+    least = np.inf
+    for i, form in enumerate(forms):
+        own = form[drives + 1 + i]
+        start, middle, end = (float(y @ own @ y) for y in (empty, (empty + z) / 2, z))
+        b, c = 4 * middle - 3 * start - end, 2 * (start + end) - 4 * middle
+        t = min(max(-b / (2 * c), 0.0), 1.0) if c > 0 else 0.0
+        least = min(least, start, end, start + t * (b + t * c))
+    return least
 
 
 @dataclass(frozen=True)
@@ -126,11 +156,11 @@ class ExactStepper(_Base):
             slopes = forms @ z @ z
             error = slopes @ z - target
             if np.abs(error / target).max(initial=0.0) <= _ROUNDING:
-                return self._state(z[1:], updates)
+                return self._settled(z, updates)
             step = np.linalg.solve(3 * slopes[:, k + 1 :], error)
             z[k + 1 :] -= step
             if np.abs(step).max() <= 1e-14 * np.abs(z[k + 1 :]).max():
-                return self._state(z[1:], updates + 1)
+                return self._settled(z, updates + 1)
         worst = float(np.abs(error / target).max())
         why = f"no pressure keeps the volume: error {worst:.2%} after {_NEWTON_STEPS} Newton steps"
         return self._state(z[1:], _NEWTON_STEPS, ("not_converged", why))
@@ -150,7 +180,7 @@ class LoopStepper(_Base):
             error = 1 - (self.responses.volumes @ z @ z @ z) / V0
             worst = float(np.abs(error).max(initial=0.0))
             if worst <= self.settings.tolerance or last <= worst <= _ROUNDING:
-                return self._state(z[1:], updates)
+                return self._settled(z, updates)
             if not worst < 1e3:
                 why = f"volume error {worst:.1e} after {updates} updates, gain too large"
                 return self._state(state.inputs, updates, ("diverged", why))

@@ -1,0 +1,307 @@
+"""Ecoflex 00-30 cylinders compressed on an Instron: real logs made by others.
+
+Five logs of one specimen, 50 mm x 30 mm, 10 mm/min, from the public data set
+abubakardawood/tissue-phantom-material-database (Dawood et al. 2026, CC BY 4.0). Whether the plates
+slipped was not recorded, so linear FEM brackets it: slipping plates take the apparent modulus as
+the material's, bonded ones divide it by the stiffening that the same mesh shows.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from validate.compare.curve import curve_residuals
+from validate.compare.score import Score
+from validate.compare.verdict import Accept, Published, printed
+from validate.errors import RecordingError
+from validate.fem.system import build as build_system
+from validate.fem.system import responses
+from validate.identify.modulus import (
+    Cylinder,
+    ModulusSummary,
+    apparent_to_material,
+    cylinder_of,
+    fit_modulus,
+    gent_correction,
+    identify_modulus,
+)
+from validate.parameters import quantity
+from validate.recording.instron import read_instron
+from validate.recording.types import Recording, Signal
+from validate.register.observe import Hold, Registered, SignalObservation
+from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+from validate.scene.cylinder import quarter_cylinder
+from validate.scene.mesh import quadratic
+from validate.scene.plates import Contact
+from validate.scene.scene import Drive, Material, Scene, Support
+from validate.solve.fluid import NoFluid
+from validate.solve.types import Scheme
+
+DATA_SET = "abubakardawood/tissue-phantom-material-database (CC BY 4.0)"
+FOLDER = "force/ecoflex-compression"
+
+
+@dataclass(frozen=True)
+class MaterialCard:
+    E_slip: float | None = quantity(None, "Pa", "modulus if plates slip; none: identified")
+    E_bonded: float | None = quantity(None, "Pa", "modulus if plates hold; none: identified")
+    nu: float = quantity(0.4995, "1", "Poisson ratio, nearly incompressible silicone")
+
+
+@dataclass(frozen=True)
+class Specimen:
+    diameter: float | None = quantity(None, "m", "diameter; none: from the logs' header")
+    height: float | None = quantity(None, "m", "height; none: from the logs' header")
+
+
+@dataclass(frozen=True)
+class Grid:
+    radial: int = quantity(6, "1", "quadratic elements from axis to rim")
+    axial: int = quantity(7, "1", "quadratic elements along the axis")
+    finer_radial: int = quantity(8, "1", "the second mesh, for u_num")
+    finer_axial: int = quantity(10, "1", "the second mesh, for u_num")
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Standard uncertainties of the inputs, declared before the comparison."""
+
+    specimen: float = quantity(0.043, "1", "relative scatter of E between specimens (4.5 of 104)")
+    nu: float = quantity(0.0004, "1", "of the Poisson ratio")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    material: MaterialCard = MaterialCard()
+    specimen: Specimen = Specimen()
+    mesh: Grid = Grid()
+    ranges: Ranges = Ranges()
+    fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
+    fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
+    strain_limit: float = quantity(0.10, "1", "strain to which the linear law is shown")
+    data: str | None = quantity(None, "1", "folder of the logs; none: VALIDATE_SHARED_DATA")
+    logs: str = quantity("EF30_0T_A*.csv", "1", "file name pattern of the logs")
+
+
+@dataclass(frozen=True)
+class Method:
+    label: str = quantity("", "1", "what reports call it")
+    plates: Contact = quantity("slip", "1", "contact of both plates")
+    modulus: Literal["slip", "bonded"] = quantity("slip", "1", "modulus identified for")
+
+
+METHODS: Mapping[str, Method] = {
+    "slip": Method("linear, slipping plates"),
+    "bonded": Method("linear, bonded plates", "bonded", "bonded"),
+    "bonded_upper": Method("linear, bonded plates, modulus of slipping ones", "bonded", "slip"),
+    "slip_lower": Method("linear, slipping plates, modulus of bonded ones", "slip", "bonded"),
+}
+
+
+def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
+    where = _data_folder(parameters, folder)
+    files = sorted(where.glob(parameters.logs))
+    if not files:
+        raise RecordingError(
+            f"no logs {parameters.logs} in {where}: get {DATA_SET} and pass --set data=FOLDER or "
+            "set VALIDATE_SHARED_DATA to the folder above force/"
+        )
+    return tuple(read_instron(f) for f in files)
+
+
+def _data_folder(parameters: Parameters, folder: Path) -> Path:
+    if parameters.data:
+        return Path(parameters.data)
+    shared = os.environ.get("VALIDATE_SHARED_DATA")
+    return (Path(shared) if shared else folder.parents[1] / "shared" / "data") / FOLDER
+
+
+def build(recording: Recording, parameters: Parameters, method: Method) -> Scene:
+    p = parameters
+    E = p.material.E_slip if method.modulus == "slip" else p.material.E_bonded
+    if E is None:
+        raise RecordingError("no modulus identified; set material.E_slip and material.E_bonded")
+    diameter, height = _size(recording, p)
+    return cylinder_scene(diameter, height, p.mesh, Material(E, p.material.nu), method.plates)
+
+
+def cylinder_scene(
+    diameter: float, height: float, grid: Grid, material: Material, contact: Contact
+) -> Scene:
+    """A quarter of the cylinder with its two planes of symmetry, the upper plate driven down."""
+    mesh = quadratic(quarter_cylinder(diameter, height, grid.radial, grid.axial))
+    held = (2,) if contact == "slip" else (0, 1, 2)
+    supports = [
+        Support("lower_plate", held),
+        Support("symmetry_x", (0,)),
+        Support("symmetry_y", (1,)),
+    ]
+    if contact == "bonded":
+        supports.append(Support("upper_plate", (0, 1)))
+    drive = Drive("stage", "upper_plate", (0.0, 0.0, -1.0))
+    return Scene(mesh, material, tuple(supports), drives=(drive,), copies=4)
+
+
+def scheme(method: Method) -> Scheme:
+    return NoFluid()
+
+
+def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
+    """Displacement less contact and toe, force less the cell's offset, to the strain limit."""
+    p = parameters
+    fit = fit_modulus(recording, window=(p.fit_from, p.fit_to))
+    _, height = _size(recording, p)
+    d, force = recording.signal("displacement", "m"), recording.signal("force", "N")
+    moved = d.y[:, 0] - fit.contact - fit.toe * height
+    last = int(np.argmax(moved > p.strain_limit * height)) or len(moved)
+    t, moved = d.t[:last], moved[:last]
+    stage = Signal(t, moved[:, None], "m", d.sd, "machine")
+    seen = SignalObservation(
+        "force", "stage.force", t, force.y[:last, 0] - fit.offset, "N", fit.noise
+    )
+    holds = (Hold("0mm", 0.0, float(t[0])), Hold("end", float(moved[-1]), float(t[-1])))
+    edges = {"5pct": (p.fit_from, p.fit_to), "10pct": (p.fit_to, p.strain_limit)}
+    windows = {label: (a * height, b * height) for label, (a, b) in edges.items()}
+    return Registered(stage, holds, None, None, (seen,), windows)
+
+
+def _size(recording: Recording, p: Parameters) -> tuple[float, float]:
+    """Diameter and height m: what the user set, else the header's."""
+    stated = cylinder_of(recording)
+    own = p.specimen
+    return (
+        stated.diameter if own.diameter is None else own.diameter,
+        stated.height if own.height is None else own.height,
+    )
+
+
+# --- identification ------------------------------------------------------------------------------
+
+
+def stiffening(diameter: float, height: float, grid: Grid, nu: float, contact: Contact) -> float:
+    """Apparent over true modulus of the meshed cylinder: E_app = F h / (A d) at E = 1 Pa."""
+    scene = cylinder_scene(diameter, height, grid, Material(1.0, nu), contact)
+    force = responses(build_system(scene)).reactions[0, 0]
+    return float(force * height / (np.pi * diameter**2 / 4))
+
+
+def identify(recordings: Sequence[Recording], parameters: Parameters) -> Identified:
+    """The modulus for which this mesh has the measured slope, slipping and bonded."""
+    p = parameters
+    window = (p.fit_from, p.fit_to)
+    diameter, height = _size(recordings[0], p)
+    found = identify_modulus(recordings, Cylinder(diameter, height), window)
+    slip, bonded = (
+        stiffening(diameter, height, p.mesh, p.material.nu, c) for c in ("slip", "bonded")
+    )
+    half = stiffening(diameter, height / 2, p.mesh, p.material.nu, "bonded")
+    material = replace(
+        p.material,
+        E_slip=p.material.E_slip or found.mean / slip,
+        E_bonded=p.material.E_bonded or found.mean / bonded,
+    )
+    scores = _scores(found, bonded, gent_correction(diameter, height))
+    return Identified(replace(p, material=material), scores, _notes(found, bonded, half, height))
+
+
+def _scores(found: ModulusSummary, bonded: float, gent: float) -> tuple[Score, ...]:
+    logs, samples = len(found.fits), sum(f.count for f in found.fits)
+    bracket = apparent_to_material(found, bonded)
+    noise = float(np.sqrt(np.mean([f.noise**2 for f in found.fits])))
+    rows = [
+        ("modulus.E", found.mean, "Pa", samples, "apparent modulus, mean over the logs"),
+        ("modulus.E.sd_repeats", found.sd_repeats or 0.0, "Pa", logs, "sd of one log's modulus"),
+        ("modulus.E.sd_mean", found.sd_mean, "Pa", logs, "sd of the mean over the logs"),
+        ("modulus.E_slip", bracket.slip, "Pa", samples, "material's, if the plates slip"),
+        ("modulus.E_bonded", bracket.bonded, "Pa", samples, "material's, if the plates hold"),
+        ("modulus.bonded_factor", bonded, "1", 1, "apparent over true modulus, bonded, this mesh"),
+        ("modulus.gent_factor", gent, "1", 1, "the same by Gent's formula"),
+        ("load_cell.noise", noise, "N", samples, "sd of the load cell's noise, from the logs"),
+    ]
+    return tuple(
+        Score(name, v, unit, n, "measured logs", words) for name, v, unit, n, words in rows
+    )
+
+
+def _notes(found: ModulusSummary, bonded: float, half: float, height: float) -> tuple[str, ...]:
+    offsets = [f.offset for f in found.fits]
+    toes = [1e3 * height * f.toe for f in found.fits]
+    return (
+        f"Whether the plates slipped was not recorded. The material's modulus lies between "
+        f"{found.mean / bonded / 1e3:.1f} kPa (bonded) and {found.mean / 1e3:.1f} kPa (slipping).",
+        f"Force alone cannot tell the two apart. A cylinder of {500 * height:.0f} mm height would: "
+        f"its apparent modulus would be {half / bonded:.2f} times this one's with bonded plates "
+        "and the same with slipping ones.",
+        f"Load cell offsets of {min(offsets):.3f}..{max(offsets):.3f} N and toes of "
+        f"{min(toes):.3f}..{max(toes):.3f} mm (seating of the plate: where the fitted line reaches "
+        "zero force) were taken off. The modulus is fitted in the window 5pct, so only 10pct is a "
+        "prediction.",
+        "The scatter of repeats on one specimen understates that between specimens; the range "
+        "declared for the modulus is the latter.",
+    )
+
+
+# --- what is judged ------------------------------------------------------------------------------
+
+
+def _scaled(p: Parameters) -> Parameters:
+    m, by = p.material, 1 + p.ranges.specimen
+    return replace(
+        p, material=replace(m, E_slip=(m.E_slip or 0.0) * by, E_bonded=(m.E_bonded or 0.0) * by)
+    )
+
+
+def _softer(p: Parameters) -> Parameters:
+    return replace(p, material=replace(p.material, nu=p.material.nu - p.ranges.nu))
+
+
+def _finer(p: Parameters) -> Parameters:
+    g = p.mesh
+    return replace(p, mesh=replace(g, radial=g.finer_radial, axial=g.finer_axial))
+
+
+def _refinement(p: Parameters) -> float:
+    return float((p.mesh.finer_radial / p.mesh.radial) ** 2 - 1)
+
+
+def _one(_: Parameters) -> float:
+    return 1.0
+
+
+INPUTS = (
+    Input("modulus", _scaled, _one, "E within its declared scatter between specimens"),
+    Input("Poisson ratio", _softer, _one, "nu within its declared uncertainty"),
+)
+
+
+def published(values: Mapping[str, Mapping[str, float]]) -> tuple[Published, ...]:
+    E = values["identified"]["modulus.E"]
+    return (
+        printed(
+            "modulus.E, 0.5-5 % strain", E, 104e3, "Pa", f"{DATA_SET}: ten repeats, two specimens",
+            tolerance=9e3, reason="within two sd (4.5 kPa) of the scatter between specimens",
+        ),
+    )  # fmt: skip
+
+
+EXPERIMENT = Experiment(
+    name="ecoflex_cylinder",
+    title="Ecoflex 00-30 cylinder compressed between plates, five logs",
+    source=f"{DATA_SET}; Dawood et al. (2026)",
+    parameters=Parameters(),
+    methods=METHODS,
+    accepted=("slip", "bonded"),
+    accept=(Accept("force", 2.5, "a tenth of the force at 10 % strain (ours)"),),
+    load=load,
+    build=build,
+    scheme=scheme,
+    place=place,
+    residuals=curve_residuals,
+    uncertainty=Uncertainty(_finer, _refinement, INPUTS, surrogate="slip"),
+    published=published,
+    identify=identify,
+)

@@ -1,0 +1,194 @@
+"""The command line from outside: exit codes, one-line errors, light help, files that appear."""
+
+import contextlib
+import io
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+from validate.cli import main as cli
+from validate.errors import ValidateError
+
+COARSE = [
+    "--set", "mesh.nodes_x=7", "--set", "mesh.nodes_y=8", "--set", "mesh.nodes_z=11",
+]  # fmt: skip
+
+
+def called(
+    *arguments: str, cwd: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "validate", *arguments],
+        capture_output=True, text=True, cwd=cwd, env={**os.environ, **environment}, timeout=200,
+    )  # fmt: skip
+
+
+def here(*arguments: str, cwd: Path | None = None, **environment: str) -> tuple[int, str, str]:
+    """Exit code, standard output and error of a command run in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(cwd or Path.cwd()),
+        mock.patch.dict(os.environ, environment),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        code = cli.run(list(arguments))
+    return code, out.getvalue(), err.getvalue()
+
+
+def refused(*arguments: str, cwd: Path | None = None, **environment: str) -> str:
+    """Runs a command that must be refused: exit 2, one line on standard error, nothing else."""
+    code, out, err = here(*arguments, cwd=cwd, **environment)
+    assert code == 2, (code, out, err)
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("validate: ")
+    return lines[0]
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["import", "--help"], []])
+def test_help_loads_none_of_the_heavy_libraries(arguments: list[str]) -> None:
+    script = (
+        "import sys; from validate.cli.main import run; code = run(sys.argv[1:]);"
+        "heavy = {'numpy','scipy','skfem','pyvista','vtk','matplotlib','mcap','pint','shapely',"
+        "'cv2','filterpy','rich','jinja2'} & set(sys.modules);"
+        "print('LOADED', sorted(heavy)); sys.exit(code)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Usage" in done.stdout
+    assert done.stdout.splitlines()[-1] == "LOADED []"
+
+
+def test_usage_errors_are_one_line_with_the_nearest_name() -> None:
+    assert "nearest: fluid_phantom" in refused("run", "fluid_phatom")
+    assert "nearest: material.E" in refused("run", "fluid_phantom", "--set", "material.EE=1")
+    assert "not a number" in refused("run", "fluid_phantom", "--set", "material.E=soft")
+    assert "PATH=VALUE" in refused("run", "fluid_phantom", "--set", "material.E")
+    assert "nearest: p2_fluid" in refused("run", "fluid_phantom", "--methods", "p2_fluit")
+    assert "one or more experiments" in refused("run")
+    assert "No such option" in refused("run", "--frobnicate")
+    assert "no experiment file" in refused("run", "nowhere.py")
+    assert "nearest: instron" in refused("import", "x.csv", "--as", "instrom", "-o", "x.mcap")
+
+
+@pytest.mark.parametrize(
+    ("setting", "says"),
+    [
+        ("material.nu=0.5", "nu = 0.5"),
+        ("material.nu=-1", "nu = -1"),
+        ("material.E=-15200", "E = -15200"),
+        ("inclusion.centre_x=0.006", "x = 0"),
+        ("inclusion.radius=0.0005", "smaller than an element"),
+        ("loads=0.004", "0 matched samples"),
+        ("recording=nowhere.mcap", "nowhere.mcap"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(tmp_path: Path, setting: str, says: str) -> None:
+    arguments = ("run", "fluid_phantom", "--methods", "p1_fluid", "--out", str(tmp_path))
+    line = refused(*arguments, "--set", setting)
+    assert says in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_without_an_accepted_method_fails_but_reports(tmp_path: Path) -> None:
+    arguments = ["run", "fluid_phantom", "--methods", "p1_fluid,p1_loop", "--out", str(tmp_path)]
+    done = called(*arguments, *COARSE, cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "Nothing was decided" in done.stdout
+    assert "fluid_phantom/report.html" in done.stdout
+    results = json.loads((tmp_path / "fluid_phantom" / "results.json").read_text("utf-8"))
+    assert [m["name"] for m in results["methods"]] == ["p1_fluid", "p1_loop"]
+
+
+def test_json_on_standard_output_is_one_document(tmp_path: Path) -> None:
+    done = called(
+        "run", "fluid_phantom", "--json", "--methods", "p1_dry", "--out", str(tmp_path), *COARSE
+    )
+    assert json.loads(done.stdout)["experiment"] == "fluid_phantom"
+    assert done.stderr == ""  # no progress bar where there is no terminal
+
+
+def test_an_experiment_file_anywhere_and_from_any_folder(
+    tmp_path: Path, project_root: Path
+) -> None:
+    source = (project_root / "experiments" / "fluid_phantom.py").read_text("utf-8")
+    mine = tmp_path / "mine.py"
+    mine.write_text(source.replace('name="fluid_phantom"', 'name="mine"'), "utf-8")
+    recording = project_root / "recordings" / "fluid_phantom.mcap"
+    done = called(
+        "run", "mine.py", "--methods", "p1_dry", "--set", f"recording={recording}", *COARSE,
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 1, done.stderr  # nothing accepted was run
+    assert (tmp_path / "reports" / "mine" / "report.html").is_file()
+    renamed = tmp_path / "other.py"
+    renamed.write_text(source, "utf-8")
+    assert "not the file's name" in refused("run", "other.py", cwd=tmp_path)
+
+
+def test_list_names_every_parameter_with_path_type_unit_and_default() -> None:
+    found = json.loads(here("list", "--json")[1])
+    assert {e["name"] for e in found} == {"ecoflex_cylinder", "fluid_phantom"}
+    detail = json.loads(here("list", "fluid_phantom", "--json")[1])
+    paths = {p["path"]: p for p in detail["parameters"]}
+    assert paths["material.E"] == {
+        "path": "material.E", "type": "float", "unit": "Pa", "default": 15200.0,
+        "doc": paths["material.E"]["doc"],
+    }  # fmt: skip
+    wanted = {"mesh.nodes_x", "mesh.order", "inclusion.radius", "methods.p1_fluid.plates", "loads"}
+    assert wanted <= set(paths)
+    assert all(p["unit"] and p["doc"] for p in paths.values())
+    assert {m["name"] for m in detail["methods"]} >= {"p1_fluid", "p2_fluid", "md_fluid"}
+    assert "material.E" in here("list", "fluid_phantom")[1]
+
+
+def test_inspect_and_import(tmp_path: Path, project_root: Path, shared_data: Path) -> None:
+    shown = here("inspect", str(project_root / "recordings" / "fluid_phantom.mcap"))[1]
+    assert all(word in shown for word in ("load_cell", "371", "Pa", "integrity: verified"))
+    log = shared_data / "force" / "ecoflex-compression" / "EF30_0T_A1.csv"
+    out = tmp_path / "a.mcap"
+    assert here("import", str(log), "--as", "instron", "-o", str(out))[0] == 0
+    topics = json.loads(here("inspect", str(out), "--json")[1])["topics"]
+    assert {(t["name"], t["count"], t["unit"]) for t in topics} == {
+        ("displacement", 1202, "m"), ("force", 1202, "N"),
+    }  # fmt: skip
+    other = tmp_path / "b.mcap"
+    assert "no table" in refused("import", str(log.parent / "README.txt"), "--as", "instron",
+                                 "-o", str(other))  # fmt: skip
+    assert "nowhere" in refused("inspect", "nowhere.mcap")
+    missing = str(tmp_path / "no" / "such" / "folder.mcap")
+    refused("import", str(log), "--as", "instron", "-o", missing)
+    assert {p.name for p in tmp_path.iterdir()} == {"a.mcap"}
+
+
+def test_a_missing_data_folder_names_the_public_data_set(tmp_path: Path) -> None:
+    line = refused("run", "ecoflex_cylinder", VALIDATE_SHARED_DATA=str(tmp_path))
+    assert "tissue-phantom-material-database" in line
+    assert "--set data=FOLDER" in line
+
+
+def test_exit_codes_of_known_errors_interrupts_and_bugs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def raising(error: BaseException) -> int:
+        def broken(*_: object, **__: object) -> None:
+            raise error
+
+        monkeypatch.setattr(cli.cli, "main", broken)
+        return cli.run(["list"])
+
+    assert raising(ValidateError("two\nlines")) == 2
+    assert capsys.readouterr().err == "validate: two lines\n"
+    assert raising(KeyboardInterrupt()) == 130
+    capsys.readouterr()
+    assert raising(ZeroDivisionError("a bug")) == 70
+    assert "Traceback" in capsys.readouterr().err

@@ -1,0 +1,69 @@
+"""Circle fits: exact recovery, honest uncertainty, outlines that are no circles."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from validate.errors import RegistrationError
+from validate.register.circle import fit_circle
+
+
+def circle(centre, radius, k, first=0.0):
+    angle = first + 2 * np.pi * np.arange(k) / k
+    return np.array(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(
+    st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(1e-3, 0.05), st.integers(6, 80),
+    st.floats(0, 6),
+)  # fmt: skip
+def test_exact_circle_is_recovered(x, y, radius, k, first):
+    found = fit_circle(circle((x, y), radius, k, first), 0.0)
+    assert found.centre == pytest.approx([x, y], abs=1e-10)
+    assert found.radius == pytest.approx(radius, abs=1e-10)
+    assert found.rms < 1e-10
+
+
+def test_half_a_circle_is_recovered():
+    found = fit_circle(circle((0.01, 0.02), 0.008, 60)[:30], 0.0)
+    assert found.centre == pytest.approx([0.01, 0.02], abs=1e-9)
+    assert found.radius == pytest.approx(0.008, abs=1e-9)
+
+
+def test_stated_sd_is_the_scatter_of_repeated_fits():
+    """400 repetitions, 48 points, 0.15 mm along the normal; sd of an sd is 1/sqrt(800) = 3.5 %."""
+    rng = np.random.default_rng(7)
+    fits = []
+    for _ in range(400):
+        points = circle((0.0, 0.0), 0.0085, 48)
+        fits.append(fit_circle(points * (1 + rng.normal(0, 0.15e-3, (48, 1)) / 0.0085), 0.15e-3))
+    centres, radii = np.array([f.centre for f in fits]), np.array([f.radius for f in fits])
+    assert centres.std(axis=0) == pytest.approx(0.15e-3 * np.sqrt(2 / 48), rel=0.12)
+    assert radii.std() == pytest.approx(0.15e-3 / np.sqrt(48), rel=0.12)
+    stated = [np.mean([f.sd_centre for f in fits]), np.mean([f.sd_radius for f in fits])]
+    assert stated == pytest.approx([centres.std(), radii.std()], rel=0.12)
+    assert radii.mean() == pytest.approx(0.0085, abs=5e-6)
+    assert np.mean([f.rms for f in fits]) == pytest.approx(0.15e-3, rel=0.05)
+
+
+def test_larger_of_stated_noise_and_misfit_counts():
+    points = circle((0, 0), 1.0, 8) * np.tile([1.1, 0.9], 4)[:, None]
+    found = fit_circle(points, 0.01)
+    assert found.radius == pytest.approx(1.0)
+    assert found.rms == pytest.approx(0.1)
+    assert found.sd_radius == pytest.approx(0.1 / np.sqrt(8))
+    assert found.sd_centre == pytest.approx(0.1 / 2)
+    assert fit_circle(points, 0.5).sd_radius == pytest.approx(0.5 / np.sqrt(8))
+
+
+def test_too_few_points_are_refused():
+    with pytest.raises(RegistrationError, match="outline of 5 points: a circle fit needs 6"):
+        fit_circle(circle((0, 0), 1.0, 5), 0.0)
+
+
+def test_outline_far_from_a_circle_is_refused():
+    stretched = circle((0, 0), 0.01, 40) * [1.0, 0.2]
+    with pytest.raises(RegistrationError, match=r"no circle: \d\.\d\d mm rms off a radius of"):
+        fit_circle(stretched, 0.0)

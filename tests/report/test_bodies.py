@@ -1,0 +1,119 @@
+"""The picture of the body: it follows the displacement, the camera does not follow the body."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_samples import small_result
+
+from validate.report import gl
+from validate.report.body import Body, body
+from validate.report.cut import cut
+
+
+def cube_body() -> Body:
+    found = body(small_result())
+    assert found is not None
+    return found
+
+
+def test_body_of_the_accepted_method() -> None:
+    found = cube_body()
+    assert found.load == "2 mm"
+    assert np.abs(found.u).max() == pytest.approx(2.0)  # mm
+    assert found.pressure is None
+    shifts = sorted(float(p.shift[0]) for p in found.plates)
+    assert shifts == pytest.approx([-2.0, 0.0])
+    assert [float(p.sizes[1]) for p in found.plates] == pytest.approx([22.4, 22.4])
+
+
+def test_plates_lie_outside() -> None:
+    centres = sorted(float(p.centre[0]) for p in cube_body().plates)
+    assert centres[0] < 0
+    assert centres[1] > 20
+
+
+def test_drawn_body_follows_the_displacement() -> None:
+    one = cube_body()
+    two = cut(replace(one, u=2 * one.u))
+    assert two.pixels.shape == cut(one).pixels.shape
+    assert (two.pixels != cut(one).pixels).any()
+
+
+def test_no_gl_by_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    assert not gl.available()
+
+
+def test_a_probe_that_dies_means_no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
+    died = subprocess.CompletedProcess([], -11)
+    monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
+    monkeypatch.setattr(subprocess, "run", lambda *_a, **_k: died)
+    gl._working_window.cache_clear()
+    assert not gl.available()
+    gl._working_window.cache_clear()
+
+
+def test_a_probe_that_hangs_means_no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
+    def hangs(*_a: object, **_k: object) -> None:
+        raise subprocess.TimeoutExpired("probe", 60)
+
+    monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
+    monkeypatch.setattr(subprocess, "run", hangs)
+    gl._working_window.cache_clear()
+    assert not gl.available()
+    gl._working_window.cache_clear()
+
+
+RENDER = """
+import sys
+from dataclasses import replace
+import numpy as np
+from report_samples import small_result
+from validate.report import gl
+if not gl.available():
+    raise SystemExit(3)
+from validate.report.body import body
+from validate.report.renders import renders
+one = body(small_result())
+for factor in (1.0, 2.0):
+    np.savez(f"{sys.argv[1]}/{factor:g}.npz",
+             **{p.name: p.pixels for p in renders(replace(one, u=factor * one.u))})
+"""
+
+
+def test_renders(tmp_path: Path, project_root: Path) -> None:
+    """In a process of its own: VTK keeps the window class of its first import."""
+    paths = os.pathsep.join([str(project_root), str(Path(__file__).parent)])
+    environment = {k: v for k, v in os.environ.items() if k != "VALIDATE_NO_GL"}
+    done = subprocess.run(
+        [sys.executable, "-c", RENDER, str(tmp_path)],
+        env={**environment, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    if done.returncode == 3:
+        pytest.skip("no OpenGL library: renders not tested")
+    assert done.returncode == 0, done.stderr
+    with np.load(tmp_path / "1.npz") as one, np.load(tmp_path / "2.npz") as two:
+        assert all(one[name].min() < 200 < one[name].max() for name in one.files)
+        assert near(one["render_rest"], two["render_rest"])
+        assert not near(one["render_deformed"], two["render_deformed"])
+        assert height(two["render_flat"]) < height(one["render_flat"]) < height(one["render_rest"])
+
+
+def near(a: np.ndarray, b: np.ndarray) -> bool:
+    """Equal to 2 grey levels on 99.5 % of the pixels."""
+    off = np.abs(a.astype(int) - b.astype(int)).max(axis=2)
+    return bool((off <= 2).mean() >= 0.995)
+
+
+def height(pixels: np.ndarray) -> int:
+    """Rows in which the body or a plate is drawn, in the middle column."""
+    return int((pixels[:, 550].min(axis=1) < 250).sum())

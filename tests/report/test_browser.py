@@ -1,0 +1,83 @@
+"""The page in a real browser, without a network: visible, whole, every picture decoded."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from html import unescape
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from report_samples import small_result
+
+from validate.report.write import write_report
+
+OPTIONS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr", "--v=0",
+)  # fmt: skip
+# Added by the test only: the shipped page has no script. What it finds ends up in the DOM.
+FINDINGS = """<script>addEventListener("load", () => {
+  const shown = id => { const box = document.getElementById(id).getBoundingClientRect();
+                        return box.width > 100 && box.height > 10; };
+  const found = {pictures: [...document.images].map(i => i.naturalWidth),
+                 verdict: shown("verdict"), title: document.querySelector("h1").innerText,
+                 overflow: document.documentElement.scrollWidth - innerWidth};
+  const pre = document.createElement("pre"); pre.id = "found";
+  pre.textContent = JSON.stringify(found); document.body.append(pre); });</script></body>"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> str:
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+    found = next((p for n in names if (p := shutil.which(n))), None)
+    if found is None:
+        assert os.environ.get("VALIDATE_REQUIRE_BROWSER") != "1", "no chromium on PATH"
+        pytest.skip("no chromium on PATH (VALIDATE_REQUIRE_BROWSER=1 makes this a failure)")
+    return found
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VALIDATE_NO_GL", "1")
+        folder = tmp_path_factory.mktemp("browser") / "cube"
+        return write_report(small_result(), folder, created="2026-11-21T04:00:00Z")
+
+
+def run(browser: str, page: Path, profile: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [browser, *OPTIONS, f"--user-data-dir={profile}", *more, page.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+
+
+def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
+    probe = tmp_path / "probe.html"
+    probe.write_text(report.read_text().replace("</body>", FINDINGS))
+    done = run(browser, probe, tmp_path / "profile", "--window-size=1280,1000", "--dump-dom")
+    match = re.search(r'<pre id="found">(.*?)</pre>', done.stdout)
+    assert match, done.stdout[-500:]
+    found = json.loads(unescape(match.group(1)))
+    assert found["title"] == "A cube <between> plates"
+    assert found["verdict"] is True
+    assert len(found["pictures"]) >= 3
+    assert all(width > 300 for width in found["pictures"])
+    assert found["overflow"] <= 0
+    assert small_result().sentence in unescape(done.stdout)
+    assert "CONSOLE" not in done.stderr
+
+
+def test_screenshot(browser: str, report: Path, tmp_path: Path) -> None:
+    shot = tmp_path / "shot.png"
+    run(browser, report, tmp_path / "profile", "--window-size=1280,900", f"--screenshot={shot}")
+    with Image.open(shot) as image:
+        colours = image.convert("RGB").getcolors(1280 * 900) or []
+    green = (226, 244, 238)  # the band of an agreeing verdict
+    assert {c: n for n, c in colours}.get(green, 0) > 20_000

@@ -1,0 +1,46 @@
+"""SI values as readers see them."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from validate.report.numbers import significant, spaced, text, with_unit
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [
+        (0.000102345, "m", "0.102 mm"),
+        (1233.4, "Pa", "1\u202f233 Pa"),
+        (-8.013, "Pa", "−8.01 Pa"),
+        (2.5e-4, "m2", "250 mm²"),
+        (0.0000466, "s", "0.0466 ms"),
+        (3.0, "1", "3"),
+        (0.0, "m", "0 mm"),
+        (0.9996, "N", "1.00 N"),
+        (5e-12, "m", "5e−9 mm"),
+        (None, "N", "– N"),
+        (math.nan, "N", "– N"),
+    ],
+)
+def test_with_unit(value: float | None, unit: str, shown: str) -> None:
+    assert with_unit(value, unit) == shown
+
+
+@given(st.floats(1e-12, 1e12), st.integers(2, 5))
+def test_never_more_digits_than_asked_and_never_wrong(value: float, digits: int) -> None:
+    shown = significant(value, digits).replace("\u202f", "").replace("−", "-")
+    assert float(shown) == pytest.approx(value, rel=0.51 * 10 ** (1 - digits))
+    if "e" not in shown and value < 10**digits:
+        assert len(shown.replace(".", "").lstrip("0")) <= digits
+
+
+def test_missing_is_a_dash() -> None:
+    assert text(math.inf) == "–"
+
+
+def test_loads_as_text() -> None:
+    assert spaced("9mm") == "9 mm"
+    assert spaced("0.5mm") == "0.5 mm"

@@ -1,0 +1,77 @@
+"""The fluid phantom through the whole road on its cheapest methods: outlines and markers drawn."""
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import pytest
+from report_samples import CHECK
+
+from validate.compare.result import Result
+from validate.replay.road import Options, compare
+from validate.report.html import SECTIONS
+from validate.report.observed import outline_seen, shown_method
+from validate.report.page import Section
+from validate.report.store import document, schema
+
+
+@pytest.fixture(scope="module")
+def result(project_root: Path) -> Result:
+    path = project_root / "experiments" / "fluid_phantom.py"
+    spec = importlib.util.spec_from_file_location("fluid_phantom", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["fluid_phantom"] = module
+    spec.loader.exec_module(module)
+    experiment = replace(module.EXPERIMENT, path=path)
+    return compare(experiment, Options({}, methods=("p1_fluid", "p1_dry")))
+
+
+@pytest.fixture(scope="module")
+def sections(result: Result) -> dict[str, Section]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VALIDATE_NO_GL", "1")
+        return {name: s for name, make in SECTIONS if (s := make(result)) is not None}
+
+
+def test_all_sections_that_apply(result: Result, sections: dict[str, Section]) -> None:
+    left_out = {name for name, _ in SECTIONS} - set(sections) - {"published"}
+    assert left_out == {"checks", "identified"}
+    assert ("published" in sections) == bool(result.published)
+
+
+def test_pictures_of_the_paper(sections: dict[str, Section]) -> None:
+    names = {p.name for s in sections.values() for p in s.pictures}
+    assert names == {
+        "outlines", "outline_models", "markers", "marker_rise", "curve_force_plate",
+        "curve_pressure", "curve_volume_ratio", "errors_over_noise", "cut", "registration",
+    }  # fmt: skip
+
+
+def test_top_left_is_the_score(result: Result, sections: dict[str, Section]) -> None:
+    table = next(p for p in sections["outlines"].parts if p.kind == "table")
+    shown = {row[0].text: row[-1].text for row in table.rows}
+    scores = {s.name: s.value for s in result.methods[0].scores}
+    simulated = 1e3 * scores["contour.top_left.simulated@9mm"]
+    assert float(shown["P1 with fluid"]) == pytest.approx(simulated, abs=0.005)
+    measured = 1e3 * scores["contour.top_left.measured@9mm"]
+    assert float(shown["measured"]) == pytest.approx(measured, abs=0.005)
+
+
+def test_an_outline_that_was_not_judged_is_not_drawn(result: Result) -> None:
+    method = shown_method(result)
+    assert method is not None
+    assert outline_seen(result, method) is not None
+    wrong = replace(method.run, u=1.01 * method.run.u)
+    assert outline_seen(result, replace(method, runs=(wrong,))) is None
+
+
+def test_results_validate(result: Result) -> None:
+    checked = replace(result.methods[0], accepted=True, checks=(CHECK,))
+    content = document(replace(result, methods=(checked,)), "2026-11-21T04:00:00Z")
+    jsonschema.Draft202012Validator(schema()).validate(content)
+    assert content["inputs"][0]["path"] == "fluid_phantom.mcap"
+    assert len(content["inputs"][0]["sha256"]) == 64

@@ -1,0 +1,128 @@
+"""The folder: complete or not there, the old one kept until the new one is complete."""
+
+import csv
+import json
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from report_samples import small_result
+
+from validate.compare.result import Result
+from validate.errors import UsageError
+from validate.report import write
+from validate.report.page import Section
+from validate.report.write import write_report
+
+CREATED = "2026-11-21T04:00:00Z"
+
+
+@pytest.fixture(autouse=True)
+def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+
+
+def test_files_without_gl(tmp_path: Path) -> None:
+    steps: list[str] = []
+    path = write_report(
+        small_result(), tmp_path / "new" / "cube", created=CREATED, progress=steps.append
+    )
+    folder = path.parent
+    names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+    assert names >= {
+        "report.html", "results.json", "runs/soft.npz", "runs/stiff.npz", "figures/cut.png",
+        "figures/curve_force_plate.png", "tables/scores.csv", "tables/checks.csv",
+        "tables/effects.csv", "tables/published.csv", "tables/load_displacement.csv",
+    }  # fmt: skip
+    assert "libegl1 and libgl1-mesa-dri" in path.read_text()
+    assert json.loads((folder / "results.json").read_text())["experiment"] == "cube"
+    assert steps[0] == "tables and runs"
+    assert steps[-1] == "page"
+    assert [p.name for p in folder.parent.iterdir()] == ["cube"]
+
+
+def test_figures_are_whole_pictures(tmp_path: Path) -> None:
+    folder = write_report(small_result(), tmp_path / "cube", created=CREATED).parent
+    for path in (folder / "figures").iterdir():
+        with Image.open(BytesIO(path.read_bytes())) as image:
+            assert image.width > 400
+            assert len(set(image.convert("L").tobytes())) > 10
+
+
+def test_tables_are_si(tmp_path: Path) -> None:
+    folder = write_report(small_result(), tmp_path / "cube", created=CREATED).parent
+    with (folder / "tables" / "load_displacement.csv").open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    assert {(r["recording"], r["who"]) for r in rows} == {
+        (a, b) for a in ("cube_a", "cube_b") for b in ("measured", "soft", "stiff")
+    }
+    last = [r for r in rows if r["who"] == "soft"][-1]
+    assert float(last["stage_m"]) == pytest.approx(0.002)
+    assert float(last["value"]) == pytest.approx(4.0)
+
+
+def test_old_report_is_replaced_whole(tmp_path: Path) -> None:
+    folder = tmp_path / "cube"
+    write_report(small_result(), folder, created=CREATED)
+    (folder / "left_over.txt").write_text("old")
+    write_report(replace(small_result(), title="Second"), folder, created=CREATED)
+    assert not (folder / "left_over.txt").exists()
+    assert "Second" in (folder / "report.html").read_text()
+    assert [p.name for p in tmp_path.iterdir()] == ["cube"]
+
+
+def test_failing_figure_leaves_the_old_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "cube"
+    write_report(small_result(), folder, created=CREATED)
+    before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+    def fails(_: Result) -> Section:
+        raise RuntimeError("no figure today")
+
+    monkeypatch.setattr(write, "SECTIONS", (*write.SECTIONS[:2], ("broken", fails)))
+    with pytest.raises(RuntimeError, match="no figure today"):
+        write_report(replace(small_result(), title="Second"), folder, created=CREATED)
+    assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before
+    assert [p.name for p in tmp_path.iterdir()] == ["cube"]
+
+
+def test_failed_move_puts_the_old_report_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "cube"
+    write_report(small_result(), folder, created=CREATED)
+    rename = Path.rename
+
+    def only_old(self: Path, target: Path) -> Path:
+        if ".new-" in self.name:
+            raise OSError("disk is gone")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", only_old)
+    with pytest.raises(OSError, match="disk is gone"):
+        write_report(replace(small_result(), title="Second"), folder, created=CREATED)
+    assert "A cube &lt;between&gt; plates" in (folder / "report.html").read_text()
+    assert [p.name for p in tmp_path.iterdir()] == ["cube"]
+
+
+def test_a_folder_of_the_user_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(UsageError, match=r"holds 1 entries and no results\.json"):
+        write_report(small_result(), tmp_path, created=CREATED)
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_a_file_in_the_place(tmp_path: Path) -> None:
+    (tmp_path / "cube").write_text("")
+    with pytest.raises(UsageError, match="is a file"):
+        write_report(small_result(), tmp_path / "cube", created=CREATED)
+
+
+def test_an_unwritable_place(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="cannot write beside"):
+        write_report(small_result(), tmp_path / "file" / "cube", created=CREATED)

@@ -1,0 +1,52 @@
+"""The quarter cylinder: its volume converges at second order, its planes are planes."""
+
+import numpy as np
+import pytest
+
+from validate.errors import SceneError
+from validate.scene.cylinder import quarter_cylinder
+from validate.scene.mesh import boundary_facets, cell_volumes
+
+EXACT = np.pi * 0.05**2 / 16 * 0.03
+
+
+def test_volume_converges_to_the_exact_one_at_second_order() -> None:
+    volumes = [cell_volumes(quarter_cylinder(0.05, 0.03, n, 2)).sum() for n in (4, 8, 16)]
+    errors = 1 - np.array(volumes) / EXACT
+    assert errors.min() > 0  # inscribed polygon
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert orders == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("radial", "axial"), [(1, 1), (2, 3), (5, 4)])
+def test_volume_is_that_of_the_inscribed_polygon(radial: int, axial: int) -> None:
+    """Each of the 2 n equal sectors of the rim is a triangle of area R^2 sin(pi / 4 n) / 2."""
+    mesh = quarter_cylinder(0.05, 0.03, radial, axial)
+    area = radial * 0.025**2 * np.sin(np.pi / (4 * radial))
+    assert len(mesh.nodes) == (radial + 1) ** 2 * (axial + 1)
+    assert len(mesh.cells) == 6 * radial**2 * axial
+    assert cell_volumes(mesh).min() > 0
+    assert cell_volumes(mesh).sum() == pytest.approx(0.03 * area, rel=1e-12)
+
+
+def test_sets_lie_on_their_planes_and_cover_the_boundary() -> None:
+    mesh = quarter_cylinder(0.05, 0.03, 3, 4)
+    x = {name: mesh.nodes[mesh.facet_nodes(name)] for name in mesh.facets}
+    assert np.abs(x["lower_plate"][:, 2]).max() == 0
+    assert x["upper_plate"][:, 2] == pytest.approx(0.03)
+    assert np.abs(x["symmetry_x"][:, 0]).max() < 1e-17
+    assert np.abs(x["symmetry_y"][:, 1]).max() < 1e-17
+    assert np.hypot(*x["rim"][:, :2].T) == pytest.approx(0.025, rel=1e-14)
+    named = sum(len(f) for f in mesh.facets.values())
+    assert named == len(boundary_facets(mesh.cells, 3))
+
+
+@pytest.mark.parametrize(
+    ("diameter", "height", "radial", "axial"),
+    [(0.0, 0.03, 2, 2), (0.05, -0.03, 2, 2), (0.05, 0.03, 0, 2), (0.05, 0.03, 2, 0)],
+)
+def test_empty_cylinders_are_refused(
+    diameter: float, height: float, radial: int, axial: int
+) -> None:
+    with pytest.raises(SceneError, match="all must be positive"):
+        quarter_cylinder(diameter, height, radial, axial)

@@ -1,0 +1,48 @@
+"""Scenes refuse impossible materials and sets that are not there, with the numbers."""
+
+import math
+
+import pytest
+from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
+
+from validate.errors import SceneError
+from validate.scene.mesh import quadratic
+from validate.scene.scene import Cavity, Drive, Material, Scene, Support
+
+
+@pytest.mark.parametrize("E", [0.0, -1.0, math.nan, math.inf])
+def test_modulus_must_be_positive(E: float) -> None:
+    with pytest.raises(SceneError, match=r"modulus E = .* Pa: it must be positive"):
+        Material(E, 0.3)
+
+
+@pytest.mark.parametrize("nu", [0.5, 0.51, -1.0, -2.0, math.nan])
+def test_poisson_ratio_has_a_range_and_a_reason(nu: float) -> None:
+    with pytest.raises(SceneError, match=r"1/\(1 - 2 nu\) is infinite at 0.5"):
+        Material(1.0, nu)
+
+
+def test_moduli() -> None:
+    soft = Material(9.0, 0.125)
+    assert soft.shear_modulus == pytest.approx(4.0)
+    assert soft.bulk_modulus == pytest.approx(4.0)
+    for nu in (-0.99, 0.4999999999):
+        assert Material(1.0, nu).bulk_modulus > 0
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"supports": (Support("lid", (0,)),)},
+        {"drives": (Drive("stage", "lid", (1.0, 0.0, 0.0)),)},
+        {"cavities": (Cavity("cyst", "lid"),)},
+    ],
+)
+def test_sets_that_the_mesh_lacks_are_refused(parts: dict[str, tuple[object, ...]]) -> None:
+    with pytest.raises(SceneError, match=r"no facets 'lid'; it has .*'cavity'"):
+        Scene(phantom_mesh(COARSE_GRID), Material(1.0, 0.3), **parts)  # type: ignore[arg-type]
+
+
+def test_nodal_mean_dilatation_needs_linear_elements() -> None:
+    with pytest.raises(SceneError, match="use order 1"):
+        phantom_scene(quadratic(phantom_mesh(COARSE_GRID)), dilatation="nodal_mean")

@@ -1,0 +1,148 @@
+"""The loop over steps: counts, traces, output frames, and runs that end early."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from phantoms import COARSE_GRID, phantom_responses
+
+from validate.errors import ComparisonError, ValidateError
+from validate.fem.system import Responses
+from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.march import march
+from validate.solve.types import Run, State, Stepper, Trace
+
+STEPS = 60
+T = np.linspace(0, 6, STEPS)
+DRIVES = np.linspace(0, 0.009, STEPS)[:, None]
+AT = np.array([0, 20, 40, 59])
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Responses:
+    return phantom_responses(COARSE_GRID)
+
+
+@dataclass(frozen=True)
+class Breaks:
+    """A stepper that fails from one step on."""
+
+    inner: Stepper
+    at: float  # m of the first drive
+
+    @property
+    def responses(self) -> Responses:
+        return self.inner.responses
+
+    def rest(self) -> State:
+        return self.inner.rest()
+
+    def step(self, state: State, drives: np.ndarray) -> State:
+        new = self.inner.step(state, drives)
+        return replace(new, failure=("diverged", "as asked")) if drives[0] > self.at else new
+
+
+def test_finished_run(coarse: Responses) -> None:
+    run = march("exact", ExactPressure().prepare(coarse), T, DRIVES, AT, 1.5)
+    assert run.finished
+    assert (run.method, run.outcome.state, run.outcome.step) == ("exact", "finished", STEPS)
+    assert run.setup_s == 1.5
+    assert np.array_equal(run.t, T)
+    assert np.array_equal(run.at, AT)
+    assert run.u.shape == (4, len(coarse.scene.mesh.nodes), 3)
+    assert sorted(run.traces) == [
+        "cyst.pressure",
+        "cyst.volume_ratio",
+        "stage.displacement",
+        "stage.force",
+        "updates",
+    ]
+    assert all(len(trace.y) == STEPS for trace in run.traces.values())
+    units = {name: trace.unit for name, trace in run.traces.items()}
+    assert units["cyst.pressure"] == "Pa"
+    assert units["stage.force"] == "N"
+    assert units["stage.displacement"] == "m"
+
+
+def test_traces_and_fields_are_those_of_single_steps(coarse: Responses) -> None:
+    stepper = ExactPressure().prepare(coarse)
+    run = march("exact", stepper, T, DRIVES, AT, 0.0)
+    for frame, step in enumerate(AT):
+        alone = stepper.step(stepper.rest(), DRIVES[step])
+        assert run.traces["cyst.pressure"].y[step] == pytest.approx(alone.pressures[0], abs=1e-7)
+        force = float((coarse.reactions @ alone.inputs)[0])
+        assert run.traces["stage.force"].y[step] == pytest.approx(force, abs=1e-12)
+        u = np.tensordot(alone.inputs, coarse.fields, 1)
+        assert run.u[frame] == pytest.approx(u, abs=1e-14)
+    assert np.array_equal(run.traces["stage.displacement"].y, DRIVES[:, 0])
+    assert run.traces["cyst.volume_ratio"].y == pytest.approx(1.0, abs=1e-13)
+    assert run.traces["stage.force"].y[-1] > 0
+
+
+def test_each_step_starts_from_the_last_state(coarse: Responses) -> None:
+    stepper = PressureLoop(tolerance=1e-3).prepare(coarse)
+    run = march("loop", stepper, T, DRIVES, AT, 0.0)
+    state, updates = stepper.rest(), []
+    for drives in DRIVES:
+        state = stepper.step(state, drives)
+        updates.append(state.updates)
+    assert run.traces["updates"].y.tolist() == updates
+    assert run.traces["cyst.pressure"].y[-1] == state.pressures[0]
+
+
+def test_run_that_breaks_keeps_what_was_done(coarse: Responses) -> None:
+    broken = Breaks(ExactPressure().prepare(coarse), 0.0045)
+    run = march("broken", broken, T, DRIVES, AT, 0.0)
+    whole = march("whole", broken.inner, T, DRIVES, AT, 0.0)
+    done = 30
+    assert not run.finished
+    assert (run.outcome.state, run.outcome.step, run.outcome.why) == ("diverged", done, "as asked")
+    assert np.array_equal(run.t, T[:done])
+    assert run.at.tolist() == [0, 20]
+    assert np.array_equal(run.u, whole.u[:2])
+    for name, trace in run.traces.items():
+        assert np.array_equal(trace.y, whole.traces[name].y[:done])
+
+
+def test_run_that_breaks_at_once_is_empty_but_whole(coarse: Responses) -> None:
+    run = march("broken", Breaks(NoFluid().prepare(coarse), -1.0), T, DRIVES, AT, 0.0)
+    assert (run.outcome.state, run.outcome.step) == ("diverged", 0)
+    assert run.t.shape == (0,)
+    assert run.u.shape == (0, len(coarse.scene.mesh.nodes), 3)
+    assert all(len(trace.y) == 0 for trace in run.traces.values())
+    assert run.step_s is not None
+    assert run.step_s.n == 1
+
+
+@pytest.mark.parametrize(
+    ("steps", "frames", "message"),
+    [(0, 1, "empty: 0 steps and 1 output frames"), (3, 0, "empty: 3 steps and 0 output frames")],
+)
+def test_empty_schedule_is_refused(
+    coarse: Responses, steps: int, frames: int, message: str
+) -> None:
+    stepper = NoFluid().prepare(coarse)
+    with pytest.raises(ComparisonError, match=message):
+        march("empty", stepper, T[:steps], DRIVES[:steps], AT[:frames], 0.0)
+
+
+@pytest.mark.parametrize(("steps", "timed"), [(1, 1), (40, 40), (41, 21), (60, 40)])
+def test_first_steps_are_left_out_of_the_times(coarse: Responses, steps: int, timed: int) -> None:
+    run = march("dry", NoFluid().prepare(coarse), T[:steps], DRIVES[:steps], AT[:1], 0.0)
+    assert run.step_s is not None
+    assert run.step_s.n == timed
+    assert 0 < run.step_s.p50 <= run.step_s.p99 <= run.step_s.max
+    assert run.step_s.rate_hz == 1 / run.step_s.p50
+
+
+def test_run_and_traces_are_read_only_and_checked(coarse: Responses) -> None:
+    run = march("dry", NoFluid().prepare(coarse), T, DRIVES, AT, 0.0)
+    for array in (run.t, run.u, run.traces["updates"].y):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    with pytest.raises(TypeError):
+        run.traces["updates"] = run.traces["stage.force"]  # type: ignore[index]
+    with pytest.raises(ValidateError, match="trace: 1 of 2 values not finite"):
+        Trace(np.array([0.0, np.nan]), "1")
+    with pytest.raises(ValidateError, match=r"run u \[m\]: shape \(4, \d+, 3\), expected \(2,"):
+        Run("m", run.t, AT[:2], run.u, run.traces, run.outcome, 0.0, None)

@@ -1,0 +1,64 @@
+"""Habits that hold in every module: frozen types, schemes that are all in their tuple."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from phantoms import COARSE_GRID, phantom_mesh
+
+# Grows while one file is read and never leaves its reader.
+ACCUMULATORS = {"mcap_streams.py:Collected"}
+
+
+def modules(root: Path) -> list[Path]:
+    return sorted((root / "validate").rglob("*.py")) + sorted((root / "experiments").glob("*.py"))
+
+
+def classes(path: Path) -> Iterator[ast.ClassDef]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+
+
+def dataclass_settings(node: ast.ClassDef) -> dict[str, object] | None:
+    """Keywords of the class's dataclass decorator; None when it has none."""
+    for decorator in node.decorator_list:
+        call = decorator if isinstance(decorator, ast.Call) else None
+        name = ast.unparse(call.func if call else decorator)
+        if name in ("dataclass", "dataclasses.dataclass"):
+            return {str(k.arg): ast.literal_eval(k.value) for k in call.keywords} if call else {}
+    return None
+
+
+def test_every_dataclass_is_frozen(project_root: Path) -> None:
+    found = {
+        f"{path.name}:{node.name}": settings
+        for path in modules(project_root)
+        for node in classes(path)
+        if (settings := dataclass_settings(node)) is not None
+    }
+    assert len(found) > 40
+    assert {name for name, s in found.items() if s.get("frozen") is not True} == ACCUMULATORS
+
+
+def test_every_scheme_is_in_the_tuple(project_root: Path) -> None:
+    """A class with `prepare` is a scheme; the contract tests reach it only through SCHEMES."""
+    from validate.solve.fluid import SCHEMES
+
+    written = {
+        node.name
+        for path in (project_root / "validate" / "solve").glob("*.py")
+        for node in classes(path)
+        if any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
+        and "Protocol" not in [ast.unparse(b) for b in node.bases]
+    }
+    assert written == {scheme.__name__ for scheme in SCHEMES}
+
+
+def test_arrays_of_meshes_are_read_only() -> None:
+    mesh = phantom_mesh(COARSE_GRID, 2)
+    for array in (mesh.nodes, mesh.cells, *mesh.facets.values()):
+        assert isinstance(array, np.ndarray)
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0

@@ -1,0 +1,119 @@
+"""Twins: seeded, the same on every machine, noise as declared, files beside what must be read."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from validate.recording.mcap_read import read_recording
+from validate.recording.mcap_write import write_recording
+from validate.recording.summary import summary
+from validate.recording.types import Recording
+from validate.scene.inclusion import Block
+from validate.scene.scene import Material
+from validate.twin.phantom import IMAGE_POSE, TwinSettings, record_phantom
+from validate.twin.sensors import StageProfile, streams
+
+COARSE = TwinSettings(nodes_x=7, nodes_y=8, nodes_z=11)
+SIZE, GELATIN = Block(0.060, 0.045, 0.070), Material(15_200.0, 0.485)
+
+
+def made(settings: TwinSettings = COARSE) -> Recording:
+    return record_phantom(settings, SIZE, GELATIN, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def twin() -> Recording:
+    return made()
+
+
+def apart(one: Any, other: Any) -> float:
+    """Largest absolute difference between the numbers of two nested documents."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        return max((apart(one[k], other[k]) for k in one), default=0.0)
+    if isinstance(one, list):
+        assert len(one) == len(other)
+        return max((apart(a, b) for a, b in zip(one, other, strict=True)), default=0.0)
+    if isinstance(one, float) and isinstance(other, float):
+        return abs(one - other)
+    assert one == other
+    return 0.0
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, twin: Recording) -> None:
+    write_recording(twin, tmp_path / "a.mcap")
+    write_recording(made(), tmp_path / "b.mcap")
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+    other = made(replace(COARSE, seed=1))
+    assert not np.array_equal(other.markers["markers"].x, twin.markers["markers"].x)
+
+
+def test_sensors_read_the_simulation_with_their_declared_noise(twin: Recording) -> None:
+    quiet = made(replace(COARSE, sd_outline=0.0, sd_tip=0.0, sd_hand=0.0, sd_force=0.0,
+                         sd_pressure=0.0, sd_stage=0.0))  # fmt: skip
+    for topic, sd in (("load_cell", 0.02), ("pressure", 10.0), ("stage", 2e-6)):
+        noise = twin.signals[topic].y - quiet.signals[topic].y
+        assert twin.signals[topic].sd == sd
+        assert noise.std() == pytest.approx(sd, rel=0.12)  # 371 samples
+    hand = twin.markers["markers"].x - quiet.markers["markers"].x
+    assert hand.std() == pytest.approx(np.hypot(0.2e-3, 0.577e-3), rel=0.1)  # 504 numbers
+    radius = np.linalg.norm(quiet.contours["outline"].outlines[0] - [0.0206, 0.0284], axis=1)
+    assert radius == pytest.approx(np.full(72, 0.0085), abs=2e-5)  # wall samples of a coarse mesh
+    noisy = np.linalg.norm(twin.contours["outline"].outlines[0] - [0.0206, 0.0284], axis=1)
+    assert (noisy - radius).std() == pytest.approx(0.15e-3, rel=0.3)
+
+
+def test_signs_compression_and_closing_are_positive(twin: Recording) -> None:
+    stage, force, pressure = (twin.signals[k].y[-1, 0] for k in ("stage", "load_cell", "pressure"))
+    assert stage == pytest.approx(0.009, abs=1e-5)
+    assert force > 5
+    assert pressure > 800
+
+
+def test_the_pen_has_a_frame_of_its_own_and_markers_rise(twin: Recording) -> None:
+    up = np.array([float(v) for v in twin.record("pen")["up"].split()])
+    assert np.linalg.norm(up) == pytest.approx(1.0)
+    rise = (twin.markers["markers"].x[3] - twin.markers["markers"].x[0]) @ up
+    assert rise.mean() == pytest.approx(3.3e-3, rel=0.1)  # nu x strain x height
+
+
+def test_the_image_pose_is_a_proper_rotation() -> None:
+    R = IMAGE_POSE[:3, :3]
+    assert np.array_equal(R.T @ R, np.eye(3))
+    assert np.linalg.det(R) == 1.0
+
+
+def test_the_profile_holds_at_every_load() -> None:
+    t, q, middles = StageProfile((0.0, 0.003, 0.009), speed=1e-3, hold=2.0, rate=10.0).positions()
+    assert np.interp(middles, t, q) == pytest.approx([0.0, 0.003, 0.009])
+    assert t[-1] == pytest.approx(2 + 3 + 2 + 6 + 2)
+    assert np.abs(np.diff(q)).max() == pytest.approx(1e-4)
+
+
+def test_every_sensor_has_a_stream_of_its_own() -> None:
+    one, two = streams(3, ("a", "b")), streams(3, ("a", "c"))
+    assert one["a"].standard_normal() == two["a"].standard_normal()
+    assert one["b"].standard_normal() != one["a"].standard_normal()
+
+
+def test_the_shipped_recording_reads_as_the_file_beside_it_says(project_root: Path) -> None:
+    file = project_root / "recordings" / "fluid_phantom.mcap"
+    beside = json.loads(file.with_suffix(".json").read_text("utf-8"))
+    assert json.loads(json.dumps(summary(read_recording(file)))) == beside
+    assert file.stat().st_size < 2e6
+
+
+@pytest.mark.slow
+def test_the_shipped_recording_is_made_again_to_1e_9(project_root: Path) -> None:
+    beside = json.loads((project_root / "recordings" / "fluid_phantom.json").read_text("utf-8"))
+    again = json.loads(json.dumps(summary(made(TwinSettings()))))
+    scale = {"stage": 1e-2, "load_cell": 7.0, "pressure": 1e3}
+    for topic, size in scale.items():
+        assert apart(again["signals"][topic], beside["signals"][topic]) < 1e-9 * size
+    assert apart(again["markers"], beside["markers"]) < 1e-9
+    assert apart(again["contours"], beside["contours"]) < 1e-9
+    assert again["metadata"]["marker_layout"] == beside["metadata"]["marker_layout"]

@@ -1,0 +1,1 @@
+"""The command line: parse, call, print. Heavy libraries load inside the commands."""

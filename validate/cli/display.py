@@ -1,0 +1,59 @@
+"""Tables and progress bars on the terminal; plain lines when it is not one."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from validate.replay.road import Report
+
+
+def console(*, error: bool = False) -> Console:
+    """Standard output or error; a pipe gets wide lines without colour."""
+    found = Console(stderr=error, highlight=False)
+    return found if found.is_terminal else Console(stderr=error, highlight=False, width=160)
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table of texts; every column with a unit carries it in its name."""
+    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    for column in columns:
+        made.add_column(column, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Report]:
+    """A bar with the time left on standard error; silent when that is no terminal."""
+    screen = Console(stderr=True)
+    with Progress(
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+        console=screen,
+        disable=not screen.is_terminal,
+        transient=True,
+    ) as bar:
+        task = bar.add_task("", total=None)
+
+        def report(done: int, total: int, text: str) -> None:
+            bar.update(task, completed=done, total=total, description=text)
+
+        yield report
+
+
+def shown(value: float, unit: str) -> str:
+    """A value as people read it: m as mm, Pa as kPa above 1000, s as us."""
+    if unit == "m":
+        return f"{1e3 * value:.3f} mm"
+    if unit == "Pa":
+        return f"{value / 1e3:.3f} kPa" if abs(value) >= 1000 else f"{value:.1f} Pa"
+    if unit == "s":
+        return f"{1e6 * value:.1f} us" if value < 1e-2 else f"{value:.2f} s"
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"

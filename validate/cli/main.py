@@ -1,0 +1,130 @@
+"""Commands and exit codes: 0 all checks hold, 1 a check failed, 2 usage or bad input, 70 a bug."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from validate import __version__
+from validate.errors import UsageError, ValidateError
+
+FAILED, BAD_INPUT, BUG, INTERRUPTED = 1, 2, 70, 130
+_OUT = click.Path(file_okay=False, path_type=Path)
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Runs the command line and exits."""
+    sys.exit(run(sys.argv[1:] if argv is None else argv))
+
+
+def run(argv: list[str]) -> int:
+    """The exit code of a command; known errors print one line, a bug its traceback."""
+    try:
+        return int(cli.main(argv, prog_name="validate", standalone_mode=False) or 0)
+    except ValidateError as error:
+        _complain(str(error))
+    except click.exceptions.NoArgsIsHelpError as wanted:
+        click.echo(wanted.ctx.get_help())
+        return 0
+    except click.UsageError as error:
+        _complain(f"{error.format_message()} Try 'validate --help'.")
+    except (click.Abort, KeyboardInterrupt):
+        _complain("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:
+        return INTERRUPTED
+    except Exception:  # a bug: keep its traceback and say so by the exit code
+        import traceback
+
+        traceback.print_exc()
+        return BUG
+    return BAD_INPUT
+
+
+def _complain(message: str) -> None:
+    click.echo("validate: " + " ".join(message.split()), err=True)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="validate")
+def cli() -> None:
+    """Does my simulation predict what was measured, within the error of the measurement?"""
+
+
+@cli.command("list")
+@click.argument("name", required=False)
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def list_(name: str | None, as_json: bool) -> None:
+    """Experiments; with NAME its parameters, methods, scores and source."""
+    from validate.cli import listing
+
+    listing.show(name, as_json)
+
+
+@cli.command("run")
+@click.argument("names", nargs=-1, metavar="NAME|FILE.py ...")
+@click.option("--all", "everything", is_flag=True, help="Every experiment.")
+@click.option("--quick", is_flag=True, help="Coarser and fewer comparisons; a banner says so.")
+@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+@click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
+@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
+    """Replay, simulate, compare and write a report."""
+    from validate.cli import running
+
+    if everything == bool(names):
+        raise UsageError("name one or more experiments, or --all; see 'validate list'")
+    return running.run(names, everything=everything, **options)
+
+
+@cli.command()
+@click.argument("file", type=_FILE)
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def inspect(file: Path, as_json: bool) -> None:
+    """What a recording holds: topics, clocks, rates, gaps, units, defects."""
+    from validate.cli import recordings
+
+    recordings.inspect(file, as_json)
+
+
+@cli.command("import")
+@click.argument("file", type=_FILE)
+@click.option("--as", "kind", required=True, metavar="KIND", help="Kind of file: instron.")
+@click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
+@click.option(
+    "--map",
+    "mapping",
+    multiple=True,
+    metavar="ROLE=COLUMN[:UNIT][:-]",
+    help="Overrides: time, displacement or force is that column, unit, sign.",
+)
+def import_(file: Path, kind: str, out: Path, mapping: tuple[str, ...]) -> None:
+    """Turn a testing machine's export into a recording."""
+    from validate.cli import recordings
+
+    recordings.import_file(file, kind, out, mapping)
+
+
+@cli.command()
+@click.argument("name")
+@click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+def record(name: str, out: Path, values: tuple[str, ...]) -> None:
+    """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
+    from validate.cli import recordings
+
+    recordings.record(name, out, values)
+
+
+def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:
+    """`a=b` texts as a mapping; raises `UsageError` for a text without '='."""
+    found = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        if not (sign and key.strip()):
+            raise UsageError(f"{option} {text}: expected PATH=VALUE")
+        found[key.strip()] = value.strip()
+    return found

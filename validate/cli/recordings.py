@@ -1,0 +1,92 @@
+"""`validate inspect`, `import` and `record`."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+from validate.cli.display import console, progress, table
+from validate.cli.main import pairs
+from validate.errors import UsageError
+from validate.parameters import nearest_names, with_values
+from validate.recording.inspect import Inspection, Topic, inspect_recording
+from validate.recording.instron import KINDS, read_instron
+from validate.recording.mcap_read import read_recording
+from validate.recording.mcap_write import write_recording
+from validate.recording.summary import summary
+from validate.recording.types import Recording
+from validate.replay.find import find
+
+
+def inspect(file: Path, as_json: bool) -> None:
+    """Prints what an MCAP file holds."""
+    found = inspect_recording(file)
+    if as_json:
+        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+    else:
+        _print(found)
+
+
+def import_file(file: Path, kind: str, out: Path, mapping: tuple[str, ...]) -> None:
+    """Reads a foreign file and writes it as a recording."""
+    if kind not in KINDS:
+        raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, set(KINDS))}")
+    recording = read_instron(file, pairs(mapping, "--map"))
+    write_recording(recording, out)
+    _report(recording, out)
+
+
+def record(name: str, out: Path, values: tuple[str, ...]) -> None:
+    """Makes an experiment's twin recording, with a JSON beside it of what must be read."""
+    experiment = find(name, Path.cwd())
+    if experiment.record is None:
+        raise UsageError(f"experiment '{name}' has no synthetic recording; its data are measured")
+    parameters = with_values(experiment.parameters, pairs(values, "--set"))
+    with progress(f"record {name}") as bar:
+        done = iter(range(10))
+        made = experiment.record(parameters, lambda text: bar(next(done), 3, text))
+    write_recording(made, out)
+    written = read_recording(out)
+    beside = out.with_suffix(".json")
+    beside.write_text(json.dumps(summary(written), indent=1, allow_nan=False) + "\n", "utf-8")
+    _report(written, out)
+
+
+def _report(recording: Recording, out: Path) -> None:
+    streams = [*recording.signals, *recording.markers, *recording.contours]
+    size = out.stat().st_size / 1e3
+    console().print(f"{out}: {', '.join(streams)}; {size:.0f} kB", soft_wrap=True)
+
+
+def _print(found: Inspection) -> None:
+    screen = console()
+    head = ["topic", "kind", "schema (encoding)", "n", "duration s", "rate Hz", "gaps", "unit"]
+    rows = [_row(topic) for topic in found.topics]
+    screen.print(table(found.source.path, [*head, "frame"], rows))
+    screen.print(_head(found), soft_wrap=True)
+    screen.print(f"defects: {len(found.defects)}")
+    for defect in found.defects:
+        screen.print(f"  {defect}", soft_wrap=True)
+
+
+def _row(topic: Topic) -> list[str]:
+    clock = topic.clock
+    duration = "-" if clock is None else f"{clock.duration:.3f}"
+    rate = "-" if clock is None or clock.rate_hz is None else f"{clock.rate_hz:.4g}"
+    gaps = "-" if clock is None else str(clock.gaps)
+    schema = f"{topic.schema or '-'} ({topic.schema_encoding or '-'}/{topic.message_encoding})"
+    return [
+        topic.name, topic.kind, schema, str(topic.count), duration, rate, gaps,
+        topic.unit or "-", topic.frame or "-",
+    ]  # fmt: skip
+
+
+def _head(found: Inspection) -> str:
+    start = [t.first_ns for t in found.topics if t.first_ns is not None]
+    when = datetime.fromtimestamp(min(start) / 1e9, UTC).isoformat() if start else "-"
+    return (
+        f"\n{found.messages} messages from {when}; {found.attachments} attachments; metadata: "
+        f"{', '.join(found.metadata) or 'none'}\n"
+        f"{found.source.bytes} bytes in {found.chunks} chunks ({', '.join(found.compressions)}), "
+        f"library '{found.library}', profile '{found.profile}'\n"
+        f"integrity: {found.source.integrity}; sha256 {found.source.sha256}"
+    )

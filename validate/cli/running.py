@@ -1,0 +1,68 @@
+"""`validate run`."""
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+from time import perf_counter
+
+from validate.cli.display import console, progress, shown, table
+from validate.cli.main import FAILED, pairs
+from validate.compare.result import Result
+from validate.replay.experiment import Experiment
+from validate.replay.find import experiment_files, find, root_of
+from validate.replay.road import Options, compare
+from validate.report.write import write_report
+
+
+def run(
+    names: tuple[str, ...],
+    *,
+    everything: bool,
+    quick: bool,
+    out: Path | None,
+    values: tuple[str, ...],
+    methods: str,
+    as_json: bool,
+) -> int:
+    """Runs experiments and writes their reports; 0 when all checks of all hold."""
+    start = Path.cwd()
+    chosen = [find(n, start) for n in (experiment_files(start) if everything else names)]
+    wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
+    options = Options(pairs(values, "--set"), wanted, quick)
+    passed = [_one(e, options, out or root_of(e, start) / "reports", as_json) for e in chosen]
+    return 0 if all(passed) else FAILED
+
+
+def _one(experiment: Experiment, options: Options, out: Path, as_json: bool) -> bool:
+    start = perf_counter()
+    with progress(experiment.name) as report:
+        result = compare(experiment, options, report)
+        report(1, 1, "report")
+        created = datetime.now(UTC).isoformat(timespec="seconds")
+        page = write_report(result, out / experiment.name, created=created)
+    if as_json:
+        print((page.parent / "results.json").read_text(encoding="utf-8"))
+    else:
+        _summary(result, page, perf_counter() - start)
+    return result.passed
+
+
+def _summary(result: Result, page: Path, seconds: float) -> None:
+    screen = console()
+    rows = [
+        [m.name, c.name, shown(c.value, c.unit), shown(2 * c.u_val, c.unit),
+         shown(c.limit, c.unit), str(c.count), c.verdict, c.why]
+        for m in result.methods for c in m.checks
+    ]  # fmt: skip
+    head = ["method", "check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
+    screen.print(f"{result.name}: {result.title}\n", soft_wrap=True)
+    if rows:
+        screen.print(table("Checks", head, rows))
+    screen.print(f"\n{result.sentence}", soft_wrap=True)
+    screen.print(f"{seconds:.1f} s wall time; report: {_relative(page)}", soft_wrap=True)
+
+
+def _relative(path: Path) -> str:
+    """The path from here when it lies below, else whole."""
+    text = os.path.relpath(path)
+    return str(path.resolve()) if text.startswith("..") else text

@@ -1,0 +1,113 @@
+"""The simulated body to be drawn: deformed state, plates, the plane that opens it, the camera."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.result import MethodResult, Result
+from validate.report.numbers import spaced
+from validate.report.observed import shown_method
+from validate.scene.mesh import Mesh
+
+_MM = 1e3
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A flat face pressed on, in rest position: centre (3,) mm, sizes (3,) mm, `shift` (3,) mm."""
+
+    centre: Floats
+    sizes: Floats
+    shift: Floats
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh at rest with displacements u (n, 3) mm at `load`, opened by a plane or whole.
+
+    The part on the side of `normal` (3,) beyond `origin` (3,) mm is taken away; None: whole.
+    `up` (3,) is the camera's; pressure Pa is None without a cavity, `pressures` its range Pa.
+    """
+
+    label: str
+    load: str
+    mesh: Mesh
+    u: Floats
+    plates: tuple[Plate, ...]
+    cavity: str | None
+    pressure: float | None
+    pressures: tuple[float, float]
+    origin: Floats
+    normal: Floats | None
+    up: Floats
+    toward: Floats
+
+
+def body(result: Result) -> Body | None:
+    """The accepted method's body at its last load; None in 2-D or when nothing finished."""
+    method = shown_method(result)
+    if method is None or len(method.run.u) == 0 or method.scene.mesh.dimension != 3:
+        return None
+    scene, run = method.scene, method.run
+    cavity = scene.cavities[0] if scene.cavities else None
+    trace = run.traces.get(f"{cavity.name}.pressure") if cavity else None
+    holds = result.registered[0].holds if result.registered else ()
+    frame = min(len(holds), len(run.u)) - 1
+    nodes = _MM * scene.mesh.nodes
+    wall = nodes[scene.mesh.facet_nodes(cavity.facets)] if cavity else nodes
+    normal = _normal(result) if cavity else None
+    toward = np.array(scene.drives[0].direction) if scene.drives else np.array([-1.0, 0.0, 0.0])
+    return Body(
+        label=method.label,
+        load=spaced(holds[frame].label) if holds else "the last output",
+        mesh=scene.mesh,
+        u=_MM * run.u[frame],
+        plates=_plates(method, frame),
+        cavity=cavity.facets if cavity else None,
+        pressure=float(trace.y[run.at[frame]]) if trace else None,
+        pressures=(0.0, max(float(trace.y.max()), 1.0)) if trace else (0.0, 1.0),
+        origin=0.5 * (wall.min(axis=0) + wall.max(axis=0)),
+        normal=normal,
+        up=normal if normal is not None else -toward,
+        toward=toward,
+    )
+
+
+def _normal(result: Result) -> Floats:
+    """The image plane's normal, turned upward; y without images."""
+    seen = result.registered[0].outline if result.registered else None
+    if seen is None:
+        return np.array([0.0, 1.0, 0.0])
+    normal = seen.pose[:3, 2]
+    return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
+
+
+def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:
+    """Flat facet sets across the first drive: the driven one and the held ones."""
+    scene = method.scene
+    if not scene.drives:
+        return ()
+    drive = scene.drives[0]
+    axis = int(np.argmax(np.abs(drive.direction)))
+    travel = method.run.traces[f"{drive.name}.displacement"].y[method.run.at[frame]]
+    moved = {drive.facets: _MM * float(travel) * np.array(drive.direction)}
+    held = dict.fromkeys(s.facets for s in scene.supports if axis in s.components)
+    found = []
+    for name in {**moved, **held}:
+        nodes = _MM * scene.mesh.nodes[scene.mesh.facet_nodes(name)]
+        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        if high[axis] - low[axis] < 1e-6:
+            shift = moved.get(name, np.zeros(3))
+            found.append(_plate(low, high, axis, scene.mesh, shift))
+    return tuple(found)
+
+
+def _plate(low: Floats, high: Floats, axis: int, mesh: Mesh, shift: Floats) -> Plate:
+    middle = 0.5 * _MM * (mesh.nodes[:, axis].min() + mesh.nodes[:, axis].max())
+    sizes = (high - low) * 1.12
+    thick = 0.04 * float((high - low).max())
+    sizes[axis] = thick
+    centre = 0.5 * (low + high)
+    centre[axis] += 0.55 * thick * np.sign(low[axis] - middle)
+    return Plate(centre, sizes, shift)

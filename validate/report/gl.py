@@ -1,0 +1,60 @@
+"""Whether this machine can render off-screen, found out without risk.
+
+Without GL libraries VTK ends the process with a segmentation fault at its first window, so the
+first window is opened in a process of its own. `VALIDATE_NO_GL=1` answers no at once.
+"""
+
+import os
+import subprocess
+import sys
+from functools import cache
+
+HOW_TO_GET = (
+    "Three-dimensional renders are missing: this machine has no OpenGL library. On Debian or "
+    "Ubuntu install libegl1 and libgl1-mesa-dri (or libosmesa6) and run again."
+)
+_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
+_WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+_PROBE = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
+plotter.add_mesh(pyvista.Sphere(), color="black")
+pixels = plotter.screenshot(return_img=True)
+raise SystemExit(0 if pixels.min() < pixels.max() else 1)
+"""
+_TIMEOUT = 60.0  # s: a cold start of VTK on a slow disk
+
+
+def available() -> bool:
+    """True when a window opened elsewhere; sets VTK's window class for this process then.
+
+    Call before the first import of vtk or pyvista.
+    """
+    if os.environ.get("VALIDATE_NO_GL") == "1":
+        return False
+    window = _working_window(os.environ.get(_VARIABLE, ""))
+    if window is None:
+        return False
+    os.environ[_VARIABLE] = window
+    return True
+
+
+@cache
+def _working_window(chosen: str) -> str | None:
+    candidates = (chosen,) if chosen else _WINDOWS
+    return next((window for window in candidates if _opens(window)), None)
+
+
+def _opens(window: str) -> bool:
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE],
+            env={**os.environ, _VARIABLE: window},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=_TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0

@@ -1,0 +1,57 @@
+"""Numbers as people read them: SI in, mm, mm², ms, N and Pa out, three significant digits."""
+
+import math
+
+_SHOWN = {
+    "m": ("mm", 1e3),
+    "m2": ("mm²", 1e6),
+    "s": ("ms", 1e3),
+    "1": ("", 1.0),
+}
+MISSING = "–"
+
+
+def shown_unit(unit: str) -> str:
+    """The unit that readers see for an SI unit; empty for pure numbers."""
+    return _SHOWN.get(unit, (unit, 1.0))[0]
+
+
+def scale(unit: str) -> float:
+    """Shown value = scale x SI value."""
+    return _SHOWN.get(unit, (unit, 1.0))[1]
+
+
+def text(value: float | None, unit: str = "1", digits: int = 3) -> str:
+    """`value` (SI) in the shown unit, without the unit; a dash for None, NaN and infinity."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    if unit == "1" and value == int(value) and abs(value) < 1e7:
+        return f"{int(value):,}".replace(",", "\u202f").replace("-", "−")
+    return significant(value * scale(unit), digits)
+
+
+def with_unit(value: float | None, unit: str = "1", digits: int = 3) -> str:
+    """As `text`, with the shown unit behind."""
+    return f"{text(value, unit, digits)} {shown_unit(unit)}".strip()
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Decimal notation with `digits` significant digits; powers of ten beyond 1e-4..1e7."""
+    if value == 0:
+        return "0"
+    power = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -4 <= power < 7:
+        mantissa = f"{value / 10.0**power:.{digits - 1}f}".rstrip("0").rstrip(".")
+        return f"{mantissa}e{power}".replace("-", "−")
+    return f"{value:,.{max(0, digits - 1 - power)}f}".replace(",", "\u202f").replace("-", "−")
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number already in its shown unit with fixed decimals and a true minus sign."""
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def spaced(label: str) -> str:
+    """A load label such as "9mm" as text: "9 mm"."""
+    number = label.rstrip("abcdefghijklmnopqrstuvwxyzNP%")
+    return f"{number} {label[len(number) :]}".strip()

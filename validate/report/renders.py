@@ -1,0 +1,159 @@
+"""Off-screen renders of the simulated body by pyvista. Import only after `gl.available()`."""
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from validate.report.body import Body
+from validate.report.page import Picture, Pixels
+from validate.scene.mesh import EDGES
+
+_IN_FRONT = (
+    0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
+)
+_SIZE = [1100, 760]
+_CELL = {4: 10, 10: 24}  # VTK_TETRA, VTK_QUADRATIC_TETRA: the same local order as ours
+_BAR: dict[str, Any] = {
+    "vertical": True,
+    "height": 0.6,
+    "width": 0.06,
+    "position_y": 0.2,
+    "title_font_size": 19,
+    "label_font_size": 18,
+    "color": "black",
+    "n_labels": 5,
+}
+
+
+def renders(body: Body) -> tuple[Picture, ...]:
+    """The body opened and deformed, from above at rest and deformed, and with element edges."""
+    wall = "" if body.pressure is None else (
+        f" The cavity wall is coloured by the pressure, {body.pressure:.4g} Pa."
+    )  # fmt: skip
+    whole = body.normal is None
+    opened = "whole" if whole else "cut open through the inclusion in the image plane"
+    cut = "" if whole else " at and behind the cut"
+    flat = "from the side" if whole else "against the cut"
+    shots = (
+        ("render_deformed", f"{body.label} at {body.load}, {opened}, true to scale: displacement "
+         f"magnitude in mm; plates grey.{wall}", _shot(body, scale=1.0, oblique=True)),
+        ("render_rest", f"The same body at rest, seen {flat}, before any load (no "
+         "displacement).", _shot(body, scale=0.0, oblique=False)),
+        ("render_flat", f"Seen {flat} at {body.load}: displacement magnitude "
+         f"in mm.{wall}", _shot(body, scale=1.0, oblique=False)),
+        ("render_mesh", f"The mesh of {body.label} at {body.load}: {len(body.mesh.cells)} "
+         f"elements, {len(body.mesh.nodes)} nodes; edges of the elements{cut}.",
+         _shot(body, scale=1.0, oblique=True, edges=True)),
+    )  # fmt: skip
+    return tuple(
+        Picture(n, words, "Render: " + words, shot, photo=True) for n, words, shot in shots
+    )
+
+
+def _shot(body: Body, *, scale: float, oblique: bool, edges: bool = False) -> Pixels:
+    plotter: Any = pv.Plotter(off_screen=True, window_size=_SIZE, lighting="light kit")
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    _add_body(plotter, body, scale, edges)
+    _add_wall(plotter, body, scale, edges)
+    for plate in body.plates:
+        x, y, z = plate.sizes
+        box = pv.Cube(center=plate.centre + scale * plate.shift, x_length=x, y_length=y, z_length=z)
+        if body.normal is not None:
+            box = box.clip(normal=body.normal, origin=body.origin)
+        plotter.add_mesh(box, color="#A9B0B7", ambient=0.3)
+    _aim(plotter, body, oblique)
+    pixels = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
+    plotter.close()
+    return pixels[..., :3].copy()
+
+
+def _add_body(plotter: Any, body: Body, scale: float, edges: bool) -> None:
+    count = body.mesh.cells.shape[1]
+    packed = np.hstack([np.full((len(body.mesh.cells), 1), count), body.mesh.cells]).ravel()
+    kinds = np.full(len(body.mesh.cells), _CELL[count], dtype=np.uint8)
+    grid = pv.UnstructuredGrid(packed, kinds, 1e3 * body.mesh.nodes)
+    grid.point_data["u"] = body.u
+    if body.normal is not None:
+        grid = grid.clip(normal=body.normal, origin=body.origin, crinkle=edges)
+    moved = np.asarray(grid.point_data["u"])
+    grid.points = np.asarray(grid.points) + scale * moved
+    if scale == 0:
+        plotter.add_mesh(grid, color="#DCC9A3", ambient=0.3)
+        return
+    grid.point_data["displacement"] = np.linalg.norm(moved, axis=1)
+    top = max(float(np.linalg.norm(body.u, axis=1).max()), 1e-9)
+    bar: Any = {**_BAR, "title": "displacement / mm\n", "position_x": 0.87, "fmt": "%.1f"}
+    plotter.add_mesh(
+        grid, scalars="displacement", cmap="viridis", clim=(0.0, top), show_edges=edges,
+        edge_color="#303030", line_width=1, ambient=0.3, scalar_bar_args=bar,
+    )  # fmt: skip
+
+
+def _add_wall(plotter: Any, body: Body, scale: float, edges: bool) -> None:
+    if body.cavity is None:
+        return
+    facets = body.mesh.facets[body.cavity]
+    triangles = facets if facets.shape[1] == 3 else facets[:, _QUARTERS].reshape(-1, 3)
+    nodes = 1e3 * body.mesh.nodes
+    if edges and body.normal is not None:  # whole triangles, as the elements beside them
+        below = (nodes - body.origin) @ body.normal < 0
+        triangles = triangles[below[triangles].any(axis=1)]
+    faces = np.hstack([np.full((len(triangles), 1), 3), triangles]).ravel()
+    wall = pv.PolyData(nodes, faces)
+    wall.point_data["u"] = body.u
+    if body.normal is not None and not edges:
+        wall = wall.clip(normal=body.normal, origin=body.origin)
+    moved = np.asarray(wall.points) + scale * np.asarray(wall.point_data["u"])
+    centre = body.origin + scale * body.u[np.unique(triangles)].mean(axis=0)
+    wall.points = centre + _IN_FRONT * (moved - centre)
+    if scale == 0 or body.pressure is None:
+        plotter.add_mesh(wall, color="#B98B5E", ambient=0.3)
+        return
+    wall.point_data["pressure"] = np.full(wall.n_points, body.pressure)
+    bar: Any = {**_BAR, "title": "pressure / Pa\n", "position_x": 0.05, "fmt": "%.0f"}
+    plotter.add_mesh(
+        wall,
+        scalars="pressure",
+        cmap="Oranges",
+        clim=body.pressures,
+        scalar_bar_args=bar,
+        ambient=0.45,
+    )
+    plotter.add_text(
+        f"cavity pressure {body.pressure:.0f} Pa", position=(20, 20), font_size=10, color="black"
+    )
+
+
+def _quarters() -> list[list[int]]:
+    """The four triangles of a six-node one: three corners, then the middles in `EDGES` order."""
+    middle = {frozenset(edge): 3 + i for i, edge in enumerate(EDGES[2])}
+    a, b, c = (middle[frozenset(e)] for e in ((0, 1), (1, 2), (0, 2)))
+    return [[0, a, c], [a, 1, b], [c, b, 2], [a, b, c]]
+
+
+_QUARTERS = _quarters()
+
+
+def _aim(plotter: Any, body: Body, oblique: bool) -> None:
+    """A camera fixed by the body at rest, so that a wrong size shows."""
+    nodes = 1e3 * body.mesh.nodes
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    up, along = body.up, -body.toward
+    if abs(float(up @ along)) > 0.9:
+        along = np.roll(up, 1)
+    side = np.cross(along, up)
+    opened = body.normal is not None
+    flat, flat_up = (up, -side) if opened else (side, up)
+    above = (0.95, 0.9, 0.3) if opened else (0.45, 1.0, 0.55)
+    away = above[0] * up + above[1] * side + above[2] * along if oblique else flat
+    drop = 0.16 * size if oblique and opened else 0.0  # the upper half is gone
+    plotter.camera.focal_point = tuple(middle - drop * up)
+    plotter.camera.position = tuple(middle - drop * up + 3 * size * away / np.linalg.norm(away))
+    plotter.camera.up = tuple(up if oblique else flat_up)
+    scale = 0.42 if not oblique else 0.47 if opened else 0.56
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = scale * size
+    plotter.camera.clipping_range = (0.1 * size, 10 * size)

@@ -1,0 +1,160 @@
+"""Tables of scores: methods side by side, every score by load, identified and printed figures."""
+
+import re
+
+from validate.compare.result import MethodResult, Result
+from validate.compare.score import Score
+from validate.compare.verdict import Published
+from validate.report.numbers import shown_unit, spaced, text
+from validate.report.page import Cell, Items, Mark, Section, Table, cells, section
+
+_MARKS: dict[str, Mark] = {
+    "reproduced": "good",
+    "not reproduced": "bad",
+    "not reproducible as printed": "open",
+    "not comparable": "open",
+}
+
+
+def side_by_side(result: Result) -> Section | None:
+    """How each method ended, what it cost and its errors at the last load."""
+    heads = _headline(result)
+    cost = Table(
+        "How each method ended and what it cost. Rate: 1 over the median time of one step; set-up: "
+        "mesh, assembly, factorisation and response columns. Times are of this machine.",
+        ("method", "name", "ended", "rate / kHz", "p99 / µs", "updates", "set-up / s"),
+        tuple(_cost_row(m) for m in result.methods),
+        words=(0, 1, 2),
+    )
+    last = ", ".join(dict.fromkeys(spaced(name.partition("@")[2]) for name, _ in heads))
+    units = (f"{name.partition('@')[0]} / {shown_unit(unit)}" for name, unit in heads)
+    errors = Table(
+        f"Errors against the recording at the last load ({last}).",
+        ("method", *(u.removesuffix(" / ") for u in units)),
+        tuple(_error_row(m, heads) for m in result.methods),
+    )
+    return section("methods", "Models side by side", cost, errors if heads else None)
+
+
+def _headline(result: Result) -> list[tuple[str, str]]:
+    """Rms and scalar errors at the last load of any method: names and SI units."""
+    found: dict[str, str] = {}
+    for method in result.methods:
+        last = {r.quantity: r for r in method.residuals.values()}
+        for residual in last.values():
+            scalar = residual.values.shape == (1, 1)
+            statistic = "" if scalar else ".rms"
+            found[f"{residual.quantity}{statistic}@{residual.load}"] = residual.unit
+    return list(found.items())
+
+
+def _cost_row(method: MethodResult) -> tuple[Cell, ...]:
+    times = method.run.step_s
+    updates = next((s.value for s in method.scores if s.name == "updates.max"), None)
+    end = next((r.outcome for r in method.runs if not r.finished), method.run.outcome)
+    ended = "finished" if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
+    return (
+        Cell(method.label + (" (checked)" if method.accepted else ""), "strong"),
+        *cells(
+            method.name,
+            ended,
+            text(1e-3 * times.rate_hz if times else None),
+            text(1e6 * times.p99 if times else None),
+            text(updates),
+            text(method.run.setup_s),
+        ),
+    )
+
+
+def _error_row(method: MethodResult, heads: list[tuple[str, str]]) -> tuple[Cell, ...]:
+    values = {s.name: s for s in method.scores}
+    errors = [values.get(name) for name, _ in heads]
+    return Cell(method.label, "strong"), *(Cell(_value(e)) for e in errors)
+
+
+def scores(result: Result) -> Section | None:
+    """Every score of every method, rows quantity and statistic, columns loads."""
+    return section(
+        "scores", "All scores", *(t for m in result.methods if (t := _scores_of(m)) is not None)
+    )
+
+
+def _scores_of(method: MethodResult) -> Table | None:
+    by_name: dict[str, dict[str, Score]] = {}
+    for score in method.scores:
+        name, at, load = score.name.partition("@")
+        if at:
+            by_name.setdefault(name, {})[load] = score
+    if not by_name:
+        return None
+    loads = list(dict.fromkeys(load for found in by_name.values() for load in found))
+    rows = tuple(
+        (
+            *cells(name, shown_unit(next(iter(found.values())).unit)),
+            *(Cell(_value(found.get(load))) for load in loads),
+            Cell(str(next(iter(found.values())).count)),
+        )
+        for name, found in sorted(by_name.items(), key=lambda item: _group(item[0]))
+    )
+    return Table(
+        f"{method.label} ({method.name})",
+        ("quantity.statistic", "unit", *(spaced(load) for load in loads), "values"),
+        rows,
+        words=(0, 1),
+        folded=not method.accepted,
+    )
+
+
+def _value(score: Score | None) -> str:
+    return text(score.value, score.unit) if score else "–"
+
+
+def _group(name: str) -> str:
+    """Statistics of one quantity stay together, in their order."""
+    return re.sub(r"\.(rms|max|mean|bias|simulated|measured)$", "", name)
+
+
+def identified(result: Result) -> Section | None:
+    """What was identified from the recordings, and the experiment's notes."""
+    rows = tuple(
+        (
+            *cells(s.name, text(s.value, s.unit), shown_unit(s.unit), str(s.count)),
+            *cells(s.against, s.definition),
+        )
+        for s in result.identified
+    )
+    table = Table(
+        "Identified from the recordings.",
+        ("name", "value", "unit", "values", "against", "definition"),
+        rows,
+        words=(0, 2, 4, 5),
+    )
+    return section(
+        "identified",
+        "Identified parameters and notes",
+        table if rows else None,
+        Items(result.notes) if result.notes else None,
+    )
+
+
+def published(result: Result) -> Section | None:
+    """Printed figures beside ours; None without any (a quick run has none)."""
+    if not result.published:
+        return None
+    table = Table(
+        f"Figures printed in {result.source}, beside ours.",
+        ("figure", "ours", "theirs", "tolerance", "unit", "verdict", "reason", "place"),
+        tuple(_printed(p) for p in result.published),
+        words=(0, 4, 5, 6, 7),
+    )
+    return section("published", "Published figures", table)
+
+
+def _printed(figure: Published) -> tuple[Cell, ...]:
+    values = (text(v, figure.unit) for v in (figure.ours, figure.theirs, figure.tolerance))
+    return (
+        Cell(figure.name),
+        *cells(*values, shown_unit(figure.unit)),
+        Cell(figure.verdict, _MARKS[figure.verdict]),
+        *cells(figure.reason, figure.source),
+    )

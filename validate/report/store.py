@@ -1,0 +1,198 @@
+"""results.json and the runs' arrays: SI with units, no NaN, no infinity, no absolute path."""
+
+import json
+import math
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.compare.effects import Effect
+from validate.compare.result import MethodResult, Result
+from validate.compare.score import Score
+from validate.compare.verdict import Check, Published
+from validate.recording.types import Source
+from validate.report.environment import environment, file_name, without_folder
+from validate.solve.types import Run, StepTimes
+
+SCHEMA_VERSION = 1
+Json = dict[str, Any]
+
+
+def schema() -> Json:
+    """The JSON Schema of results.json that ships with the package."""
+    text = files("validate.report").joinpath("results.schema.json").read_text(encoding="utf-8")
+    loaded: Json = json.loads(text)
+    return loaded
+
+
+def document(result: Result, created: str) -> Json:
+    """The content of results.json. Numbers that are not finite become null with a `why`."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "experiment": result.name,
+        "title": result.title,
+        "source": result.source,
+        "created": created,
+        "sentence": result.sentence,
+        "passed": result.passed,
+        "quick": result.quick,
+        "same_model": result.same_model,
+        "twin_notice": result.twin_notice,
+        "seed": result.seed,
+        "notes": list(result.notes),
+        "inputs": [_input(r.source) for r in result.recordings],
+        "parameters": {
+            p.path: {"value": _plain(p.default), "unit": p.unit} for p in result.parameters
+        },
+        "environment": environment(),
+        "methods": [_method(m, result) for m in result.methods],
+        "effects": [_effect(e) for e in result.effects],
+        "rest": [
+            {"name": r.name, "unit": r.unit, "sd": _finite(r.sd), "count": r.count,
+             "rms": _finite(float(np.sqrt((r.values**2).sum(axis=1).mean())))}
+            for r in result.rest
+        ],
+        "identified": [_score(s) for s in result.identified],
+        "published": [_published(p) for p in result.published],
+        "uncertain_inputs": list(result.inputs),
+    }  # fmt: skip
+
+
+def write_json(content: Json, path: Path) -> None:
+    """The document as text; a NaN that slipped through is a bug and raises `ValueError`."""
+    text = json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def write_runs(result: Result, folder: Path) -> None:
+    """<method>.npz: t (nt,) s, u (no, n, d) m at the steps `at`, nodes (n, d) m, cells (e, m).
+
+    Several recordings: the arrays of the second and later ones end in _2, _3, ...
+    """
+    for method in result.methods:
+        arrays: dict[str, NDArray[Any]] = {
+            "nodes": method.scene.mesh.nodes,
+            "cells": method.scene.mesh.cells,
+        }
+        for i, run in enumerate(method.runs, start=1):
+            end = "" if i == 1 else f"_{i}"
+            arrays |= {f"t{end}": run.t, f"u{end}": run.u, f"at{end}": run.at}
+        with (folder / f"{method.name}.npz").open("wb") as out:
+            np.savez_compressed(out, allow_pickle=False, **arrays)
+
+
+def _input(source: Source) -> Json:
+    return {"path": file_name(source.path), "sha256": source.sha256, "bytes": source.bytes,
+            "integrity": source.integrity}  # fmt: skip
+
+
+def _method(method: MethodResult, result: Result) -> Json:
+    first = method.run
+    end = next((r.outcome for r in method.runs if not r.finished), first.outcome)
+    names = [r.name for r in result.recordings]
+    return {
+        "name": method.name,
+        "label": method.label,
+        "accepted": method.accepted,
+        "outcome": {"state": end.state, "step": end.step, "why": end.why},
+        "setup_s": _finite(first.setup_s),
+        "step_s": _times(first.step_s),
+        "rate_hz": _finite(first.step_s.rate_hz) if first.step_s else None,
+        "t": first.t.tolist(),
+        "traces": _traces(first),
+        "further_runs": [
+            {"recording": name, "outcome": run.outcome.state, "t": run.t.tolist(),
+             "traces": _traces(run)}
+            for name, run in zip(names[1:], method.runs[1:], strict=False)
+        ],
+        "scores": [_score(s) for s in method.scores],
+        "checks": [_check(c) for c in method.checks],
+        "published": [
+            _published(p) for p in result.published if p.name.startswith(f"{method.name}: ")
+        ],
+    }  # fmt: skip
+
+
+def _times(times: StepTimes | None) -> Json | None:
+    if times is None:
+        return None
+    return {"p50": times.p50, "p99": times.p99, "max": times.max, "n": times.n}
+
+
+def _traces(run: Run) -> Json:
+    return {k: {"unit": t.unit, "y": t.y.tolist()} for k, t in run.traces.items()}
+
+
+def _score(score: Score) -> Json:
+    return {
+        "name": score.name,
+        **_number("value", score.value),
+        "unit": score.unit,
+        "count": score.count,
+        "against": score.against,
+        "definition": score.definition,
+    }
+
+
+def _check(check: Check) -> Json:
+    compared = check.count > 0
+    parts = ("u_val", "u_D", "u_num", "u_input")
+    return {
+        "name": check.name,
+        "value": _finite(check.value) if compared else None,
+        "limit": _finite(check.limit),
+        **{p: _finite(getattr(check, p)) if compared else None for p in parts},
+        "unit": check.unit,
+        "count": check.count,
+        "verdict": check.verdict,
+        "why": check.why,
+    }
+
+
+def _published(figure: Published) -> Json:
+    return {
+        "name": figure.name,
+        "ours": _finite(figure.ours),
+        "theirs": _finite(figure.theirs),
+        "tolerance": _finite(figure.tolerance),
+        "unit": figure.unit,
+        "verdict": figure.verdict,
+        "reason": figure.reason,
+        "source": figure.source,
+    }
+
+
+def _effect(effect: Effect) -> Json:
+    return {
+        "name": effect.name,
+        "doc": effect.doc,
+        "changes": [
+            {"name": c.name, "rms": _finite(c.rms), "max": _finite(c.max), "unit": c.unit,
+             "separation": _finite(c.separation)}
+            for c in effect.changes
+        ],
+        "seen_by": list(effect.seen_by),
+        "would_see": list(effect.would_see),
+    }  # fmt: skip
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _number(key: str, value: float) -> Mapping[str, Any]:
+    if math.isfinite(value):
+        return {key: float(value)}
+    return {key: None, "why": f"not finite ({value})"}
+
+
+def _plain(value: object) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return _finite(value)
+    return without_folder(value)

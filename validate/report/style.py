@@ -1,0 +1,72 @@
+"""How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from validate.compare.result import Result
+from validate.report.page import Pixels
+
+MEASURED = "#000000"
+ACCEPTED = "#0072B2"
+NOISE = "#D9D9D9"
+_RIVALS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
+_DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 3)), (0, (2, 3)))
+_POINTS = ("s", "^", "D", "v", "P", "X")
+_SETTINGS: Mapping[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E5E5E5",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "savefig.facecolor": "white",
+}
+_DPI = 130
+
+
+@dataclass(frozen=True)
+class Look:
+    """The colour, dash and point of a method, the same in every figure of a report."""
+
+    colour: str
+    dash: Any
+    point: str
+    width: float
+
+
+def looks(result: Result) -> dict[str, Look]:
+    """By method: accepted ones blue and solid, rivals in the other colours and dashed."""
+    found: dict[str, Look] = {}
+    rivals = 0
+    for method in result.methods:
+        if method.accepted and not any(m.colour == ACCEPTED for m in found.values()):
+            found[method.name] = Look(ACCEPTED, "-", "o", 1.8)
+            continue
+        i = rivals % len(_RIVALS)
+        found[method.name] = Look(_RIVALS[i], _DASHES[i], _POINTS[i], 1.2)
+        rivals += 1
+    return found
+
+
+def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels:
+    """Pixels (h, w, 3) of a figure of width x height inches that `paint` fills."""
+    settings: Any = dict(_SETTINGS)
+    with mpl.rc_context(settings):
+        figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
+        canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
+        paint(figure)
+        canvas.draw()
+        return np.array(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()
