@@ -7,8 +7,8 @@
 import sys
 from pathlib import Path
 
-import validate
 from validate.compare.result import MethodResult, Result
+from validate.replay import compare, load
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
@@ -50,7 +50,7 @@ def markdown(table: list[list[str]]) -> str:
 
 
 def main() -> None:
-    result = validate.compare(validate.load(str(ROOT / "experiments" / "fluid_phantom.py")))
+    result = compare(load(str(ROOT / "experiments" / "fluid_phantom.py")))
     text = markdown(rows(result))
     print(text)
     if "--write" in sys.argv[1:]:

@@ -14,39 +14,7 @@ Conventions, one page:
   in `register`.
 - *measured* is a recording; *reference* is a finer or more exact model; never one for the other.
 
-The same road from Python:
-
-    import validate
-    experiment = validate.load("fluid_phantom")
-    result = validate.compare(experiment, {"material.E": "14000"})
-    for check in result.checks:
-        print(check.name, check.value, check.unit, check.verdict)
+The same road from Python: `validate.replay` (load, compare).
 """
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from validate.compare.result import Result
-    from validate.replay.experiment import Experiment
-
 __version__ = "0.1.0"
-
-
-def load(name: str) -> "Experiment":
-    """The experiment of that name, or of that file; raises `UsageError` naming the nearest."""
-    from pathlib import Path
-
-    from validate.replay.find import find
-
-    return find(name, Path.cwd())
-
-
-def compare(
-    experiment: "Experiment", values: Mapping[str, str] | None = None, *, quick: bool = False
-) -> "Result":
-    """Runs the road and judges it; `values` are parameter paths and texts, as for `--set`."""
-    from validate.replay.road import Options
-    from validate.replay.road import compare as run
-
-    return run(experiment, Options(dict(values or {}), quick=quick))

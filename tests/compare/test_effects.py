@@ -58,6 +58,7 @@ def test_quantity_without_sensor_is_not_seen_but_would_be() -> None:
     )
     found = effect("fluid", "no fluid", one, other, {}, sensors)
     assert found.seen_by == ()
+    assert effect("fluid", "", one, other, {"pressure@9mm": 1.0}, ()).seen_by == ()
     assert found.would_see == ("transducer",)
     assert found.changes[0].separation == 0.0
     assert (found.name, found.doc) == ("fluid", "no fluid")

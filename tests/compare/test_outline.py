@@ -94,6 +94,18 @@ def test_outline_that_folds_back_is_refused() -> None:
         angular_points(np.vstack([outer, inner[::-1]]), np.zeros(1))
 
 
+def test_outline_with_a_pocket_is_refused() -> None:
+    """Once around, but 40 deg of it three times over."""
+    arcs = [(1.0, 0, 60), (0.8, 60, 20), (0.6, 20, 340)]
+    legs = [
+        r * np.exp(1j * np.deg2rad(np.linspace(start, end, abs(end - start) // 2 + 1)))
+        for r, start, end in arcs
+    ]
+    z = np.concatenate(legs)
+    with pytest.raises(ComparisonError, match="folds back on itself"):
+        angular_points(np.stack([z.real, z.imag], axis=1), np.zeros(1))
+
+
 @pytest.mark.parametrize("measure", [enclosed, lambda o: normal_distances(o, SQUARE)])
 def test_outline_that_crosses_itself_is_refused(measure) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ComparisonError, match=r"outline of 4 points .*Self-intersection"):

@@ -66,6 +66,19 @@ def test_far_origin_loses_no_digits(kind: Kind) -> None:
     assert ours == pytest.approx(volume_form(surface, np.stack([near, near])), rel=1e-9)
 
 
+@kinds
+def test_far_origin_loses_nothing_of_exact_data(kind: Kind) -> None:
+    """Binary fractions moved by 2^20 m are not rounded, so no digit of the volume may change."""
+    hole = ((slice(1, 3), slice(1, 2), slice(1, 4)),)
+    mesh = grid_mesh((5, 5, 9), holes=hole, kind=kind)
+    surface = cavity_surface(mesh, "box", "hole0")
+    far = mesh.nodes + 2.0**20
+    exact = (2 / 4) * (1 / 4) * (3 / 8)
+    assert volume_of(surface, far) == pytest.approx(exact, rel=1e-14)
+    form = volume_form(surface, np.stack([far, far]))
+    assert form == pytest.approx(exact, rel=1e-14)
+
+
 def test_volume_of_the_capsule_converges_from_below() -> None:
     volumes = []
     for grid in (COARSE_GRID, PAPER_GRID):

@@ -1,6 +1,6 @@
 """Systems and response columns: exact compression, reciprocity, energy, published numbers."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_responses, ph
 from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
 from validate.scene.cylinder import quarter_cylinder
-from validate.scene.mesh import cell_volumes, quadratic
+from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.scene import Cavity, Dilatation, Drive, Material, Pin, Scene, Support
 
 SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)), Support("lower_plate", (2,)))
@@ -85,6 +85,33 @@ def test_reciprocity_of_plate_and_pressure() -> None:
     squeezed = 3 * r.volumes[0, 0, 0, 1]
     assert r.reactions[0, 1] == pytest.approx(-squeezed, rel=1e-11)
     assert squeezed < 0 < r.reactions[0, 0]
+
+
+def test_reciprocity_of_a_driven_cavity_wall() -> None:
+    """A plate that is itself wetted: the fluid's push counts in its force."""
+    grid = grid_mesh((6, 5, 5), holes=((slice(2, 4), slice(1, 3), slice(1, 3)),))
+    hole = grid.facets["hole0"]
+    wetted = hole[np.isclose(grid.nodes[hole, 0], 0.8).all(axis=1)]
+    mesh = Mesh(grid.nodes, grid.cells, "tet4", {**grid.facets, "piston": wetted})
+    scene = Scene(
+        mesh,
+        Material(1.0, 0.3),
+        (Support("x0", (0, 1, 2)),),
+        drives=(Drive("piston", "piston", (-1.0, 0.0, 0.0)),),
+        cavities=(Cavity("box", "hole0"),),
+    )
+    r = responses(build(scene))
+    squeezed = 3 * r.volumes[0, 0, 0, 1]
+    assert len(wetted) == 8
+    assert squeezed < 0
+    assert r.reactions[0, 1] == pytest.approx(-squeezed, rel=1e-11)
+
+
+def test_parts_of_a_symmetric_body_add_up() -> None:
+    quarter = compressed(1, 0.3, bonded=False).scene
+    one, whole = (responses(build(replace(quarter, copies=n))) for n in (1, 4))
+    assert whole.reactions == pytest.approx(4 * one.reactions, rel=1e-15)
+    assert np.array_equal(whole.fields, one.fields)
 
 
 def two_drives() -> Scene:

@@ -122,6 +122,16 @@ def test_plane_through_vertices_and_along_edges_is_cut_cleanly():
         assert outline.max() == pytest.approx(0.75)
 
 
+def test_largest_of_several_outlines_is_the_section():
+    small = (slice(1, 2), slice(1, 2), slice(1, 3))
+    large = (slice(3, 5), slice(1, 3), slice(1, 3))
+    mesh = grid_mesh((7, 7, 5), holes=(small, large))
+    pose = np.eye(4)
+    pose[2, 3] = 0.4
+    both = np.vstack([mesh.facets["hole0"], mesh.facets["hole1"]])
+    assert signed_area(section(mesh.nodes, both, pose)) == pytest.approx(4 / 36)
+
+
 @pytest.mark.parametrize("height", [0.0141, -0.05])
 def test_plane_that_misses_is_refused_with_the_span(wall, height):
     low = -1e3 * (0.014 - height)

@@ -44,3 +44,5 @@ def test_missing_is_a_dash() -> None:
 def test_loads_as_text() -> None:
     assert spaced("9mm") == "9 mm"
     assert spaced("0.5mm") == "0.5 mm"
+    assert spaced("10pct") == "10 %"
+    assert spaced("end") == "end"

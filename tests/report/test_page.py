@@ -6,7 +6,7 @@ from html import unescape
 from html.parser import HTMLParser
 
 import pytest
-from report_samples import CHECK, bare_result, small_result
+from report_samples import BLIND, CHECK, bare_result, small_result
 
 from validate.compare.effects import Change
 from validate.compare.result import Result
@@ -121,7 +121,8 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
     found, _ = made(small_result())
     table = next(p for p in found["checks"].parts if p.kind == "table")
     assert [c.text for c in table.rows[0]] == [
-        "force.plate@2mm", "N", "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
+        "soft <cube>", "force.plate@2mm", "N",
+        "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
         "✓ agrees", "|E| is 0.5 u_val",
     ]  # fmt: skip
 
@@ -138,7 +139,22 @@ def test_references_without_noise_are_no_sensors() -> None:
     result = small_result()
     exact = Change("volume.relative_error@2mm", 0.08, 0.08, "1", 3e13)
     effect = replace(result.effects[0], changes=(*result.effects[0].changes, exact))
-    found, _ = made(replace(result, effects=(effect,)))
+    soft = result.methods[0]
+    noiseless = replace(
+        next(iter(soft.residuals.values())), quantity="volume.relative_error", sd=0.0, unit="1"
+    )
+    soft = replace(soft, residuals={**soft.residuals, noiseless.name: noiseless})
+    found, _ = made(replace(result, effects=(effect, BLIND), methods=(soft,)))
     tables = [p for p in found["discrimination"].parts if p.kind == "table"]
     assert tables[0].headings == ("effect", "force.plate")
     assert [c.text for c in tables[0].rows[0]] == ["modulus: E 10 % higher", "✓ 7.0"]
+    assert [c.text for c in tables[0].rows[1]] == ["nu: nu 0.45", "0.1"]
+    assert [row[1].mark for row in tables[0].rows] == ["good", ""]
+
+
+def test_a_line_on_another_is_named() -> None:
+    result = small_result()
+    twin = replace(result.methods[0], name="twin", label="the same again", accepted=False)
+    found, _ = made(replace(result, methods=(*result.methods, twin)))
+    (picture,) = found["curves"].pictures
+    assert "lying on another line: the same again (on soft <cube>)" in picture.caption

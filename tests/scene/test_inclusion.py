@@ -120,12 +120,18 @@ def test_inclusion_that_reaches_a_face_is_refused(
 
 def test_inclusion_too_near_a_face_for_its_mesh_is_refused() -> None:
     with pytest.raises(SceneError, match=r"shares \d+ nodes with the outer faces"):
-        block_with_inclusion(BLOCK, (5, 5, 5), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.0445))
+        block_with_inclusion(BLOCK, (9, 5, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.0445))
 
 
 def test_inclusion_smaller_than_an_element_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"no node .* radius 0.5 mm; refine"):
+    with pytest.raises(SceneError, match=r"diameter 1 mm is smaller than an element of 23.3 mm"):
         block_with_inclusion(BLOCK, (4, 4, 4), Capsule((0.03, 0.0225, 0.035), 0.0005, 0.001))
+
+
+def test_inclusion_between_the_nodes_is_refused() -> None:
+    """As wide as an element, yet every node is outside."""
+    with pytest.raises(SceneError, match=r"no node of the \(8, 8, 8\) mesh .* radius 5.2 mm"):
+        block_with_inclusion(BLOCK, (8, 8, 8), Capsule((0.03, 0.0225, 0.035), 0.0052, 0.0104))
 
 
 @pytest.mark.parametrize("grid", [(3, 10, 15), (9, 3, 15), (9, 10, 3)])

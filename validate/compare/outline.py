@@ -34,8 +34,9 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
     away = outline - centre
     polar = np.arctan2(away[:, 1], away[:, 0])
     around = np.unwrap(np.append(polar, polar[0]))  # the closed way
-    steps = np.diff(around) * np.sign(around[-1] - around[0])
-    if steps.min() < -np.deg2rad(20) or not 1.5 * np.pi < steps.sum() < 2.5 * np.pi:
+    ahead = (around - around[0]) * np.sign(around[-1] - around[0])
+    back = (np.maximum.accumulate(ahead) - ahead).max()
+    if back > np.deg2rad(20) or not 1.5 * np.pi < ahead[-1] < 2.5 * np.pi:
         raise ComparisonError("an outline folds back on itself; its polar angles are not ordered")
     at = np.mod(polar, 2 * np.pi)
     order = np.argsort(at, kind="stable")

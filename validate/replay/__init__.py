@@ -1,1 +1,34 @@
-"""An experiment and the road from its recording to a comparison."""
+"""An experiment and the road from its recording to a comparison, for notebooks too.
+
+    from validate.replay import compare, load
+    result = compare(load("fluid_phantom"), {"material.E": "14000"})
+    for check in result.checks:
+        print(check.name, check.value, check.unit, check.verdict)
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from validate.compare.result import Result
+from validate.replay import road
+from validate.replay.experiment import Experiment
+from validate.replay.find import find
+
+
+def load(name: str) -> Experiment:
+    """The experiment of that name, or of that file; raises `UsageError` naming the nearest."""
+    return find(name, Path.cwd())
+
+
+def compare(
+    experiment: Experiment,
+    values: Mapping[str, str] | None = None,
+    methods: tuple[str, ...] = (),
+    *,
+    quick: bool = False,
+) -> Result:
+    """Runs the road and judges it; `values` are parameter paths and texts, as for `--set`.
+
+    Raises children of `ValidateError` for bad input.
+    """
+    return road.compare(experiment, road.Options(dict(values or {}), methods, quick))

@@ -6,7 +6,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
-from validate.report.numbers import spaced
+from validate.register.observe import Hold
+from validate.report.numbers import spaced, with_unit
 from validate.report.observed import shown_method
 from validate.scene.mesh import Mesh
 
@@ -27,10 +28,12 @@ class Body:
     """A mesh at rest with displacements u (n, 3) mm at `load`, opened by a plane or whole.
 
     The part on the side of `normal` (3,) beyond `origin` (3,) mm is taken away; None: whole.
-    `up` (3,) is the camera's; pressure Pa is None without a cavity, `pressures` its range Pa.
+    `part` says when symmetry leaves out the rest of it. `up` (3,) is the camera's; pressure Pa is
+    None without a cavity, `pressures` its range Pa.
     """
 
     label: str
+    part: str
     load: str
     mesh: Mesh
     u: Floats
@@ -60,7 +63,8 @@ def body(result: Result) -> Body | None:
     toward = np.array(scene.drives[0].direction) if scene.drives else np.array([-1.0, 0.0, 0.0])
     return Body(
         label=method.label,
-        load=spaced(holds[frame].label) if holds else "the last output",
+        part=f" One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
+        load=_load(holds[frame]) if holds else "the last output",
         mesh=scene.mesh,
         u=_MM * run.u[frame],
         plates=_plates(method, frame),
@@ -72,6 +76,11 @@ def body(result: Result) -> Body | None:
         up=normal if normal is not None else -toward,
         toward=toward,
     )
+
+
+def _load(hold: Hold) -> str:
+    """The load in words; a label without a number is replaced by the stage's position."""
+    return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.stage, "m")
 
 
 def _normal(result: Result) -> Floats:

@@ -54,7 +54,8 @@ def _observations(result: Result, quantity: str) -> list[tuple[int, Registered, 
 
 def _signal(result: Result, quantity: str) -> Picture | None:
     seen = _observations(result, quantity)
-    lines = _lines(result, seen)
+    lines, hidden = _lines(result, seen)
+    left_out = f" Not drawn, lying on another line: {'; '.join(hidden)}." if hidden else ""
     if not lines:
         return None
     unit, factor = _AXIS.get(seen[0][2].unit, (seen[0][2].unit, 1.0))
@@ -65,8 +66,8 @@ def _signal(result: Result, quantity: str) -> Picture | None:
         f"curve_{quantity.replace('.', '_')}",
         f"Left: {quantity} in {unit} against stage displacement in mm, "
         f"every sample of {count} (points) and the models (lines). Right: model less measurement; "
-        "grey: ± 2 standard deviations of one sample; outside of it the axis is "
-        "logarithmic. Models whose line would lie on another's are left out.",
+        "grey: ± 2 standard deviations of one sample; outside of it the axis is logarithmic."
+        f"{left_out}",
         f"{quantity} against stage displacement: measured and {names}, with the "
         "differences beside.",
         pixels,
@@ -75,16 +76,20 @@ def _signal(result: Result, quantity: str) -> Picture | None:
 
 def _lines(
     result: Result, seen: Sequence[tuple[int, Registered, SignalObservation]]
-) -> list[_Line]:
-    styles, kept = looks(result), list[_Line]()
+) -> tuple[list[_Line], list[str]]:
+    """Lines to draw, and the methods whose line lies on one of them."""
+    styles, kept, hidden = looks(result), list[_Line](), list[str]()
     scale = max((float(np.ptp(s.y)) for _, _, s in seen), default=0.0)
     for method in finished(result):
         if any(s.trace not in method.runs[i].traces for i, _, s in seen):
             continue
         y = tuple(_at_samples(method.runs[i], s) for i, _, s in seen)
-        if all(_apart(y, k.y) > _APART * scale for k in kept):
+        same = next((k for k in kept if _apart(y, k.y) <= _APART * scale), None)
+        if same is None:
             kept.append(_Line(method, styles[method.name], y))
-    return kept
+        else:
+            hidden.append(f"{method.label} (on {same.method.label})")
+    return kept, hidden
 
 
 def _at_samples(run: Run, seen: SignalObservation) -> Floats:

@@ -22,7 +22,7 @@ def cut(body: Body) -> Picture:
     pressure = "" if body.pressure is None else f" Cavity pressure {body.pressure:.4g} Pa."
     words = (
         f"{body.label} at {body.load}: {what}, deformed true to scale, coloured by the "
-        f"displacement magnitude in mm.{pressure}"
+        f"displacement magnitude in mm.{pressure}{body.part}"
     )
     return Picture("cut", words, "Section: " + words, pixels, photo=True)
 

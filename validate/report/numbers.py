@@ -54,4 +54,5 @@ def fixed(value: float, decimals: int) -> str:
 def spaced(label: str) -> str:
     """A load label such as "9mm" as text: "9 mm"."""
     number = label.rstrip("abcdefghijklmnopqrstuvwxyzNP%")
-    return f"{number} {label[len(number) :]}".strip()
+    unit = label[len(number) :].replace("pct", "%")
+    return f"{number} {unit}".strip()

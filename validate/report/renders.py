@@ -37,7 +37,7 @@ def renders(body: Body) -> tuple[Picture, ...]:
     flat = "from the side" if whole else "against the cut"
     shots = (
         ("render_deformed", f"{body.label} at {body.load}, {opened}, true to scale: displacement "
-         f"magnitude in mm; plates grey.{wall}", _shot(body, scale=1.0, oblique=True)),
+         f"magnitude in mm; plates grey.{wall}{body.part}", _shot(body, scale=1.0, oblique=True)),
         ("render_rest", f"The same body at rest, seen {flat}, before any load (no "
          "displacement).", _shot(body, scale=0.0, oblique=False)),
         ("render_flat", f"Seen {flat} at {body.load}: displacement magnitude "

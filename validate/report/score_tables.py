@@ -92,7 +92,7 @@ def _scores_of(method: MethodResult) -> Table | None:
         (
             *cells(name, shown_unit(next(iter(found.values())).unit)),
             *(Cell(_value(found.get(load))) for load in loads),
-            Cell(str(next(iter(found.values())).count)),
+            Cell(", ".join(dict.fromkeys(str(s.count) for s in found.values()))),
         )
         for name, found in sorted(by_name.items(), key=lambda item: _group(item[0]))
     )

@@ -22,18 +22,18 @@ def checks(result: Result) -> Section | None:
     """Every check of the accepted methods; None when there is none."""
     if not result.checks:
         return None
-    rows = tuple(_row(c) for c in result.checks)
+    rows = tuple((Cell(m.label), *_row(c)) for m in result.methods for c in m.checks)
     table = Table(
         "E = simulation less measurement; for many points the part of the rms that noise does not "
         "explain. u_val² = u_D² (measurement) + u_num² (mesh) + u_input² (declared ranges), "
         "standard uncertainties. Agrees: |E| ≤ 2 u_val ≤ limit. Differs: |E| > 2 u_val. Cannot "
         "decide: 2 u_val exceeds the limit.",
-        ("check", "unit", "E", "2 u_val", "u_D", "u_num", "u_input", "limit", "values", "verdict",
-         "why"),
+        ("method", "check", "unit", "E", "2\u00a0u_val", "u_D", "u_num", "u_input", "limit",
+         "values", "verdict", "why"),
         rows,
-        words=(0, 1, 9, 10),
+        words=(0, 1, 2, 10, 11),
     )  # fmt: skip
-    methods = ", ".join(m.label for m in result.methods if m.checks)
+    methods = "; ".join(m.label for m in result.methods if m.checks)
     return section(
         "checks",
         "Checks",
