@@ -1,7 +1,7 @@
 """The README's table: models of the fluid phantom side by side, from today's run.
 
-    python benchmarks/readme_table.py            prints it
-    python benchmarks/readme_table.py --write    puts it into README.md, with the picture
+python benchmarks/readme_table.py            prints it
+python benchmarks/readme_table.py --write    puts it into README.md, with the picture
 """
 
 import sys
@@ -38,7 +38,7 @@ def _row(method: MethodResult) -> list[str]:
         f"{mm['marker.inplane.rms@9mm']} / {mm['marker.vertical.rms@9mm']}",
         f"{s['force.plate@9mm']:+.2f}",
         f"{s['pressure@9mm']:+.0f}",
-        f"{100 * s['volume.relative_error@9mm']:+.2f}",
+        f"{100 * s['volume.relative_error@9mm'] + 0.0:.2f}".replace("-0.00", "0.00"),
         f"{s['updates.max']:.0f}",
         f"{rate:.0f}",
     ]

@@ -61,7 +61,8 @@ class Specimen:
 @dataclass(frozen=True)
 class Grid:
     radial: int = quantity(6, "1", "quadratic elements from axis to rim")
-    axial: int = quantity(7, "1", "quadratic elements along the axis")
+    axial: int = quantity(8, "1", "quadratic elements along the axis")
+    grading: float = quantity(2.0, "1", "above 1: smaller cells towards rim and plates")
     finer_radial: int = quantity(8, "1", "the second mesh, for u_num")
     finer_axial: int = quantity(10, "1", "the second mesh, for u_num")
 
@@ -133,7 +134,7 @@ def cylinder_scene(
     diameter: float, height: float, grid: Grid, material: Material, contact: Contact
 ) -> Scene:
     """A quarter of the cylinder with its two planes of symmetry, the upper plate driven down."""
-    mesh = quadratic(quarter_cylinder(diameter, height, grid.radial, grid.axial))
+    mesh = quadratic(quarter_cylinder(diameter, height, grid.radial, grid.axial, grid.grading))
     held = (2,) if contact == "slip" else (0, 1, 2)
     supports = [
         Support("lower_plate", held),

@@ -69,13 +69,14 @@ def run(name: str, stiffness: float, press: float = PRESS) -> Run:
 
 def method(name: str, stiffness: float, *, accepted: bool = False) -> MethodResult:
     runs = (run(name, stiffness), run(name, stiffness))
+    seen = (recording("cube_a", 1)[1], recording("cube_b", 2)[1])
     force = stiffness * PRESS
     residual = Residual(
         "force.plate", "2mm", np.array([[force - 4.0]]), 0.02, 0.0, "N", "plate force", force, 4.0
     )
     scores = (*scores_of(residual, "measured recording"), *run_scores(runs[0]))
     return MethodResult(
-        name, f"{name} <cube>", accepted, scene(), runs, {residual.name: residual}, scores,
+        name, f"{name} <cube>", accepted, scene(), seen, runs, {residual.name: residual}, scores,
         (CHECK,) if accepted else (),
     )  # fmt: skip
 
@@ -113,7 +114,6 @@ def small_result() -> Result:
         ),
         methods=(method("soft", 2000.0, accepted=True), method("stiff", 2600.0)),
         recordings=tuple(p[0] for p in pairs),
-        registered=tuple(p[1] for p in pairs),
         rest=(),
         effects=(EFFECT, BLIND),
         published=(PRINTED,),
@@ -132,8 +132,8 @@ def bare_result() -> Result:
         failed.run, at=np.zeros(0, int), u=np.zeros((0, 27, 3)), step_s=None,
         outcome=Outcome("not_converged", 3, "1 update allowed"),
     )  # fmt: skip
-    failed = replace(failed, runs=(ended,), residuals={}, scores=())
+    failed = replace(failed, registered=(), runs=(ended,), residuals={}, scores=())
     return replace(
-        result, methods=(failed,), recordings=(), registered=(), effects=(), published=(),
+        result, methods=(failed,), recordings=(), effects=(), published=(),
         identified=(), notes=(), inputs=(), parameters=(), sentence="Nothing was decided.",
     )  # fmt: skip

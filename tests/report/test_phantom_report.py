@@ -9,10 +9,11 @@ import jsonschema
 import pytest
 from report_samples import CHECK
 
+from validate.compare.outline import normal_distances
 from validate.compare.result import Result
 from validate.replay.road import Options, compare
 from validate.report.html import SECTIONS
-from validate.report.observed import outline_seen, shown_method
+from validate.report.observed import outline_seen
 from validate.report.page import Section
 from validate.report.store import document, schema
 
@@ -61,12 +62,12 @@ def test_top_left_is_the_score(result: Result, sections: dict[str, Section]) -> 
     assert float(shown["measured"]) == pytest.approx(measured, abs=0.005)
 
 
-def test_an_outline_that_was_not_judged_is_not_drawn(result: Result) -> None:
-    method = shown_method(result)
-    assert method is not None
-    assert outline_seen(result, method) is not None
-    wrong = replace(method.run, u=1.01 * method.run.u)
-    assert outline_seen(result, replace(method, runs=(wrong,))) is None
+def test_the_outline_drawn_is_the_one_that_was_judged(result: Result) -> None:
+    for method in result.methods:
+        seen = outline_seen(method)
+        assert seen is not None
+        drawn = normal_distances(seen.simulated(method.run.u[-1]), seen.outlines[-1])
+        assert drawn == pytest.approx(method.residuals["contour@9mm"].values[:, 0], abs=1e-12)
 
 
 def test_results_validate(result: Result) -> None:

@@ -50,3 +50,13 @@ def test_empty_cylinders_are_refused(
 ) -> None:
     with pytest.raises(SceneError, match="all must be positive"):
         quarter_cylinder(diameter, height, radial, axial)
+
+
+def test_grading_shrinks_cells_towards_rim_and_plates_and_keeps_the_volume() -> None:
+    plain, graded = (quarter_cylinder(0.05, 0.03, 6, 8, g) for g in (1.0, 2.0))
+    assert cell_volumes(graded).sum() == pytest.approx(cell_volumes(plain).sum(), rel=1e-12)
+    z = np.unique(np.round(graded.nodes[:, 2], 9))
+    assert z[1] - z[0] == pytest.approx((z[4] - z[3]) / 7)  # 1/16 and 7/16 of the half height
+    assert z + z[::-1] == pytest.approx(np.full(9, 0.03))
+    r = np.unique(np.round(np.linalg.norm(graded.nodes[:, :2], axis=1), 9))
+    assert r[-1] - r[-2] == pytest.approx(0.025 / 36)

@@ -75,5 +75,6 @@ def _change(one: Residual, other: Residual, sd: float, shared: float) -> Change:
     moved = other.values - one.values
     noise = np.sqrt(moved.shape[1] * (sd**2 / one.count + one.systematic**2) + shared**2)
     size = rms(moved)
-    separation = float(size / noise) if noise > 0 else 0.0
+    # Without a measured noise there is no sensor that could see the change.
+    separation = float(size / noise) if sd > 0 else 0.0
     return Change(one.name, size, max_length(moved), one.unit, separation)

@@ -17,12 +17,13 @@ from validate.solve.types import Run
 
 @dataclass(frozen=True)
 class MethodResult:
-    """One method: its scene, one run per recording, scores against them, checks if accepted."""
+    """One method: its scene; per recording the registration and the run; scores and checks."""
 
     name: str
     label: str
     accepted: bool
     scene: Scene
+    registered: tuple[Registered, ...]
     runs: tuple[Run, ...]
     residuals: Mapping[str, Residual]
     scores: tuple[Score, ...]
@@ -48,7 +49,6 @@ class Result:
     parameters: tuple[Parameter, ...]
     methods: tuple[MethodResult, ...]
     recordings: tuple[Recording, ...]
-    registered: tuple[Registered, ...]
     rest: tuple[Residual, ...]
     effects: tuple[Effect, ...]
     published: tuple[Published, ...]
@@ -59,6 +59,11 @@ class Result:
     seed: int | None = None
     twin_notice: str = ""
     inputs: tuple[str, ...] = field(default=())
+
+    @property
+    def registered(self) -> tuple[Registered, ...]:
+        """The registrations of the first method, one per recording."""
+        return self.methods[0].registered if self.methods else ()
 
     @property
     def checks(self) -> tuple[Check, ...]:

@@ -149,7 +149,9 @@ def _verdict(E: float, u_val: float, limit: float, parts: dict[str, float]) -> t
         )
     if u_val == 0:
         return "agrees", "the error is exactly zero, and so is u_val"
-    return "agrees", f"|E| is {abs(E) / u_val:.1f} u_val; largest part: {largest}"
+    blunt = abs(E) / parts["measurement"] if parts["measurement"] else 0.0
+    beyond = f" but {blunt:.0f} times u_D" if blunt > 5 else ""
+    return "agrees", f"|E| is {abs(E) / u_val:.1f} u_val{beyond}; largest part: {largest}"
 
 
 def _scalar(residual: Residual) -> bool:

@@ -1,9 +1,9 @@
 """An experiment and the road from its recording to a comparison, for notebooks too.
 
-    from validate.replay import compare, load
-    result = compare(load("fluid_phantom"), {"material.E": "14000"})
-    for check in result.checks:
-        print(check.name, check.value, check.unit, check.verdict)
+from validate.replay import compare, load
+result = compare(load("fluid_phantom"), {"material.E": "14000"})
+for check in result.checks:
+    print(check.name, check.value, check.unit, check.verdict)
 """
 
 from collections.abc import Mapping

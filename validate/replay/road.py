@@ -82,7 +82,6 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         parameters=describe(used) + describe(methods, "methods."),
         methods=results,
         recordings=recordings,
-        registered=first.registered,
         rest=rest_residuals(first.registered[0], first.runs[0]),
         effects=effects,
         published=printed,
@@ -186,6 +185,7 @@ def _method(road: _Road, name: str, quick: bool) -> MethodResult:
         label=road.settings[name].label,
         accepted=accepted,
         scene=solved.scene,
+        registered=solved.registered,
         runs=solved.runs,
         residuals=solved.residuals,
         scores=(

@@ -21,7 +21,7 @@ _UP = 1
 def markers(result: Result) -> Section | None:
     """Vectors and positions at every load, rise against x; None without markers."""
     judged = shown_method(result)
-    seen = markers_seen(result, judged) if judged else None
+    seen = markers_seen(judged) if judged else None
     if seen is None or judged is None or len(result.registered[0].holds) < 2:
         return None
     holds = result.registered[0].holds
@@ -124,7 +124,7 @@ def _rise_panels(
         ax.errorbar(x, rise, np.sqrt(2) * _MM * seen.sd, fmt=".", color=MEASURED, ecolor="#A0A0A0",
                     ms=4, lw=0.8, label="measured")  # fmt: skip
         for method, look in drawn:
-            own = markers_seen(result, method)
+            own = markers_seen(method)
             if own is not None:
                 there, mean = _banded(x, _MM * own.rows.apply(method.run.u[i])[:, _UP])
                 ax.plot(there, mean, color=look.colour, ls=look.dash, lw=look.width,

@@ -1,26 +1,10 @@
 """Picks that all figures share: which methods to draw, and a method's view of the measurement."""
 
-from dataclasses import replace
-
-import numpy as np
-
-from validate.compare.outline import normal_distances
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import rms
-from validate.errors import ValidateError
-from validate.fem.locate import barycentric_rows
-from validate.register.observe import (
-    Hold,
-    MarkerObservation,
-    OutlineObservation,
-    Registered,
-    nearest_sample,
-)
-from validate.register.plane import SurfaceSampler, cavity_sampler
-from validate.scene.mesh import Mesh
+from validate.register.observe import Hold, MarkerObservation, OutlineObservation
 
-_SAME = 1e-9  # m: a redrawn residual further from the judged one is not drawn
 _APART = 0.08  # share of the largest difference below which two methods draw one line
 
 
@@ -65,51 +49,11 @@ def _apart(one: Residual, other: Residual) -> float:
     return rms(one.values - other.values)
 
 
-def outline_seen(result: Result, method: MethodResult) -> OutlineObservation | None:
-    """The outlines with the wall of the method's own mesh.
-
-    None when there are none, or when the section drawn would not be the one that was judged.
-    """
-    first = result.registered[0].outline if result.registered else None
-    if first is None or not method.run.finished:
-        return None
-    mesh = method.scene.mesh
-    if first.wall.rows.weights.shape[1] == len(mesh.nodes):
-        seen = first
-    elif method.scene.cavities:
-        seen = replace(first, wall=_wall_on(first.wall, mesh, method.scene.cavities[0].facets))
-    else:
-        return None
-    return seen if _as_judged(seen, result.registered[0], method) else None
+def outline_seen(method: MethodResult) -> OutlineObservation | None:
+    """The outlines with the wall of the method's own mesh; None without them or a whole run."""
+    return method.registered[0].outline if method.registered and method.run.finished else None
 
 
-def _wall_on(wall: SurfaceSampler, mesh: Mesh, facets: str) -> SurfaceSampler:
-    """The same samples of the wall, read from another mesh with the same facets."""
-    own = cavity_sampler(mesh, facets, None)
-    if len(own.rest) != len(wall.rest):
-        return own
-    return SurfaceSampler(wall.rest, own.rows, own.triangles)
-
-
-def _as_judged(seen: OutlineObservation, registered: Registered, method: MethodResult) -> bool:
-    hold, u = registered.holds[-1], method.run.u[len(registered.holds) - 1]
-    judged = method.residuals.get(f"contour@{hold.label}")
-    if judged is None:
-        return False
-    measured = seen.outlines[nearest_sample(seen.t, hold.t, "outlines")]
-    try:
-        drawn = normal_distances(seen.simulated(u), measured)
-    except ValidateError:
-        return False
-    return bool(np.abs(drawn - judged.values[:, 0]).max() < _SAME)
-
-
-def markers_seen(result: Result, method: MethodResult) -> MarkerObservation | None:
-    """The markers with the rows of the method's own mesh; None when there are none."""
-    first = result.registered[0].markers if result.registered else None
-    if first is None or not method.run.finished:
-        return None
-    mesh = method.scene.mesh
-    if first.rows.weights.shape[1] == len(mesh.nodes):
-        return first
-    return replace(first, rows=barycentric_rows(mesh, first.rest))
+def markers_seen(method: MethodResult) -> MarkerObservation | None:
+    """The markers with the rows of the method's own mesh; None without them or a whole run."""
+    return method.registered[0].markers if method.registered and method.run.finished else None

@@ -13,7 +13,7 @@ from validate.compare.result import MethodResult, Result
 from validate.register.observe import Hold, OutlineObservation, nearest_sample
 from validate.report.numbers import shown_unit, spaced, text
 from validate.report.observed import distinct, outline_seen, shown_method
-from validate.report.page import Cell, Paragraph, Picture, Section, Table, section
+from validate.report.page import Cell, Picture, Section, Table, section
 from validate.report.style import ACCEPTED, MEASURED, NOISE, Look, draw, looks
 
 _MM = 1e3
@@ -31,29 +31,25 @@ class _Drawn:
 def outlines(result: Result) -> Section | None:
     """Outlines at every load, rivals and errors at the last one; None without outlines."""
     judged = shown_method(result)
-    seen = outline_seen(result, judged) if judged else None
+    seen = outline_seen(judged) if judged else None
     if seen is None or judged is None:
         return None
     holds = result.registered[0].holds
     measured = tuple(seen.outlines[nearest_sample(seen.t, h.t, "outlines")] for h in holds)
     drawn = _drawn(result, len(holds))
-    left_out = [m.label for m in result.methods if m.residuals and outline_seen(result, m) is None]
     return section(
         "outlines",
         "Outlines of the inclusion",
         _by_load(holds, measured, next(d for d in drawn if d.method is judged)),
         _at_last(holds[-1], measured[-1], drawn, seen),
         _top_left_table(result, holds),
-        Paragraph(f"Not drawn, as their section was not found: {', '.join(left_out)}.")
-        if left_out
-        else None,
     )
 
 
 def _drawn(result: Result, count: int) -> list[_Drawn]:
     styles, found = looks(result), []
     for method in distinct(result, "contour"):
-        seen = outline_seen(result, method)
+        seen = outline_seen(method)
         if seen is not None:
             sections = tuple(seen.simulated(u) for u in method.run.u[:count])
             found.append(_Drawn(method, styles[method.name], sections))

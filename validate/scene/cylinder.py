@@ -7,14 +7,17 @@ from validate.errors import SceneError
 from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_positive_cells
 
 
-def quarter_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:
+def quarter_cylinder(
+    diameter: float, height: float, radial: int, axial: int, grading: float = 1.0
+) -> Mesh:
     """Linear tetrahedra of x, y >= 0, axis z; `radial`, `axial` count elements.
 
     A square grid is mapped onto the quarter disc ring by ring (the concentric map); Kuhn's diagonal
-    runs from the axis to the rim, so no cell is flat. Facet sets: "lower_plate" (z = 0),
-    "upper_plate" (z = height), "symmetry_x", "symmetry_y", "rim".
+    runs from the axis to the rim, so no cell is flat. `grading` above 1 shrinks the cells towards
+    the rim and the plates, where bonded plates concentrate the stress. Facet sets: "lower_plate"
+    (z = 0), "upper_plate" (z = height), "symmetry_x", "symmetry_y", "rim".
     """
-    if min(diameter, height) <= 0 or min(radial, axial) < 1:
+    if min(diameter, height, grading) <= 0 or min(radial, axial) < 1:
         raise SceneError(
             f"cylinder {1e3 * diameter:g} x {1e3 * height:g} mm with {radial} x {axial} elements: "
             "all must be positive"
@@ -25,8 +28,10 @@ def quarter_cylinder(diameter: float, height: float, radial: int, axial: int) ->
     ring = np.maximum(i, j)
     angle = np.pi / 4 * _ratio(np.where(i >= j, j, i), ring)
     angle = np.where(i >= j, angle, np.pi / 2 - angle)
-    r = diameter / 2 * ring / radial
-    nodes = np.stack([r * np.cos(angle), r * np.sin(angle), height * k / axial], axis=-1)
+    r = diameter / 2 * (1 - (1 - ring / radial) ** grading)
+    s = 2 * k / axial - 1
+    z = height / 2 * (1 + np.sign(s) * (1 - (1 - np.abs(s)) ** grading))
+    nodes = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=-1)
     cells = kuhn_cells((radial + 1, radial + 1, axial + 1))
     place = np.stack([i, j, k], axis=-1).reshape(-1, 3)
     outside = boundary_facets(cells, 3)

@@ -3,7 +3,8 @@
 The construction of paper 000, section 4.4: a regular mesh of the block, elements with a node in
 the inclusion removed, the nodes of the hole moved onto the measured shape. Departures: the grid
 lines are graded so that the inclusion's centre keeps its place in the grid wherever it lies in the
-block (a centred one gives the regular grid), which keeps the projection free of inverted cells.
+block (a centred one gives the regular grid); cells that the projection would flatten or invert are
+removed with the inclusion, where the paper does not say what became of them.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,16 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_positive_cells
+from validate.scene.mesh import (
+    Mesh,
+    boundary_facets,
+    cell_volumes,
+    kuhn_cells,
+    require_positive_cells,
+)
 
+_ROUNDS = 6  # of removing flattened cells and projecting again
+_FLAT = 1e-3  # a cell smaller than this share of the median one counts as flattened
 FACES = ("probe_plate", "stage_plate", "bottom", "top", "side_low", "side_high")
 
 
@@ -86,12 +95,25 @@ def block_with_inclusion(block: Block, grid: tuple[int, int, int], capsule: Caps
             f"no node of the {grid} mesh lies inside the inclusion of radius "
             f"{1e3 * capsule.radius:g} mm; refine the mesh"
         )
-    kept = cells[~removed]
-    facets = _named_facets(nodes, kept, block, grid)
-    wall = np.unique(facets["cavity"])
-    nodes[wall] = capsule.project(nodes[wall])
-    mesh = _compact(nodes, kept, facets)
+    mesh = _projected(nodes, cells[~removed], block, grid, capsule)
     require_positive_cells(mesh)
+    return mesh
+
+
+def _projected(
+    nodes: Floats, cells: Ints, block: Block, grid: tuple[int, int, int], capsule: Capsule
+) -> Mesh:
+    """The cells with their wall on the capsule; cells that the move would flatten are removed."""
+    for _ in range(_ROUNDS):
+        facets = _named_facets(nodes, cells, block, grid)
+        wall = np.unique(facets["cavity"])
+        moved = nodes.copy()
+        moved[wall] = capsule.project(nodes[wall])
+        mesh = _compact(moved, cells, facets)
+        flat = cell_volumes(mesh) <= _FLAT * np.median(cell_volumes(mesh))
+        if not flat.any():
+            break
+        cells = cells[~flat]
     return mesh
 
 

@@ -124,6 +124,13 @@ class _Base:
         return self._state(z[1:], updates, ("not_converged", why))
 
 
+def _rises(a: float, b: float, c: float, P: float) -> bool:
+    """Whether a P^3 + b P^2 + c P + d grows with P all the way from 0 to P."""
+    turn = -b / (3 * a) if a else 0.0
+    places = [0.0, P, *([turn] if min(P, 0.0) < turn < max(P, 0.0) else [])]
+    return all((3 * a * x + 2 * b) * x + c > 0 for x in places)
+
+
 def _least_slope(forms: Floats, z: Floats, drives: int) -> float:
     """The least dV_i/dP_i of any cavity on the way t P, 0 <= t <= 1: a quadratic in t, exactly."""
     empty = z.copy()
@@ -149,6 +156,41 @@ class ExactStepper(_Base):
     volume_ratio: float
 
     def step(self, state: State, drives: Floats) -> State:
+        one = len(self.responses.volumes) == 1
+        return self._one_cavity(state, drives) if one else self._cavities(state, drives)
+
+    def _one_cavity(self, state: State, drives: Floats) -> State:
+        """Newton on the scalar cubic in P: with the drives fixed its coefficients are numbers."""
+        form, p = self.responses.volumes[0], len(drives) + 1
+        z = np.concatenate([[1.0], drives, [0.0]])
+        W = form @ z
+        y = W @ z
+        target = self.volume_ratio * float(form[0, 0, 0])
+        a, b, c = float(form[p, p, p]), 3 * float(W[p, p]), 3 * float(y[p])
+        d = float(y @ z) - target
+        P, failed = float(state.pressures[0]), ""
+        for updates in range(_NEWTON_STEPS):
+            error = ((a * P + b) * P + c) * P + d
+            slope = (3 * a * P + 2 * b) * P + c
+            if abs(error) <= _ROUNDING * target or slope == 0:
+                break
+            step = error / slope
+            P -= step
+            if abs(step) <= 1e-14 * abs(P):
+                updates += 1
+                break
+        z[p] = P
+        if abs(error) > 1e-9 * target:
+            failed = f"error {error / target:.2%} after {updates} Newton steps"
+        elif not _rises(a, b, c, P):
+            failed = f"P = {P:.4g} Pa is a spurious root: volume falls as pressure grows before it"
+        if failed:
+            why = f"no pressure keeps the volume: {failed}"
+            return self._state(z[1:], updates, ("not_converged", why))
+        return self._state(z[1:], updates)
+
+    def _cavities(self, state: State, drives: Floats) -> State:
+        """Newton on all volumes together; one cavity's pressure changes the others' volumes."""
         forms, k = self.responses.volumes, self.responses.drives
         target = self.volume_ratio * self.responses.rest_volumes
         z = np.concatenate([[1.0], drives, state.pressures])

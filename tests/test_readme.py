@@ -1,0 +1,69 @@
+"""The README is tested from its own text."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from click.testing import CliRunner
+
+from validate.cli.main import cli
+from validate.compare.result import Result
+
+
+@pytest.fixture(scope="module")
+def readme(project_root: Path) -> str:
+    return (project_root / "README.md").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def script(project_root: Path) -> ModuleType:
+    path = project_root / "benchmarks" / "readme_table.py"
+    spec = importlib.util.spec_from_file_location("readme_table", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["readme_table"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_its_first_two_shell_blocks_are_one_line_each(readme: str) -> None:
+    blocks = re.findall(r"```sh\n(.*?)```", readme, flags=re.DOTALL)
+    assert len(blocks) == 2
+    assert all(block.count("\n") == 1 for block in blocks)
+    assert "validate run fluid_phantom" in blocks[0]
+    assert "pytest" in blocks[1]
+
+
+def test_its_table_is_todays_run_but_for_the_rates(
+    readme: str, script: ModuleType, phantom_result: Result
+) -> None:
+    text = readme.split(script.BEGIN)[1].split(script.END)[0]
+    cells = [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
+    printed = cells[2:-1]
+    assert [row[:-1] for row in printed] == [row[:-1] for row in script.rows(phantom_result)]
+    assert all(float(row[-1]) > 0 for row in printed)
+
+
+def test_every_command_is_documented_and_every_documented_one_exists(readme: str) -> None:
+    documented = set(re.findall(r"^\| `validate (\w+)", readme, flags=re.MULTILINE))
+    assert documented == set(cli.commands)
+
+
+def test_its_parameters_exist(readme: str) -> None:
+    listed = "".join(
+        CliRunner().invoke(cli, ["list", name, "--json"]).output
+        for name in ("fluid_phantom", "ecoflex_cylinder")
+    )
+    for path in re.findall(r"`--set ([\w.]+)=", readme):
+        if path != "path":
+            assert f'"path": "{path}"' in listed, path
+
+
+def test_its_pictures_are_there_and_small(readme: str, project_root: Path) -> None:
+    pictures = re.findall(r"!\[.+?\]\((.+?)\)", readme)
+    assert len(pictures) == 1
+    assert 0 < (project_root / pictures[0]).stat().st_size < 500_000
