@@ -105,7 +105,7 @@ def test_residual_of_anything_but_finite_rows_is_refused(bad: np.ndarray) -> Non
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    stepper = ExactPressure().prepare(phantom_responses(COARSE_GRID))
+    stepper = ExactPressure().on(phantom_responses(COARSE_GRID))
     return march("exact", stepper, T, np.array([[0.0], [0.004], [0.009]]), np.arange(3), 0.5)
 
 

@@ -10,7 +10,7 @@ NINE = np.array([0.009])
 
 def stepped(scheme: Scheme, r: Responses, drives: np.ndarray | float) -> State:
     """One step from rest."""
-    stepper = scheme.prepare(r)
+    stepper = scheme.on(r)
     return stepper.step(stepper.rest(), np.atleast_1d(np.asarray(drives, dtype=float)))
 
 

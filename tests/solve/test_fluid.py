@@ -28,7 +28,7 @@ from validate.solve.types import Scheme
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: s.__name__)
 def test_every_scheme_prepares_rests_and_steps(scheme: type[Scheme], phantom: Responses) -> None:
     settings_ = scheme()
-    stepper = settings_.prepare(phantom)
+    stepper = settings_.on(phantom)
     assert stepper.responses is phantom
     rest = stepper.rest()
     assert not rest.surface.any()
@@ -74,7 +74,7 @@ def test_every_scheme_runs_a_scene_without_cavity(scheme: type[Scheme]) -> None:
 def test_scene_that_nothing_moves_is_refused(scheme: type[Scheme]) -> None:
     held = Scene(grid_mesh((3, 3, 3)), Material(1.0, 0.3), (Support("x0", (0, 1, 2)),))
     with pytest.raises(SceneError, match="nothing moves"):
-        scheme().prepare(responses(build(held)))
+        scheme().on(responses(build(held)))
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_plate_work_and_fluid_work_are_strain_energy() -> None:
 @given(st.floats(-0.02, 0.03), st.floats(-0.02, 0.03))
 def test_exact_pressure_keeps_the_volume_from_any_start(first: float, second: float) -> None:
     r = phantom_responses()
-    stepper = ExactPressure().prepare(r)
+    stepper = ExactPressure().on(r)
     state = stepper.rest()
     for drive in (first, second):
         state = stepper.step(state, np.array([drive]))

@@ -1,5 +1,6 @@
 """The loop over steps: counts, traces, output frames, and runs that end early."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from phantoms import COARSE_GRID, phantom_responses
 
 from validate.errors import ComparisonError, ValidateError
 from validate.fem.system import Responses
+from validate.scene.scene import Scene
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
 from validate.solve.march import march
 from validate.solve.types import Run, State, Stepper, Trace
@@ -31,8 +33,14 @@ class Breaks:
     at: float  # m of the first drive
 
     @property
-    def responses(self) -> Responses:
-        return self.inner.responses
+    def scene(self) -> Scene:
+        return self.inner.scene
+
+    def field(self, state: State) -> np.ndarray:
+        return self.inner.field(state)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        return self.inner.traces(states)
 
     def rest(self) -> State:
         return self.inner.rest()
@@ -43,7 +51,7 @@ class Breaks:
 
 
 def test_finished_run(coarse: Responses) -> None:
-    run = march("exact", ExactPressure().prepare(coarse), T, DRIVES, AT, 1.5)
+    run = march("exact", ExactPressure().on(coarse), T, DRIVES, AT, 1.5)
     assert run.finished
     assert (run.method, run.outcome.state, run.outcome.step) == ("exact", "finished", STEPS)
     assert run.setup_s == 1.5
@@ -65,7 +73,7 @@ def test_finished_run(coarse: Responses) -> None:
 
 
 def test_traces_and_fields_are_those_of_single_steps(coarse: Responses) -> None:
-    stepper = ExactPressure().prepare(coarse)
+    stepper = ExactPressure().on(coarse)
     run = march("exact", stepper, T, DRIVES, AT, 0.0)
     for frame, step in enumerate(AT):
         alone = stepper.step(stepper.rest(), DRIVES[step])
@@ -80,7 +88,7 @@ def test_traces_and_fields_are_those_of_single_steps(coarse: Responses) -> None:
 
 
 def test_each_step_starts_from_the_last_state(coarse: Responses) -> None:
-    stepper = PressureLoop(tolerance=1e-3).prepare(coarse)
+    stepper = PressureLoop(tolerance=1e-3).on(coarse)
     run = march("loop", stepper, T, DRIVES, AT, 0.0)
     state, updates = stepper.rest(), []
     for drives in DRIVES:
@@ -91,7 +99,7 @@ def test_each_step_starts_from_the_last_state(coarse: Responses) -> None:
 
 
 def test_run_that_breaks_keeps_what_was_done(coarse: Responses) -> None:
-    broken = Breaks(ExactPressure().prepare(coarse), 0.0045)
+    broken = Breaks(ExactPressure().on(coarse), 0.0045)
     run = march("broken", broken, T, DRIVES, AT, 0.0)
     whole = march("whole", broken.inner, T, DRIVES, AT, 0.0)
     done = 30
@@ -105,7 +113,7 @@ def test_run_that_breaks_keeps_what_was_done(coarse: Responses) -> None:
 
 
 def test_run_that_breaks_at_once_is_empty_but_whole(coarse: Responses) -> None:
-    run = march("broken", Breaks(NoFluid().prepare(coarse), -1.0), T, DRIVES, AT, 0.0)
+    run = march("broken", Breaks(NoFluid().on(coarse), -1.0), T, DRIVES, AT, 0.0)
     assert (run.outcome.state, run.outcome.step) == ("diverged", 0)
     assert run.t.shape == (0,)
     assert run.u.shape == (0, len(coarse.scene.mesh.nodes), 3)
@@ -121,14 +129,14 @@ def test_run_that_breaks_at_once_is_empty_but_whole(coarse: Responses) -> None:
 def test_empty_schedule_is_refused(
     coarse: Responses, steps: int, frames: int, message: str
 ) -> None:
-    stepper = NoFluid().prepare(coarse)
+    stepper = NoFluid().on(coarse)
     with pytest.raises(ComparisonError, match=message):
         march("empty", stepper, T[:steps], DRIVES[:steps], AT[:frames], 0.0)
 
 
 @pytest.mark.parametrize(("steps", "timed"), [(1, 1), (40, 40), (41, 21), (60, 40)])
 def test_first_steps_are_left_out_of_the_times(coarse: Responses, steps: int, timed: int) -> None:
-    run = march("dry", NoFluid().prepare(coarse), T[:steps], DRIVES[:steps], AT[:1], 0.0)
+    run = march("dry", NoFluid().on(coarse), T[:steps], DRIVES[:steps], AT[:1], 0.0)
     assert run.step_s is not None
     assert run.step_s.n == timed
     assert 0 < run.step_s.p50 <= run.step_s.p99 <= run.step_s.max
@@ -136,7 +144,7 @@ def test_first_steps_are_left_out_of_the_times(coarse: Responses, steps: int, ti
 
 
 def test_run_and_traces_are_read_only_and_checked(coarse: Responses) -> None:
-    run = march("dry", NoFluid().prepare(coarse), T, DRIVES, AT, 0.0)
+    run = march("dry", NoFluid().on(coarse), T, DRIVES, AT, 0.0)
     for array in (run.t, run.u, run.traces["updates"].y):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0

@@ -53,8 +53,8 @@ def test_limit_of_the_gain_is_twice_the_slope_at_the_solution(phantom: Responses
     slope = slope_at(phantom, exact)
     near = replace(exact, pressures=1.01 * exact.pressures)
     loop = PressureLoop(tolerance=1e-7, max_updates=4000)
-    below = replace(loop, gain=1.99 * slope).prepare(phantom).step(near, NINE)
-    above = replace(loop, gain=2.01 * slope).prepare(phantom).step(near, NINE)
+    below = replace(loop, gain=1.99 * slope).on(phantom).step(near, NINE)
+    above = replace(loop, gain=2.01 * slope).on(phantom).step(near, NINE)
     assert below.failure is None
     assert below.pressures == pytest.approx(exact.pressures, abs=30e3 * 1e-7)
     assert above.failure is not None
@@ -63,7 +63,7 @@ def test_limit_of_the_gain_is_twice_the_slope_at_the_solution(phantom: Responses
 
 
 def test_gain_far_too_large_diverges_and_keeps_the_last_state(phantom: Responses) -> None:
-    stepper = PressureLoop(gain=1e6).prepare(phantom)
+    stepper = PressureLoop(gain=1e6).on(phantom)
     state = stepper.step(stepper.rest(), NINE)
     assert state.failure is not None
     assert state.failure[0] == "diverged"
@@ -82,7 +82,7 @@ def test_warm_start_saves_updates(phantom: Responses) -> None:
     path = np.linspace(0, 0.009, 10)[1:, None]
     total = {}
     for warm in (True, False):
-        stepper = PressureLoop(tolerance=1e-3, warm_start=warm).prepare(phantom)
+        stepper = PressureLoop(tolerance=1e-3, warm_start=warm).on(phantom)
         state, updates = stepper.rest(), 0
         for drives in path:
             state = stepper.step(state, drives)
@@ -93,7 +93,7 @@ def test_warm_start_saves_updates(phantom: Responses) -> None:
 
 
 def test_gain_of_each_cavity_is_its_own(two_cavities: Responses) -> None:
-    stepper = PressureLoop().prepare(two_cavities)
+    stepper = PressureLoop().on(two_cavities)
     own = [tuned_gain(two_cavities, i) for i in (0, 1)]
     assert stepper.gains.tolist() == own  # type: ignore[attr-defined]
     assert own[0] > 1.2 * own[1]  # the smaller cavity is stiffer

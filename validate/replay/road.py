@@ -14,7 +14,7 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import rms, run_scores, scores_of
 from validate.compare.verdict import SAFETY, Check, Sensitivity, judge
 from validate.errors import ComparisonError, UsageError
-from validate.fem.system import build, responses
+from validate.fem.system import build
 from validate.parameters import describe, nearest_names, with_values
 from validate.recording.types import Recording
 from validate.register.observe import Registered
@@ -128,7 +128,7 @@ class _Road:
     def _solve(self, name: str, settings: Any, parameters: Any) -> Solved:
         start = perf_counter()
         scene = self.experiment.build(self.recordings[0], parameters, settings)
-        stepper = self.experiment.scheme(settings).prepare(responses(build(scene)))
+        stepper = self.experiment.scheme(settings).prepare(build(scene))
         setup = perf_counter() - start
         seen = tuple(self.experiment.place(r, parameters, scene) for r in self.recordings)
         runs = tuple(

@@ -10,8 +10,10 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.system import Responses
-from validate.solve.types import Ending, Scheme, State, Stepper
+from validate.fem.system import Responses, System
+from validate.fem.system import responses as responses_of
+from validate.solve.linear import LinearStepper, condensed
+from validate.solve.types import Scheme, State, Stepper
 
 _NEWTON_STEPS = 30
 _ROUNDING = 4e-15  # relative volume error that rounding alone leaves
@@ -21,8 +23,12 @@ _ROUNDING = 4e-15  # relative volume error that rounding alone leaves
 class NoFluid:
     """The cavity is empty: gauge pressure zero, its volume changes freely."""
 
-    def prepare(self, responses: Responses) -> Stepper:
-        return DryStepper(responses, _kept(responses))
+    def prepare(self, system: System) -> Stepper:
+        return self.on(responses_of(system))
+
+    def on(self, responses: Responses) -> Stepper:
+        """The scheme on columns that are there already."""
+        return DryStepper(responses, condensed(responses))
 
 
 @dataclass(frozen=True)
@@ -38,8 +44,12 @@ class ExactPressure:
         if not self.volume_ratio > 0:
             raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
 
-    def prepare(self, responses: Responses) -> Stepper:
-        return ExactStepper(responses, _kept(responses), self.volume_ratio)
+    def prepare(self, system: System) -> Stepper:
+        return self.on(responses_of(system))
+
+    def on(self, responses: Responses) -> Stepper:
+        """The scheme on columns that are there already."""
+        return ExactStepper(responses, condensed(responses), self.volume_ratio)
 
 
 @dataclass(frozen=True)
@@ -55,10 +65,14 @@ class PressureLoop:
     max_updates: int = 100
     warm_start: bool = True
 
-    def prepare(self, responses: Responses) -> Stepper:
+    def prepare(self, system: System) -> Stepper:
+        return self.on(responses_of(system))
+
+    def on(self, responses: Responses) -> Stepper:
+        """The scheme on columns that are there already."""
         cavities = range(len(responses.volumes))
         gains = [tuned_gain(responses, i) if self.gain is None else self.gain for i in cavities]
-        return LoopStepper(responses, _kept(responses), np.array(gains), self)
+        return LoopStepper(responses, condensed(responses), np.array(gains), self)
 
 
 def tuned_gain(responses: Responses, cavity: int = 0) -> float:
@@ -98,21 +112,7 @@ def _real_roots(polynomial: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Base:
-    responses: Responses
-    kept: Floats  # (s, d, m): response columns at the cavity and plate nodes
-
-    def rest(self) -> State:
-        zeros = np.zeros(self.kept.shape[2])
-        k = self.responses.drives
-        return State(zeros[:k], zeros[k:], 0, np.zeros(self.kept.shape[:2]))
-
-    def _state(
-        self, inputs: Floats, updates: int, failure: tuple[Ending, str] | None = None
-    ) -> State:
-        k = self.responses.drives
-        return State(inputs[:k], inputs[k:], updates, self.kept @ inputs, failure)
-
+class _Settling(LinearStepper):
     def _settled(self, z: Floats, updates: int) -> State:
         """The state of a root z; a failure when it is not on the branch that begins at P = 0."""
         if _least_slope(self.responses.volumes, z, self.responses.drives) > 0:
@@ -146,13 +146,13 @@ def _least_slope(forms: Floats, z: Floats, drives: int) -> float:
 
 
 @dataclass(frozen=True)
-class DryStepper(_Base):
+class DryStepper(LinearStepper):
     def step(self, state: State, drives: Floats) -> State:
         return self._state(np.concatenate([drives, np.zeros_like(state.pressures)]), 0)
 
 
 @dataclass(frozen=True)
-class ExactStepper(_Base):
+class ExactStepper(_Settling):
     volume_ratio: float
 
     def step(self, state: State, drives: Floats) -> State:
@@ -209,7 +209,7 @@ class ExactStepper(_Base):
 
 
 @dataclass(frozen=True)
-class LoopStepper(_Base):
+class LoopStepper(_Settling):
     gains: Floats
     settings: PressureLoop
 
@@ -233,16 +233,6 @@ class LoopStepper(_Base):
             f"{self.settings.tolerance:.2%}, gain {self.gains.tolist()} Pa"
         )
         return self._state(z[1:], self.settings.max_updates, ("not_converged", why))
-
-
-def _kept(responses: Responses) -> Floats:
-    """Columns at the nodes of the cavities and driven plates: the condensed model."""
-    scene = responses.scene
-    sets = [c.facets for c in scene.cavities] + [d.facets for d in scene.drives]
-    if not sets:
-        raise SceneError("scene without drive and cavity: nothing moves")
-    nodes = np.unique(np.concatenate([scene.mesh.facet_nodes(name) for name in sets]))
-    return np.ascontiguousarray(responses.fields[:, nodes].transpose(1, 2, 0))
 
 
 SCHEMES: tuple[type[Scheme], ...] = (NoFluid, ExactPressure, PressureLoop)

@@ -1,6 +1,6 @@
 """States, outcomes and runs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal, Protocol
@@ -8,7 +8,8 @@ from typing import Literal, Protocol
 import numpy as np
 
 from validate.arrays import Floats, Ints, checked
-from validate.fem.system import Responses
+from validate.fem.system import System
+from validate.scene.scene import Scene
 
 Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]
 
@@ -42,20 +43,24 @@ class State:
 
 
 class Stepper(Protocol):
-    """A prepared scheme."""
+    """A prepared scheme: steps, and what a state means: field (n, d) m, traces per step."""
 
     @property
-    def responses(self) -> Responses: ...
+    def scene(self) -> Scene: ...
 
     def rest(self) -> State: ...
 
     def step(self, state: State, drives: Floats) -> State: ...
 
+    def field(self, state: State) -> Floats: ...
+
+    def traces(self, states: Sequence[State]) -> dict[str, "Trace"]: ...
+
 
 class Scheme(Protocol):
     """Settings of a scheme. `prepare` does all that is done once."""
 
-    def prepare(self, responses: Responses) -> Stepper: ...
+    def prepare(self, system: System) -> Stepper: ...
 
 
 @dataclass(frozen=True)

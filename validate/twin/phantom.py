@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.system import build, responses
+from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Recording, Source
 from validate.register.plane import cavity_sampler
@@ -62,7 +62,7 @@ def record_phantom(
     mesh = quadratic(block_with_inclusion(size, grid, capsule))
     scene = between_plates(mesh, material, "slip")
     progress(f"factorise {mesh.nodes.size} unknowns")
-    stepper = ExactPressure().prepare(responses(build(scene)))
+    stepper = ExactPressure().prepare(build(scene))
     t, stage, middles = PROFILE.positions()
     at = np.searchsorted(t, middles)
     run = march("twin", stepper, t, stage[:, None], at, 0.0)
