@@ -18,7 +18,9 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.effects import Sensor
 from validate.compare.residual import static_residuals
+from validate.compare.score import Score
 from validate.compare.verdict import Accept, Published, printed
+from validate.identify.interval import profile_interval
 from validate.parameters import quantity
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Contours, Recording
@@ -36,15 +38,17 @@ from validate.register.plane import cavity_sampler
 from validate.replay.experiment import (
     EffectSpec,
     Experiment,
+    Identified,
     Input,
     Progress,
     Uncertainty,
     Variant,
 )
+from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact, between_plates
-from validate.scene.scene import Dilatation, Material, Scene
+from validate.scene.scene import Dilatation, Material, Membrane, Scene
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
 from validate.solve.types import Scheme
 from validate.twin.phantom import TwinSettings, record_phantom
@@ -72,6 +76,13 @@ class Inclusion:
     centre_z: float | None = quantity(None, "m", "lateral centre; none: from the outline")
     radius: float | None = quantity(None, "m", "radius; none: from the outline")
     length: float | None = quantity(None, "m", "length along y; none: from the sweep")
+
+
+@dataclass(frozen=True)
+class Wall:
+    thickness: float = quantity(0.0, "m", "latex membrane on the wall of the cavity; 0: none")
+    E: float = quantity(1.2e6, "Pa", "modulus of latex, small strain")
+    nu: float = quantity(0.49, "1", "Poisson ratio of latex")
 
 
 @dataclass(frozen=True)
@@ -126,13 +137,15 @@ class Parameters:
     material: MaterialCard = MaterialCard()
     block: BlockSize = BlockSize()
     inclusion: Inclusion = Inclusion()
+    membrane: Wall = Wall()
     mesh: Grid = Grid()
     registration: Placing = Placing()
     ranges: Ranges = Ranges()
     twin: TwinSettings = TwinSettings()
-    plates: Literal["as_method", "slip", "bonded"] = quantity(
+    plates: Literal["as_method", "slip", "partial", "bonded"] = quantity(
         "as_method", "1", "contact of both plates, for every method"
     )
+    friction: float = quantity(1e5, "N/m3", "tangential stiffness of the plates, if partial")
     loads: tuple[float, ...] = quantity((0.003, 0.006, 0.009), "m", "stage positions compared")
     recording: str | None = quantity(None, "1", "MCAP file; none: recordings/fluid_phantom.mcap")
 
@@ -184,7 +197,15 @@ def build(recording: Recording, parameters: Parameters, method: Method) -> Scene
         Material(p.material.E, p.material.nu),
         contact,
         "pointwise" if order == 2 else method.dilatation,
+        friction=p.friction,
+        membrane=_membrane(p.membrane),
     )
+
+
+def _membrane(wall: Wall) -> tuple[Membrane, ...]:
+    if wall.thickness == 0:
+        return ()
+    return (Membrane("cavity", wall.thickness, Material(wall.E, wall.nu)),)
 
 
 def scheme(method: Method) -> Scheme:
@@ -286,6 +307,43 @@ def _finer(p: Parameters) -> Parameters:
     return replace(p, mesh=replace(g, nodes_x=g.finer_x, nodes_y=g.finer_y, nodes_z=g.finer_z))
 
 
+# --- friction from the markers' rise -------------------------------------------------------------
+
+SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
+HALF = 1e6  # N/m3: the tangential stiffness at a share of one half
+
+
+def _rubbing(p: Parameters, share: float) -> Parameters:
+    """Share 0 slips, 1 bonds, between them springs of HALF share/(1 - share)."""
+    if share in (0.0, 1.0):
+        return replace(p, plates="slip" if share == 0 else "bonded")
+    return replace(p, plates="partial", friction=HALF * share / (1 - share))
+
+
+def identify(recordings: Sequence[Recording], parameters: Parameters) -> Identified:
+    """Plate friction from the vertical rise of the markers, by mean dilatation elements."""
+    chi_square, count = [], 0
+    for share in SHARES:
+        rubbing = _rubbing(parameters, float(share))
+        found = solve(EXPERIMENT, tuple(recordings), "md_fluid", METHODS["md_fluid"], rubbing)
+        rise = [r for r in found.residuals.values() if r.quantity == "marker.vertical"]
+        chi_square.append(sum(float((r.values**2).sum()) / r.sd**2 for r in rise))
+        count = sum(r.count for r in rise)
+    fit = profile_interval(SHARES, np.array(chi_square), count)
+    words = "tangential plate stiffness k as k/(k + 1e6 N/m3): 0 slips, 1 bonds; from the rise"
+    rows = (("friction.share", fit.best), ("friction.share.low", fit.low),
+            ("friction.share.high", fit.high), ("friction.chi_square", fit.chi_square))  # fmt: skip
+    note = (
+        f"Plate friction from the markers' vertical rise ({count} values): share {fit.best:.2f}, "
+        f"between {fit.low:.2f} and {fit.high:.2f} (two standard deviations), where 0 is slipping, "
+        "1 bonded and 0.5 a tangential stiffness of 1e6 N/m3."
+    )
+    scores = tuple(
+        Score(name, value, "1", count, "measured markers", words) for name, value in rows
+    )
+    return Identified(parameters, scores, (note,))
+
+
 def _one(_: Parameters) -> float:
     return 1.0
 
@@ -314,6 +372,12 @@ EFFECTS = (
     EffectSpec("plate contact", "bonded instead of slipping plates",
                BASE, Variant("md_fluid", lambda p: replace(p, plates="bonded")),
                itself="plate friction"),
+    EffectSpec("partial friction", "plates with 1e5 N/m3 of tangential stiffness instead of slip",
+               BASE, Variant("md_fluid", lambda p: replace(p, plates="partial", friction=1e5)),
+               itself="plate friction"),
+    EffectSpec("membrane", "a taut latex membrane of 0.1 mm on the cavity wall",
+               BASE, Variant("md_fluid", lambda p: replace(
+                   p, membrane=replace(p.membrane, thickness=1e-4)))),
     EffectSpec("locking", "P1 instead of P2 on the same mesh",
                Variant("p2_fluid"), Variant("p1_fluid")),
     EffectSpec("element", "P1 mean dilatation instead of P2 on the same mesh",
@@ -406,6 +470,7 @@ EXPERIMENT = Experiment(
     effects=EFFECTS,
     sensors=ADDED_SENSORS,
     published=published,
+    identify=identify,
     record=record,
     quick=_quick,
     seed=Parameters().twin.seed,

@@ -7,6 +7,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.surface import surface_stiffness
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
 
@@ -20,8 +21,12 @@ def stiffness(scene: Scene) -> sparse.csr_array:
     """
     require_positive_cells(scene.mesh)
     if scene.dilatation == "nodal_mean":
-        return _nodal_mean_stiffness(scene.mesh, scene.material)
-    return _assembled(scene.mesh, scene.material.E, scene.material.nu)
+        K = _nodal_mean_stiffness(scene.mesh, scene.material)
+    else:
+        K = _assembled(scene.mesh, scene.material.E, scene.material.nu)
+    for part in surface_stiffness(scene):
+        K = K + part
+    return sparse.csr_array(K)
 
 
 def _assembled(mesh: Mesh, E: float, nu: float) -> sparse.csr_array:

@@ -16,14 +16,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.scene.mesh import EDGES, Mesh
-
-# Six points, exact to degree 4, on the triangle of corners (0,0), (1,0), (0,1) (Dunavant 1985).
-_A, _B = 0.445948490915965, 0.091576213509771
-_XI = np.array(
-    [[_A, _A], [1 - 2 * _A, _A], [_A, 1 - 2 * _A], [_B, _B], [1 - 2 * _B, _B], [_B, 1 - 2 * _B]]
-)
-_WEIGHTS = np.repeat([0.111690794839005, 0.054975871827661], 3)
+from validate.fem.facets import WEIGHTS, facet_shapes
+from validate.scene.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -65,10 +59,10 @@ def volume_of(surface: CavitySurface, positions: Floats) -> float:
 
 def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
     """dV/dx (n, 3) m^2: nodal forces of a unit pressure, fluid pushing on the solid."""
-    N, dxi, deta = _shapes(surface.facets.shape[1])
+    N, dxi, deta = facet_shapes(surface.facets.shape[1])
     x = positions[surface.facets]
     normal = -np.cross(_at(dxi, x), _at(deta, x))
-    nodal = np.einsum("q,qm,fqd->fmd", _WEIGHTS, N, normal)
+    nodal = np.einsum("q,qm,fqd->fmd", WEIGHTS, N, normal)
     load = np.zeros_like(positions)
     np.add.at(load, surface.facets, nodal)
     return load
@@ -91,29 +85,12 @@ def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
 
 
 def _trilinear(surface: CavitySurface, a: Floats, b: Floats, c: Floats) -> Floats:
-    N, dxi, deta = _shapes(surface.facets.shape[1])
+    N, dxi, deta = facet_shapes(surface.facets.shape[1])
     local = surface.local()
     normal = -np.cross(_at(dxi, b[local]), _at(deta, c[local]))
-    return np.asarray(np.einsum("q,fqd,fqd->", _WEIGHTS, _at(N, a[local]), normal) / 3)
+    return np.asarray(np.einsum("q,fqd,fqd->", WEIGHTS, _at(N, a[local]), normal) / 3)
 
 
 def _at(values: Floats, nodal: Floats) -> Floats:
     """Fields (f, q, d) at the quadrature points from nodal values (f, m, d)."""
     return np.asarray(np.einsum("qm,fmd->fqd", values, nodal))
-
-
-def _shapes(per_facet: int) -> tuple[Floats, Floats, Floats]:
-    """N, dN/dxi, dN/deta (q, m) of triangles with 3 or 6 nodes at the quadrature points."""
-    xi, eta = _XI.T
-    L = np.stack([1 - xi - eta, xi, eta], axis=1)
-    dL = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    if per_facet == 3:
-        ones = np.ones((len(xi), 1))
-        return L, ones * dL[:, 0], ones * dL[:, 1]
-    i, j = np.array(EDGES[2]).T
-    N = np.hstack([L * (2 * L - 1), 4 * L[:, i] * L[:, j]])
-    slopes = [
-        np.hstack([(4 * L - 1) * dL[:, s], 4 * (L[:, i] * dL[j, s] + L[:, j] * dL[i, s])])
-        for s in (0, 1)
-    ]
-    return N, slopes[0], slopes[1]

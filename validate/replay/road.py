@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -14,14 +13,11 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import rms, run_scores, scores_of
 from validate.compare.verdict import SAFETY, Check, Sensitivity, judge
 from validate.errors import ComparisonError, UsageError
-from validate.fem.system import build
 from validate.parameters import describe, nearest_names, with_values
 from validate.recording.types import Recording
-from validate.register.observe import Registered
 from validate.replay.experiment import EffectSpec, Experiment, Variant
 from validate.replay.sentence import verdict_sentence
-from validate.scene.scene import Scene
-from validate.solve.march import march
+from validate.replay.solved import Solved, solve
 from validate.solve.types import Run
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
@@ -34,16 +30,6 @@ class Options:
     values: Mapping[str, str]
     methods: tuple[str, ...] = ()
     quick: bool = False
-
-
-@dataclass(frozen=True)
-class Solved:
-    """One method with one set of parameters, run on every recording."""
-
-    scene: Scene
-    registered: tuple[Registered, ...]
-    runs: tuple[Run, ...]
-    residuals: Mapping[str, Residual]
 
 
 def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Any]]:
@@ -119,42 +105,11 @@ class _Road:
         if key not in self._done:
             if self._report:
                 self._report(len(self._done), self._total, variant.method)
-            self._done[key] = self._solve(variant.method, *key)
+            self._done[key] = solve(self.experiment, self.recordings, variant.method, *key)
         return self._done[key]
 
     def _key(self, variant: Variant) -> tuple[Any, Any]:
         return self.settings[variant.method], variant.change(self.parameters)
-
-    def _solve(self, name: str, settings: Any, parameters: Any) -> Solved:
-        start = perf_counter()
-        scene = self.experiment.build(self.recordings[0], parameters, settings)
-        stepper = self.experiment.scheme(settings).prepare(build(scene))
-        setup = perf_counter() - start
-        seen = tuple(self.experiment.place(r, parameters, scene) for r in self.recordings)
-        runs = tuple(
-            march(name, stepper, r.stage.t, r.stage.y, r.steps_at_holds(), setup) for r in seen
-        )
-        found = [
-            self.experiment.residuals(*pair)
-            for pair in zip(seen, runs, strict=True)
-            if pair[1].finished
-        ]
-        return Solved(scene, seen, runs, _merged(found))
-
-
-def _merged(found: list[tuple[Residual, ...]]) -> dict[str, Residual]:
-    """Residuals of all recordings by name; repeats of one quantity are stacked."""
-    merged: dict[str, Residual] = {}
-    for residual in (r for rs in found for r in rs):
-        other = merged.get(residual.name)
-        if other is not None:
-            values = np.vstack([other.values, residual.values])
-            residual = Residual(
-                residual.quantity, residual.load, values, residual.sd, residual.systematic,
-                residual.unit, residual.definition,
-            )  # fmt: skip
-        merged[residual.name] = residual
-    return merged
 
 
 def _variants(experiment: Experiment, methods: Mapping[str, Any], quick: bool) -> list[Variant]:
@@ -171,8 +126,11 @@ def _variants(experiment: Experiment, methods: Mapping[str, Any], quick: bool) -
 def _shown(
     experiment: Experiment, methods: Mapping[str, Any], quick: bool
 ) -> tuple[EffectSpec, ...]:
-    """The effects whose methods the user runs anyway; none in a quick run."""
-    if quick:
+    """The effects whose methods the user runs anyway; none in a quick run.
+
+    None either without an accepted method: its u_num and u_input are part of what hides an effect.
+    """
+    if quick or not set(experiment.accepted) & set(methods):
         return ()
     return tuple(e for e in experiment.effects if {e.one.method, e.other.method} <= set(methods))
 

@@ -67,6 +67,35 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Foundation:
+    """Springs from a facet set to the ground along some components: stiffness N/m^3.
+
+    Zero lets the facets slip, infinity would bond them; what lies between is partial friction.
+    """
+
+    facets: str
+    components: tuple[int, ...]
+    stiffness: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.stiffness) and self.stiffness >= 0):
+            raise SceneError(f"foundation stiffness {self.stiffness:g} N/m3: a number >= 0")
+
+
+@dataclass(frozen=True)
+class Membrane:
+    """A taut elastic sheet glued to a facet set: thickness m."""
+
+    facets: str
+    thickness: float
+    material: Material
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.thickness) and self.thickness > 0):
+            raise SceneError(f"membrane thickness {self.thickness:g} m: a number above 0")
+
+
+@dataclass(frozen=True)
 class Cavity:
     """A closed facet set filled with fluid at one gauge pressure Pa."""
 
@@ -90,11 +119,16 @@ class Scene:
     cavities: tuple[Cavity, ...] = ()
     dilatation: Dilatation = "pointwise"
     copies: int = 1
+    foundations: tuple[Foundation, ...] = ()
+    membranes: tuple[Membrane, ...] = ()
 
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation is for linear elements; use order 1")
+        if self.copies < 1:
+            raise SceneError(f"{self.copies} copies of the mesh: at least 1")
         named = [s.facets for s in self.supports]
+        named += [f.facets for f in self.foundations] + [m.facets for m in self.membranes]
         named += [d.facets for d in self.drives] + [c.facets for c in self.cavities]
         for facets in named:
             self.mesh.facet_nodes(facets)
