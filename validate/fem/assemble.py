@@ -2,20 +2,36 @@
 
 import numpy as np
 from scipy import sparse
-from skfem import Basis, ElementTetP1, ElementTetP2, ElementVector, MeshTet, asm
+from skfem import (
+    Basis,
+    ElementTetP1,
+    ElementTetP2,
+    ElementTriP1,
+    ElementTriP2,
+    ElementVector,
+    MeshTet,
+    MeshTri,
+    asm,
+)
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.arrays import Floats, Ints
-from validate.errors import SceneError
 from validate.fem.surface import surface_stiffness
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
 
-_ELEMENTS = {"tet4": (ElementTetP1, 1), "tet10": (ElementTetP2, 2)}
+_ELEMENTS = {
+    "tri3": (MeshTri, ElementTriP1, 1),
+    "tri6": (MeshTri, ElementTriP2, 2),
+    "tet4": (MeshTet, ElementTetP1, 1),
+    "tet10": (MeshTet, ElementTetP2, 2),
+}
 
 
 def stiffness(scene: Scene) -> sparse.csr_array:
     """K (N, N) N/m of the scene's mesh and material, N = n d, node-major.
+
+    In 2-D plane strain, N/m per metre of thickness.
 
     Raises `SceneError` for an inverted element, named, or an element kind that is not assembled.
     """
@@ -30,12 +46,10 @@ def stiffness(scene: Scene) -> sparse.csr_array:
 
 
 def _assembled(mesh: Mesh, E: float, nu: float) -> sparse.csr_array:
-    if mesh.kind not in _ELEMENTS:
-        raise SceneError(f"elements of kind {mesh.kind} are not assembled; use tet4 or tet10")
-    element, degree = _ELEMENTS[mesh.kind]
+    library_mesh, element, degree = _ELEMENTS[mesh.kind]
     corners = np.ascontiguousarray(mesh.corners.T)
     vertices = int(mesh.corners.max()) + 1
-    domain = MeshTet(np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
+    domain = library_mesh(np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
     basis = Basis(domain, ElementVector(element()), intorder=degree)
     _require_node_major(basis.doflocs, mesh.nodes)
     K = asm(linear_elasticity(*lame_parameters(E, nu)), basis)
@@ -44,7 +58,9 @@ def _assembled(mesh: Mesh, E: float, nu: float) -> sparse.csr_array:
 
 def _require_node_major(places: Floats, nodes: Floats) -> None:
     """The library's unknowns must lie where ours do, or every result would be permuted."""
-    if not np.allclose(places, np.repeat(nodes, 3, axis=0).T, atol=1e-9 * np.ptp(nodes)):
+    if not np.allclose(
+        places, np.repeat(nodes, nodes.shape[1], axis=0).T, atol=1e-9 * np.ptp(nodes)
+    ):
         raise AssertionError("scikit-fem numbers its unknowns differently from the mesh")
 
 

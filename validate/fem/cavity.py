@@ -16,6 +16,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.cavity_area import area_bilinear, area_load
 from validate.fem.facets import WEIGHTS, facet_shapes
 from validate.scene.mesh import Mesh
 
@@ -36,29 +37,43 @@ class CavitySurface:
 def cavity_surface(mesh: Mesh, name: str, facets: str) -> CavitySurface:
     """The named facet set as a cavity; raises `SceneError` when open, flipped or inside out."""
     surface = CavitySurface(name, mesh.facets[facets], mesh.facet_nodes(facets))
-    corners = surface.facets[:, :3]
-    edges = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-    if (uses != 2).any():
-        raise SceneError(f"cavity '{name}' is open: {int((uses != 2).sum())} edges without partner")
-    _, same_way = np.unique(edges, axis=0, return_counts=True)
-    if (same_way != 1).any():
-        count = int((same_way != 1).sum())
-        raise SceneError(f"cavity '{name}': at {count} edges two facets face opposite ways")
+    (_require_closed_line if mesh.dimension == 2 else _require_closed)(surface)
     volume = volume_of(surface, mesh.nodes)
     if volume <= 0:
         raise SceneError(f"cavity '{name}' is inside out: volume {1e9 * volume:.4g} mm3")
     return surface
 
 
+def _require_closed(surface: CavitySurface) -> None:
+    corners = surface.facets[:, :3]
+    edges = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    if (uses != 2).any():
+        raise SceneError(
+            f"cavity '{surface.name}' is open: {int((uses != 2).sum())} edges without partner"
+        )
+    _, same_way = np.unique(edges, axis=0, return_counts=True)
+    if (same_way != 1).any():
+        count = int((same_way != 1).sum())
+        raise SceneError(f"cavity '{surface.name}': at {count} edges two facets face opposite ways")
+
+
+def _require_closed_line(surface: CavitySurface) -> None:
+    starts, ends = np.sort(surface.facets[:, 0]), np.sort(surface.facets[:, 1])
+    if not np.array_equal(starts, ends) or len(np.unique(starts)) != len(starts):
+        raise SceneError(f"cavity '{surface.name}' is open or its facets face opposite ways")
+
+
 def volume_of(surface: CavitySurface, positions: Floats) -> float:
-    """Volume m^3 for the positions (n, 3) m of all mesh nodes."""
+    """Volume m^3 for the positions (n, d) m of all mesh nodes; in 2-D m^3 per metre."""
     x = positions[surface.nodes]
     return float(_trilinear(surface, *(3 * [x - x.mean(axis=0)])))
 
 
 def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
-    """dV/dx (n, 3) m^2: nodal forces of a unit pressure, fluid pushing on the solid."""
+    """dV/dx (n, d) m^2: nodal forces of a unit pressure, fluid pushing on the solid."""
+    if positions.shape[1] == 2:
+        return area_load(surface.facets, positions)
     N, dxi, deta = facet_shapes(surface.facets.shape[1])
     x = positions[surface.facets]
     normal = -np.cross(_at(dxi, x), _at(deta, x))
@@ -71,13 +86,15 @@ def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
 def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
     """T (k, k, k), symmetric: V = sum T_abc z_a z_b z_c for positions sum_a z_a columns_a.
 
-    `columns` (k, n, 3): the rest positions first, then displacement fields. A translation of a
+    `columns` (k, n, d): the rest positions first, then displacement fields. A translation of a
     closed surface leaves its volume, so every column is centred for the digits' sake.
     """
     k = len(columns)
     local = columns[:, surface.nodes] - columns[:, surface.nodes].mean(axis=1, keepdims=True)
     T = np.zeros((k, k, k))
-    for a in range(k):
+    # An area is bilinear: its first factor is the constant one that stands with the rest shape.
+    firsts = range(1 if columns.shape[2] == 2 else k)
+    for a in firsts:
         for b in range(k):
             for c in range(k):
                 T[a, b, c] = _trilinear(surface, local[a], local[b], local[c])
@@ -85,8 +102,10 @@ def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
 
 
 def _trilinear(surface: CavitySurface, a: Floats, b: Floats, c: Floats) -> Floats:
-    N, dxi, deta = facet_shapes(surface.facets.shape[1])
     local = surface.local()
+    if a.shape[1] == 2:
+        return np.asarray(area_bilinear(local, b, c))
+    N, dxi, deta = facet_shapes(surface.facets.shape[1])
     normal = -np.cross(_at(dxi, b[local]), _at(deta, c[local]))
     return np.asarray(np.einsum("q,fqd,fqd->", WEIGHTS, _at(N, a[local]), normal) / 3)
 
