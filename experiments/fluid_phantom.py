@@ -19,7 +19,7 @@ from validate.arrays import Floats
 from validate.compare.effects import Sensor
 from validate.compare.residual import static_residuals
 from validate.compare.score import Score
-from validate.compare.verdict import Accept, Published, printed
+from validate.compare.verdict import Accept
 from validate.identify.interval import profile_interval
 from validate.parameters import quantity
 from validate.recording.mcap_read import read_recording
@@ -44,6 +44,7 @@ from validate.replay.experiment import (
     Uncertainty,
     Variant,
 )
+from validate.replay.paper_000 import figures
 from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
@@ -420,26 +421,6 @@ ACCEPT = (
 )
 
 
-def published(values: Mapping[str, Mapping[str, float]]) -> tuple[Published, ...]:
-    """The paper's figures of sections 3.3 and 4.5 beside ours."""
-    return tuple(
-        printed(f"{m}: {score}", values[m][score], theirs, unit, source,
-                tolerance=tolerance, reason=reason)
-        for m, score, theirs, unit, tolerance, reason, source in _PRINTED
-        if score in values.get(m, {})
-    )  # fmt: skip
-
-
-_OTHER = "another phantom: the paper prints neither its block nor its inclusion nor plate contact"
-_PRINTED: Sequence[tuple[str, str, float, str, float | None, str, str]] = (
-    ("p1_loop", "contour.top_left.simulated@9mm", 3.3e-3, "m", None, _OTHER, "section 4.5"),
-    ("p1_loop", "contour.top_left.measured@9mm", 3.71e-3, "m", None, _OTHER, "section 4.5"),
-    ("p1_loop", "contour.max@9mm", 0.41e-3, "m", None, _OTHER, "section 4.5"),
-    ("p1_loop", "updates.max", 1.0, "1", 0.0,
-     "at most one update to 1 % at every step of the stage, warm start", "section 3.3"),
-)  # fmt: skip
-
-
 def _quick(p: Parameters) -> Parameters:
     """A coarser mesh; the nominal one serves as its finer one."""
     g = p.mesh
@@ -469,7 +450,7 @@ EXPERIMENT = Experiment(
     ),
     effects=EFFECTS,
     sensors=ADDED_SENSORS,
-    published=published,
+    published=figures,
     identify=identify,
     record=record,
     quick=_quick,

@@ -6,12 +6,15 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
 import pytest
 
+from validate.cli import checking
 from validate.cli import main as cli
+from validate.compare.result import Result
 from validate.errors import ValidateError
 
 COARSE = [
@@ -192,3 +195,19 @@ def test_exit_codes_of_known_errors_interrupts_and_bugs(
     capsys.readouterr()
     assert raising(ZeroDivisionError("a bug")) == 70
     assert "Traceback" in capsys.readouterr().err
+
+
+def test_check_shows_every_figure_and_fails_when_one_moves(
+    monkeypatch: pytest.MonkeyPatch, phantom_result: Result
+) -> None:
+    monkeypatch.setattr(checking, "compare", lambda *_: phantom_result)
+    code, out, _ = here("check", "fluid_phantom", "--json")
+    found = json.loads(out)[0]
+    assert (code, found["holds"], len(found["published"])) == (0, True, 11)
+    assert "no longer stand; 12 of 12 checks agree" in here("check", "fluid_phantom")[1]
+    moved = replace(phantom_result.published[0], expected=1.0)
+    spoiled = replace(phantom_result, published=(moved,))
+    monkeypatch.setattr(checking, "compare", lambda *_: spoiled)
+    assert here("check", "fluid_phantom")[0] == 1
+    monkeypatch.setattr(checking, "compare", lambda *_: replace(phantom_result, published=()))
+    assert here("check", "fluid_phantom")[0] == 1  # nothing compared

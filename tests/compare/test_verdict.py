@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from validate.compare.residual import Residual
 from validate.compare.result import Result
-from validate.compare.verdict import Check, Sensitivity, error_and_noise, judge, printed
+from validate.compare.verdict import Check, Sensitivity, error_and_noise, judge
 from validate.errors import ComparisonError
 
 
@@ -140,37 +140,10 @@ def test_noisy_bias_is_found_as_often_as_the_normal_law_says() -> None:
         assert found == pytest.approx(share, abs=0.02)
 
 
-# Printed figures
-
-
-@pytest.mark.parametrize(
-    ("ours", "tolerance", "verdict"),
-    [
-        (3.25, 0.25, "reproduced"),
-        (2.75, 0.25, "reproduced"),
-        (3.26, 0.25, "not reproduced"),
-        (3.0, None, "not comparable"),
-    ],
-)
-def test_printed_figures(ours: float, tolerance: float | None, verdict: str) -> None:
-    found = printed("P", ours, 3.0, "Pa", "table 1", tolerance=tolerance, reason="because")
-    assert found.verdict == verdict
-    assert (found.ours, found.theirs, found.tolerance) == (ours, 3.0, tolerance)
-    assert (found.unit, found.source, found.reason) == ("Pa", "table 1", "because")
-
-
-def test_printed_figure_without_tolerance_says_why_not() -> None:
-    found = printed(
-        "P", 1.0, 3.0, "Pa", "", tolerance=None, reason="",
-        otherwise="not reproducible as printed",
-    )  # fmt: skip
-    assert found.verdict == "not reproducible as printed"
-
-
 # The whole
 
 
 def test_result_that_checked_nothing_has_failed() -> None:
-    nothing = Result("n", "t", "s", "", (), (), (), (), (), (), ())
+    nothing = Result("n", "t", "s", "", (), (), (), (), (), ())
     assert nothing.checks == ()
     assert not nothing.passed

@@ -81,6 +81,16 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
 
 
 @cli.command()
+@click.argument("names", nargs=-1, metavar="[NAME ...]")
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def check(names: tuple[str, ...], as_json: bool) -> int:
+    """Every published figure and accepted limit: ours, theirs, verdict, count."""
+    from validate.cli import checking
+
+    return checking.check(names, as_json)
+
+
+@cli.command()
 @click.argument("file", type=_FILE)
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def inspect(file: Path, as_json: bool) -> None:

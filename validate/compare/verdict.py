@@ -60,7 +60,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Published:
-    """A printed figure beside ours: `verdict` says whether it reproduces and `reason` why not."""
+    """A printed figure beside ours: `verdict` says whether it reproduces and `reason` why not.
+
+    `expected` is our own value when the verdict was written, good to `drift` (absolute, in `unit`).
+    """
 
     name: str
     ours: float | None
@@ -70,6 +73,24 @@ class Published:
     verdict: PublishedVerdict
     reason: str
     source: str
+    expected: float | None = None
+    drift: float | None = None
+
+    @property
+    def fault(self) -> str:
+        """Why the verdict no longer stands: ours moved, or it left its tolerance; else empty."""
+        if self.verdict == "reproduced" and self.ours is None:
+            return "marked reproduced, and compared nothing"
+        if self.ours is None:
+            return ""
+        if self.expected is not None and abs(self.ours - self.expected) > (self.drift or 0.0):
+            return f"ours moved from {self.expected:g} to {self.ours:g}, beyond {self.drift:g}"
+        known = self.theirs is not None and self.tolerance is not None
+        if self.verdict == "reproduced" and known:
+            off = abs(self.ours - float(self.theirs or 0.0))
+            if off > float(self.tolerance or 0.0):
+                return f"off by {off:g}, beyond the tolerance {self.tolerance:g}"
+        return ""
 
 
 @dataclass(frozen=True)
@@ -106,25 +127,6 @@ def judge(
     return Check(
         name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why
     )
-
-
-def printed(
-    name: str,
-    ours: float,
-    theirs: float,
-    unit: str,
-    source: str,
-    *,
-    tolerance: float | None,
-    reason: str,
-    otherwise: PublishedVerdict = "not comparable",
-) -> Published:
-    """A printed figure: with a tolerance it is reproduced or not, without one `otherwise`."""
-    if tolerance is None:
-        verdict = otherwise
-    else:
-        verdict = "reproduced" if abs(ours - theirs) <= tolerance else "not reproduced"
-    return Published(name, ours, theirs, tolerance, unit, verdict, reason, source)
 
 
 def error_and_noise(residual: Residual) -> tuple[float, float]:

@@ -163,6 +163,9 @@ def _published(figure: Published) -> Json:
         "verdict": figure.verdict,
         "reason": figure.reason,
         "source": figure.source,
+        "expected": _finite(figure.expected),
+        "drift": _finite(figure.drift),
+        "fault": figure.fault,
     }
 
 

@@ -1,0 +1,73 @@
+"""`validate check`: published figures and accepted limits, today."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from validate.cli.display import console, progress, shown, table
+from validate.cli.main import FAILED
+from validate.compare.result import Result
+from validate.compare.verdict import Published
+from validate.replay.find import experiment_files, find
+from validate.replay.road import Options, compare
+
+
+def check(names: tuple[str, ...], as_json: bool) -> int:
+    """Runs the experiments and holds every figure; 0 when none failed and one was compared."""
+    start = Path.cwd()
+    results = []
+    for name in names or tuple(experiment_files(start)):
+        with progress(f"check {name}") as report:
+            results.append(compare(find(name, start), Options({}), report))
+    if as_json:
+        print(json.dumps([_document(r) for r in results], indent=1, allow_nan=False))
+    else:
+        for result in results:
+            _print(result)
+    return 0 if all(_holds(r) for r in results) else FAILED
+
+
+def _holds(result: Result) -> bool:
+    return result.passed and bool(result.published) and not any(p.fault for p in result.published)
+
+
+def _document(result: Result) -> dict[str, Any]:
+    return {
+        "experiment": result.name,
+        "holds": _holds(result),
+        "published": [
+            {"name": p.name, "ours": p.ours, "theirs": p.theirs, "unit": p.unit,
+             "verdict": p.verdict, "fault": p.fault, "reason": p.reason, "source": p.source}
+            for p in result.published
+        ],
+        "checks": [
+            {"name": c.name, "value": c.value, "limit": c.limit, "unit": c.unit, "count": c.count,
+             "verdict": c.verdict, "why": c.why}
+            for c in result.checks
+        ],
+    }  # fmt: skip
+
+
+def _print(result: Result) -> None:
+    screen = console()
+    screen.print(f"{result.name}: {result.source}\n", soft_wrap=True)
+    rows = [
+        [p.name, _value(p.ours, p), _value(p.theirs, p), p.fault or p.verdict, p.reason]
+        for p in result.published
+    ]
+    screen.print(table("Published figures", ["figure", "ours", "theirs", "verdict", "why"], rows))
+    checks = [
+        [c.name, shown(c.value, c.unit), shown(c.limit, c.unit), str(c.count), c.verdict]
+        for c in result.checks
+    ]
+    screen.print(table("\nAccepted limits", ["check", "error", "limit", "n", "verdict"], checks))
+    faults = sum(bool(p.fault) for p in result.published)
+    held = sum(c.holds for c in result.checks)
+    screen.print(
+        f"\n{len(result.published)} published figures, {faults} no longer stand; "
+        f"{held} of {len(result.checks)} checks agree\n"
+    )
+
+
+def _value(value: float | None, figure: Published) -> str:
+    return "-" if value is None else shown(value, figure.unit)
