@@ -21,7 +21,8 @@ from validate.compare.residual import static_residuals
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.identify.interval import profile_interval
-from validate.parameters import quantity
+from validate.parameters import quantity, require_ranges
+from validate.recording.contour import outlines_of
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.inclusion import outlined_capsule
@@ -33,6 +34,7 @@ from validate.register.observe import (
     nearest_sample,
     observe_markers,
     observe_outlines,
+    require_rising,
 )
 from validate.register.plane import cavity_sampler
 from validate.replay.experiment import (
@@ -49,8 +51,10 @@ from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact, between_plates
-from validate.scene.scene import Dilatation, Material, Membrane, Scene
+from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 from validate.twin.phantom import TwinSettings, record_phantom
 
@@ -77,6 +81,8 @@ class Inclusion:
     centre_z: float | None = quantity(None, "m", "lateral centre; none: from the outline")
     radius: float | None = quantity(None, "m", "radius; none: from the outline")
     length: float | None = quantity(None, "m", "length along y; none: from the sweep")
+    wider: float = quantity(0.0, "m", "added to the radius that is meshed")
+    longer: float = quantity(0.0, "m", "added to the length that is meshed")
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,9 @@ class Grid:
     finer_x: int = quantity(11, "1", "nodes along x of the second mesh, for u_num")
     finer_y: int = quantity(13, "1", "nodes along y of the second mesh")
     finer_z: int = quantity(19, "1", "nodes along z of the second mesh")
-    order: int | None = quantity(None, "1", "1 or 2 for every method; none: each method's own")
+    order: Literal[1, 2] | None = quantity(
+        None, "1", "1 or 2 for every method; none: each method's own"
+    )
 
     @property
     def nodes(self) -> tuple[int, int, int]:
@@ -132,6 +140,9 @@ class Ranges:
     radius: float = quantity(0.05e-3, "m", "of the inclusion's radius")
     length: float = quantity(0.5e-3, "m", "of the inclusion's length")
 
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -148,14 +159,19 @@ class Parameters:
     )
     friction: float = quantity(1e5, "N/m3", "tangential stiffness of the plates, if partial")
     loads: tuple[float, ...] = quantity((0.003, 0.006, 0.009), "m", "stage positions compared")
+    outlines: Literal["recorded", "images"] = quantity(
+        "recorded", "1", "outlines as recorded, or extracted from the B-mode images"
+    )
     recording: str | None = quantity(None, "1", "MCAP file; none: recordings/fluid_phantom.mcap")
 
 
 @dataclass(frozen=True)
 class Method:
     label: str = quantity("", "1", "what reports call it")
-    order: int = quantity(1, "1", "element order, 1 or 2")
+    order: Literal[1, 2] = quantity(1, "1", "element order")
     dilatation: Dilatation = quantity("pointwise", "1", "volume strain per cell or nodal mean")
+    law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
+    load_step: float = quantity(0.0015, "m", "grid of loads that large strain is solved at")
     plates: Contact = quantity("slip", "1", "contact of both plates")
     fluid: Literal["exact", "loop", "none"] = quantity("exact", "1", "pressure of the fluid")
     gain: float | None = quantity(None, "Pa", "gain of the loop; none: tuned (paper 000, 3.3)")
@@ -179,13 +195,18 @@ def _block(p: Parameters) -> Block:
 
 def record(parameters: Parameters, progress: Progress) -> Recording:
     p = parameters
-    return record_phantom(p.twin, _block(p), Material(p.material.E, p.material.nu), progress)
+    material = Material(p.material.E, p.material.nu, p.twin.law)
+    return record_phantom(p.twin, _block(p), material, progress)
 
 
 def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
     named = parameters.recording
     path = Path(named) if named else folder.parent / "recordings" / "fluid_phantom.mcap"
-    return (read_recording(path),)
+    recording = read_recording(path)
+    if parameters.outlines == "images":
+        outlines = outlines_of(recording.frame("b_mode"))
+        recording = replace(recording, contours={"outline": outlines})
+    return (recording,)
 
 
 def build(recording: Recording, parameters: Parameters, method: Method) -> Scene:
@@ -195,7 +216,7 @@ def build(recording: Recording, parameters: Parameters, method: Method) -> Scene
     contact = method.plates if p.plates == "as_method" else p.plates
     return between_plates(
         mesh if order == 1 else quadratic(mesh),
-        Material(p.material.E, p.material.nu),
+        Material(p.material.E, p.material.nu, method.law),
         contact,
         "pointwise" if order == 2 else method.dilatation,
         friction=p.friction,
@@ -210,6 +231,10 @@ def _membrane(wall: Wall) -> tuple[Membrane, ...]:
 
 
 def scheme(method: Method) -> Scheme:
+    if method.law != "linear":
+        return Tabulated(
+            StaticNewton("none" if method.fluid == "none" else "exact"), method.load_step
+        )
     if method.fluid == "none":
         return NoFluid()
     if method.fluid == "exact":
@@ -227,6 +252,12 @@ def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registe
     nearest = p.registration.wall == "nearest_node"
     wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=nearest)
     pen = recording.record("pen")
+    signals = (
+        _scalar(recording, "load_cell", "force.plate", "stage.force", "N"),
+        _scalar(recording, "pressure", "pressure", "inclusion.pressure", "Pa"),
+    )
+    for signal in signals:
+        require_rising(stage, signal)
     return Registered(
         stage,
         find_holds(stage, contours.t, p.loads, within=0.1e-3),
@@ -239,10 +270,20 @@ def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registe
             up=(_vector(pen["up"]), np.array([0.0, 1.0, 0.0])),
         ),
         observe_outlines(contours, wall),
-        (
-            _scalar(recording, "load_cell", "force.plate", "stage.force", "N"),
-            _scalar(recording, "pressure", "pressure", "inclusion.pressure", "Pa"),
-        ),
+        signals,
+        findings=_misplaced(capsule, inclusion(recording, p)),
+    )
+
+
+def _misplaced(measured: Capsule, meshed: Capsule) -> tuple[str, ...]:
+    """A word where the meshed inclusion is not where the rest outline lies."""
+    off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
+    wide = meshed.radius - measured.radius
+    if off < 0.5e-3 and abs(wide) < 0.5e-3:
+        return ()
+    return (
+        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its radius "
+        f"{1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and cannot show that.",
     )
 
 
@@ -257,8 +298,8 @@ def inclusion(recording: Recording, parameters: Parameters) -> Capsule:
     )
     return Capsule(
         (centre[0], centre[1], centre[2]),
-        measured.radius if mine.radius is None else mine.radius,
-        measured.length if mine.length is None else mine.length,
+        (measured.radius if mine.radius is None else mine.radius) + mine.wider,
+        (measured.length if mine.length is None else mine.length) + mine.longer,
     )
 
 
@@ -316,6 +357,7 @@ HALF = 1e6  # N/m3: the tangential stiffness at a share of one half
 
 def _rubbing(p: Parameters, share: float) -> Parameters:
     """Share 0 slips, 1 bonds, between them springs of HALF share/(1 - share)."""
+    p = replace(p, mesh=replace(p.mesh, order=None))
     if share in (0.0, 1.0):
         return replace(p, plates="slip" if share == 0 else "bonded")
     return replace(p, plates="partial", friction=HALF * share / (1 - share))
@@ -360,10 +402,10 @@ INPUTS = (
           "image plane along the stage; the meshed inclusion follows"),
     Input("image pose z", lambda p: _place(p, image_shift_z=p.ranges.pose), _one,
           "image plane sideways; the meshed inclusion follows"),
-    Input("inclusion radius", lambda p: _include(p, radius=0.0085 + p.ranges.radius), _one,
-          "radius of the meshed inclusion"),
-    Input("inclusion length", lambda p: _include(p, length=0.028 + p.ranges.length), _one,
-          "length of the meshed inclusion"),
+    Input("inclusion radius", lambda p: _include(p, wider=p.inclusion.wider + p.ranges.radius),
+          _one, "radius of the meshed inclusion"),
+    Input("inclusion length", lambda p: _include(p, longer=p.inclusion.longer + p.ranges.length),
+          _one, "length of the meshed inclusion"),
 )  # fmt: skip
 
 BASE = Variant("md_fluid")
@@ -396,7 +438,7 @@ EFFECTS = (
                BASE, Variant("md_fluid", lambda p: _material(p, nu=0.45)),
                itself="Poisson ratio"),
     EffectSpec("radius", "inclusion radius 0.5 mm smaller",
-               BASE, Variant("md_fluid", lambda p: _include(p, radius=0.0080)),
+               BASE, Variant("md_fluid", lambda p: _include(p, wider=-0.5e-3)),
                itself="inclusion radius"),
     EffectSpec("centre", "image pose 1 mm along the stage, the inclusion follows",
                BASE, Variant("md_fluid", lambda p: _place(p, image_shift_x=1e-3)),
@@ -422,11 +464,11 @@ ACCEPT = (
 
 
 def _quick(p: Parameters) -> Parameters:
-    """A coarser mesh; the nominal one serves as its finer one."""
+    """The first load on a coarser mesh; the nominal one serves as its finer one."""
     g = p.mesh
     coarse = replace(g, nodes_x=7, nodes_y=8, nodes_z=11,
                      finer_x=g.nodes_x, finer_y=g.nodes_y, finer_z=g.nodes_z)  # fmt: skip
-    return replace(p, mesh=coarse)
+    return replace(p, mesh=coarse, loads=p.loads[:1])
 
 
 EXPERIMENT = Experiment(

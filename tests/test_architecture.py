@@ -44,7 +44,7 @@ def test_every_dataclass_is_frozen(project_root: Path) -> None:
 
 def test_every_scheme_is_in_the_tuple(project_root: Path) -> None:
     """A class with `prepare` is a scheme; the contract tests reach it only through SCHEMES."""
-    from validate.solve.fluid import SCHEMES
+    from validate.solve.schemes import SCHEMES
 
     written = {
         node.name

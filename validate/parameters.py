@@ -56,6 +56,17 @@ def with_values(settings: Any, values: Mapping[str, str]) -> Any:
     return settings
 
 
+def require_ranges(ranges: Any) -> None:
+    """Every field is a standard uncertainty: raises `UsageError` unless it is 0 or above.
+
+    Those without unit are relative or shares, and at most 1.
+    """
+    for f in fields(ranges):
+        value = getattr(ranges, f.name)
+        if not value >= 0 or (f.metadata.get("unit") == "1" and value > 1):
+            raise UsageError(f"ranges.{f.name} = {value:g}: a standard uncertainty is 0 or above")
+
+
 def nearest_names(name: str, known: set[str]) -> str:
     """A hint naming the known ones nearest to `name`."""
     return _nearest(name, known)
@@ -92,9 +103,10 @@ def _parse(hint: Any, path: str, text: str) -> Any:
         options = [a for a in get_args(hint) if a is not type(None)]
         return None if text.lower() in ("none", "null") else _parse(options[0], path, text)
     if get_origin(hint) is Literal:
-        if text not in get_args(hint):
-            raise UsageError(f"{path}={text}: one of {', '.join(map(str, get_args(hint)))}")
-        return text
+        choices = {str(choice): choice for choice in get_args(hint)}
+        if text not in choices:
+            raise UsageError(f"{path}={text}: one of {', '.join(choices)}")
+        return choices[text]
     if get_origin(hint) is tuple:
         return tuple(_parse(get_args(hint)[0], path, part) for part in text.split(","))
     if hint is bool:

@@ -140,7 +140,11 @@ def test_an_experiment_file_anywhere_and_from_any_folder(
 
 def test_list_names_every_parameter_with_path_type_unit_and_default() -> None:
     found = json.loads(here("list", "--json")[1])
-    assert {e["name"] for e in found} == {"ecoflex_cylinder", "fluid_phantom"}
+    assert {e["name"] for e in found} == {
+        "ecoflex_cylinder",
+        "fluid_phantom",
+        "fluid_phantom_large",
+    }
     detail = json.loads(here("list", "fluid_phantom", "--json")[1])
     paths = {p["path"]: p for p in detail["parameters"]}
     assert paths["material.E"] == {

@@ -84,10 +84,10 @@ DEFECTS: dict[str, tuple[str | bytes, str]] = {
     "two tests": (bare() + bare(), "line 62"),
     "longer second test": (
         "\n".join(bare().split("\n")[:21]) + "\n" + bare(),
-        "two tables or text amid the rows: 20 rows from line 2 on and more from line 23 on",
+        r"2 specimens in one file: '1' \(20 rows from line 2 on.*'2' \(60 rows from line 23 on",
     ),
     "text amid": (spoiled(30, lambda r: "Pause"), "line 30: text 'Pause' amid"),
-    "no time": (bare("Zeit (s),Displacement (mm),Load (N)"), "no time column .*time=every"),
+    "no time": (bare("Kanal 1 (s),Displacement (mm),Load (N)"), "no time column .*time=every"),
     "no force": (bare("Time (s),Displacement (mm),Channel 3 (V)"), "no force column"),
     "no unit": (bare("Time (s),Displacement (mm),Load"), r"'Load': no unit .*force=Load:UNIT"),
     "empty unit": (bare("Time (s),Displacement (mm),Load ()"), "no unit for force"),

@@ -164,7 +164,10 @@ _FRAMES = Frames(_T, (np.zeros((2, 2), np.uint8),) * 2, (1e-4, 1e-4), np.eye(4),
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
-        ({"frames": {"/f": _FRAMES}}, "frames cannot be written yet"),
+        (
+            {"frames": {"/f": _FRAMES}, "metadata": {"calibration//f": {}}},
+            r"metadata names \['calibration//f'\] are reserved",
+        ),
         ({}, "no streams to write"),
         ({"markers": {"/m": _MARKERS}, "signals": {"/m": _SIGNAL}}, r"topics used twice: \['/m'\]"),
         (

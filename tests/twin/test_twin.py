@@ -100,8 +100,11 @@ def test_every_sensor_has_a_stream_of_its_own() -> None:
     assert one["b"].standard_normal() != one["a"].standard_normal()
 
 
-def test_the_shipped_recording_reads_as_the_file_beside_it_says(project_root: Path) -> None:
-    file = project_root / "recordings" / "fluid_phantom.mcap"
+@pytest.mark.parametrize("name", ["fluid_phantom", "fluid_phantom_large"])
+def test_a_shipped_recording_reads_as_the_file_beside_it_says(
+    project_root: Path, name: str
+) -> None:
+    file = project_root / "recordings" / f"{name}.mcap"
     beside = json.loads(file.with_suffix(".json").read_text("utf-8"))
     assert json.loads(json.dumps(summary(read_recording(file)))) == beside
     assert file.stat().st_size < 2e6

@@ -101,21 +101,52 @@ def inspect(file: Path, as_json: bool) -> None:
 
 
 @cli.command("import")
-@click.argument("file", type=_FILE)
-@click.option("--as", "kind", required=True, metavar="KIND", help="Kind of file: instron.")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--as", "kind", required=True, metavar="KIND", help="instron or png-stack.")
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option(
     "--map",
     "mapping",
     multiple=True,
     metavar="ROLE=COLUMN[:UNIT][:-]",
-    help="Overrides: time, displacement or force is that column, unit, sign.",
+    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; encoding=cp1250.",
 )
-def import_(file: Path, kind: str, out: Path, mapping: tuple[str, ...]) -> None:
-    """Turn a testing machine's export into a recording."""
+@click.option("--m-per-px", type=float, help="png-stack: size of a pixel, m.")
+@click.option("--rate", type=float, help="png-stack: images a second, Hz.")
+@click.option("--topic", default="images", show_default=True, help="png-stack: its topic.")
+def import_(file: Path, kind: str, out: Path, mapping: tuple[str, ...], **stack: Any) -> None:
+    """Turn a testing machine's export, or a folder of PNG images, into a recording."""
     from validate.cli import recordings
 
-    recordings.import_file(file, kind, out, mapping)
+    recordings.import_file(file, kind, out, mapping, recordings.Stack(**stack))
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, type=_FILE)
+@click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
+@click.option(
+    "--shift",
+    "shifts",
+    multiple=True,
+    metavar="TOPIC=SECONDS[:SD]",
+    help="Add to the times of a stream with a clock of its own; kept as a record.",
+)
+def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
+    """Put the streams of several recordings into one, clocks as they are or shifted."""
+    from validate.cli import recordings
+
+    recordings.merge_files(files, out, shifts)
+
+
+@cli.command()
+@click.argument("name")
+@click.option("--from", "source", required=True, type=_FILE, help="The MCAP recording.")
+@click.option("-o", "out", type=_FILE, help="The file (default: experiments/NAME.py).")
+def new(name: str, source: Path, out: Path | None) -> None:
+    """Write a commented experiment file, filled with what a recording holds."""
+    from validate.cli import new as writing
+
+    writing.new(name, source, out)
 
 
 @cli.command()

@@ -1,6 +1,7 @@
-"""`validate inspect`, `import` and `record`."""
+"""`validate inspect`, `import`, `merge` and `record`."""
 
 import json
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -8,13 +9,18 @@ from validate.cli.display import console, progress, table
 from validate.cli.main import pairs
 from validate.errors import UsageError
 from validate.parameters import nearest_names, with_values
+from validate.recording.alignment import declared_offset, shift
 from validate.recording.inspect import Inspection, Topic, inspect_recording
 from validate.recording.instron import KINDS, read_instron
 from validate.recording.mcap_read import read_recording
 from validate.recording.mcap_write import write_recording
+from validate.recording.merge import merge
+from validate.recording.png_stack import read_png_stack
 from validate.recording.summary import summary
-from validate.recording.types import Recording
+from validate.recording.types import Recording, Source
 from validate.replay.find import find
+
+PNG_STACK = "png-stack"
 
 
 def inspect(file: Path, as_json: bool) -> None:
@@ -26,13 +32,60 @@ def inspect(file: Path, as_json: bool) -> None:
         _print(found)
 
 
-def import_file(file: Path, kind: str, out: Path, mapping: tuple[str, ...]) -> None:
+@dataclass(frozen=True)
+class Stack:
+    """What a folder of images does not say itself: m per pixel, images a second, the topic."""
+
+    m_per_px: float | None
+    rate: float | None
+    topic: str
+
+
+def import_file(file: Path, kind: str, out: Path, mapping: tuple[str, ...], stack: Stack) -> None:
     """Reads a foreign file and writes it as a recording."""
-    if kind not in KINDS:
-        raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, set(KINDS))}")
-    recording = read_instron(file, pairs(mapping, "--map"))
+    known = {*KINDS, PNG_STACK}
+    if kind not in known:
+        raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, known)}")
+    said = pairs(mapping, "--map")
+    recording = _images(file, stack) if kind == PNG_STACK else read_instron(file, said)
     write_recording(recording, out)
     _report(recording, out)
+
+
+def _images(folder: Path, stack: Stack) -> Recording:
+    """A recording of one stream of frames, in the image's own frame (metres, x right, y down)."""
+    if stack.m_per_px is None or stack.rate is None:
+        raise UsageError(f"--as {PNG_STACK} needs --m-per-px and --rate, e.g. 1e-4 and 10")
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is no folder of PNG images")
+    scale = (stack.m_per_px, stack.m_per_px)
+    frames = read_png_stack(folder, scale, rate_hz=stack.rate)
+    name = folder.resolve().name
+    made = {"kind": "folder of PNG images", "images": str(len(frames.images))}
+    return Recording(
+        name=name,
+        source=Source(name, "", 0, "folder of images: integrity not provable"),
+        t0_ns=0,
+        frames={stack.topic: frames},
+        metadata={"provenance": {**made, "rate_hz": repr(stack.rate)}},
+    )
+
+
+def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
+    """Writes one recording with all streams, moved where the user says so."""
+    merged = merge([read_recording(f) for f in files], out.stem)
+    for topic, text in pairs(shifts, "--shift").items():
+        merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))
+    write_recording(merged, out)
+    _report(merged, out)
+
+
+def _seconds(topic: str, text: str) -> tuple[float, float]:
+    seconds, _, sd = text.partition(":")
+    try:
+        return float(seconds), float(sd or "nan")
+    except ValueError:
+        raise UsageError(f"--shift {topic}={text}: expected SECONDS or SECONDS:SD") from None
 
 
 def record(name: str, out: Path, values: tuple[str, ...]) -> None:
@@ -52,7 +105,9 @@ def record(name: str, out: Path, values: tuple[str, ...]) -> None:
 
 
 def _report(recording: Recording, out: Path) -> None:
-    streams = [*recording.signals, *recording.markers, *recording.contours]
+    streams = [
+        *recording.signals, *recording.markers, *recording.contours, *recording.frames,
+    ]  # fmt: skip
     size = out.stat().st_size / 1e3
     console().print(f"{out}: {', '.join(streams)}; {size:.0f} kB", soft_wrap=True)
 
@@ -63,6 +118,8 @@ def _print(found: Inspection) -> None:
     rows = [_row(topic) for topic in found.topics]
     screen.print(table(found.source.path, [*head, "frame"], rows))
     screen.print(_head(found), soft_wrap=True)
+    for line in found.clock_offsets:
+        screen.print(line, soft_wrap=True)
     screen.print(f"defects: {len(found.defects)}")
     for defect in found.defects:
         screen.print(f"  {defect}", soft_wrap=True)

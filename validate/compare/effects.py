@@ -66,6 +66,7 @@ def effect(
         for s in sensors
         for n in names
         if one[n].quantity == s.quantity
+        and (s.sd < one[n].sd or one[n].sd == 0)
         and _change(one[n], other[n], s.sd, shared.get(n, 0.0)).separation > TELLS_APART
     )
     return Effect(name, doc, changes, seen, tuple(dict.fromkeys(would)))

@@ -17,7 +17,10 @@ from validate.solve.types import Run
 
 @dataclass(frozen=True)
 class MethodResult:
-    """One method: its scene; per recording the registration and the run; scores and checks."""
+    """One method: its scene; per recording the registration and the run; scores and checks.
+
+    `band`: relative standard uncertainty of the force from the modulus; 0: not declared.
+    """
 
     name: str
     label: str
@@ -28,6 +31,7 @@ class MethodResult:
     residuals: Mapping[str, Residual]
     scores: tuple[Score, ...]
     checks: tuple[Check, ...]
+    band: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "residuals", MappingProxyType(dict(self.residuals)))

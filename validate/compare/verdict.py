@@ -30,11 +30,12 @@ SAFETY = 3.0 / 2
 
 @dataclass(frozen=True)
 class Accept:
-    """A quantity the accepted methods must predict at every load, to within `limit` (SI)."""
+    """A quantity the accepted methods must predict to `limit` (SI), at `loads` (none: all)."""
 
     quantity: str
     limit: float
     source: str
+    loads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,11 @@ def judge(
     """
     if finer is None:
         raise ComparisonError(f"{residual.name}: no second mesh, so no u_num; set a finer mesh")
+    if refinement <= 0:
+        raise ComparisonError(
+            f"{residual.name}: the second mesh is not finer than the first (r^p - 1 = "
+            f"{refinement:.3g}); set a finer one"
+        )
     E, u_D = error_and_noise(residual)
     u_num = SAFETY * rms(finer.values - residual.values) / refinement
     parts = {s.name: abs(s.scale) * rms(s.change.values) for s in inputs}

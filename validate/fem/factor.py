@@ -13,10 +13,14 @@ from validate.fem.ordering import nested_dissection
 
 @dataclass(frozen=True)
 class Factor:
-    """P^T L U P of a matrix (m, m); `solve` takes (m,) or (m, k)."""
+    """P^T L U P of a matrix (m, m); `solve` takes (m,) or (m, k).
+
+    `negative_pivots` counts the negative eigenvalues of the matrix (Sylvester's law of inertia).
+    """
 
     lu: SuperLU
     order: Ints
+    negative_pivots: int = 0
 
     def solve(self, b: Floats) -> Floats:
         x = np.empty_like(b)
@@ -30,20 +34,39 @@ def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor:
     Raises `SceneError` when A is not positive definite: SuperLU itself would go on silently.
     Without pivoting U's diagonal holds the pivots, whose signs are the inertia of A.
     """
-    order = _order(A, node, places)
+    factor, pivots = _factorised(A, elimination_order(A, node, places))
+    if pivots.min() <= 1e-13 * pivots.max():
+        raise _not_definite(float(pivots.min() / pivots.max()), int((pivots <= 0).sum()))
+    return factor
+
+
+def factorise_indefinite(A: sparse.csr_array, order: Ints) -> Factor:
+    """Factorises a symmetric A (m, m) in the given order, whatever the signs of its pivots.
+
+    For tangents, which may lose definiteness: the caller reads `negative_pivots`. Raises
+    `SceneError` only where a pivot vanishes.
+    """
+    factor, pivots = _factorised(A, order)
+    if np.abs(pivots).min() <= 1e-13 * np.abs(pivots).max():
+        raise _not_definite(float(pivots.min() / pivots.max()), int((pivots <= 0).sum()))
+    return factor
+
+
+def _factorised(A: sparse.csr_array, order: Ints) -> tuple[Factor, Floats]:
+    """The factor and its pivots (m,): without row exchanges these are U's diagonal."""
     B = A[order][:, order].tocsc()
     try:
         lu = splu(B, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError as singular:
         raise _not_definite(0.0, int(A.shape[0])) from singular
     pivots = lu.U.diagonal()
-    unmoved = bool((lu.perm_r == np.arange(len(order))).all())
-    if not unmoved or pivots.min() <= 1e-13 * pivots.max():
+    if not (lu.perm_r == np.arange(len(order))).all():
         raise _not_definite(float(pivots.min() / pivots.max()), int((pivots <= 0).sum()))
-    return Factor(lu, order)
+    return Factor(lu, order, int((pivots < 0).sum())), pivots
 
 
-def _order(A: sparse.csr_array, node: Ints, places: Floats) -> Ints:
+def elimination_order(A: sparse.csr_array, node: Ints, places: Floats) -> Ints:
+    """Nested dissection of the unknowns (m,) by their nodes; holds for every A of one pattern."""
     used, local = np.unique(node, return_inverse=True)
     links = A.tocoo()
     ones = np.ones(links.nnz, dtype=np.int8)

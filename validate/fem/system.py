@@ -78,7 +78,13 @@ def build(scene: Scene) -> System:
 
 
 def responses(system: System) -> Responses:
-    """Solves for every response column: one factorisation, one solve per input."""
+    """Solves for every response column: one factorisation, one solve per input.
+
+    Raises `SceneError` for a law at large strain: its fields are no sums of columns.
+    """
+    law = system.scene.material.law
+    if law != "linear":
+        raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
     mesh, factor = system.scene.mesh, system.factor()
     loads = [pressure_load(c, mesh.nodes).ravel() for c in system.cavities]
     columns = [_driven_field(system, factor, move) for move in system.moves.T]

@@ -29,7 +29,8 @@ def check_time(pick: Pick, lines: Sequence[int]) -> None:
             at = int(np.argmax(bad)) + 1
             raise RecordingError(
                 f"line {lines[at]}: time {what}, {t[at - 1]:.6g} -> {t[at]:.6g} {pick.unit} "
-                f"({int(bad.sum())} such rows); mend the rows or, at a constant rate, say "
+                f"({int(bad.sum())} such rows); mend the rows, say --map "
+                "repeated=last (or first) for rows of one time or, at a constant rate, "
                 "--map time=every:0.1s"
             )
 

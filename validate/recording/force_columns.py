@@ -1,7 +1,7 @@
 """Which columns of a force-displacement table are time, displacement and force; what the user says.
 
-`SYNONYMS` is the only place that knows words. A column has a role when its name holds one of the
-role's words and none of the words that make it something else; rows are tried from the top.
+Words are in `vocabulary`; where one word names a length on one machine and a strain on another, the
+column's unit decides.
 """
 
 import difflib
@@ -15,32 +15,8 @@ from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.table import Column, Table
 from validate.recording.units import si_factor
+from validate.recording.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
 
-# (role, words that give it, words that take it away)
-SYNONYMS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
-    ("stress", ("stress",), ("true", "cauchy", "rate", "max", "maximum", "yield")),
-    ("strain", ("strain",), ("true", "log", "logarithmic", "rate", "max", "maximum", "plastic")),
-    ("time", ("time", "t"), ("cycle", "date", "start", "step")),
-    ("force", ("force", "load", "f"), ("rate", "max", "maximum", "peak", "temperature")),
-    (
-        "displacement",
-        (
-            "displacement",
-            "disp",
-            "compression",
-            "extension",
-            "crosshead",
-            "position",
-            "stroke",
-            "travel",
-            "deflection",
-            "deformation",
-            "closing",
-            "indentation",
-        ),
-        ("rate", "speed", "velocity", "max", "maximum", "corrected"),
-    ),
-)
 NEEDED = ("time", "displacement", "force")
 QUANTITY = {
     "time": "time",
@@ -49,6 +25,7 @@ QUANTITY = {
     "strain": "strain",
     "stress": "stress",
 }
+SETTINGS = ("specimen", "encoding", "decimal", "repeated")  # of the file, not of a column
 _SIGNS = {":-": -1, ":+": 1}
 
 
@@ -79,12 +56,13 @@ class Pick:
 
 def parse_mapping(mapping: Mapping[str, str], table: Table) -> dict[str, Said]:
     """The mapping's entries by role, see `read_instron`; raises `UsageError` naming the nearest."""
+    known = (*NEEDED, *SETTINGS)
     for key in mapping:
-        if key not in NEEDED:
-            near = difflib.get_close_matches(key, NEEDED, n=1, cutoff=0.3)
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
             hint = f"did you mean '{near[0]}'? " if near else ""
-            raise UsageError(f"--map {key}=...: no such key; {hint}known: {', '.join(NEEDED)}")
-    return {key: _said(key, text, table) for key, text in mapping.items()}
+            raise UsageError(f"--map {key}=...: no such key; {hint}known: {', '.join(known)}")
+    return {key: _said(key, text, table) for key, text in mapping.items() if key in NEEDED}
 
 
 def _said(key: str, text: str, table: Table) -> Said:
@@ -120,12 +98,19 @@ def _nearest(text: str, table: Table) -> str:
 
 
 def role_of(column: Column) -> str | None:
-    """The role that the column's name gives it, None for a column of no interest here."""
-    words = set(re.findall(r"[^\W\d_]+", column.name.casefold()))
-    for role, given, taken in SYNONYMS:
-        if words & set(given):
-            return None if words & set(taken) else role
-    return None
+    """The role of a column by its name and unit, None for a column of no interest here."""
+    role = role_of_name(column.name)
+    if role not in ("displacement", "strain") or not holds(column.name, LENGTH_OR_STRAIN):
+        return "displacement" if role == "strain" and _measures(column, "length") else role
+    return "strain" if _measures(column, "strain") else role
+
+
+def _measures(column: Column, quantity: str) -> bool:
+    try:
+        si_factor(column.unit or "", quantity)
+    except RecordingError:
+        return False
+    return True
 
 
 def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
@@ -149,12 +134,12 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
         raise RecordingError(
             f"no {role} column among {labels}; name it with --map {role}=COLUMN{synthetic}"
         )
-    return _one_of([_pick(role, column, table, None) for column in found], role)
+    return _one_of(_moving([_pick(role, column, table, None) for column in found]), role)
 
 
 def derived_pick(role: str, table: Table) -> Pick | None:
     """The strain or stress column that checks the others; None when there is no single sure one."""
-    found = [c for c in table.columns if role_of(c) == role and c.unit]
+    found = [c for c in table.columns if role_of(c) == role and c.unit and all(c.cells)]
     if len(found) > 1:
         found = [c for c in found if re.search(r"engineering|nominal", c.name, re.IGNORECASE)]
     return _pick(role, found[0], table, None) if len(found) == 1 else None
@@ -175,6 +160,11 @@ def _pick(role: str, column: Column, table: Table, said: Said | None) -> Pick:
             f"wrong say so with --map '{role}=COLUMN:UNIT'"
         ) from error
     return Pick(role, column, unit, factor, table.numbers(column) * factor, said)
+
+
+def _moving(picks: list[Pick]) -> list[Pick]:
+    """The columns that are not constant, where there are any: an idle sensor is no rival."""
+    return [p for p in picks if np.ptp(p.values) > 0] or picks
 
 
 def _one_of(picks: list[Pick], role: str) -> Pick:

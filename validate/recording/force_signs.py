@@ -1,6 +1,5 @@
 """Which way compression points in a force-displacement table, and which columns to flip for it."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,9 +8,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.force_columns import Pick
-
-_COMPRESSION = re.compile(r"\b(compress(ion|ive|ed)?|closing)\b", re.IGNORECASE)
-_TENSION = re.compile(r"\b(tensile|tension)\b", re.IGNORECASE)
+from validate.recording.vocabulary import COMPRESSION, TENSION, holds
 
 
 @dataclass(frozen=True)
@@ -26,8 +23,8 @@ class Signs:
 def kind_of_test(header: Mapping[str, str], labels: tuple[str, ...]) -> str | None:
     """`compression` or `tension` as the header says, else the column names; None: neither."""
     for text in (" ".join(f"{k} {v}" for k, v in header.items()), " ".join(labels)):
-        squeezed, pulled = _COMPRESSION.search(text), _TENSION.search(text)
-        if bool(squeezed) != bool(pulled):
+        squeezed, pulled = holds(text, COMPRESSION), holds(text, TENSION)
+        if squeezed != pulled:
             return "compression" if squeezed else "tension"
     return None
 

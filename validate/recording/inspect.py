@@ -13,23 +13,25 @@ import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError
+from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks import GAP_FACTOR, clock_of
 from validate.recording.integrity import verify
 from validate.recording.mcap_file import Verified, messages_of, opened
 from validate.recording.mcap_read import metadata_records, stream_of
 from validate.recording.mcap_records import Channel
-from validate.recording.mcap_streams import Collected, fill, ours
-from validate.recording.schemas import CONTOUR, MARKERS, MIRROR, MIRROR_OF, SIGNAL
+from validate.recording.mcap_streams import CALIBRATION, Collected, fill, ours
+from validate.recording.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
 from validate.recording.types import Clock, Source
 
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
-_KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours"}
+_KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours", IMAGE: "frames"}
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One channel: kind is markers, signal, contours, mirror or foreign; times in ns, None: empty.
+    """One channel: kind is markers, signal, contours, frames, mirror or foreign.
 
+    Times are in ns, None: empty;
     first_ns and last_ns are the earliest and latest time of measurement; `unit` is empty where the
     schema says none. `clock` holds rate, gaps and duplicates.
     """
@@ -61,11 +63,12 @@ class Inspection:
     metadata: tuple[str, ...]
     topics: tuple[Topic, ...]
     defects: tuple[str, ...]
+    clock_offsets: tuple[str, ...] = ()  # streams that were moved, one line each
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts, lists, texts and finite numbers for JSON; None where nothing is known."""
         plain = asdict(self)
-        for name in ("compressions", "metadata", "topics", "defects"):
+        for name in ("compressions", "metadata", "topics", "defects", "clock_offsets"):
             plain[name] = list(plain[name])
         return plain
 
@@ -99,7 +102,17 @@ def inspect_recording(path: Path) -> Inspection:
         metadata=tuple(record.name for record in verified.metadata),
         topics=tuple(topics),
         defects=tuple(defects),
+        clock_offsets=tuple(_offset_lines(verified)),
     )
+
+
+def _offset_lines(verified: Verified) -> list[str]:
+    """What `alignment.shift` wrote: nothing is moved without being shown."""
+    return [
+        f"{record.name}: {', '.join(f'{key} {value}' for key, value in record.values.items())}"
+        for record in verified.metadata
+        if record.name.startswith(CLOCK_OFFSET)
+    ]
 
 
 def _topic(
@@ -113,7 +126,7 @@ def _topic(
     samples = raw.samples if raw else []
     topic = Topic(
         name=channel.topic,
-        kind=_kind(channel, schema.name if schema else ""),
+        kind=_kind(channel, schema.name if schema else "", raw),
         schema=schema.name if schema else "",
         schema_encoding=schema.encoding if schema else "",
         message_encoding=channel.encoding,
@@ -128,12 +141,14 @@ def _topic(
 
 
 def _unit(raw: Collected) -> str:
-    return raw.samples[0].unit if raw.schema == SIGNAL else "m"
+    return {SIGNAL: raw.samples[0].unit, IMAGE: "grey level"}.get(raw.schema, "m")
 
 
-def _kind(channel: Channel, schema: str) -> str:
+def _kind(channel: Channel, schema: str, raw: Collected | None) -> str:
     if schema == MIRROR and MIRROR_OF in channel.metadata:
         return "mirror"
+    if raw is None:
+        return "foreign"
     return _KINDS.get(schema, "foreign")
 
 
@@ -165,6 +180,10 @@ def _file_defects(verified: Verified) -> list[str]:
         found.append(f"{verified.unknown_records} records of unknown kind")
     topics = Counter(c.topic for c in verified.channels.values())
     found += [f"{topic!r} is on {n} channels" for topic, n in topics.items() if n > 1]
+    for number, channel in verified.channels.items():
+        schema = verified.schemas.get(channel.schema_id)
+        if schema is not None and schema.name == IMAGE and number not in ours(verified):
+            found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
     names = Counter(m.name for m in verified.metadata)
     found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
     return found

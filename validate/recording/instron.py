@@ -2,13 +2,16 @@
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.recording.blocks import parse_tables
 from validate.recording.clocks import clock_of
+from validate.recording.encoding import MAX_BYTES
 from validate.recording.force_checks import (
     MIN_SAMPLES,
     check_derived,
@@ -25,18 +28,20 @@ from validate.recording.force_columns import (
     needed_pick,
     parse_mapping,
 )
+from validate.recording.force_repeats import without_repeats
 from validate.recording.force_signs import Signs, kind_of_test, signs
 from validate.recording.specimen import loaded_area, specimen_of
-from validate.recording.table import MAX_BYTES, Column, Table, parse_table
+from validate.recording.specimens import chosen, specimen_tables
+from validate.recording.table import Column, Table
 from validate.recording.types import Record, Recording, Signal, Source
 from validate.recording.units import si_factor
 
 KINDS = ("instron",)
-_SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
+_SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space"}
 
 
 def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Recording:
-    """Read a force-displacement test exported as CSV text.
+    """Read a force-displacement test exported as CSV text, of one specimen.
 
     Returns signals `displacement` (nt, 1) m and `force` (nt, 1) N, compression positive, on the
     file's own time in s (sd 0: not stated), and the records `header` (as written), `specimen`
@@ -50,16 +55,53 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         displacement=COLUMN[:UNIT][:-]   `:+` keeps it; COLUMN is the header text, with or without
         time=COLUMN[:UNIT]               its unit, or #3 for the third column
         time=every:STEP UNIT             no or useless time column: constant step, `every:0.1s`
+        specimen=LABEL                   which of several specimens, by the file's label or number
+        repeated=first|last              which row counts where several have the same time
+        encoding=cp1250, decimal=,       how the text is written, where that cannot be found out
 
     A column or unit given so is believed: checks of it are reported in `provenance`, not raised.
     Raises `UsageError` for a missing file and an unknown key or column, `RecordingError` for a file
-    that is no such table, is damaged or contradicts itself; nothing is ever returned in part.
+    that is no such table, is damaged or contradicts itself, or holds several specimens and none is
+    named; nothing is ever returned in part.
     """
+    said = dict(mapping or {})
     data = _bytes(path)
     try:
-        return _recording(path, data, mapping or {})
+        label, table = chosen(_tables(data, said), said.get("specimen"))
+        return _recording(path, data, table, said, label)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
+
+
+def read_instron_all(path: Path, mapping: Mapping[str, str] | None = None) -> tuple[Recording, ...]:
+    """Every specimen of an export, in the order of the file, each as `read_instron` gives it.
+
+    The recordings are called after file and specimen. Raises as `read_instron` does; one damaged
+    specimen refuses the file, with its label.
+    """
+    said = dict(mapping or {})
+    if "specimen" in said:
+        raise UsageError(f"--map specimen={said['specimen']} chooses one; leave it out to read all")
+    data = _bytes(path)
+    found = []
+    try:
+        tables = _tables(data, said)
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+    for label, table in tables.items():
+        try:
+            found.append(_recording(path, data, table, said, label))
+        except RecordingError as error:
+            raise RecordingError(f"{path.name}, specimen '{label}': {error}") from error
+    many = len(found) > 1
+    return tuple(
+        replace(r, name=f"{r.name}_{label}") if many else r
+        for r, label in zip(found, tables, strict=True)
+    )
+
+
+def _tables(data: bytes, said: Mapping[str, str]) -> dict[str, Table]:
+    return specimen_tables(parse_tables(data, said.get("encoding"), said.get("decimal")))
 
 
 def _bytes(path: Path) -> bytes:
@@ -72,9 +114,11 @@ def _bytes(path: Path) -> bytes:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
 
-def _recording(path: Path, data: bytes, mapping: Mapping[str, str]) -> Recording:
-    table = parse_table(data)
+def _recording(
+    path: Path, data: bytes, table: Table, mapping: Mapping[str, str], label: str
+) -> Recording:
     said = parse_mapping(mapping, table)
+    table = without_repeats(table, said.get("time"), mapping.get("repeated"))
     if len(table.lines) < MIN_SAMPLES:
         raise RecordingError(
             f"{len(table.lines)} samples, at least {MIN_SAMPLES} are needed; export the whole test"
@@ -98,6 +142,7 @@ def _recording(path: Path, data: bytes, mapping: Mapping[str, str]) -> Recording
             "provenance": {
                 "file": path.name,
                 "sha256": digest,
+                "specimen in file": label,
                 **_provenance(table, picks, flips, notes),
             },
         },
@@ -177,6 +222,8 @@ def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: li
         "given by the user": ", ".join(role for role in NEEDED if picks[role].said) or "nothing",
         "compared": "; ".join(notes) or "nothing: no strain or stress with known geometry",
         "columns not used": ", ".join(c.label for c in table.columns if c.label not in used),
-        "text": f"{table.encoding}, {_SEPARATOR_NAMES[table.separator]} separated, "
-        f"decimal sign {table.decimal}, {len(table.lines)} rows",
+        "besides": "; ".join(table.notes) or "nothing",
+        "text": f"{table.encoding} ({table.encoding_why}), "
+        f"{_SEPARATOR_NAMES[table.separator]} separated, decimal sign {table.decimal}, "
+        f"{len(table.lines)} rows",
     }

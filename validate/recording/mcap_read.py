@@ -1,6 +1,7 @@
 """An MCAP file as a recording: verified front to back, then read by the index of that check.
 
 Topics with schemas of others, mirrors among them, are not read; `validate inspect` lists them.
+So are images without a record of their calibration (`calibration/<topic>`: m_per_px_x, m_per_px_y).
 Nothing in the file is used as a path, and sizes are bounded before memory is taken
 (`mcap_records.MAX_RECORD`, `integrity.MAX_MESSAGES`, `schemas.MAX_MESSAGE`,
 `mcap_streams.MAX_NUMBERS`).
@@ -17,10 +18,19 @@ from validate.errors import RecordingError
 from validate.recording.clocks import clock_of
 from validate.recording.integrity import verify
 from validate.recording.mcap_file import Verified, messages_of, opened
-from validate.recording.mcap_streams import Collected, contours, fill, markers, ours, signal
-from validate.recording.mcap_write import FORMAT, POSE, POSE_KEY, RECORD
-from validate.recording.schemas import MARKERS, SIGNAL
-from validate.recording.types import Clock, Contours, Markers, Record, Recording, Signal
+from validate.recording.mcap_streams import (
+    CALIBRATION,
+    Collected,
+    contours,
+    fill,
+    frames,
+    markers,
+    ours,
+    signal,
+)
+from validate.recording.mcap_write import CALIBRATION_KEYS, FORMAT, POSE, POSE_KEY, RECORD
+from validate.recording.schemas import IMAGE, MARKERS, SIGNAL
+from validate.recording.types import Clock, Contours, Frames, Markers, Record, Recording, Signal
 
 
 def read_recording(path: Path) -> Recording:
@@ -46,8 +56,8 @@ def _topics(verified: Verified) -> dict[int, Collected]:
     if not collected:
         schemas = sorted({s.name for s in verified.schemas.values()})
         raise RecordingError(
-            f"no topic with markers, signals or contours; schemas found: {schemas}; "
-            "see `validate inspect`"
+            "no topic with markers, signals or contours, nor calibrated images; "
+            f"schemas found: {schemas}; see `validate inspect`"
         )
     topics = Counter(c.channel.topic for c in collected.values())
     twice = sorted(topic for topic, n in topics.items() if n > 1)
@@ -67,7 +77,9 @@ def _recording(path: Path, verified: Verified, collected: list[Collected]) -> Re
     t0 = min(int(raw.checked().times_ns.min()) for raw in collected)
     streams = {raw.channel.topic: stream_of(raw, t0, records) for raw in collected}
     outlines = {topic: s for topic, s in streams.items() if isinstance(s, Contours)}
-    read_already = {RECORD, *(POSE + topic for topic in outlines)}
+    images = {topic: s for topic, s in streams.items() if isinstance(s, Frames)}
+    read_already = {RECORD, *(POSE + topic for topic in [*outlines, *images])}
+    read_already |= {CALIBRATION + topic for topic in images}
     return Recording(
         name=name,
         source=verified.source,
@@ -75,6 +87,7 @@ def _recording(path: Path, verified: Verified, collected: list[Collected]) -> Re
         markers={topic: s for topic, s in streams.items() if isinstance(s, Markers)},
         signals={topic: s for topic, s in streams.items() if isinstance(s, Signal)},
         contours=outlines,
+        frames=images,
         clock={raw.channel.topic: _clock(raw) for raw in collected},
         metadata={n: r for n, r in records.items() if n not in read_already},
     )
@@ -86,13 +99,17 @@ def _clock(raw: Collected) -> Clock:
 
 def stream_of(
     raw: Collected, t0_ns: int, records: Mapping[str, Record]
-) -> Markers | Signal | Contours:
-    """The stream of one channel of ours, times from `t0_ns`; `records` hold a contour's pose."""
+) -> Markers | Signal | Contours | Frames:
+    """The stream of one channel of ours, times from `t0_ns`; `records` hold poses and scales."""
     if raw.schema == MARKERS:
         return markers(raw, t0_ns)
     if raw.schema == SIGNAL:
         return signal(raw, t0_ns)
-    return contours(raw, t0_ns, _pose(records, raw.channel.topic))
+    pose = _numbers(records, POSE + raw.channel.topic, (POSE_KEY,), 16).reshape(4, 4)
+    if raw.schema == IMAGE:
+        scale = _numbers(records, CALIBRATION + raw.channel.topic, CALIBRATION_KEYS, 2)
+        return frames(raw, t0_ns, scale, pose)
+    return contours(raw, t0_ns, pose)
 
 
 def metadata_records(verified: Verified) -> dict[str, Record]:
@@ -121,14 +138,14 @@ def _name(records: Mapping[str, Record], path: Path) -> str:
     return record["name"]
 
 
-def _pose(records: Mapping[str, Record], topic: str) -> Floats:
-    """T_frame_from_image (4, 4) of a contour topic, from its metadata record."""
-    text = records.get(POSE + topic, {}).get(POSE_KEY)
-    if text is None:
-        raise RecordingError(f"{topic!r}: no record {POSE + topic!r} with {POSE_KEY}, 16 numbers")
+def _numbers(records: Mapping[str, Record], name: str, keys: tuple[str, ...], count: int) -> Floats:
+    """The `count` numbers under `keys` of a topic's metadata record."""
+    record = records.get(name, {})
+    missing = [key for key in keys if key not in record]
+    if missing:
+        raise RecordingError(f"no record {name!r} with {', '.join(missing)}, {count} numbers")
     try:
-        numbers = np.array([float(word) for word in text.split()])
+        numbers = np.array([float(word) for key in keys for word in record[key].split()])
     except ValueError as error:
-        raise RecordingError(f"{topic!r}: {POSE_KEY}: {error}") from None
-    numbers = checked(numbers, f"{topic!r} {POSE_KEY}", (16,), error=RecordingError)
-    return numbers.reshape(4, 4)
+        raise RecordingError(f"record {name!r}: {error}") from None
+    return checked(numbers, f"record {name!r}: {', '.join(keys)}", (count,), error=RecordingError)

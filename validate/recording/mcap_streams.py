@@ -17,6 +17,7 @@ from validate.recording.mcap_file import Verified
 from validate.recording.mcap_records import Channel, Message
 from validate.recording.schemas import (
     CONTOUR,
+    IMAGE,
     MARKERS,
     MESSAGE_ENCODING,
     SCHEMA_ENCODING,
@@ -24,9 +25,10 @@ from validate.recording.schemas import (
     Sample,
     decode,
 )
-from validate.recording.types import Contours, Markers, Signal
+from validate.recording.types import Contours, Frames, Markers, Signal
 
 OURS = (MARKERS, SIGNAL, CONTOUR)
+CALIBRATION = "calibration/"  # metadata record CALIBRATION + topic of every stream of frames
 MAX_NUMBERS = 50_000_000  # decoded numbers of one file: 400 MB
 
 T = TypeVar("T")
@@ -52,7 +54,7 @@ class Collected:
         except RecordingError as error:
             self.error = f"{self.channel.topic!r} message {len(self.samples)}: {error}"
             return 0
-        return int(self.samples[-1].values.size)
+        return self.samples[-1].size
 
     def checked(self) -> "Collected":
         """Itself; raises `RecordingError` when a message was wrong or there is none."""
@@ -83,11 +85,15 @@ class Collected:
 
 
 def ours(verified: Verified) -> dict[int, Collected]:
-    """An empty collector for every channel with a schema of ours."""
+    """An empty collector for every channel with a schema of ours, and of images calibrated."""
     found: dict[int, Collected] = {}
+    records = {record.name for record in verified.metadata}
     for number, channel in verified.channels.items():
         schema = verified.schemas.get(channel.schema_id)
-        if schema is not None and schema.name in OURS:
+        if schema is None:
+            continue
+        calibrated = schema.name == IMAGE and CALIBRATION + channel.topic in records
+        if schema.name in OURS or calibrated:
             log, publish = verified.log_ns[number], verified.publish_ns[number]
             found[number] = Collected(channel, schema.name, publish, log)
             if (schema.encoding, channel.encoding) != (SCHEMA_ENCODING, MESSAGE_ENCODING):
@@ -129,6 +135,14 @@ def contours(raw: Collected, t0_ns: int, pose: Floats) -> Contours:
     t, outlines = _times(raw, t0_ns), tuple(s.values for s in raw.samples)
     sd, frame = _sd(raw), _frame(raw)
     return _named(raw, lambda: Contours(t=t, outlines=outlines, sd=sd, pose=pose, frame=frame))
+
+
+def frames(raw: Collected, t0_ns: int, m_per_px: Floats, pose: Floats) -> Frames:
+    """The stream of a calibrated `foxglove.CompressedImage` channel, times from `t0_ns`."""
+    t, frame = _times(raw, t0_ns), _frame(raw)
+    images = tuple(s.image for s in raw.samples if s.image is not None)
+    scale = float(m_per_px[0]), float(m_per_px[1])
+    return _named(raw, lambda: Frames(t, images, scale, pose, frame))
 
 
 def _named(raw: Collected, make: Callable[[], T]) -> T:

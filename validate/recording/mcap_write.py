@@ -19,13 +19,15 @@ from mcap.writer import CompressionType, Writer
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording import schemas
-from validate.recording.schemas import CONTOUR, MARKERS, MIRROR, MIRROR_OF, SIGNAL, Json
-from validate.recording.types import Contours, Markers, Recording, Signal
+from validate.recording.mcap_streams import CALIBRATION
+from validate.recording.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL, Json
+from validate.recording.types import Contours, Frames, Markers, Recording, Signal
 
 RECORD = "validate.recording"  # metadata record with the recording's name and format
 FORMAT = "1"
-POSE = "pose/"  # metadata record POSE + topic of every contour stream
+POSE = "pose/"  # metadata record POSE + topic of every stream of contours or frames
 POSE_KEY = "T_frame_from_image"
+CALIBRATION_KEYS = ("m_per_px_x", "m_per_px_y")
 LIBRARY = "validate"  # without a version: two versions write the same bytes
 
 
@@ -41,14 +43,9 @@ class _Stream:
 def write_recording(recording: Recording, path: Path) -> None:
     """Write `recording` to `path`, replacing what is there only when all is written.
 
-    Raises `RecordingError`: no streams, frames (not written yet), a topic or metadata name used
-    twice, times that are no int64 nanoseconds, or a path that cannot be written.
+    Raises `RecordingError`: no streams, a topic or metadata name used twice, times that are no
+    int64 nanoseconds, images over 4096 px a side, or a path that cannot be written.
     """
-    if recording.frames:
-        raise RecordingError(
-            f"{recording.name}: frames cannot be written yet ({sorted(recording.frames)}); "
-            "leave them out or extract their contours first"
-        )
     streams = _streams(recording)
     metadata = _metadata(recording)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -107,6 +104,8 @@ def _streams(recording: Recording) -> list[_Stream]:
         streams.append(_signal(topic, signal, recording))
     for topic, contours in recording.contours.items():
         streams.append(_contours(topic, contours, recording))
+    for topic, frames in recording.frames.items():
+        streams.append(_frames(topic, frames, recording))
     if not streams:
         raise RecordingError(f"{recording.name}: no streams to write")
     topics = [s.topic for s in streams]
@@ -152,6 +151,15 @@ def _contours(topic: str, c: Contours, recording: Recording) -> _Stream:
     return _Stream(topic, CONTOUR, ns, own, {})
 
 
+def _frames(topic: str, f: Frames, recording: Recording) -> _Stream:
+    ns = stamps_ns(recording.t0_ns, f.t, topic)
+
+    def own(i: int) -> Json:
+        return schemas.image_message(int(ns[i]), f.frame, f.images[i])
+
+    return _Stream(topic, IMAGE, ns, own, {})
+
+
 def stamps_ns(t0_ns: int, t: Floats, topic: str) -> Ints:
     """t0_ns + round(t 1e9) in int64 ns; raises `RecordingError` outside 0 .. 2^63 - 1."""
     largest = int(np.iinfo(np.int64).max)
@@ -164,9 +172,13 @@ def stamps_ns(t0_ns: int, t: Floats, topic: str) -> Ints:
 
 def _metadata(recording: Recording) -> dict[str, dict[str, str]]:
     own = {RECORD: {"format": FORMAT, "name": recording.name}}
-    for topic, contours in recording.contours.items():
-        numbers = " ".join(repr(v) for v in contours.pose.ravel().tolist())
+    posed: list[tuple[str, Contours | Frames]] = [*recording.contours.items()]
+    for topic, stream in [*posed, *recording.frames.items()]:
+        numbers = " ".join(repr(v) for v in stream.pose.ravel().tolist())
         own[POSE + topic] = {POSE_KEY: numbers}
+    for topic, frames in recording.frames.items():
+        scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
+        own[CALIBRATION + topic] = {key: repr(scale) for key, scale in scales}
     taken = sorted(own.keys() & recording.metadata.keys())
     if taken:
         raise RecordingError(f"{recording.name}: metadata names {taken} are reserved; rename them")

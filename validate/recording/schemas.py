@@ -4,6 +4,9 @@
                                                            z null as a whole: points in a plane
     validate.Signal    {stamp, frame, unit, values, sd}     in `unit`
     validate.Contour   {stamp, frame, x, y, sd}             m, image plane, closed
+    foxglove.CompressedImage {timestamp, frame_id, data, format}
+                                                           PNG, 8-bit grey, base64; read where the
+                                                           file holds its calibration
     foxglove.PosesInFrame                                   mirror of markers, for viewing only
 
 `stamp` is {sec, nsec}; a foreign writer may leave it out, then publish time counts. Numbers are
@@ -11,6 +14,8 @@ written in their shortest exact form, so they return bit for bit. Own schemas be
 well-known pose list has no names and JSON has no NaN.
 """
 
+import base64
+import binascii
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,8 +25,10 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
+from validate.recording.image import Pixels, decode_png, encode_png
 
 MARKERS, SIGNAL, CONTOUR = "validate.Markers", "validate.Signal", "validate.Contour"
+IMAGE = "foxglove.CompressedImage"
 MIRROR = "foxglove.PosesInFrame"
 MIRROR_OF = "validate.mirror_of"  # key in a mirror channel's metadata: the topic it repeats
 SCHEMA_ENCODING, MESSAGE_ENCODING = "jsonschema", "json"
@@ -32,7 +39,7 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Sample:
-    """One decoded message; `names` of markers only, `unit` of signals only.
+    """One decoded message; `names` of markers only, `unit` of signals only, `image` of frames only.
 
     values: markers (k, 2 or 3) m with NaN = not seen, signal (c,) in `unit`, contour (k, 2) m.
     """
@@ -43,6 +50,12 @@ class Sample:
     names: tuple[str, ...]
     unit: str
     values: Floats
+    image: Pixels | None = None
+
+    @property
+    def size(self) -> int:
+        """How many float64 would take the memory that the sample takes."""
+        return self.values.size + (0 if self.image is None else -(-self.image.size // 8))
 
 
 def _object(title: str, required: str, **properties: Json) -> Json:
@@ -93,6 +106,14 @@ SCHEMAS: Mapping[str, Json] = {
         x=_list(_NUMBER),
         y=_list(_NUMBER),
         sd=_SPREAD,
+    ),
+    IMAGE: _object(
+        IMAGE,
+        "timestamp frame_id data format",
+        timestamp=_STAMP,
+        frame_id=_TEXT,
+        data=_TEXT | {"contentEncoding": "base64"},
+        format=_TEXT,
     ),
     MIRROR: _object(
         MIRROR,
@@ -160,6 +181,16 @@ def contour_message(ns: int, frame: str, outline: Floats, sd: float) -> Json:
     return {"stamp": stamp(ns), "frame": frame, "x": x, "y": y, "sd": sd}
 
 
+def image_message(ns: int, frame: str, image: Pixels) -> Json:
+    """The message of one instant; image (h, w) uint8 as PNG."""
+    data = base64.b64encode(encode_png(image)).decode("ascii")
+    if len(data) > MAX_MESSAGE - 1024:
+        raise RecordingError(
+            f"image {image.shape}: {len(data)} bytes as a message, limit {MAX_MESSAGE}; crop it"
+        )
+    return {"timestamp": stamp(ns), "frame_id": frame, "data": data, "format": "png"}
+
+
 def decode(schema: str, data: bytes) -> Sample:
     """The sample in a message of one of our schemas.
 
@@ -167,6 +198,8 @@ def decode(schema: str, data: bytes) -> Sample:
     missing, of a wrong type or of another length than its neighbours.
     """
     message = _parse(data)
+    if schema == IMAGE:
+        return _image(message)
     names: tuple[str, ...] = ()
     unit = ""
     if schema == MARKERS:
@@ -177,8 +210,19 @@ def decode(schema: str, data: bytes) -> Sample:
         unit, values = _text(message, "unit"), _numbers(message, "values")
     else:
         values = _columns([_numbers(message, "x"), _numbers(message, "y")])
-    ns = _stamp_ns(message) if "stamp" in message else None
+    ns = _stamp_ns(message, "stamp") if "stamp" in message else None
     return Sample(ns, _text(message, "frame"), _sd(message), names, unit, values)
+
+
+def _image(message: Json) -> Sample:
+    ns = _stamp_ns(message, "timestamp") if "timestamp" in message else None
+    if _text(message, "format") != "png":
+        raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
+    try:
+        data = base64.b64decode(_text(message, "data"), validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise RecordingError(f"field 'data' is no base64 ({error})") from None
+    return Sample(ns, _text(message, "frame_id"), 0.0, (), "", np.empty(0), decode_png(data))
 
 
 def _parse(data: bytes) -> Json:
@@ -226,8 +270,8 @@ def _names(message: Json) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _stamp_ns(message: Json) -> int:
-    value = message["stamp"]
+def _stamp_ns(message: Json, name: str) -> int:
+    value = message[name]
     parts = (value.get("sec"), value.get("nsec")) if isinstance(value, dict) else (None, None)
     sec, nsec = (p if type(p) is int else -1 for p in parts)
     if not (0 <= sec < 2**63 // 10**9 and 0 <= nsec < 10**9):

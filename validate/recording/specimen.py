@@ -8,17 +8,18 @@ from validate.errors import RecordingError
 from validate.recording.numerals import number
 from validate.recording.table import split_unit
 from validate.recording.units import is_unit, si_factor
+from validate.recording.vocabulary import OTHER_PARTS, SIZES, holds
 
 # (name in the record, quantity, words of the header's key, words that make it something else)
-_OTHER = ("platen", "plate", "anvil", "probe", "plunger", "indenter", "grip", "final", "cell")
-GEOMETRY: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
-    ("diameter_m", "length", ("diameter",), _OTHER),
-    ("height_m", "length", ("height",), _OTHER),
-    ("width_m", "length", ("width",), _OTHER),
-    ("thickness_m", "length", ("thickness",), _OTHER),
-    ("length_m", "length", ("length",), _OTHER),
-    ("area_m2", "area", ("area",), _OTHER),
-    ("speed_m_per_s", "speed", ("speed", "rate"), (*_OTHER, "jog", "return", "preload", "data")),
+_NO_TEST_SPEED = OTHER_PARTS + " jog return preload vorkraft data datenrate abtastrate"
+GEOMETRY: tuple[tuple[str, str, str, str], ...] = (
+    ("diameter_m", "length", SIZES["diameter"], OTHER_PARTS),
+    ("height_m", "length", SIZES["height"], OTHER_PARTS),
+    ("width_m", "length", SIZES["width"], OTHER_PARTS),
+    ("thickness_m", "length", SIZES["thickness"], OTHER_PARTS),
+    ("length_m", "length", SIZES["length"], OTHER_PARTS),
+    ("area_m2", "area", SIZES["area"], OTHER_PARTS),
+    ("speed_m_per_s", "speed", SIZES["speed"], _NO_TEST_SPEED),
 )
 _GLUED = re.compile(r"(?P<number>[-+]?[0-9.,' ]*[0-9][.,]?(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D.*)?")
 
@@ -54,10 +55,9 @@ def loaded_area(specimen: Mapping[str, float]) -> float | None:
 
 
 def _value(
-    key: str, text: str, quantity: str, given: tuple[str, ...], taken: tuple[str, ...], decimal: str
+    key: str, text: str, quantity: str, given: str, taken: str, decimal: str
 ) -> float | None:
-    words = set(re.findall(r"[^\W\d_]+", key.casefold()))
-    if not words & set(given) or words & set(taken):
+    if not holds(key, given) or holds(key, taken):
         return None
     parts = _GLUED.fullmatch(text.strip())
     if parts is None:

@@ -1,5 +1,6 @@
 """What must be read from a recording, as numbers: the JSON that lies beside a twin's file."""
 
+import hashlib
 from typing import Any
 
 from validate.recording.types import Recording
@@ -23,6 +24,12 @@ def summary(recording: Recording) -> dict[str, Any]:
             k: {"frame": c.frame, "sd": c.sd, "t": c.t.tolist(), "pose": c.pose.tolist(),
                 "outlines": [o.tolist() for o in c.outlines]}
             for k, c in recording.contours.items()
+        },
+        "frames": {
+            k: {"frame": f.frame, "t": f.t.tolist(), "m_per_px": list(f.m_per_px),
+                "pose": f.pose.tolist(), "shape": list(f.images[0].shape),
+                "sha256": [hashlib.sha256(i.tobytes()).hexdigest() for i in f.images]}
+            for k, f in recording.frames.items()
         },
         "metadata": {k: dict(v) for k, v in recording.metadata.items()},
     }  # fmt: skip

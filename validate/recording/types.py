@@ -111,11 +111,24 @@ class Contours:
         _set(self, "pose", checked(self.pose, "contours pose", (4, 4), error=RecordingError))
 
 
+def _image(image: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:
+    if image.dtype != np.uint8 or image.ndim != 2 or not image.size:
+        raise RecordingError(
+            f"frames: image {number} is {image.shape} {image.dtype}, expected (h, w) uint8"
+        )
+    if not image.flags.writeable:
+        return image
+    image = image.copy()
+    image.setflags(write=False)
+    return image
+
+
 @dataclass(frozen=True)
 class Frames:
     """B-mode images over time: images nt x (h, w) uint8, m_per_px (x, y), pose T_frame_from_image.
 
-    The place for ultrasound frames; no reader fills it yet.
+    Image x runs along the columns, y along the rows (depth); the centre of pixel [row, column] lies
+    at (column, row) * m_per_px in image metres.
     """
 
     t: Floats
@@ -128,6 +141,14 @@ class Frames:
         _set(self, "t", _times(self.t, "frames"))
         if len(self.images) != len(self.t):
             raise RecordingError(f"frames: {len(self.images)} images, {len(self.t)} times")
+        _set(self, "images", tuple(_image(a, i) for i, a in enumerate(self.images)))
+        shapes = sorted({a.shape for a in self.images})
+        if len(shapes) > 1:
+            raise RecordingError(f"frames: images of different sizes {shapes}")
+        scale = checked(self.m_per_px, "frames m_per_px", (2,), error=RecordingError)
+        if (scale <= 0).any():
+            raise RecordingError(f"frames: {self.m_per_px} m per pixel, expected two numbers > 0")
+        _set(self, "m_per_px", (float(scale[0]), float(scale[1])))
         _set(self, "pose", checked(self.pose, "frames pose", (4, 4), error=RecordingError))
 
 
@@ -191,6 +212,10 @@ class Recording:
     def contour(self, topic: str) -> Contours:
         """The contours of that topic; raises `RecordingError` when absent."""
         return _present(self.contours, topic, f"{self.name}: no outlines")
+
+    def frame(self, topic: str) -> Frames:
+        """The images of that topic; raises `RecordingError` when absent."""
+        return _present(self.frames, topic, f"{self.name}: no images")
 
     def record(self, name: str) -> Record:
         """The metadata record of that name; raises `RecordingError` when absent."""

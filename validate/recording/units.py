@@ -25,7 +25,26 @@ QUANTITIES: tuple[tuple[str, str], ...] = (
 _SI = dict(QUANTITIES)
 
 _NUMBERS = {"-": 1.0, "1": 1.0, "%": 0.01, "percent": 0.01}
-_SPELLED = {"in": "inch", "sec": "second", "secs": "second", "msec": "millisecond"}
+_SPELLED = {
+    **dict.fromkeys(("in", "IN", "In", "INCH", "Inch", "ins", "Zoll", "pouce", "cal"), "inch"),
+    **dict.fromkeys(("sec", "secs", "Sec", "SEC", "Sek", "sek", "seg", "Sekunden"), "second"),
+    **dict.fromkeys(("s", "S"), "second"),
+    **dict.fromkeys(("LBF", "Lbf"), "lbf"),
+    **dict.fromkeys(("Newton", "Newtons", "newtons", "niuton"), "newton"),
+    **dict.fromkeys(("KN", "Kn", "kn"), "kN"),
+    **dict.fromkeys(("MM", "Mm"), "mm"),
+    **dict.fromkeys(("KPa", "KPA", "kpa", "Kpa"), "kPa"),
+    **dict.fromkeys(("MPA", "Mpa", "mpa"), "MPa"),
+    **dict.fromkeys(("KGF", "Kgf", "kp", "kG", "Kg_f"), "kgf"),
+    **dict.fromkeys(("mil", "mils"), "thou"),
+    "msec": "millisecond",
+    "PSI": "psi",
+}
+_WHOLE = {
+    '"': "in", "牛": "N", "牛顿": "N", "千牛": "kN", "毫米": "mm", "厘米": "cm", "米": "m",
+    "秒": "s", "毫秒": "ms", "兆帕": "MPa", "千帕": "kPa", "帕": "Pa", "公斤力": "kgf",
+    "Н": "N", "кН": "kN", "мм": "mm", "с": "s", "сек": "s", "МПа": "MPa", "кПа": "kPa",
+}  # fmt: skip
 
 # A product of powers and nothing else: text from a file is never given to a parser unchecked.
 _FACTOR = r"[A-Za-z]{1,12}(?:\^-?[1-4])?"
@@ -42,6 +61,8 @@ def si_factor(unit: str, quantity: str) -> float:
     if factor is None:
         kinds = [name for name, _ in QUANTITIES if _factor(unit.strip(), name) is not None]
         meant = f"it measures {kinds[0]}" if kinds else "it is not known"
+        if quantity == "force" and unit.strip().lower() in ("kg", "g"):
+            meant = f"it is not known as force; if the weight of a mass is meant say {unit}f"
         raise RecordingError(
             f"unit '{unit}' is no unit of {quantity}: {meant}; examples: {_EXAMPLES[quantity]}"
         )
@@ -79,6 +100,8 @@ def _factor(unit: str, quantity: str) -> float | None:
     if quantity not in _SI:
         raise ValueError(f"quantity {quantity!r} is none of {sorted(_SI)}")
     text = _spelling(unit)
+    if quantity in ("force", "stress"):  # a testing machine's pound is the weight of one
+        text = re.sub(r"\b(lb|lbs|LB|LBS|pound|pounds)\b(?!f)", "lbf", text)
     if text in _NUMBERS:
         return _NUMBERS[text] if quantity == "strain" else None
     if _PRODUCT.fullmatch(text) is None:
@@ -97,6 +120,7 @@ def _ratio(text: str) -> float | None:
 
 def _spelling(unit: str) -> str:
     text = unicodedata.normalize("NFKC", unit.strip()).replace("μ", "u").replace("**", "^")
+    text = _WHOLE.get(text, text).rstrip(".")
     text = re.sub(r"(?<=[A-Za-z])(-?[1-4])(?![0-9])", r"^\1", text)
     return re.sub(r"[A-Za-z]+", lambda word: _SPELLED.get(word[0], word[0]), text)
 

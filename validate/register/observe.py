@@ -87,7 +87,8 @@ class Hold:
 class Registered:
     """All observations of a recording in the scene's frame, and the drive that was measured.
 
-    `windows` are ranges (from, to] m of the stage by label, for curves without holds.
+    `windows` are ranges (from, to] m of the stage by label, for curves without holds; `outside`
+    counts the samples left out because they lie beyond the law's validity.
     """
 
     stage: Signal
@@ -96,6 +97,8 @@ class Registered:
     outline: OutlineObservation | None
     signals: tuple[SignalObservation, ...]
     windows: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    outside: int = 0
+    findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "windows", MappingProxyType(dict(self.windows)))
@@ -125,6 +128,9 @@ def find_holds(
     Raises `ComparisonError` when a load has no measurement within `within` m of it.
     """
     reached = [float(stage.y[nearest_sample(stage.t, ti, "stage"), 0]) for ti in t]
+    if min(loads, default=1.0) <= 0 or len(set(loads)) != len(loads):
+        shown = ", ".join(f"{1e3 * load:g}" for load in loads)
+        raise ComparisonError(f"loads {shown} mm: each must be above 0 (rest) and stand once")
     holds = []
     for load in (0.0, *loads):
         off = np.abs(np.array(reached) - load)
@@ -161,6 +167,7 @@ def observe_markers(
             f"{len(unknown)} of {len(markers.names)} markers are not in the layout: {unknown[:5]}"
         )
     rest = np.array([layout[name] for name in markers.names])
+    _require_scale(markers.x[0], rest)
     registration = register_points(
         markers.names, markers.x[0], rest, method=method, expected_sd=markers.sd, up=up
     )
@@ -170,6 +177,35 @@ def observe_markers(
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
     tre = registration.tre_at(rest)
     return MarkerObservation(markers.t, markers.names, x, rest, rows, markers.sd, tre, registration)
+
+
+def _require_scale(x: Floats, rest: Floats) -> None:
+    """A layout of another size is a wrong unit, not a bad fit."""
+    seen = np.isfinite(x).all(axis=1)
+    if seen.sum() < 3:
+        return
+    size, known = _spread(x[seen]), _spread(rest[seen])
+    if not 0.5 < size / known < 2:
+        raise RegistrationError(
+            f"the markers spread over {1e3 * size:.4g} mm, their layout over {1e3 * known:.4g} mm: "
+            f"{size / known:.4g} times as much; wrong unit? positions are metres"
+        )
+
+
+def _spread(points: Floats) -> float:
+    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def require_rising(stage: Signal, seen: SignalObservation) -> None:
+    """Raises `RegistrationError` when a signal falls as the stage closes."""
+    most = int(np.argmax(stage.y[:, 0]))
+    least = int(np.argmin(stage.y[:, 0]))
+    change = seen.at(float(stage.t[most])) - seen.at(float(stage.t[least]))
+    if change < -5 * seen.sd:
+        raise RegistrationError(
+            f"'{seen.quantity}' falls by {-change:.4g} {seen.unit} as the stage closes by "
+            f"{1e3 * np.ptp(stage.y):.3g} mm; compression and pressure are positive: turn its sign"
+        )
 
 
 def observe_outlines(contours: Contours, wall: SurfaceSampler) -> OutlineObservation:

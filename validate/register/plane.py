@@ -8,7 +8,7 @@ import shapely
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
 from validate.fem.locate import Rows, facet_samples, nearest_node_rows
-from validate.scene.inclusion import Capsule
+from validate.scene.inclusion_shape import InclusionShape
 from validate.scene.mesh import Mesh
 
 
@@ -26,7 +26,7 @@ class SurfaceSampler:
 
 
 def cavity_sampler(
-    mesh: Mesh, facets: str, shape: Capsule | None, parts: int = 8, *, nearest: bool = False
+    mesh: Mesh, facets: str, shape: InclusionShape | None, parts: int = 8, *, nearest: bool = False
 ) -> SurfaceSampler:
     """Samples of a cavity wall, `parts` per facet edge.
 

@@ -64,21 +64,28 @@ class Uncertainty:
     """How u_num and u_input are found: a finer mesh, the inputs, and a cheap method for them.
 
     `refinement` is r^p - 1 from the parameters: ratio of cell sizes r, order of convergence p.
+    `stand_in` names, for a method too slow on the finer mesh, a faster one of the same element
+    whose change between the meshes is taken for its own.
     """
 
     finer: Change
     refinement: Callable[[Any], float]
     inputs: tuple[Input, ...]
     surrogate: str
+    stand_in: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Identified:
-    """What was identified from the recordings: parameters to use, scores, and rows to show."""
+    """What was identified from the recordings: parameters to use, scores, and sentences to show.
+
+    `headline` opens the verdict.
+    """
 
     parameters: Any
     scores: tuple[Score, ...]
     notes: tuple[str, ...]
+    headline: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,7 +94,8 @@ class Experiment:
 
     `methods` maps a name to its frozen settings, each with `label`. `load` gets the parameters and
     the experiment's folder. `published` turns scores by (method, name) into printed figures beside
-    ours. `twin_notice` is printed on the report of a twin.
+    ours. `band` is the relative standard uncertainty of the force that the modulus brings.
+    `twin_notice` is printed on the report of a twin.
     """
 
     name: str
@@ -108,6 +116,7 @@ class Experiment:
     published: Callable[[Mapping[str, Mapping[str, float]]], tuple[Published, ...]] | None = None
     identify: Callable[[Sequence[Recording], Any], Identified] | None = None
     record: Callable[[Any, Progress], Recording] | None = None
+    band: Callable[[Any], float] | None = None
     quick: Change = unchanged
     same_model: bool = False
     seed: int | None = None

@@ -1,7 +1,7 @@
 """The road: recording -> scene -> registration -> system -> run -> comparison."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,15 @@ import numpy as np
 from validate.compare.effects import Effect, effect
 from validate.compare.residual import Residual, rest_residuals
 from validate.compare.result import MethodResult, Result
-from validate.compare.score import rms, run_scores, scores_of
-from validate.compare.verdict import SAFETY, Check, Sensitivity, judge
+from validate.compare.score import Score, rms, run_scores, scores_of
+from validate.compare.verdict import SAFETY, Accept, Check, Sensitivity, judge
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, nearest_names, with_values
 from validate.recording.types import Recording
-from validate.replay.experiment import EffectSpec, Experiment, Variant
+from validate.replay.experiment import EffectSpec, Experiment, Identified, Variant
 from validate.replay.sentence import verdict_sentence
 from validate.replay.solved import Solved, solve
+from validate.scene.scene import Scene
 from validate.solve.types import Run
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
@@ -64,7 +65,7 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         name=experiment.name,
         title=experiment.title,
         source=experiment.source,
-        sentence=verdict_sentence(results, quick=options.quick),
+        sentence=_opening(identified) + verdict_sentence(results, quick=options.quick),
         parameters=describe(used) + describe(methods, "methods."),
         methods=results,
         recordings=recordings,
@@ -72,13 +73,24 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         effects=effects,
         published=printed,
         identified=identified.scores if identified else (),
-        notes=identified.notes if identified else (),
+        notes=(*(identified.notes if identified else ()), *_findings(first)),
         quick=options.quick,
         same_model=experiment.same_model,
         seed=experiment.seed,
         twin_notice=experiment.twin_notice,
         inputs=tuple(f"{i.name}: {i.doc}" for i in experiment.uncertainty.inputs),
     )
+
+
+def _opening(identified: Identified | None) -> str:
+    return f"{identified.headline}; " if identified and identified.headline else ""
+
+
+def _findings(solved: Solved) -> tuple[str, ...]:
+    """What registration noticed and did not refuse."""
+    found = [f for r in solved.registered for f in r.findings]
+    seen = [r.markers for r in solved.registered if r.markers is not None]
+    return tuple(dict.fromkeys(found + [f for m in seen for f in m.registration.findings]))
 
 
 class _Road:
@@ -116,7 +128,9 @@ def _variants(experiment: Experiment, methods: Mapping[str, Any], quick: bool) -
     wanted = [Variant(name) for name in methods]
     accepted = [name for name in experiment.accepted if name in methods]
     uncertainty = experiment.uncertainty
-    wanted += [Variant(name, uncertainty.finer) for name in accepted]
+    for name in accepted:
+        own = uncertainty.stand_in.get(name, name)
+        wanted += [Variant(own), Variant(own, uncertainty.finer)]
     if accepted:
         wanted += [Variant(uncertainty.surrogate)]
         wanted += [Variant(uncertainty.surrogate, i.change) for i in uncertainty.inputs]
@@ -140,7 +154,7 @@ def _method(road: _Road, name: str, quick: bool) -> MethodResult:
     accepted = name in road.experiment.accepted
     return MethodResult(
         name=name,
-        label=road.settings[name].label,
+        label=_label(road.settings[name], solved.scene),
         accepted=accepted,
         scene=solved.scene,
         registered=solved.registered,
@@ -149,29 +163,67 @@ def _method(road: _Road, name: str, quick: bool) -> MethodResult:
         scores=(
             *(s for r in solved.residuals.values() for s in scores_of(r, "measured recording")),
             *run_scores(solved.runs[0]),
+            *_outside(solved),
         ),
         checks=_checks(road, name, solved) if accepted else (),
+        band=road.experiment.band(road.parameters) if road.experiment.band else 0.0,
     )
+
+
+def _label(settings: Any, scene: Scene) -> str:
+    """The method's label, and what it was run as where parameters changed that."""
+    order = getattr(settings, "order", scene.mesh.order)
+    label = str(settings.label)
+    return label if order == scene.mesh.order else f"{label} [order {scene.mesh.order}]"
+
+
+def _outside(solved: Solved) -> tuple[Score, ...]:
+    """How many samples lie beyond the law's validity and were not compared."""
+    outside = sum(r.outside for r in solved.registered)
+    if outside == 0:
+        return ()
+    words = "samples beyond the law's validity, not compared"
+    count = outside + sum(len(r.stage.t) for r in solved.registered)
+    return (Score("samples.outside_law", float(outside), "1", count, "none", words),)
 
 
 def _checks(road: _Road, name: str, solved: Solved) -> tuple[Check, ...]:
     uncertainty = road.experiment.uncertainty
-    finer = road.solved(Variant(name, uncertainty.finer)).residuals
+    refined = _refined(road, name, solved.residuals)
     inputs = _sensitivities(road)
     found = []
     for accept in road.experiment.accept:
-        keys = [k for k, r in solved.residuals.items() if r.quantity == accept.quantity]
+        keys = [k for k, r in solved.residuals.items() if _accepts(accept, r)]
         found += [
             judge(
                 solved.residuals[key],
                 accept.limit,
-                finer.get(key),
+                refined.get(key),
                 uncertainty.refinement(road.parameters),
                 inputs.get(key, []),
             )
             for key in keys
         ] or [_nothing(accept.quantity, accept.limit, solved.runs)]
     return tuple(found)
+
+
+def _accepts(accept: Accept, residual: Residual) -> bool:
+    return residual.quantity == accept.quantity and (
+        not accept.loads or residual.load in accept.loads
+    )
+
+
+def _refined(road: _Road, name: str, residuals: Mapping[str, Residual]) -> dict[str, Residual]:
+    """A method's residuals as they would be on the finer mesh, by itself or its stand-in."""
+    uncertainty = road.experiment.uncertainty
+    own = uncertainty.stand_in.get(name, name)
+    coarse = road.solved(Variant(own)).residuals
+    finer = road.solved(Variant(own, uncertainty.finer)).residuals
+    return {
+        key: replace(r, values=r.values + finer[key].values - coarse[key].values)
+        for key, r in residuals.items()
+        if key in finer and key in coarse
+    }
 
 
 def _nothing(key: str, limit: float, runs: tuple[Run, ...]) -> Check:
@@ -219,13 +271,9 @@ def _effects(
 
 def _mesh_errors(road: _Road, method: MethodResult) -> dict[str, float]:
     """u_num of every residual of an accepted method, SI."""
-    uncertainty = road.experiment.uncertainty
-    finer = road.solved(Variant(method.name, uncertainty.finer)).residuals
-    scale = SAFETY / uncertainty.refinement(road.parameters)
-    return {
-        key: scale * rms(finer[key].values - method.residuals[key].values)
-        for key in method.residuals.keys() & finer.keys()
-    }
+    refined = _refined(road, method.name, method.residuals)
+    scale = SAFETY / road.experiment.uncertainty.refinement(road.parameters)
+    return {key: scale * rms(r.values - method.residuals[key].values) for key, r in refined.items()}
 
 
 def _shared(

@@ -26,7 +26,12 @@ def _of(method: MethodResult) -> str:
     open_ = [c.name for c in method.checks if c.verdict == "cannot decide"]
     told = [f"{len(held)} of {count} checks agree"]
     if differs:
-        told.append(f"{len(differs)} differ ({', '.join(differs[:4])})")
+        told.append(f"{len(differs)} differ ({_named(differs)})")
     if open_:
-        told.append(f"{len(open_)} cannot be decided ({', '.join(open_[:4])})")
+        told.append(f"{len(open_)} cannot be decided ({_named(open_)})")
     return f"{method.label}: " + ", ".join(told)
+
+
+def _named(names: list[str]) -> str:
+    shown = ", ".join(names[:4])
+    return shown if len(names) <= 4 else f"{shown} and {len(names) - 4} others"

@@ -23,11 +23,16 @@ _GREYS = ("#000000", "#5F5F5F", "#8C8C8C", "#AFAFAF")
 
 @dataclass(frozen=True)
 class _Line:
-    """A model's values (nt,) at the measurement's samples, in the signal's unit."""
+    """A model's values y (nt,) at its own samples, with the stage q mm and the error, per log.
+
+    Laws reach different strains, so every method has its own samples.
+    """
 
     method: MethodResult
     look: Look
+    q: tuple[Floats, ...]
     y: tuple[Floats, ...]
+    off: tuple[Floats, ...]
 
 
 def curves(result: Result) -> Section | None:
@@ -44,9 +49,17 @@ def curves(result: Result) -> Section | None:
 
 
 def _observations(result: Result, quantity: str) -> list[tuple[int, Registered, SignalObservation]]:
+    """The recordings' signals, from the method that was compared over the longest way."""
+    widest = max(finished(result), key=lambda m: float(m.registered[0].stage.y.max()))
+    return _signals(widest, quantity)
+
+
+def _signals(
+    method: MethodResult, quantity: str
+) -> list[tuple[int, Registered, SignalObservation]]:
     return [
         (i, r, s)
-        for i, r in enumerate(result.registered)
+        for i, r in enumerate(method.registered)
         for s in r.signals
         if s.quantity == quantity
     ]
@@ -54,7 +67,7 @@ def _observations(result: Result, quantity: str) -> list[tuple[int, Registered, 
 
 def _signal(result: Result, quantity: str) -> Picture | None:
     seen = _observations(result, quantity)
-    lines, hidden = _lines(result, seen)
+    lines, hidden = _lines(result, quantity, seen)
     left_out = f" Not drawn, lying on another line: {'; '.join(hidden)}." if hidden else ""
     if not lines:
         return None
@@ -67,26 +80,37 @@ def _signal(result: Result, quantity: str) -> Picture | None:
         f"Left: {quantity} in {unit} against stage displacement in mm, "
         f"every sample of {count} (points) and the models (lines). Right: model less measurement; "
         "grey: ± 2 standard deviations of one sample; outside of it the axis is logarithmic."
-        f"{left_out}",
+        f"{_band_words(lines)}{left_out}",
         f"{quantity} against stage displacement: measured and {names}, with the "
         "differences beside.",
         pixels,
     )
 
 
+def _band_words(lines: list[_Line]) -> str:
+    bands = {line.method.band for line in lines} - {0.0}
+    if not bands:
+        return ""
+    shares = ", ".join(f"{200 * band:.0f} %" for band in sorted(bands))
+    return f" Shaded about each line: ± {shares}, two standard uncertainties of the modulus."
+
+
 def _lines(
-    result: Result, seen: Sequence[tuple[int, Registered, SignalObservation]]
+    result: Result, quantity: str, seen: Sequence[tuple[int, Registered, SignalObservation]]
 ) -> tuple[list[_Line], list[str]]:
     """Lines to draw, and the methods whose line lies on one of them."""
     styles, kept, hidden = looks(result), list[_Line](), list[str]()
     scale = max((float(np.ptp(s.y)) for _, _, s in seen), default=0.0)
     for method in finished(result):
-        if any(s.trace not in method.runs[i].traces for i, _, s in seen):
+        own = _signals(method, quantity)
+        if not own or any(x.trace not in method.runs[i].traces for i, _, x in own):
             continue
-        y = tuple(_at_samples(method.runs[i], s) for i, _, s in seen)
+        q = tuple(_stage(r, x.t) for _, r, x in own)
+        y = tuple(_at_samples(method.runs[i], x) for i, _, x in own)
+        off = tuple(yi - x.y for yi, (_, _, x) in zip(y, own, strict=True))
         same = next((k for k in kept if _apart(y, k.y) <= _APART * scale), None)
         if same is None:
-            kept.append(_Line(method, styles[method.name], y))
+            kept.append(_Line(method, styles[method.name], q, y, off))
         else:
             hidden.append(f"{method.label} (on {same.method.label})")
     return kept, hidden
@@ -97,6 +121,9 @@ def _at_samples(run: Run, seen: SignalObservation) -> Floats:
 
 
 def _apart(one: tuple[Floats, ...], other: tuple[Floats, ...]) -> float:
+    """Largest difference of two lines; infinite when they do not cover the same samples."""
+    if any(len(a) != len(b) for a, b in zip(one, other, strict=True)):
+        return float("inf")
     return max(float(np.abs(a - b).max()) for a, b in zip(one, other, strict=True))
 
 
@@ -116,11 +143,15 @@ def _two(
         q = _stage(registered, s.t)
         label = "measured" if j == 0 else None
         left.plot(q, factor * s.y, ".", color=_GREYS[j % len(_GREYS)], ms=3, label=label, zorder=3)
-        for line in lines:
-            style = {"color": line.look.colour, "ls": line.look.dash, "lw": line.look.width}
-            label = line.method.label if j == 0 else None
-            _plot(left, q, factor * line.y[j], label, style)
-            _plot(right, q, factor * (line.y[j] - s.y), None, {**style, "lw": 0.9})
+    for line in lines:
+        style = {"color": line.look.colour, "ls": line.look.dash, "lw": line.look.width}
+        for j, (q, y, off) in enumerate(zip(line.q, line.y, line.off, strict=True)):
+            _plot(left, q, factor * y, line.method.label if j == 0 else None, style)
+            _plot(right, q, factor * off, None, {**style, "lw": 0.9})
+        if line.method.band:
+            y, wide = factor * line.y[0], 2 * line.method.band
+            left.fill_between(line.q[0], y * (1 - wide), y * (1 + wide), color=line.look.colour,
+                              alpha=0.15, lw=0)  # fmt: skip
     left.set(xlabel="stage displacement / mm", ylabel=f"{quantity} / {unit}")
     right.set(xlabel="stage displacement / mm", ylabel=f"model − measured / {unit}")
     if noise > 0:

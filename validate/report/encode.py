@@ -5,7 +5,9 @@ from io import BytesIO
 
 from PIL import Image
 
-from validate.report.page import Picture
+from validate.report.page import Animation, Picture
+
+_GIF_COLOURS = 32  # line art: few colours and the steps between them
 
 
 def png(picture: Picture) -> bytes:
@@ -27,3 +29,21 @@ def data_uri(picture: Picture) -> str:
     else:
         image.save(out, "WEBP", lossless=True, quality=60, method=4)
     return "data:image/webp;base64," + base64.b64encode(out.getvalue()).decode("ascii")
+
+
+def gif(animation: Animation) -> bytes:
+    """An endless GIF in one palette, so that only what moves is stored again."""
+    frames = [Image.fromarray(f) for f in animation.frames]
+    palette = frames[0].quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
+    first, *others = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in frames]
+    out = BytesIO()
+    first.save(
+        out, "GIF", save_all=True, append_images=others, duration=list(animation.milliseconds),
+        loop=0, optimize=True,
+    )  # fmt: skip
+    return out.getvalue()
+
+
+def gif_uri(animation: Animation) -> str:
+    """The animation as a GIF data URI."""
+    return "data:image/gif;base64," + base64.b64encode(gif(animation)).decode("ascii")

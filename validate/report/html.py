@@ -16,7 +16,7 @@ from validate.report import (
     score_tables,
     verdicts,
 )
-from validate.report.encode import data_uri
+from validate.report.encode import data_uri, gif_uri
 from validate.report.page import Section, SectionOf
 
 SECTIONS: tuple[tuple[str, SectionOf], ...] = (
@@ -41,6 +41,7 @@ def page(result: Result, shown: tuple[Section, ...], created: str) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True,
                               lstrip_blocks=True)  # fmt: skip
     environment.filters["data_uri"] = data_uri
+    environment.filters["gif_uri"] = gif_uri
     environment.filters["breakable"] = _breakable
     source = files("validate.report").joinpath("report.html").read_text(encoding="utf-8")
     colour, word = verdicts.band(result)

@@ -11,6 +11,7 @@ from validate.compare.outline import angular_points, enclosed
 from validate.compare.residual import TOP_LEFT
 from validate.compare.result import MethodResult, Result
 from validate.register.observe import Hold, OutlineObservation, nearest_sample
+from validate.report.animation import moving_outline
 from validate.report.numbers import shown_unit, spaced, text
 from validate.report.observed import distinct, outline_seen, shown_method
 from validate.report.page import Cell, Picture, Section, Table, section
@@ -40,6 +41,7 @@ def outlines(result: Result) -> Section | None:
     return section(
         "outlines",
         "Outlines of the inclusion",
+        moving_outline(result, judged),
         _by_load(holds, measured, next(d for d in drawn if d.method is judged)),
         _at_last(holds[-1], measured[-1], drawn, seen),
         _top_left_table(result, holds),

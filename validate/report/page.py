@@ -1,4 +1,4 @@
-"""What a page is made of: sections of paragraphs, lists, tables and pictures."""
+"""What a page is made of: sections of paragraphs, lists, tables, pictures and animations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -63,7 +63,27 @@ class Picture:
     photo: bool = False
 
 
-Part = Paragraph | Items | Table | Picture
+@dataclass(frozen=True)
+class Animation:
+    """frames (h, w, 3) sRGB shown in turn for `milliseconds` each, again and again.
+
+    The first frame stands for all of them where nothing moves: on paper.
+    """
+
+    kind: ClassVar[str] = "animation"
+    name: str
+    caption: str
+    alt: str
+    frames: tuple[Pixels, ...]
+    milliseconds: tuple[int, ...]
+
+    @property
+    def still(self) -> Picture:
+        """The first frame as a picture."""
+        return Picture(self.name, self.caption, self.alt, self.frames[0])
+
+
+Part = Paragraph | Items | Table | Picture | Animation
 
 
 @dataclass(frozen=True)
@@ -77,6 +97,10 @@ class Section:
     @property
     def pictures(self) -> tuple[Picture, ...]:
         return tuple(p for p in self.parts if isinstance(p, Picture))
+
+    @property
+    def animations(self) -> tuple[Animation, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Animation))
 
 
 SectionOf = Callable[[Result], Section | None]

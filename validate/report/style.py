@@ -61,6 +61,26 @@ def looks(result: Result) -> dict[str, Look]:
     return found
 
 
+def film(
+    paint: Callable[[Figure], Callable[[int], None]], count: int, width: float, height: float
+) -> tuple[Pixels, ...]:
+    """`count` pictures of one figure: `paint` fills it and returns what turns it to number i.
+
+    The layout is that of number 0 throughout.
+    """
+    settings: Any = dict(_SETTINGS)
+    with mpl.rc_context(settings):
+        figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
+        canvas: Any = FigureCanvasAgg(figure)
+        turn, taken = paint(figure), list[Pixels]()
+        for i in range(count):
+            turn(i)
+            canvas.draw()
+            figure.set_layout_engine("none")
+            taken.append(_pixels(canvas))
+    return tuple(taken)
+
+
 def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels:
     """Pixels (h, w, 3) of a figure of width x height inches that `paint` fills."""
     settings: Any = dict(_SETTINGS)
@@ -69,4 +89,8 @@ def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels
         canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
         paint(figure)
         canvas.draw()
-        return np.array(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()
+        return _pixels(canvas)
+
+
+def _pixels(canvas: Any) -> Pixels:
+    return np.array(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()

@@ -8,9 +8,10 @@ from uuid import uuid4
 from validate.compare.result import Result
 from validate.errors import UsageError
 from validate.report.csv_tables import write_tables
-from validate.report.encode import png
+from validate.report.encode import gif, png
 from validate.report.html import SECTIONS, page
 from validate.report.page import Section
+from validate.report.replay_mcap import write_replay
 from validate.report.store import document, write_json, write_runs
 
 Progress = Callable[[str], None]
@@ -67,6 +68,8 @@ def _fill(result: Result, folder: Path, created: str, progress: Progress) -> Non
     write_json(document(result, created), folder / _MARK)
     write_tables(result, folder / "tables")
     write_runs(result, folder / "runs")
+    progress("replay")
+    write_replay(result, folder / "replay.mcap")
     shown: list[Section] = []
     for name, make in SECTIONS:
         progress(name)
@@ -75,6 +78,8 @@ def _fill(result: Result, folder: Path, created: str, progress: Progress) -> Non
             shown.append(section)
             for picture in section.pictures:
                 (folder / "figures" / f"{picture.name}.png").write_bytes(png(picture))
+            for animation in section.animations:
+                (folder / "figures" / f"{animation.name}.gif").write_bytes(gif(animation))
     progress("page")
     text = page(result, tuple(shown), created)
     (folder / "report.html").write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A block with a capsule-shaped hole: tetrahedra inside are removed, the wall is projected.
+"""A block with an inclusion-shaped hole: tetrahedra inside are removed, the wall is projected.
 
 The construction of paper 000, section 4.4: a regular mesh of the block, elements with a node in
 the inclusion removed, the nodes of the hole moved onto the measured shape. Departures: the grid
@@ -13,6 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.scene.inclusion_shape import InclusionShape
 from validate.scene.mesh import (
     Mesh,
     boundary_facets,
@@ -21,6 +22,7 @@ from validate.scene.mesh import (
     require_positive_cells,
 )
 
+_MOST_NODES = 100_000  # before memory is taken: P2 has 8 times as many
 _ROUNDS = 6  # of removing flattened cells and projecting again
 _FLAT = 1e-3  # a cell smaller than this share of the median one counts as flattened
 FACES = ("probe_plate", "stage_plate", "bottom", "top", "side_low", "side_high")
@@ -72,43 +74,53 @@ class Capsule:
         return np.asarray(foot + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
 
     @property
+    def reach(self) -> Floats:
+        """Half extents (3,) m."""
+        return np.array([self.radius, self.length / 2, self.radius])
+
+    @property
     def volume(self) -> float:
         cylinder = np.pi * self.radius**2 * (self.length - 2 * self.radius)
         return float(cylinder + 4 / 3 * np.pi * self.radius**3)
 
 
-def block_with_inclusion(block: Block, grid: tuple[int, int, int], capsule: Capsule) -> Mesh:
-    """Linear tetrahedra around the capsule; `grid` counts the nodes along x, y, z.
+def block_with_inclusion(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> Mesh:
+    """Linear tetrahedra around the inclusion; `grid` counts the nodes along x, y, z.
 
     Facet sets: the six faces and "cavity". Raises `SceneError` when the inclusion touches a face,
     is smaller than an element, or when the projection inverts a cell.
     """
     if min(grid) < 4:
         raise SceneError(f"mesh of {grid} nodes: at least 4 along each side are needed")
-    _require_inside(block, capsule)
-    _require_resolved(block, grid, capsule)
-    nodes = _graded_grid(block, grid, capsule)
+    if int(np.prod(grid)) > _MOST_NODES:
+        raise SceneError(
+            f"mesh of {grid} nodes: {int(np.prod(grid))} in all, at most {_MOST_NODES} are taken; "
+            "coarsen it"
+        )
+    _require_inside(block, shape)
+    _require_resolved(block, grid, shape)
+    nodes = _graded_grid(block, grid, shape)
     cells = kuhn_cells(grid)
-    removed = (capsule.distance(nodes)[cells] < -1e-9).any(axis=1)
+    removed = (shape.distance(nodes)[cells] < -1e-9).any(axis=1)
     if not removed.any():
         raise SceneError(
             f"no node of the {grid} mesh lies inside the inclusion of radius "
-            f"{1e3 * capsule.radius:g} mm; refine the mesh"
+            f"{1e3 * shape.radius:g} mm; refine the mesh"
         )
-    mesh = _projected(nodes, cells[~removed], block, grid, capsule)
+    mesh = _projected(nodes, cells[~removed], block, grid, shape)
     require_positive_cells(mesh)
     return mesh
 
 
 def _projected(
-    nodes: Floats, cells: Ints, block: Block, grid: tuple[int, int, int], capsule: Capsule
+    nodes: Floats, cells: Ints, block: Block, grid: tuple[int, int, int], shape: InclusionShape
 ) -> Mesh:
-    """The cells with their wall on the capsule; cells that the move would flatten are removed."""
+    """The cells with their wall on the shape; cells that the move would flatten are removed."""
     for _ in range(_ROUNDS):
         facets = _named_facets(nodes, cells, block, grid)
         wall = np.unique(facets["cavity"])
         moved = nodes.copy()
-        moved[wall] = capsule.project(nodes[wall])
+        moved[wall] = shape.project(nodes[wall])
         mesh = _compact(moved, cells, facets)
         flat = cell_volumes(mesh) <= _FLAT * np.median(cell_volumes(mesh))
         if not flat.any():
@@ -117,10 +129,9 @@ def _projected(
     return mesh
 
 
-def _require_inside(block: Block, capsule: Capsule) -> None:
-    reach = np.array([capsule.radius, capsule.length / 2, capsule.radius])
-    centre = np.array(capsule.centre)
-    gaps = np.concatenate([centre - reach, block.sizes - centre - reach])
+def _require_inside(block: Block, shape: InclusionShape) -> None:
+    centre = np.array(shape.centre)
+    gaps = np.concatenate([centre - shape.reach, block.sizes - centre - shape.reach])
     faces = ("x = 0", "y = 0", "z = 0", "x = max", "y = max", "z = max")
     if gaps.min() <= 0:
         raise SceneError(
@@ -129,19 +140,19 @@ def _require_inside(block: Block, capsule: Capsule) -> None:
         )
 
 
-def _require_resolved(block: Block, grid: tuple[int, int, int], capsule: Capsule) -> None:
-    centre = np.array(capsule.centre)
+def _require_resolved(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> None:
+    centre = np.array(shape.centre)
     h = float((np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1))[[0, 2]].max())
-    if 2 * capsule.radius < h:
+    if 2 * shape.radius < h:
         raise SceneError(
-            f"the inclusion's diameter {2e3 * capsule.radius:.3g} mm is smaller than an element of "
+            f"the inclusion's diameter {2e3 * shape.radius:.3g} mm is smaller than an element of "
             f"{1e3 * h:.3g} mm; refine the mesh"
         )
 
 
-def _graded_grid(block: Block, grid: tuple[int, int, int], capsule: Capsule) -> Floats:
+def _graded_grid(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> Floats:
     lines = []
-    for count, size, centre in zip(grid, block.sizes, capsule.centre, strict=True):
+    for count, size, centre in zip(grid, block.sizes, shape.centre, strict=True):
         s = np.linspace(0, 1, count)
         lines.append(np.where(s <= 0.5, 2 * s * centre, centre + (2 * s - 1) * (size - centre)))
     return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)

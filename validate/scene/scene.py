@@ -9,14 +9,19 @@ from validate.errors import SceneError
 from validate.scene.mesh import Mesh
 
 Dilatation = Literal["pointwise", "nodal_mean"]
+LawName = Literal["linear", "svk", "neo_hooke"]
 
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic linear elasticity: E Pa, nu -."""
+    """Isotropic elasticity: E Pa, nu -, and the law at large strain (`fem.laws`).
+
+    Every law has this E and nu at small strain, which is all that the linear schemes use.
+    """
 
     E: float
     nu: float
+    law: LawName = "linear"
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.E) and self.E > 0):
@@ -125,6 +130,10 @@ class Scene:
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation is for linear elements; use order 1")
+        if self.mesh.dimension == 2 and (
+            self.dilatation == "nodal_mean" or self.foundations or self.membranes
+        ):
+            raise SceneError("mean dilatation, foundations and membranes are for 3-D meshes")
         if self.copies < 1:
             raise SceneError(f"{self.copies} copies of the mesh: at least 1")
         named = [s.facets for s in self.supports]

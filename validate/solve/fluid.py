@@ -235,4 +235,4 @@ class LoopStepper(_Settling):
         return self._state(z[1:], self.settings.max_updates, ("not_converged", why))
 
 
-SCHEMES: tuple[type[Scheme], ...] = (NoFluid, ExactPressure, PressureLoop)
+LINEAR: tuple[type[Scheme], ...] = (NoFluid, ExactPressure, PressureLoop)

@@ -1,7 +1,7 @@
 """States, outcomes and runs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal, Protocol
 
@@ -28,7 +28,8 @@ class State:
     """One static step: drives (k,) m, pressures (c,) Pa, updates it took, surface (s, d) m.
 
     `surface` is the displacement of the cavity and plate nodes, what a haptic tick needs.
-    `failure` is empty or the ending and its reason.
+    `failure` is empty or the ending and its reason. Schemes whose fields are not sums of fixed
+    columns keep the displacements `u` (N,) m of all unknowns and their numbers by trace name.
     """
 
     drives: Floats
@@ -36,6 +37,8 @@ class State:
     updates: int
     surface: Floats
     failure: tuple[Ending, str] | None = None
+    u: Floats | None = None
+    numbers: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def inputs(self) -> Floats:

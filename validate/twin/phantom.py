@@ -13,22 +13,32 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
-from validate.recording.types import Recording, Source
-from validate.register.plane import cavity_sampler
+from validate.recording.types import Frames, Recording, Source
+from validate.register.plane import SurfaceSampler, cavity_sampler, section
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import between_plates
-from validate.scene.scene import Material
+from validate.scene.scene import LawName, Material
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
+from validate.solve.types import Scheme
 from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
+from validate.twin.ultrasound import Scanner, Target, b_mode
 
+_LAWS = {
+    "linear": "linear elasticity, small strain",
+    "svk": "St. Venant-Kirchhoff",
+    "neo_hooke": "compressible neo-Hookean",
+}
 IMAGE_POSE = np.array(
     [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0225], [1.0, 0.0, 0.0, 0.015], [0.0, 0.0, 0.0, 1.0]]
 )
 PROFILE = StageProfile((0.0, 0.003, 0.006, 0.009), speed=1e-3, hold=7.0, rate=10.0)
 PEN_TURN, PEN_SHIFT = (62.0, -17.0, 128.0), (0.412, -0.236, -1.137)
-SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers")
+SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers", "b_mode")
+SCANNER = Scanner(width=320, height=496, m_per_px=1.25e-4)
 
 
 @dataclass(frozen=True)
@@ -43,6 +53,8 @@ class TwinSettings:
     centre_z: float = quantity(0.0356, "m", "true centre of the inclusion")
     radius: float = quantity(0.0085, "m", "true radius")
     length: float = quantity(0.028, "m", "true length")
+    frames: bool = quantity(False, "1", "record B-mode images too")
+    law: LawName = quantity("linear", "1", "law of the material")
     seed: int = quantity(20040327, "1", "seed of every sensor's noise")
     sd_outline: float = quantity(0.15e-3, "m", "noise of the outline along its normal")
     sd_tip: float = quantity(0.2e-3, "m", "pen tip, per axis")
@@ -62,7 +74,7 @@ def record_phantom(
     mesh = quadratic(block_with_inclusion(size, grid, capsule))
     scene = between_plates(mesh, material, "slip")
     progress(f"factorise {mesh.nodes.size} unknowns")
-    stepper = ExactPressure().prepare(build(scene))
+    stepper = _scheme(material).prepare(build(scene))
     t, stage, middles = PROFILE.positions()
     at = np.searchsorted(t, middles)
     run = march("twin", stepper, t, stage[:, None], at, 0.0)
@@ -83,6 +95,9 @@ def record_phantom(
             "load_cell": signal(t, force, "N", twin.sd_force, "phantom", rng["load_cell"]),
             "pressure": signal(t, pressure, "Pa", twin.sd_pressure, "phantom", rng["pressure"]),
         },
+        frames={"b_mode": _b_mode(middles, run.u, wall, size, rng["b_mode"])}
+        if twin.frames
+        else {},
         contours={"outline": outline.measure(middles, run.u, wall, rng["outline"])},
         metadata={
             "inclusion": _declared(capsule),
@@ -91,6 +106,24 @@ def record_phantom(
             "provenance": _provenance(twin, material, mesh.nodes.size),
         },
     )
+
+
+def _b_mode(
+    t: Floats, u: Floats, wall: SurfaceSampler, size: Block, rng: np.random.Generator
+) -> Frames:
+    """An image per field of u (nt, n, d) m: fluid 30 dB below speckle, edge shadows, the plate."""
+    images = []
+    for load, ui in zip(PROFILE.loads, u, strict=True):
+        outline = section(wall.deformed(ui), wall.triangles, IMAGE_POSE)
+        target = Target(outline, shadow=4.0, enhancement=3.0, texture=1.0, plate=size.size_x - load)
+        images.append(b_mode(SCANNER, target, rng))
+    pixel = SCANNER.m_per_px
+    return Frames(t, tuple(images), (pixel, pixel), IMAGE_POSE, "phantom")
+
+
+def _scheme(material: Material) -> Scheme:
+    """Large strain is solved at every 3 mm and interpolated between (to 0.1 um, 0.01 Pa)."""
+    return ExactPressure() if material.law == "linear" else Tabulated(StaticNewton(), 0.003)
 
 
 def marker_layout(size: Block, rng: np.random.Generator) -> dict[str, Floats]:
@@ -117,7 +150,7 @@ def _declared(capsule: Capsule) -> dict[str, str]:
 def _provenance(twin: TwinSettings, material: Material, unknowns: int) -> dict[str, str]:
     return {
         "kind": "twin",
-        "law": "linear elasticity, small strain",
+        "law": _LAWS[material.law],
         "element": f"P2 tetrahedra, {unknowns} unknowns",
         "plates": "slip",
         "fluid": "constant volume, exact",

@@ -1,0 +1,116 @@
+"""Contour extraction on synthetic frames of known outline, by contrast and edge shadow.
+
+python benchmarks/contours.py [COUNT]    COUNT frames (default 200) and as many without a region
+"""
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.outline import normal_distances
+from validate.errors import RecordingError
+from validate.recording.contour import extract_outline
+from validate.recording.raster import coverage
+from validate.twin.cysts import LEVELS, SHADOWS, CystFrame, cyst_frame
+from validate.twin.ultrasound import Scanner, Target, b_mode
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Distances m of an outline from the truth, its Dice index, and rms distance / declared sd."""
+
+    level: float
+    shadow: float
+    rms: float
+    worst: float
+    bias: float
+    dice: float
+    sd_ratio: float
+
+
+def dice(a: Floats, b: Floats, shape: tuple[int, int], m_per_px: tuple[float, float]) -> float:
+    """Twice the common area over the sum of both areas of two outlines (k, 2) m."""
+    one, two = (coverage(o / np.array(m_per_px), shape) for o in (a, b))
+    return float(2 * np.minimum(one, two).sum() / (one.sum() + two.sum()))
+
+
+def judged(frame: CystFrame) -> Judged | None:
+    """The extraction without any hint against the truth; None where it refuses."""
+    try:
+        found = extract_outline(frame.image, frame.m_per_px)
+    except RecordingError:
+        return None
+    off = -normal_distances(frame.outline, found.points)
+    rms = float(np.sqrt((off**2).mean()))
+    score = dice(found.points, frame.outline, frame.image.shape, frame.m_per_px)
+    worst, bias = float(np.abs(off).max()), float(off.mean())
+    return Judged(frame.level, frame.shadow, rms, worst, bias, score, rms / found.sd)
+
+
+def frames(count: int) -> list[CystFrame]:
+    """`count` frames, taking turns in contrast and shadow."""
+    kinds = [(level, shadow) for level in LEVELS for shadow in SHADOWS]
+    return [cyst_frame(i, *kinds[i % len(kinds)]) for i in range(count)]
+
+
+def false_alarms(count: int) -> int:
+    """How many images of tissue alone are given an outline."""
+    found = 0
+    for i in range(count):
+        image = b_mode(Scanner(), Target(None, texture=1.5), np.random.default_rng([7, i]))
+        try:
+            extract_outline(image, (1e-4, 1e-4))
+            found += 1
+        except RecordingError:
+            continue
+    return found
+
+
+def line(name: str, results: list[Judged | None]) -> str:
+    kept = [r for r in results if r is not None]
+    refused = len(results) - len(kept)
+    mm = 1e3 * np.array([[r.rms, r.worst, r.bias] for r in kept])
+    scores, ratios = (np.array([getattr(r, k) for r in kept]) for k in ("dice", "sd_ratio"))
+    cells = [
+        name,
+        str(len(results)),
+        str(refused),
+        f"{np.median(mm[:, 0]):.3f}",
+        f"{mm[:, 0].max():.3f}",
+        f"{mm[:, 1].max():.3f}",
+        f"{np.median(mm[:, 2]):+.3f}",
+        f"{np.median(scores):.3f}",
+        f"{scores.min():.3f}",
+        f"{np.median(ratios):.2f}",
+        f"{np.percentile(ratios, 95):.2f}",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def table(count: int) -> str:
+    """The whole table in Markdown."""
+    made = frames(count)
+    results = [(f.level, f.shadow, judged(f)) for f in made]
+    head = (
+        "frames", "count", "refused", "rms mm median", "rms mm worst", "farthest mm", "bias mm",
+        "Dice median", "Dice worst", "rms / sd median", "95 %",
+    )  # fmt: skip
+    lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
+    for level in LEVELS:
+        lines.append(line(f"inclusion {level:g} dB", [r for a, _, r in results if a == level]))
+    for shadow in SHADOWS:
+        lines.append(line(f"edge shadow {shadow:g} dB", [r for _, b, r in results if b == shadow]))
+    lines.append(line("all", [r for _, _, r in results]))
+    return "\n".join(lines)
+
+
+def main() -> None:
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    print(table(count))
+    print(f"\ntissue without a region: {false_alarms(count)} of {count} images given an outline")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""`validate new`: the written file loads, runs, overwrites nothing and executes no data."""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from validate.cli.main import cli, run
+from validate.cli.new import written
+from validate.recording.mcap_write import write_recording
+from validate.recording.types import Recording, Signal, Source
+from validate.replay import compare
+from validate.replay.find import load_file
+
+ROWS = np.arange(200)
+DIAMETER, HEIGHT, E = 0.03, 0.02, 20e3
+
+
+def log(name: str = "gel", **specimen: str) -> Recording:
+    """A cylinder of 20 kPa between slipping plates to 8 % strain, load-cell noise 5 mN."""
+    t, d = ROWS / 10, ROWS * 8e-6
+    noise = np.random.default_rng(1).normal(0, 0.005, len(t))
+    force = E * np.pi * DIAMETER**2 / 4 * d / HEIGHT + noise
+    signals = {
+        "displacement": Signal(t, d[:, None], "m", 0.0, "machine"),
+        "force": Signal(t, force[:, None], "N", 0.005, "machine"),
+    }
+    return Recording(name, Source("x", "", 0, "x"), 0, signals=signals,
+                     metadata={"specimen": specimen} if specimen else {})  # fmt: skip
+
+
+SIZES = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT)}
+
+
+def in_folder(folder: Path, *arguments: str) -> tuple[int, str]:
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        done = CliRunner().invoke(cli, list(arguments), standalone_mode=False)
+    finally:
+        os.chdir(before)
+    if done.exception is not None:
+        return 2, str(done.exception)
+    return int(done.return_value or 0), done.output
+
+
+def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
+    listed = in_folder(tmp_path, "list", "my_gel", "--json")[1]
+    paths = {p["path"]: p["default"] for p in json.loads(listed)["parameters"]}
+    assert (paths["specimen.diameter"], paths["specimen.height"]) == (DIAMETER, HEIGHT)
+    result = compare(load_file(tmp_path / "experiments" / "my_gel.py"))
+    assert [(c.name, c.verdict) for c in result.checks] == [
+        ("force.rms@fit", "agrees"), ("force.rms@beyond", "agrees"),
+    ]  # fmt: skip
+    values = {p.path: p.default for p in result.parameters}
+    assert values["material.E"] == pytest.approx(E, rel=0.02)
+
+
+def test_it_names_channels_rates_units_and_what_is_not_recorded(tmp_path: Path) -> None:
+    text = written("my_gel", log(), "../gel.mcap")
+    assert "displacement: signal in m, sd 0; 200 in 19.9 s, 10 Hz" in text
+    assert "not in the recording: measure it" in text
+    assert "from the recording's header" in written("my_gel", log(**SIZES), "../gel.mcap")
+    sides = written("g", log(area_m2="0.0004", height_m="0.02"), "../gel.mcap")
+    assert "quantity(0.0225676, " in sides
+    assert "$" not in text
+    assert "TODO" not in text
+
+
+def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path) -> None:
+    write_recording(log(), tmp_path / "gel.mcap")
+    arguments = ("new", "mine", "--from", "gel.mcap", "-o", "mine.py")
+    assert in_folder(tmp_path, *arguments)[0] == 0
+    before = (tmp_path / "mine.py").read_bytes()
+    code, message = in_folder(tmp_path, *arguments)
+    assert (code, "exists and is left alone" in message) == (2, True)
+    assert (tmp_path / "mine.py").read_bytes() == before
+    for name in ("Mine", "json", "a-b", "../x"):
+        assert in_folder(tmp_path, "new", name, "--from", "gel.mcap")[0] == 2
+    assert "called as it is" in in_folder(tmp_path, *arguments[:-1], "other.py")[1]
+    assert in_folder(tmp_path, "list", "mine.py")[0] == 0
+
+
+def test_a_recordings_texts_are_never_code(tmp_path: Path) -> None:
+    evil = '"""\nimport os\x00\nos.abort()\n"""\\'
+    bad = log(evil)
+    bad = replace(
+        bad,
+        signals={**bad.signals, evil: bad.signals["force"]},
+        metadata={evil: {evil: evil}},
+    )
+    write_recording(bad, tmp_path / "gel.mcap")
+    assert in_folder(tmp_path, "new", "mine", "--from", "gel.mcap", "-o", "mine.py")[0] == 0
+    text = (tmp_path / "mine.py").read_text("utf-8")
+    assert all(line.lstrip().startswith("#") or "title" in line or '"""' in line
+               for line in text.splitlines() if "os.abort" in line)  # fmt: skip
+    assert in_folder(tmp_path, "list", "mine.py")[0] == 0
+
+
+def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> None:
+    lone = replace(log(), signals={"pressure": replace(log().signals["force"], unit="Pa")})
+    write_recording(lone, tmp_path / "p.mcap")
+    code, message = in_folder(tmp_path, "new", "mine", "--from", "p.mcap")
+    assert code == 2
+    assert "holds ['pressure']" in message
+    assert not (tmp_path / "experiments").exists()
+    assert run(["new", "mine", "--from", str(tmp_path / "absent.mcap")]) == 2
+
+
+def test_outlines_stage_and_markers_become_an_experiment(
+    tmp_path: Path, project_root: Path
+) -> None:
+    source = project_root / "recordings" / "fluid_phantom.mcap"
+    assert in_folder(tmp_path, "new", "mine", "--from", str(source))[0] == 0
+    listed = json.loads(in_folder(tmp_path, "list", "mine", "--json")[1])
+    defaults = {p["path"]: p["default"] for p in listed["parameters"]}
+    assert defaults["loads"] == [0.003, 0.006, 0.009]
+    assert [defaults[f"block.{axis}"] for axis in "xyz"] == [0.06, 0.045, 0.07]
+    coarse = {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
+    mine = load_file(tmp_path / "experiments" / "mine.py")
+    result = compare(mine, coarse, methods=("p1_fluid", "p1_dry"))
+    rms = {m.name: {s.name: s.value for s in m.scores} for m in result.methods}
+    assert rms["p1_fluid"]["contour.rms@9mm"] < rms["p1_dry"]["contour.rms@9mm"] < 0.6e-3
+
+
+@pytest.mark.slow
+def test_the_phantoms_experiment_agrees_as_written(tmp_path: Path, project_root: Path) -> None:
+    source = project_root / "recordings" / "fluid_phantom.mcap"
+    in_folder(tmp_path, "new", "mine", "--from", str(source))
+    code, output = in_folder(tmp_path, "run", "mine")
+    assert code == 0, output
+    assert "9 of 9 checks agree" in output

@@ -1,0 +1,33 @@
+"""The scale of a unit curve that fits measured forces."""
+
+import numpy as np
+import pytest
+
+from validate.errors import ComparisonError
+from validate.identify.law import fit_scale
+
+CURVE = np.linspace(0, 2, 50) ** 2
+
+
+def test_exact_forces_give_their_scale_back() -> None:
+    found = fit_scale([CURVE, CURVE[:30]], [3 * CURVE, 5 * CURVE[:30]])
+    assert found.scale == pytest.approx(4.0)
+    assert found.sd_repeats == pytest.approx(np.sqrt(2.0))
+    assert found.confidence(2) == pytest.approx(2.0)
+    assert (found.count, found.residual_rms) == (80, pytest.approx(0.0, abs=1e-12))
+    assert fit_scale([CURVE], [CURVE]).sd_repeats is None
+    assert fit_scale([CURVE], [CURVE]).confidence(1) is None
+
+
+def test_noise_averages_out_and_shows_in_the_residual() -> None:
+    rng = np.random.default_rng(2)
+    forces = [3 * CURVE + 0.1 * rng.standard_normal(50) for _ in range(200)]
+    found = fit_scale([CURVE] * 200, forces)
+    assert found.scale == pytest.approx(3.0, abs=3e-3)
+    assert found.residual_rms == pytest.approx(0.1, rel=0.03)
+
+
+def test_nothing_to_fit_is_an_error() -> None:
+    for curves, forces in (([], []), ([CURVE * 0], [CURVE]), ([CURVE[:0]], [CURVE[:0]])):
+        with pytest.raises(ComparisonError, match="to fit"):
+            fit_scale(curves, forces)

@@ -1,0 +1,193 @@
+"""Clock offsets: exact truths, uncertainties over seeds, refusals with numbers, shifts shown."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap_samples import sample_recording
+
+from validate.errors import RecordingError
+from validate.recording.alignment import (
+    Offset,
+    declared_offset,
+    matched,
+    offset_by_correlation,
+    rebased,
+    shift,
+)
+from validate.recording.events import event_time, offset_by_event
+from validate.recording.inspect import inspect_recording
+from validate.recording.mcap_read import read_recording
+from validate.recording.mcap_write import write_recording
+from validate.recording.types import Signal
+
+SEEDS = 60
+SEARCH = 1.5  # s
+
+
+def motion(t: np.ndarray) -> np.ndarray:
+    hump = 0.6 * np.exp(-(((t - 5) / 0.5) ** 2)) - 0.4 * np.exp(-(((t - 7.1) / 0.8) ** 2))
+    return np.tanh((t - 3) / 0.6) + hump
+
+
+def signal(t: np.ndarray, y: np.ndarray, noise: float = 0.0, seed: int = 0) -> Signal:
+    rng = np.random.default_rng(seed)
+    return Signal(t, (y + rng.normal(0, noise, len(t)))[:, None], "N", noise, "machine")
+
+
+def pair(
+    rates: tuple[float, float], offset: float, noise: float, seed: int
+) -> tuple[Signal, Signal]:
+    """Reference and stream, which starts late, ends early and has a gap of 0.6 s."""
+    ours, theirs = np.arange(0, 10, 1 / rates[0]), np.arange(0.3, 9.5, 1 / rates[1])
+    theirs = theirs[(theirs < 4) | (theirs > 4.6)]
+    one = signal(ours, motion(ours), noise, seed)
+    return one, signal(theirs, 3 * motion(theirs + offset) - 2, 3 * noise, seed + 1000)
+
+
+RATES = [(100.0, 100.0), (100.0, 37.0), (40.0, 133.0), (20.0, 25.0)]
+
+
+@pytest.mark.parametrize("rates", RATES)
+@pytest.mark.parametrize("offset", [-0.7313, 0.0, 0.1237, 0.8004])
+def test_correlation_finds_the_truth_to_a_tenth_of_a_sample(
+    rates: tuple[float, float], offset: float
+) -> None:
+    found = offset_by_correlation(*pair(rates, offset, 0.0, 0), SEARCH)
+    assert abs(found.seconds - offset) * max(rates) < 0.02  # without noise
+    noisy = offset_by_correlation(*pair(rates, offset, 0.002, 1), SEARCH)
+    assert abs(noisy.seconds - offset) * max(rates) < 0.1
+    assert noisy.method == "correlation"
+
+
+@pytest.mark.parametrize("rates", RATES)
+def test_the_uncertainty_of_a_correlation_is_calibrated(rates: tuple[float, float]) -> None:
+    truths = np.random.default_rng(3).uniform(-0.8, 0.8, 3 * SEEDS)
+    found = [
+        offset_by_correlation(*pair(rates, truth, 0.02, seed), SEARCH)
+        for seed, truth in enumerate(truths)
+    ]
+    z = np.array([(f.seconds - t) / f.sd for f, t in zip(found, truths, strict=True)])
+    assert 0.85 < np.sqrt(np.mean(z**2)) < 1.25  # chi-square of 180 alone: 0.90..1.10 at 95 %
+    assert abs(np.mean(z)) < 0.3
+
+
+def test_matched_samples_are_counted_without_gaps_and_ends() -> None:
+    t = np.arange(0, 10, 0.01)
+    gap = t[(t < 2) | (t > 3)]
+    reference, stream = signal(gap, motion(gap)), signal(t, motion(t))
+    found = matched(reference, stream, Offset(0.5, 0.0, "test", 0, 0.0))
+    missing = 50 + 101  # beyond the end; in the gap, 1.5 .. 2.5 s of the stream
+    assert abs(found.count - (1000 - missing)) <= 2
+    assert found.coverage == pytest.approx(found.count / 1000)
+
+
+@pytest.mark.parametrize("offset", [20.0, 6.0])
+def test_too_small_an_overlap_is_refused_with_its_share(offset: float) -> None:
+    reference, stream = pair((100.0, 100.0), 0.0, 0.0, 0)
+    with pytest.raises(RecordingError, match=r"of 860 samples \(\d+ %\) .* at least 50 %"):
+        matched(reference, stream, Offset(offset, 0.0, "test", 0, 0.0))
+    late = replace(stream, t=stream.t + offset)
+    with pytest.raises(RecordingError, match=r"overlap by .* % at most, at least 50 %"):
+        offset_by_correlation(reference, late, 1.0)
+
+
+T = np.arange(0, 10, 0.01)
+AMBIGUOUS = {
+    "sine": (np.sin(2 * np.pi * T), "ambiguous: .*periodic"),
+    "ramp": (T, "ambiguous: .*edge of the search"),
+    "flat": (0 * T, "flat, its standard deviation 0 N"),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("name", AMBIGUOUS)
+def test_ambiguous_signals_are_refused(name: str, noise: float) -> None:
+    y, says = AMBIGUOUS[name]
+    says = says.replace(" 0 N", "") if noise else says
+    with pytest.raises(RecordingError, match=says):
+        offset_by_correlation(signal(T, y, noise, 1), signal(T - 0.123, y, noise, 2), 2.5)
+
+
+def test_unrelated_signals_and_offsets_beyond_the_search_are_refused() -> None:
+    bumps = [np.exp(-(((T - c) / 0.2) ** 2)) for c in (2.0, 3.0, 7.0)]
+    one, other = signal(T, bumps[0] - 2 * bumps[1]), signal(T, motion(T) - bumps[2], 0.5, 4)
+    with pytest.raises(RecordingError, match=r"correlate by|ambiguous"):
+        offset_by_correlation(one, other, 1.0)
+    with pytest.raises(RecordingError, match="edge of the search"):
+        offset_by_correlation(*pair((100.0, 100.0), 0.8, 0.0, 0), 0.5)
+    with pytest.raises(RecordingError, match="expected a range above 0"):
+        offset_by_correlation(*pair((100.0, 100.0), 0.8, 0.0, 0), 0.0)
+
+
+def event(kind: str, t: np.ndarray) -> np.ndarray:
+    return 5 * np.maximum(0, t - 3) if kind == "onset" else np.tanh((t - 5) / 0.08)
+
+
+@pytest.mark.parametrize("kind", ["onset", "step"])
+def test_a_marked_event_to_a_tenth_of_a_sample_with_its_uncertainty(kind: str) -> None:
+    errors, sds = [], []
+    for seed, truth in enumerate(np.random.default_rng(5).uniform(-0.8, 0.8, SEEDS)):
+        t = np.arange(0, 10, 0.013)
+        one = signal(T, event(kind, T), 0.005, seed)
+        found = offset_by_event(one, signal(t, event(kind, t + truth), 0.005, seed + 500), kind)
+        errors.append(found.seconds - truth)
+        sds.append(found.sd)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.1 * 0.013
+    assert 0.6 < np.sqrt(np.mean(np.square(np.array(errors) / sds))) < 1.3
+
+
+def test_events_that_are_none_or_several_are_refused() -> None:
+    with pytest.raises(RecordingError, match="no event: the signal changes by"):
+        event_time(signal(T, 0 * T, 0.1), "onset")
+    with pytest.raises(RecordingError, match=r"3 crossings .* single step"):
+        event_time(signal(T, np.where((T > 3) & (T < 4), 1.0, 0.0) + (T > 6)), "step")
+    with pytest.raises(RecordingError, match="at the edge"):
+        event_time(signal(T, T), "onset")
+    blip = np.where((T > 3) & (T < 4), 1.0, 0.0) + (T > 6)
+    found, sd = event_time(signal(T, blip), "step", (5.0, 8.0))
+    assert abs(found - 6.005) <= 0.0051
+    assert sd == pytest.approx(0.01 / np.sqrt(12))
+
+
+def test_a_shift_is_kept_shown_and_not_made_twice(tmp_path: Path) -> None:
+    recording = sample_recording()
+    offset = Offset(-0.0025, 1e-4, "correlation", 7, 1.0)
+    moved = shift(recording, "/force", offset)
+    path = tmp_path / "moved.mcap"
+    write_recording(moved, path)
+    read = read_recording(path)
+    assert read.t0_ns == recording.t0_ns - 2_500_000  # /force begins first now
+    assert np.allclose(read.signals["/force"].t, recording.signals["/force"].t, atol=2e-9)
+    assert np.allclose(read.markers["/markers"].t, recording.markers["/markers"].t + 0.0025)
+    assert read.record("clock_offset//force") == {
+        "seconds": "-0.0025", "sd": "0.0001", "method": "correlation", "count": "7",
+        "coverage": "1.0",
+    }  # fmt: skip
+    (line,) = inspect_recording(path).clock_offsets
+    assert "/force" in line
+    assert "seconds -0.0025" in line
+    with pytest.raises(RecordingError, match=r"moved by -0\.0025 s before"):
+        shift(moved, "/force", offset)
+    with pytest.raises(RecordingError, match="no stream 'force' to shift; the recording has"):
+        shift(recording, "force", offset)
+
+
+def test_a_clock_without_date_never_runs_below_zero() -> None:
+    recording = replace(sample_recording(), t0_ns=0)
+    moved = shift(recording, "/force", Offset(-2.0, 0.1, "given by the user", 0, 0.0))
+    assert moved.t0_ns == 0
+    assert moved.signals["/force"].t[0] == 0
+    assert moved.markers["/markers"].t[0] == pytest.approx(2.0)
+    assert rebased(moved).t0_ns == 0
+
+
+def test_a_declared_offset_is_counted_too() -> None:
+    recording = sample_recording()
+    found = declared_offset(recording, "/outline", 0.01, 0.001)
+    assert (found.count, found.coverage) == (2, 1.0)
+    with pytest.raises(RecordingError, match=r"0 of 2 samples \(0 %\)"):
+        declared_offset(recording, "/outline", 5.0, 0.001)
+    with pytest.raises(RecordingError, match="no other stream"):
+        declared_offset(recording, "/nothing", 0.0, 0.0)

@@ -1,0 +1,245 @@
+"""Images in recordings: PNG bounds and damage, MCAP round trip, folders of PNG."""
+
+import base64
+import json
+import struct
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import jsonschema
+import numpy as np
+import pytest
+from mcap_samples import ABSENT, T0, signal_json, walk, write_foreign
+
+from validate.errors import RecordingError
+from validate.recording.image import MAX_SIDE, decode_png, encode_png
+from validate.recording.inspect import inspect_recording
+from validate.recording.mcap_read import read_recording
+from validate.recording.mcap_write import write_recording
+from validate.recording.png_stack import read_png_stack
+from validate.recording.raster import coverage
+from validate.recording.schemas import IMAGE, SCHEMAS
+from validate.recording.types import Frames, Recording
+
+RNG = np.random.default_rng(3)
+IMAGES = tuple(RNG.integers(0, 256, (17, 23), dtype=np.uint8) for _ in range(3))
+POSE = np.eye(4) + np.diag([0.25, 0.5], 2)
+FRAMES = Frames(np.array([0.0, 0.04, 0.08]), IMAGES, (1e-4, 1.3e-4), POSE, "phantom")
+RECORDING = Recording("us", ABSENT, T0, frames={"/us": FRAMES}, metadata={"note": {"a": "b"}})
+
+
+def png(kind: bytes, content: bytes) -> bytes:
+    crc = zlib.crc32(kind + content).to_bytes(4, "big")
+    return len(content).to_bytes(4, "big") + kind + content + crc
+
+
+def hand_made(width: int, height: int, rows: bytes, depth: int = 8, colour: int = 0) -> bytes:
+    header = struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, 0)
+    body = png(b"IHDR", header) + png(b"IDAT", zlib.compress(rows)) + png(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + body
+
+
+def test_png_by_hand_is_read() -> None:
+    got = decode_png(hand_made(3, 2, b"\0\1\2\3" + b"\0\xff\0\x80"))
+    assert got.tolist() == [[1, 2, 3], [255, 0, 128]]
+    assert not got.flags.writeable
+
+
+def test_png_round_trip_is_exact() -> None:
+    assert np.array_equal(decode_png(encode_png(IMAGES[0])), IMAGES[0])
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"GIF89a", "no PNG"),
+        (hand_made(MAX_SIDE + 1, 1, b""), "4097 x 1 px, allowed 1..4096"),
+        (hand_made(2**31, 2**31, b""), "2147483648 x 2147483648 px"),
+        (hand_made(0, 5, b""), "0 x 5 px"),
+        (hand_made(2, 2, b"\0\1\2"), "3 bytes of pixels, its header needs 6"),
+        (hand_made(2, 1, bytes(10**6)), "4 bytes of pixels, its header needs 3"),
+        (hand_made(2, 1, bytes(5), depth=16), "16 bits, colour type 0"),
+        (hand_made(2, 1, bytes(3), colour=3), "colour type 3"),
+        (hand_made(1, 1, b"\0\1\2\3", colour=2), "1 coloured and 0 transparent pixels"),
+        (encode_png(IMAGES[0])[:-12], "without an end"),
+        (encode_png(IMAGES[0])[:-20], "cut at byte"),
+    ],
+)
+def test_png_that_is_damaged_or_too_large_is_refused(data: bytes, message: str) -> None:
+    with pytest.raises(RecordingError, match=message):
+        decode_png(data)
+
+
+def test_every_flipped_bit_of_a_png_is_seen(capfd: pytest.CaptureFixture[str]) -> None:
+    whole = encode_png(IMAGES[0])
+    for at in range(len(whole)):
+        data = bytearray(whole)
+        data[at] ^= 0x10
+        with pytest.raises(RecordingError):
+            decode_png(bytes(data))
+    assert capfd.readouterr() == ("", "")  # OpenCV prints when it is handed damaged bytes
+
+
+def test_grey_stored_as_colour_is_grey() -> None:
+    assert decode_png(hand_made(1, 1, b"\0\7\7\7", colour=2)).tolist() == [[7]]
+
+
+def test_frames_return_exactly(tmp_path: Path) -> None:
+    write_recording(RECORDING, tmp_path / "a.mcap")
+    got = read_recording(tmp_path / "a.mcap")
+    frames = got.frame("/us")
+    assert all(np.array_equal(a, b) for a, b in zip(frames.images, IMAGES, strict=True))
+    assert frames.m_per_px == (1e-4, 1.3e-4)
+    assert np.array_equal(frames.pose, POSE)
+    assert np.array_equal(frames.t, FRAMES.t)
+    assert (frames.frame, got.t0_ns) == ("phantom", T0)
+    assert dict(got.metadata) == {"note": {"a": "b"}}
+    with pytest.raises(RecordingError, match=r"no images '/other'; it has .'/us'."):
+        got.frame("/other")
+
+
+def test_messages_are_foxglove_images(tmp_path: Path) -> None:
+    write_recording(RECORDING, tmp_path / "a.mcap")
+    bodies = [
+        json.loads(c[22:]) for op, c in walk((tmp_path / "a.mcap").read_bytes()) if op == 0x05
+    ]
+    for body, image in zip(bodies, IMAGES, strict=True):
+        jsonschema.validate(body, dict(SCHEMAS[IMAGE]))
+        assert (body["format"], body["frame_id"]) == ("png", "phantom")
+        data = np.frombuffer(base64.b64decode(body["data"]), np.uint8)
+        assert np.array_equal(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), image)
+
+
+def test_inspection_names_frames_and_their_unit(tmp_path: Path) -> None:
+    write_recording(RECORDING, tmp_path / "a.mcap")
+    got = inspect_recording(tmp_path / "a.mcap")
+    assert got.defects == ()
+    assert [(t.kind, t.unit, t.frame, t.count) for t in got.topics] == [
+        ("frames", "grey level", "phantom", 3)
+    ]
+
+
+def _image(**changes: object) -> dict[str, object]:
+    data = base64.b64encode(encode_png(IMAGES[0])).decode()
+    stamp = {"sec": T0 // 10**9, "nsec": T0 % 10**9}
+    return {"timestamp": stamp, "frame_id": "p", "data": data, "format": "png"} | changes
+
+
+CALIBRATED = {
+    "calibration//us": {"m_per_px_x": "1e-4", "m_per_px_y": "2e-4"},
+    "pose//us": {"T_frame_from_image": " ".join(map(str, np.eye(4).ravel()))},
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "metadata", "message"),
+    [
+        ({"format": "jpeg"}, CALIBRATED, "image format 'jpeg', readable: 'png'"),
+        ({"data": "!!"}, CALIBRATED, "no base64"),
+        ({"data": base64.b64encode(b"nothing").decode()}, CALIBRATED, "no PNG"),
+        ({}, CALIBRATED | {"pose//us": {}}, "no record 'pose//us' with T_frame_from_image"),
+        ({}, CALIBRATED | {"calibration//us": {"m_per_px_x": "1"}}, "with m_per_px_y, 2 numbers"),
+        (
+            {},
+            CALIBRATED | {"calibration//us": {"m_per_px_x": "0", "m_per_px_y": "1"}},
+            r"\(0.0, 1.0\) m per pixel|expected two numbers > 0",
+        ),
+        (
+            {},
+            CALIBRATED | {"calibration//us": {"m_per_px_x": "mm", "m_per_px_y": "1"}},
+            "could not convert",
+        ),
+    ],
+)
+def test_damaged_image_streams_are_refused(
+    tmp_path: Path, changes: dict, metadata: dict, message: str
+) -> None:
+    messages = [("/us", IMAGE, T0, _image(**changes))]
+    with pytest.raises(RecordingError, match=message):
+        read_recording(write_foreign(tmp_path / "f.mcap", messages, metadata=metadata))
+
+
+def test_images_without_calibration_are_listed_as_a_defect(tmp_path: Path) -> None:
+    messages = [("/us", IMAGE, T0, _image()), ("/s", "validate.Signal", T0, signal_json(T0))]
+    path = write_foreign(tmp_path / "f.mcap", messages)
+    assert not read_recording(path).frames
+    got = inspect_recording(path)
+    assert got.defects == ("'/us': images without record 'calibration//us'",)
+    assert [t.kind for t in got.topics] == ["foreign", "signal"]
+
+
+def test_images_count_against_the_memory_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_recording(RECORDING, tmp_path / "a.mcap")
+    monkeypatch.setattr("validate.recording.mcap_streams.MAX_NUMBERS", 3 * 49 - 1)
+    with pytest.raises(RecordingError, match="more than 146 numbers"):
+        read_recording(tmp_path / "a.mcap")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"images": IMAGES[:2]}, "2 images, 3 times"),
+        ({"images": (*IMAGES[:2], IMAGES[2].T)}, r"different sizes \[\(17, 23\), \(23, 17\)\]"),
+        ({"images": (IMAGES[0].astype(float),) * 3}, r"image 0 is \(17, 23\) float64"),
+        ({"images": (np.zeros((2, 2, 3), np.uint8),) * 3}, r"image 0 is \(2, 2, 3\) uint8"),
+        ({"m_per_px": (1e-4, 0.0)}, "expected two numbers > 0"),
+        ({"m_per_px": (1e-4, float("nan"))}, "1 of 2 values not finite"),
+    ],
+)
+def test_impossible_frames_are_refused(changes: dict, message: str) -> None:
+    with pytest.raises(RecordingError, match=message):
+        replace(FRAMES, **changes)
+
+
+def test_images_of_frames_are_read_only_copies() -> None:
+    image = np.zeros((4, 4), np.uint8)
+    frames = Frames(np.array([0.0]), (image,), (1.0, 1.0), np.eye(4), "f")
+    image[0, 0] = 9
+    assert frames.images[0][0, 0] == 0
+    with pytest.raises(ValueError, match="read-only"):
+        frames.images[0][0, 0] = 1
+
+
+def test_png_stack_is_sorted_by_number(tmp_path: Path) -> None:
+    for name, image in (("f2.png", IMAGES[0]), ("f10.png", IMAGES[1]), ("f1.PNG", IMAGES[2])):
+        (tmp_path / name).write_bytes(encode_png(image))
+    (tmp_path / "notes.txt").write_text("x")
+    got = read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=25)
+    assert got.t.tolist() == [0.0, 0.04, 0.08]
+    for a, b in zip(got.images, (IMAGES[2], IMAGES[0], IMAGES[1]), strict=True):
+        assert np.array_equal(a, b)
+    assert read_png_stack(tmp_path, (1e-4, 1e-4), times=[1, 2, 4]).t.tolist() == [1.0, 2.0, 4.0]
+
+
+def test_png_stacks_that_cannot_be_ordered_or_timed_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no \*.png files"):
+        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=1)
+    with pytest.raises(RecordingError, match="cannot be read"):
+        read_png_stack(tmp_path / "absent", (1e-4, 1e-4), rate_hz=1)
+    (tmp_path / "a1.png").write_bytes(encode_png(IMAGES[0]))
+    with pytest.raises(RecordingError, match="either the times of its 1 images or their rate"):
+        read_png_stack(tmp_path, (1e-4, 1e-4))
+    with pytest.raises(RecordingError, match="rate -1 Hz"):
+        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=-1)
+    (tmp_path / "a01.png").write_bytes(encode_png(IMAGES[0]))
+    with pytest.raises(RecordingError, match="have the same number"):
+        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=1)
+    (tmp_path / "a01.png").write_bytes(b"")
+    (tmp_path / "a1.png").unlink()
+    with pytest.raises(RecordingError, match=r"a01.png: no PNG"):
+        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=1)
+
+
+def test_coverage_of_a_box_and_a_disc() -> None:
+    box = np.array([[0.5, 0.5], [3.0, 0.5], [3.0, 2.75], [0.5, 2.75]])
+    want = np.outer([0, 1, 1, 0.25], [0, 1, 1, 0.5, 0])
+    assert coverage(box, (4, 5)) == pytest.approx(want, abs=1e-12)
+    assert coverage(box[::-1], (4, 5)) == pytest.approx(want, abs=1e-12)
+    a = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    disc = np.array([20.3, 18.9]) + 12.5 * np.stack([np.cos(a), np.sin(a)], axis=1)
+    assert coverage(disc, (40, 41)).sum() == pytest.approx(np.pi * 12.5**2, rel=1e-3)
+    assert coverage(disc - 30, (40, 41)).sum() < np.pi * 12.5**2 / 4  # cut by the border

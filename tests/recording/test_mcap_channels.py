@@ -1,0 +1,100 @@
+"""Channels of any JSON schema: whole, in order of time, one definition a name, or refused."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from validate.errors import RecordingError
+from validate.recording.inspect import inspect_recording
+from validate.recording.mcap_channels import LAST_NS, JsonChannel, JsonMessage, write_channels
+
+NUMBER = JsonChannel("/a", "own.Number", {"type": "object"}, {"unit": "N"})
+TEXT = JsonChannel("/b", "own.Text", {"type": "object"})
+MESSAGES = [
+    JsonMessage("/a", 5, {"v": 0.1}),
+    JsonMessage("/b", 5, {"text": "zwölf"}),
+    JsonMessage("/a", 7, {"v": 1e-300}),
+]
+
+
+def read(path: Path) -> list[tuple[str, int, int, bytes]]:
+    with path.open("rb") as stream:
+        found = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
+        return [(c.topic, m.log_time, m.sequence, m.data) for _, c, m in found]
+
+
+def test_all_returns(tmp_path: Path) -> None:
+    path = tmp_path / "made.mcap"
+    write_channels(path, [NUMBER, TEXT], MESSAGES, {"about": {"k": "v"}})
+    assert read(path) == [
+        ("/a", 5, 0, b'{"v":0.1}'),
+        ("/b", 5, 0, b'{"text":"zw\\u00f6lf"}'),
+        ("/a", 7, 1, b'{"v":1e-300}'),
+    ]
+    seen = inspect_recording(path)
+    assert seen.defects == ()
+    assert seen.source.integrity == "verified"
+    assert seen.metadata == ("about",)
+    assert [(t.name, t.schema, t.count) for t in seen.topics] == [
+        ("/a", "own.Number", 2), ("/b", "own.Text", 1)
+    ]  # fmt: skip
+
+
+def test_equal_bytes(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_channels(tmp_path / name, [NUMBER, TEXT], MESSAGES, {})
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+
+
+def test_one_flipped_bit_is_found(tmp_path: Path) -> None:
+    path = tmp_path / "made.mcap"
+    write_channels(path, [NUMBER, TEXT], MESSAGES, {"about": {"k": "v"}})
+    whole = path.read_bytes()
+    for at in range(8, len(whole) // 2, 7):  # data section
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
+        with pytest.raises(RecordingError):
+            inspect_recording(path)
+
+
+@given(st.lists(st.integers(0, LAST_NS), max_size=20).map(sorted))
+def test_any_times_in_order(tmp_path_factory: pytest.TempPathFactory, times: list[int]) -> None:
+    path = tmp_path_factory.mktemp("times") / "made.mcap"
+    write_channels(path, [NUMBER], [JsonMessage("/a", t, {}) for t in times], {})
+    assert [ns for _, ns, _, _ in read(path)] == times
+
+
+@pytest.mark.parametrize(
+    ("channels", "messages", "words"),
+    [
+        ([NUMBER, NUMBER], [], "declared twice: ['/a']"),
+        ([NUMBER, JsonChannel("/c", "own.Number", {})], [], "'/c' differs"),
+        ([TEXT], MESSAGES, "message of '/a', declared are ['/b']"),
+        ([NUMBER, TEXT], MESSAGES[::-1], "'/b' at 5 ns, expected 7"),
+        ([NUMBER], [JsonMessage("/a", -1, {})], "at -1 ns, expected 0"),
+        ([NUMBER], [JsonMessage("/a", LAST_NS + 1, {})], "in order of time"),
+    ],
+)
+def test_refused_and_the_old_file_kept(
+    tmp_path: Path, channels: list[JsonChannel], messages: list[JsonMessage], words: str
+) -> None:
+    path = tmp_path / "made.mcap"
+    path.write_text("old")
+    with pytest.raises(RecordingError) as raised:
+        write_channels(path, channels, messages, {})
+    assert words in str(raised.value)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("made.mcap", "old")]
+
+
+def test_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="cannot be written"):
+        write_channels(tmp_path / "absent" / "made.mcap", [NUMBER], [], {})
+
+
+def test_nan_is_a_bug(tmp_path: Path) -> None:
+    message = JsonMessage("/a", 0, {"v": float("nan")})
+    with pytest.raises(ValueError, match="JSON"):
+        write_channels(tmp_path / "made.mcap", [NUMBER], [message], {})
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,114 @@
+"""From images at 2 mm steps to the inclusion's surface and mesh, against a known shape."""
+
+import numpy as np
+import pytest
+
+from validate.errors import RegistrationError
+from validate.fem.cavity import cavity_surface, volume_of
+from validate.register.sweep import Stack, surface_of, sweep_stack
+from validate.scene.inclusion import Block, block_with_inclusion
+from validate.scene.mesh import cell_volumes
+from validate.twin.sweep import LeaningCapsule, sweep_frames
+from validate.twin.ultrasound import Scanner
+
+# Image x is the block's z, image y its x, the sweep goes along its y.
+POSE = np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0.015], [0, 0, 0, 1]])
+ROUND = LeaningCapsule((20e-3, 30e-3, 22.5e-3), (8.5e-3, 8.5e-3), 28e-3, (0.1, -0.05))
+OVAL = LeaningCapsule((20e-3, 30e-3, 22.5e-3), (9.8e-3, 7.2e-3), 28e-3, (0.1, -0.05))
+POSITIONS = np.arange(6e-3, 41e-3, 2e-3)
+SCANNER = Scanner(width=200, height=260, m_per_px=2e-4, axial=0.15e-3, lateral=0.3e-3)
+
+
+def exact(shape: LeaningCapsule) -> Stack:
+    """The stack that a faultless segmentation would give."""
+    sections = [(z, shape.section(float(z))) for z in POSITIONS]
+    seen = [(z, o) for z, o in sections if o is not None]
+    at = np.array([z for z, _ in seen])
+    radii = shape.cap * shape.scale(at)
+    ends = shape.centre[2] + np.array([-1, 1]) * shape.length / 2
+    centres = np.array([o.mean(axis=0) for _, o in seen])
+    outlines = tuple(o for _, o in seen)
+    return Stack(POSE, at, centres, radii, outlines, ends, 0.0, 0.0, (1, 1))
+
+
+def off_surface(shape: LeaningCapsule, stack: Stack, kind: str) -> np.ndarray:
+    points = shape.surface(30)
+    surface = surface_of(stack, kind)  # type: ignore[arg-type]
+    return surface.distance(points @ POSE[:3, :3].T + POSE[:3, 3])
+
+
+@pytest.fixture(scope="module")
+def stack() -> Stack:
+    return sweep_stack(sweep_frames(OVAL, POSITIONS, SCANNER, POSE, 5), POSITIONS)
+
+
+def test_exact_slices_give_the_shape_back() -> None:
+    surface = surface_of(exact(ROUND), "circle")
+    assert surface.volume == pytest.approx(ROUND.volume, rel=0.006)
+    assert np.sqrt((off_surface(ROUND, exact(ROUND), "circle") ** 2).mean()) < 0.04e-3
+    assert surface.radius == pytest.approx(8.5e-3, rel=1e-6)
+
+
+def test_circles_keep_an_ellipse_volume_but_not_its_surface() -> None:
+    circle, free = (surface_of(exact(OVAL), k) for k in ("circle", "free"))
+    assert circle.volume == pytest.approx(OVAL.volume, rel=0.006)
+    assert free.volume == pytest.approx(OVAL.volume, rel=0.006)
+    # Half axes 9.8 and 7.2 mm against a radius of 8.4 mm: 1.4 mm at the vertices.
+    assert np.abs(off_surface(OVAL, exact(OVAL), "circle")).max() == pytest.approx(
+        1.4e-3, abs=0.15e-3
+    )
+    assert np.sqrt((off_surface(OVAL, exact(OVAL), "free") ** 2).mean()) < 0.05e-3
+
+
+def test_a_sweep_of_images_gives_volume_and_surface(stack: Stack) -> None:
+    assert stack.empty[0] >= 1
+    assert stack.empty[1] >= 1
+    assert stack.ends == pytest.approx([8.5e-3, 36.5e-3], abs=1.0e-3)
+    assert stack.sd_ends == pytest.approx(2e-3 / np.sqrt(12))
+    free = surface_of(stack, "free")
+    assert free.volume == pytest.approx(OVAL.volume, rel=0.05)
+    rms = {k: np.sqrt((off_surface(OVAL, stack, k) ** 2).mean()) for k in ("free", "circle")}
+    assert rms["free"] < 0.25e-3
+    assert rms["circle"] > 2.5 * rms["free"]  # what the circular assumption costs
+    middle = np.abs(stack.positions - 22.5e-3) < 5e-3
+    leaning = np.polyfit(stack.positions[middle], stack.centres[middle], 1)[0]
+    assert leaning == pytest.approx(OVAL.lean, abs=0.03)
+
+
+def test_the_surface_becomes_a_mesh(stack: Stack) -> None:
+    surface = surface_of(stack, "free")
+    block = Block(0.060, 0.045, 0.070)
+    mesh = block_with_inclusion(block, (15, 15, 19), surface)
+    wall = mesh.nodes[mesh.facet_nodes("cavity")]
+    assert np.abs(surface.distance(wall)).max() < 1e-12
+    assert cell_volumes(mesh).min() > 0
+    hole = volume_of(cavity_surface(mesh, "cyst", "cavity"), mesh.nodes)
+    assert cell_volumes(mesh).sum() + hole == pytest.approx(np.prod(block.sizes), rel=1e-11)
+    assert 0.8 * OVAL.volume < hole < 1.02 * OVAL.volume
+
+
+def test_an_inclusion_that_goes_on_beyond_the_sweep_is_refused() -> None:
+    cut = POSITIONS[4:9]
+    with pytest.raises(RegistrationError, match="reaches the first or last image"):
+        sweep_stack(sweep_frames(ROUND, cut, SCANNER, POSE, 1), cut)
+
+
+def test_a_sweep_without_an_inclusion_or_order_is_refused() -> None:
+    empty = POSITIONS[-3:] + 10e-3
+    frames = sweep_frames(ROUND, empty, SCANNER, POSE, 2)
+    with pytest.raises(RegistrationError, match="no slice shows an inclusion"):
+        sweep_stack(frames, empty)
+    with pytest.raises(RegistrationError, match="do not grow"):
+        sweep_stack(frames, empty[::-1])
+    with pytest.raises(RegistrationError, match=r"positions: shape \(2,\)"):
+        sweep_stack(frames, empty[:2])
+
+
+def test_a_sphere_ends_where_its_sections_say() -> None:
+    from validate.register.sweep import _end
+
+    r = 5e-3
+    at = np.array([2.0e-3, 4.0e-3])
+    assert _end(at, np.sqrt(r**2 - at**2), 2e-3) == pytest.approx(r, rel=1e-9)
+    assert _end(-at, np.sqrt(r**2 - at**2), 2e-3) == pytest.approx(-r, rel=1e-9)
+    assert _end(at, np.array([5e-3, 5e-3]), 2e-3) == pytest.approx(7e-3)  # 1.5 steps at most

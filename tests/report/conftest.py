@@ -1,0 +1,12 @@
+"""The fluid phantom by its two cheapest methods, compared once for the tests of the report."""
+
+import pytest
+
+from validate.compare.result import Result
+from validate.replay.experiment import Experiment
+from validate.replay.road import Options, compare
+
+
+@pytest.fixture(scope="session")
+def result(phantom: Experiment) -> Result:
+    return compare(phantom, Options({}, methods=("p1_fluid", "p1_dry")))

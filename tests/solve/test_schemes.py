@@ -1,0 +1,64 @@
+"""The contract of every scheme: prepare, rest, step, field, traces."""
+
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
+
+from validate.errors import SceneError
+from validate.fem.system import System, build
+from validate.solve.fluid import LINEAR
+from validate.solve.newton import StaticNewton
+from validate.solve.schemes import SCHEMES
+from validate.solve.tabulated import Tabulated
+from validate.solve.types import Scheme
+
+
+@pytest.fixture(scope="module")
+def system() -> System:
+    return build(phantom_scene(phantom_mesh(COARSE_GRID)))
+
+
+@pytest.fixture(scope="module")
+def large(system: System) -> System:
+    """The same at large strain."""
+    scene = system.scene
+    return build(replace(scene, material=replace(scene.material, law="neo_hooke")))
+
+
+def settings(scheme: type[Scheme]) -> Scheme:
+    return Tabulated(StaticNewton(), 0.001) if scheme is Tabulated else scheme()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: s.__name__)
+def test_a_scheme_steps_and_says_what_its_states_mean(
+    scheme: type[Scheme], system: System, large: System
+) -> None:
+    stepper = settings(scheme).prepare(system if scheme in LINEAR else large)
+    mesh = system.scene.mesh
+    rest = stepper.rest()
+    state = stepper.step(rest, np.array([0.001]))
+    assert state.failure is None
+    assert state.drives.tolist() == [0.001]
+    assert state.pressures.shape == (1,)
+    assert state.surface.shape[1] == 3
+    assert np.abs(stepper.field(rest)).max() == 0.0
+    u = stepper.field(state)
+    assert u.shape == mesh.nodes.shape
+    plate = mesh.facet_nodes("stage_plate")
+    assert u[plate, 0] == pytest.approx(np.full(len(plate), -0.001))
+    traces = stepper.traces([rest, state])
+    force = next(t for name, t in traces.items() if name.endswith(".force"))
+    assert force.unit == "N"
+    assert force.y[0] == pytest.approx(0.0, abs=1e-12)
+    assert force.y[1] > 0.1
+    assert all(len(t.y) == 2 for t in traces.values())
+    with pytest.raises(FrozenInstanceError):
+        state.updates = 7  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("scheme", LINEAR, ids=lambda s: s.__name__)
+def test_a_linear_scheme_refuses_a_law_at_large_strain(scheme: type[Scheme], large: System) -> None:
+    with pytest.raises(SceneError, match="cannot solve the law 'neo_hooke'"):
+        scheme().prepare(large)

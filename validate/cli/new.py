@@ -1,0 +1,194 @@
+"""`validate new`: an experiment file filled with what a recording holds.
+
+Texts of the recording are data: they enter the file as Python literals or in comments without line
+ends, never as code.
+"""
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from validate.cli.display import console
+from validate.errors import UsageError
+from validate.recording.mcap_read import read_recording
+from validate.recording.types import Recording, Signal
+
+TEMPLATES = {"force": "new_force.py.txt", "phantom": "new_phantom.py.txt"}
+_LONGEST = 76  # characters of a text of the recording in a comment
+
+
+def new(name: str, source: Path, out: Path | None) -> None:
+    """Writes `out` (default experiments/NAME.py); refuses names that no module may have."""
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in {*sys.stdlib_module_names, "validate"}:
+        raise UsageError(f"experiment '{name}': a name of a-z, 0-9, _ that no Python module has")
+    path = out or Path("experiments") / f"{name}.py"
+    if path.name != f"{name}.py":
+        raise UsageError(f"-o {path}: an experiment's file is called as it is, {name}.py")
+    if path.exists():
+        raise UsageError(f"{path} exists and is left alone; give another NAME or -o")
+    text = written(name, read_recording(source), _beside(source, path))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror})") from error
+    console().print(f"{path}: edit it, then `validate run {_called(name, path)}`", soft_wrap=True)
+
+
+def written(name: str, recording: Recording, source: str) -> str:
+    """The experiment file's text; `source` is the recording's path from the file's folder."""
+    kind = _kind(recording)
+    fields = _force(recording) if kind == "force" else _phantom(recording)
+    template = Template((Path(__file__).parent / TEMPLATES[kind]).read_text("utf-8"))
+    title = f"{_plain(recording.name)}: measured against linear FEM"
+    return template.substitute(
+        fields,
+        name=repr(name),
+        title=title.replace("\\", "/").replace('"', "'"),
+        title_text=repr(title),
+        source=_plain(Path(source).name).replace("\\", "/").replace('"', "'"),
+        source_text=repr(_plain(Path(source).name)),
+        recording=repr(source),
+        channels="\n".join(f"#   {line}".rstrip() for line in _channels(recording)),
+    )
+
+
+def _kind(recording: Recording) -> str:
+    units = {topic: s.unit for topic, s in recording.signals.items()}
+    if units.get("displacement") == "m" and units.get("force") == "N":
+        return "force"
+    known = {"marker_layout", "inclusion"} <= recording.metadata.keys()
+    if recording.contours and recording.markers and "m" in units.values() and known:
+        return "phantom"
+    raise UsageError(
+        f"{recording.name} holds {_topics(recording)} and records {sorted(recording.metadata)}; "
+        "an experiment is written from signals 'displacement' (m) and 'force' (N), or from "
+        "outlines, a stage (m) and markers with records 'inclusion' and 'marker_layout'"
+    )
+
+
+def _topics(recording: Recording) -> list[str]:
+    streams = (recording.signals, recording.markers, recording.contours, recording.frames)
+    return [topic for kind in streams for topic in kind]
+
+
+# --- what the recording says ---------------------------------------------------------------------
+
+
+def _channels(recording: Recording) -> list[str]:
+    lines = []
+    for topic, s in recording.signals.items():
+        lines.append(_line(topic, f"signal in {s.unit}, sd {s.sd:.3g}", s.t))
+    for topic, m in recording.markers.items():
+        lines.append(_line(topic, f"{len(m.names)} markers in m, sd {m.sd:.3g}", m.t))
+    for topic, c in recording.contours.items():
+        lines.append(_line(topic, f"outlines in m, sd {c.sd:.3g}", c.t))
+    for topic, f in recording.frames.items():
+        lines.append(_line(topic, f"images, {f.m_per_px[0]:.3g} m a pixel", f.t))
+    for record, values in recording.metadata.items():
+        lines.append(_plain(f"record '{record}', {len(values)} entries"))
+        lines += [_plain(f"  {key}: {value}") for key, value in list(values.items())[:8]]
+    return lines
+
+
+def _line(topic: str, what: str, t: np.ndarray) -> str:
+    duration = float(t[-1] - t[0])
+    rate = f"{(len(t) - 1) / duration:.4g} Hz" if duration > 0 else "one moment"
+    return _plain(f"{topic}: {what}; {len(t)} in {duration:.4g} s, {rate}")
+
+
+def _plain(text: str) -> str:
+    """On one line, printable, of bounded length, and without what ends a comment or docstring."""
+    line = "".join(c if c.isprintable() else " " for c in text)
+    indent = line[: len(line) - len(line.lstrip())]
+    short = indent + " ".join(line.split())
+    return short if len(short) <= _LONGEST else short[: _LONGEST - 3] + "..."
+
+
+def _force(recording: Recording) -> dict[str, str]:
+    sizes = _sizes(recording.metadata.get("specimen", {}))
+    height = sizes["height"][0]
+    moved = recording.signal("displacement", "m").y[:, 0]
+    force = recording.signal("force", "N").y[:, 0]
+    strain = float(np.ptp(moved)) / height
+    limit = min(0.10, 0.9 * strain)
+    inside = np.abs(moved - moved[0]) <= limit * height
+    accept = 0.1 * float(np.ptp(force[inside]))
+    return {
+        **{key: f"{value:.6g}" for key, (value, _) in sizes.items()},
+        **{f"{key}_from": words for key, (_, words) in sizes.items()},
+        "fit_from": f"{0.05 * limit:.3g}",
+        "fit_to": f"{0.5 * limit:.3g}",
+        "limit": f"{limit:.3g}",
+        "accept": f"{accept:.3g}",
+    }
+
+
+def _sizes(specimen: Mapping[str, str]) -> dict[str, tuple[float, str]]:
+    """Diameter and height m, each with where it comes from."""
+    stated = {k: float(v) for k, v in specimen.items() if re.fullmatch(r"[0-9.e+-]+", v)}
+    sides = [stated[k] for k in ("width_m", "thickness_m", "length_m") if k in stated]
+    guess = "not in the recording: measure it"
+    found = {"diameter": (0.05, guess), "height": (0.03, guess)}
+    if "height_m" in stated:
+        found["height"] = (stated["height_m"], "from the recording's header")
+    if "diameter_m" in stated:
+        found["diameter"] = (stated["diameter_m"], "from the recording's header")
+    elif "area_m2" in stated or len(sides) >= 2:
+        area = stated.get("area_m2") or sides[0] * sides[1]
+        found["diameter"] = (2 * float(np.sqrt(area / np.pi)), "of the header's area")
+    return found
+
+
+def _phantom(recording: Recording) -> dict[str, str]:
+    outline, contours = next(iter(recording.contours.items()))
+    topic = next(iter(recording.markers))
+    layout = recording.record("marker_layout")
+    stage_topic, stage = _stage(recording)
+    places = np.array([[float(x) for x in v.split()] for v in layout.values()])
+    reached = np.interp(contours.t, stage.t, stage.y[:, 0])
+    loads = tuple(sorted({round(float(x), 4) for x in reached if abs(x) > 1e-4}))
+    up = '(_vector(recording.record("pen")["up"]), np.array([0.0, 1.0, 0.0]))'
+    return {
+        "block_x": f"{_side(places[:, 0]):.6g}",
+        "block_y": f"{float(places[:, 1].max()):.6g}",
+        "block_z": f"{_side(places[:, 2]):.6g}",
+        "loads": repr(loads),
+        "outline": repr(outline),
+        "markers": repr(topic),
+        "stage": repr(stage_topic),
+        "up": up if "up" in recording.metadata.get("pen", {}) else "None",
+        "signals": repr(_scalars(recording)),
+    }
+
+
+def _stage(recording: Recording) -> tuple[str, Signal]:
+    lengths = {t: s for t, s in recording.signals.items() if s.unit == "m"}
+    topic = "stage" if "stage" in lengths else next(iter(lengths))
+    return topic, lengths[topic]
+
+
+def _side(x: np.ndarray) -> float:
+    """A block whose margins on both sides are alike, to 5 mm."""
+    return round(float(x.min() + x.max()) / 5e-3) * 5e-3
+
+
+def _scalars(recording: Recording) -> tuple[tuple[str, str, str, str], ...]:
+    known = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
+    found = {s.unit: topic for topic, s in reversed(list(recording.signals.items()))}
+    return tuple((found[u], *known[u], u) for u in known if u in found)
+
+
+def _beside(source: Path, path: Path) -> str:
+    """The recording's path from the experiment's folder."""
+    return Path(os.path.relpath(source.resolve(), path.resolve().parent)).as_posix()
+
+
+def _called(name: str, path: Path) -> str:
+    return name if path.resolve().parent == Path("experiments").resolve() else str(path)

@@ -1,0 +1,173 @@
+"""Streams with clocks of their own: the offset between two of them, and a stream moved by it.
+
+It stands on the recording floor because clocks are mended before anything is registered or
+compared. An offset is what must be *added* to a stream's times to bring them onto the reference's
+clock. Nothing is moved without saying so: `shift` writes the record `clock_offset/<topic>`.
+
+Method: masked normalised cross-correlation finds the lag (Padfield 2012, IEEE Trans. Image Process.
+21, eqs. 10-12, in one dimension); the slope of the correlation is then brought to zero between the
+samples. Its curvature there and the residual noise give the standard uncertainty.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from validate.errors import RecordingError
+from validate.recording.correlate import MIN_MATCHED, coarse_lag, met, refined_lag, step_of
+from validate.recording.types import Contours, Frames, Markers, Recording, Signal
+
+RECORD = "clock_offset/"  # metadata record RECORD + topic of every stream that was moved
+MIN_COVERAGE = 0.5  # share of the stream's samples that must meet the reference
+S = TypeVar("S", Markers, Signal, Contours, Frames)
+
+
+@dataclass(frozen=True)
+class Offset:
+    """What to add to a stream's times: `seconds` s, `sd` s (one standard uncertainty).
+
+    `count` samples of the stream meet the reference then, a share `coverage` of them all.
+    """
+
+    seconds: float
+    sd: float
+    method: str
+    count: int
+    coverage: float
+
+
+def offset_by_correlation(
+    reference: Signal, stream: Signal, within: float, min_coverage: float = MIN_COVERAGE
+) -> Offset:
+    """The offset |tau| <= `within` (s) at which the stream follows the reference, up to scale.
+
+    Both signals (nt, 1), of any rate, with gaps; a positive linear relation is assumed. Raises
+    `RecordingError`, with the numbers, for flat and periodic signals, ramps (any lag fits them), a
+    weak correlation, an offset at the edge of the search, and too small a coverage.
+    """
+    for signal, name in ((reference, "reference"), (stream, "stream")):
+        _require_motion(signal, name)
+    if not within > 0:
+        raise RecordingError(f"offset within {within} s: expected a range above 0")
+    step = min(step_of(reference.t), step_of(stream.t))
+    coarse = coarse_lag(reference, stream, step, within, min_coverage)
+    fine = step_of(reference.t) <= step_of(stream.t)
+    known, seen, sign = (reference, stream, 1.0) if fine else (stream, reference, -1.0)
+    seconds, sd = refined_lag(known, seen, sign * coarse)
+    return matched(reference, stream, Offset(sign * seconds, sd, "correlation", 0, 0), min_coverage)
+
+
+def declared_offset(recording: Recording, topic: str, seconds: float, sd: float) -> Offset:
+    """An offset that the user states, s; counted are the samples that meet any other stream.
+
+    Raises `RecordingError` for an unknown topic, a lone stream, and too small a coverage.
+    """
+    times = {
+        **{k: s.t for k, s in recording.markers.items()},
+        **{k: s.t for k, s in recording.signals.items()},
+        **{k: s.t for k, s in recording.contours.items()},
+        **{k: s.t for k, s in recording.frames.items()},
+    }
+    others = [t for k, t in times.items() if k != topic and len(np.unique(t)) > 1]
+    if topic not in times or not others:
+        raise RecordingError(f"'{topic}' has no other stream to meet; there are {sorted(times)}")
+    inside = np.any([met(t, times[topic] + seconds) for t in others], axis=0)
+    offset = Offset(seconds, sd, "given by the user", int(inside.sum()), float(inside.mean()))
+    _require_coverage(offset, len(inside), MIN_COVERAGE)
+    return offset
+
+
+def matched(
+    reference: Signal, stream: S, offset: Offset, min_coverage: float = MIN_COVERAGE
+) -> Offset:
+    """The offset with its samples counted: those that fall within the reference, not in its gaps.
+
+    Raises `RecordingError` below `min_coverage`.
+    """
+    inside = met(reference.t, stream.t + offset.seconds)
+    found = replace(offset, count=int(inside.sum()), coverage=float(inside.mean()))
+    _require_coverage(found, len(inside), min_coverage)
+    return found
+
+
+def _require_coverage(offset: Offset, total: int, least: float) -> None:
+    if offset.coverage < least:
+        raise RecordingError(
+            f"at an offset of {offset.seconds:+.6g} s {offset.count} of {total} samples "
+            f"({100 * offset.coverage:.0f} %) meet the reference, at least {100 * least:.0f} % are "
+            "needed; record longer together or lower the stated share"
+        )
+
+
+def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
+    """A recording whose stream `topic` is moved by the offset, which is kept as a record.
+
+    Times start again at the earliest sample of all streams. Raises `RecordingError` for an unknown
+    topic and for one that was moved before.
+    """
+    name = RECORD + topic
+    if name in recording.metadata:
+        raise RecordingError(
+            f"'{topic}' was moved by {recording.metadata[name].get('seconds')} s before; "
+            "shift the stream of the first recording instead"
+        )
+    topics = [*recording.markers, *recording.signals, *recording.contours, *recording.frames]
+    if topic not in topics:
+        raise RecordingError(f"no stream '{topic}' to shift; the recording has {sorted(topics)}")
+    record = {
+        "seconds": repr(offset.seconds),
+        "sd": repr(offset.sd),
+        "method": offset.method,
+        "count": str(offset.count),
+        "coverage": repr(offset.coverage),
+    }
+    metadata = {**recording.metadata, name: record}
+    return rebased(replace(_moved(recording, offset.seconds, {topic}), metadata=metadata))
+
+
+def rebased(recording: Recording) -> Recording:
+    """The recording with time 0 at its earliest sample, at the same moments of the clock.
+
+    Where that moment would lie before the clock's own zero (an export without date), the clock
+    begins at the earliest sample.
+    """
+    starts = [
+        *(m.t[0] for m in recording.markers.values()),
+        *(s.t[0] for s in recording.signals.values()),
+        *(c.t[0] for c in recording.contours.values()),
+        *(f.t[0] for f in recording.frames.values()),
+    ]
+    start_ns = round(1e9 * float(min(starts)))
+    t0_ns = max(0, recording.t0_ns + start_ns)
+    return replace(_moved(recording, -start_ns / 1e9, None), t0_ns=t0_ns)
+
+
+def _moved(recording: Recording, seconds: float, topics: set[str] | None) -> Recording:
+    """`seconds` added to the times of these streams; None: of all."""
+
+    def by(topic: str) -> float:
+        return seconds if topics is None or topic in topics else 0.0
+
+    return replace(
+        recording,
+        markers={k: replace(s, t=s.t + by(k)) for k, s in recording.markers.items()},
+        signals={k: replace(s, t=s.t + by(k)) for k, s in recording.signals.items()},
+        contours={k: replace(s, t=s.t + by(k)) for k, s in recording.contours.items()},
+        frames={k: replace(s, t=s.t + by(k)) for k, s in recording.frames.items()},
+    )
+
+
+def _require_motion(signal: Signal, name: str) -> None:
+    if signal.y.shape[1] != 1:
+        raise RecordingError(f"{name}: {signal.y.shape[1]} columns, expected 1; choose one")
+    if len(np.unique(signal.t)) < MIN_MATCHED:
+        raise RecordingError(f"{name}: {len(signal.t)} samples, at least {MIN_MATCHED} are needed")
+    y = signal.y[:, 0]
+    noise = float(np.std(np.diff(y))) / np.sqrt(2)
+    spread = float(np.std(y))
+    if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
+        raise RecordingError(
+            f"{name}: flat, its standard deviation {spread:.3g} {signal.unit} is that of its noise "
+            f"({noise:.3g}); nothing to correlate, align by another stream"
+        )

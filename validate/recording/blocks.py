@@ -1,0 +1,213 @@
+"""Text of an export as tables: header blocks, names, units and rows, one or several in a file.
+
+A table begins with a line of names that rows follow. Tables much shorter than the others (results,
+statistics) are kept as header lines and named in the notes. Blank lines may stand anywhere.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from validate.errors import RecordingError, UsageError
+from validate.recording.cells import (
+    Line,
+    is_data,
+    is_names,
+    is_remark,
+    is_unit_row,
+    split_lines,
+)
+from validate.recording.encoding import Text, decode
+from validate.recording.numerals import decimal_sign
+from validate.recording.rows import fitted, is_sparse, refuse_cut, refuse_emptied
+from validate.recording.table import Table, columns_of, header_of, split_unit
+from validate.recording.vocabulary import SPECIMEN, holds
+
+MIN_ROWS = 10  # a shorter table beside longer ones is one of results, not of samples
+_NUMBERED = re.compile(r"[^0-9]{2,24}?[\s:#№._-]*(?P<label>[A-Za-z]{0,2}[0-9][\w.-]{0,8})")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Lines of one table: the file's and its own header, names, units, rows of any length."""
+
+    shared: list[Line]
+    header: list[Line]
+    names: Line
+    units: list[str]
+    rows: list[Line]
+    specimen: str
+    notes: tuple[str, ...] = ()
+
+
+def parse_tables(
+    data: bytes, encoding: str | None = None, decimal: str | None = None
+) -> list[Table]:
+    """All tables of samples in the bytes of a text file, in their order.
+
+    `encoding` and `decimal` are the user's, None: found. Raises `RecordingError` for empty and
+    binary files, text without a table, tables without column names, text amid the rows, rows with
+    too few or too many cells; `UsageError` for an unknown encoding or decimal sign.
+    """
+    if decimal not in (None, ".", ","):
+        raise UsageError(f"--map decimal={decimal}: the decimal sign is '.' or ','")
+    text = decode(data, encoding)
+    raw = re.split(r"\r\n|\r|\n", text.text)
+    split = split_lines(raw)
+    blocks = [_even(b) for b in _blocks(split.lines, split.run)]
+    if raw[-1].strip():
+        refuse_cut(blocks[-1].rows)
+    for block in blocks:
+        refuse_emptied(split.emptied, block.rows)
+    sign = decimal or decimal_sign((i, c) for b in blocks for i, row in b.rows for c in row)
+    return [_table(b, raw, text, split.separator, sign) for b in blocks]
+
+
+def _table(block: Block, raw: Sequence[str], text: Text, separator: str, decimal: str) -> Table:
+    table = Table(
+        header={**header_of(block.shared, raw), **header_of(block.header, raw)},
+        columns=columns_of(block.names[1], block.units, block.rows),
+        lines=tuple(line for line, _ in block.rows),
+        names_line=block.names[0],
+        encoding=text.encoding,
+        encoding_why=text.why,
+        separator=separator,
+        decimal=decimal,
+        specimen=block.specimen,
+        above=tuple(tuple(cells) for _, cells in block.shared + block.header),
+        notes=block.notes,
+    )
+    sparse = [c.label for c in table.columns if is_sparse(c.cells)]
+    if sparse:
+        table = replace(table, notes=(*table.notes, f"columns with gaps: {', '.join(sparse)}"))
+    return table
+
+
+def _even(block: Block) -> Block:
+    """The block with rows of equal length; text lines below its table go to its header."""
+    found = fitted(block.names, block.rows)
+    return replace(
+        block,
+        header=block.header + found.footer,
+        rows=found.rows,
+        notes=(*block.notes, *found.notes),
+    )
+
+
+# --- where tables begin and end ------------------------------------------------------------------
+
+
+def _blocks(lines: Sequence[Line], run: int) -> list[Block]:
+    tops = _tops(lines)
+    if not tops or tops[0] > run:
+        raise RecordingError(
+            f"the table at line {lines[run][0]} has no column names; add a line such as "
+            "'Time (s),Displacement (mm),Force (N)' above it"
+        )
+    sizes = [_size(lines, tops, k) for k in range(len(tops))]
+    least = min(MIN_ROWS, max(sizes))
+    shared: list[Line] = []
+    blocks: list[Block] = []
+    above: list[Line] = list(lines[: tops[0]])
+    small: list[str] = []
+    for k, top in enumerate(tops):
+        names, units, zone = _below(lines, tops, k)
+        last = k + 1 == len(tops)
+        rows, tail = (zone, []) if last and sizes[k] >= least else _parted(zone)
+        if sizes[k] < least:
+            _refuse_pretender(names, units, rows, blocks)
+            small.append(f"{len(rows)} rows below line {names[0]} ('{names[1][0]}', ...)")
+            above += lines[top : tops[k + 1] if not last else len(lines)]
+            continue
+        found = _stacked(Block([], above, names, units, rows, ""))
+        if blocks:
+            found = [replace(b, shared=shared) for b in found]
+        else:
+            shared = _shared(found[0].header)
+        blocks += found
+        above = tail
+    blocks[-1] = replace(blocks[-1], header=blocks[-1].header + above)
+    note = (f"tables not used: {'; '.join(small)}",) if small else ()
+    return [replace(b, notes=b.notes + note) for b in blocks]
+
+
+def _tops(lines: Sequence[Line]) -> list[int]:
+    """Indices of the lines of names that rows follow: the nearest line of names above each."""
+    tops: list[int] = []
+    names = -1
+    for i, (_, cells) in enumerate(lines):
+        if is_names(cells):
+            names = i
+        elif names >= 0 and is_data(cells):
+            tops.append(names)
+            names = -1
+    return tops
+
+
+def _size(lines: Sequence[Line], tops: Sequence[int], k: int) -> int:
+    end = tops[k + 1] if k + 1 < len(tops) else len(lines)
+    return sum(is_data(cells) for _, cells in lines[tops[k] : end])
+
+
+def _below(
+    lines: Sequence[Line], tops: Sequence[int], k: int
+) -> tuple[Line, list[str], list[Line]]:
+    """Names, units and the lines below them, up to the next table's names."""
+    end = tops[k + 1] if k + 1 < len(tops) else len(lines)
+    start = tops[k] + 1
+    units: list[str] = []
+    while start < end and (is_unit_row(lines[start][1]) or lines[start][1] == lines[tops[k]][1]):
+        units = units or lines[start][1]
+        start += 1
+    return lines[tops[k]], units, list(lines[start:end])
+
+
+def _parted(zone: list[Line]) -> tuple[list[Line], list[Line]]:
+    """The rows, and the header lines of the next table; a damaged row at the end is a row."""
+    end = len(zone)
+    while end and not is_data(zone[end - 1][1]) and is_remark(zone[end - 1][1]):
+        end -= 1
+    return zone[:end], zone[end:]
+
+
+def _refuse_pretender(
+    names: Line, units: list[str], rows: Sequence[Line], blocks: Sequence[Block]
+) -> None:
+    """Words amid samples, with a few more samples below, are no table of their own."""
+    width = max(len(cells) for _, cells in rows)
+    alike = blocks and width == len(blocks[-1].names[1])
+    bare = not units and not any(split_unit(cell)[1] for cell in names[1])
+    if blocks and (sum(map(bool, names[1])) != width or (alike and bare)):
+        raise RecordingError(
+            f"line {names[0]}: text '{' '.join(names[1]).strip()[:60]}' amid the rows; "
+            "export one test per file and mend this line"
+        )
+
+
+def _shared(header: list[Line]) -> list[Line]:
+    """The lines of the first table's header that are the file's: those above its specimen's."""
+    marks = [i for i, line in enumerate(header) if specimen_label(line[1])]
+    return header[: marks[0]] if marks else header
+
+
+def _stacked(block: Block) -> list[Block]:
+    """The block in parts where lines such as `Specimen 2` stand amid its rows."""
+    label = next(filter(None, (specimen_label(c) for _, c in reversed(block.header))), "")
+    parts: list[tuple[str, list[Line]]] = [(label, [])]
+    for line, cells in block.rows:
+        mark = "" if is_data(cells) else specimen_label(cells)
+        if mark and parts[-1][1]:
+            parts.append((mark, []))
+        elif mark:
+            parts[-1] = (mark, [])
+        else:
+            parts[-1][1].append((line, cells))
+    return [replace(block, specimen=mark, rows=rows) for mark, rows in parts]
+
+
+def specimen_label(cells: Sequence[str]) -> str:
+    """`2` for `Specimen 2`, `Probe;2` or `试样2`; empty for any other line."""
+    filled = [c for c in cells if c]
+    text = " ".join(filled).strip(" :;#")
+    found = _NUMBERED.fullmatch(text) if len(filled) <= 2 else None
+    return found["label"] if found and holds(text, SPECIMEN) else ""

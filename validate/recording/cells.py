@@ -1,0 +1,120 @@
+"""Lines of text as cells: which separator, which lines are rows, names or units."""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from validate.errors import RecordingError
+from validate.recording.numerals import looks_numeric
+from validate.recording.units import is_unit
+from validate.recording.vocabulary import UNIT_LABELS, holds
+
+Line = tuple[int, list[str]]  # line number in the file, cells
+SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
+NOTHING = {"nan", "-nan", "inf", "-inf", "#n/a", "n/a", "null", "none", "--", "---", "err"}
+_UNIT_CELL = re.compile(r"[(\[{<][^()\[\]]*[)\]}>]")
+_WIDE_SIGNS = str.maketrans("（）［］【】：；＃", "()[][]:;#")
+_LONGEST_UNIT = 12  # characters
+
+
+@dataclass(frozen=True)
+class Split:
+    """Lines in cells for one separator, without blank ones; `run` is where most rows begin."""
+
+    score: int
+    separator: str
+    lines: list[Line]
+    emptied: list[int]
+    run: int
+
+
+def split_lines(raw: Sequence[str]) -> Split:
+    """The lines split at the separator that gives most numbers.
+
+    Raises `RecordingError` when none gives a table.
+    """
+    best = Split(0, ",", [], [], 0)
+    for separator in SEPARATORS:
+        if not any(separator in line for line in raw):
+            continue
+        split = [(i + 1, _cells(line, separator)) for i, line in enumerate(raw)]
+        filled = [(i, cells) for i, cells in split if any(cells)]
+        score, run = _longest_run(filled)
+        if score > best.score:
+            emptied = [i for i, cells in split if len(cells) > 1 and not any(cells)]
+            best = Split(score, separator, filled, emptied, run)
+    if best.score < 4:
+        raise RecordingError(
+            f"no table of numbers in {len(raw)} lines of text "
+            "(looked for columns separated by comma, semicolon, tab, | or spaces)"
+        )
+    return best
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    text = line.translate(_WIDE_SIGNS) if not line.isascii() else line
+    if separator == "  ":
+        return [cell.strip(' "') for cell in re.split(" {2,}", text.strip())]
+    text = text.rstrip("; \t") if separator == "," else text
+    try:
+        split = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])
+    except csv.Error as error:
+        raise RecordingError(f"no CSV text: a line of {len(line)} characters: {error}") from error
+    return [cell.strip() for cell in split]
+
+
+def is_row(cells: Sequence[str], least: int = 1) -> bool:
+    """Whether at least `least` cells and half of the filled ones are numbers."""
+    numbers = sum(looks_numeric(cell) or cell.lower() in NOTHING for cell in cells)
+    return len(cells) >= 2 and numbers >= least and 2 * numbers >= sum(map(bool, cells))
+
+
+def is_data(cells: Sequence[str]) -> bool:
+    """A row of a table, not a `key,number` line of a header block."""
+    return is_row(cells, least=2)
+
+
+def _longest_run(lines: Sequence[Line]) -> tuple[int, int]:
+    """Count of numbers in the longest run of rows, and the index where it starts."""
+    best, start, score = (0, 0), 0, 0
+    for index, (_, cells) in enumerate(lines):
+        if not is_row(cells):
+            start, score = index + 1, 0
+            continue
+        score += sum(looks_numeric(cell) for cell in cells)
+        best = max(best, (score, start), key=lambda found: found[0])
+    return best
+
+
+def is_unit_row(cells: Sequence[str]) -> bool:
+    """Whether most cells are units or stand in brackets, and the others are as short."""
+    filled = [c for c in cells if c]
+    if filled and holds(filled[0], UNIT_LABELS) and not _UNIT_CELL.fullmatch(filled[0]):
+        filled = filled[1:]
+    units = sum(bool(_UNIT_CELL.fullmatch(c)) or is_unit(c) for c in filled)
+    short = all(len(c) <= _LONGEST_UNIT and not looks_numeric(c) for c in filled)
+    return (short and 2 * units > len(filled)) or (units == len(filled) > 0)
+
+
+def is_names(cells: Sequence[str]) -> bool:
+    """Whether the cells may name columns: two words or more, no numbers before the first gap."""
+    if is_unit_row(cells):
+        return False
+    return any(
+        len(named) >= 2 and not any(looks_numeric(c) or c.lower() in NOTHING for c in named)
+        for named in ([c for c in cells if c], [c for c in cells[: _gap(cells)] if c])
+    )
+
+
+def _gap(cells: Sequence[str]) -> int:
+    """Index of the first empty cell after a filled one; the length where there is none."""
+    filled = next((i for i, c in enumerate(cells) if c), 0)
+    return next((i for i in range(filled, len(cells)) if not cells[i]), len(cells))
+
+
+def is_remark(cells: Sequence[str]) -> bool:
+    """Whether the line begins with a word, as lines of header blocks do and rows do not."""
+    first = next(c for c in cells if c)
+    word = re.search(r"[^\W\d_]{2}|[^\W\d_\x00-\u2e7f]", first)
+    return bool(word) and not looks_numeric(first) and first.lower() not in NOTHING

@@ -1,0 +1,229 @@
+"""The outline of an anechoic inclusion in a B-mode image, with its uncertainty, or the reason why
+there is none.
+
+No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
+(`contour_find`), unless a centre and radius are given; the wall is the closed path in polar
+coordinates that best parts two kinds of speckle (`contour_polar`); it is then moved to where half
+of the power is left (`contour_wall`) and judged (`contour_quality`). Refusals rest on numbers that
+do not depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall
+that is closed or lies outside the image.
+
+Limits: the region must be star-shaped about its centroid; regions under about 20 speckles are lost.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats, checked
+from validate.errors import RecordingError
+from validate.recording.contour_find import candidates
+from validate.recording.contour_polar import Grey, Wall, speckle_area, trace
+from validate.recording.contour_quality import Quality, quality, wall_sd
+from validate.recording.contour_shapes import circle_points, ellipse_points
+from validate.recording.contour_wall import placed
+from validate.recording.types import Contours, Frames
+
+Shape = Literal["free", "ellipse", "circle"]
+
+MIN_GCNR = 0.63  # 1 - overlap of the grey levels of region and surroundings
+MIN_EVIDENCE = 80.0  # nats
+MIN_CLOSED = 0.75  # of the wall; two edge shadows take some 20 %
+MAX_MISSING = 0.03  # of the wall outside the image
+_ROUGH_RADIUS = 0.25  # of the shorter side, when only a centre is given
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A closed outline: points (k, 2) m in image coordinates, sd m along the normal.
+
+    centre (2,) m and radius m (of equal area); contrast 0..1 is the generalised contrast-to-noise
+    ratio; moved m is by how much the wall was moved outward from the path for the blur.
+    """
+
+    points: Floats
+    sd: float
+    centre: Floats
+    radius: float
+    contrast: float
+    closed: float
+    moved: float
+    shape: Shape
+
+    def __post_init__(self) -> None:
+        points = checked(self.points, "outline [m]", (None, 2), error=RecordingError)
+        centre = checked(self.centre, "outline centre [m]", (2,), error=RecordingError)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "centre", centre)
+
+
+def extract_outline(
+    image: NDArray[np.uint8],
+    m_per_px: tuple[float, float],
+    *,
+    centre: Sequence[float] | Floats | None = None,
+    radius: float | None = None,
+    shape: Shape = "free",
+    bright: bool = False,
+) -> Outline:
+    """The outline of the dark (`bright`: bright) closed region in an image (h, w) uint8.
+
+    `centre` (2,) m and `radius` m may be given roughly (a radius within a third of the true one);
+    m_per_px is (x, y). `shape` "free" follows the wall, the others fit it. Raises `RecordingError`
+    with the numbers where there is no such region: none found, contrast too low, open, cut by the
+    border.
+    """
+    if image.ndim != 2 or image.dtype != np.uint8 or min(image.shape) < 16:
+        raise RecordingError(f"image {image.shape} {image.dtype}: expected 16 x 16 uint8 or larger")
+    plain = image.astype(np.float64)
+    dark = 255.0 - plain if bright else plain
+    grey = Grey(dark, m_per_px, speckle_area(dark, m_per_px))
+    wall, judged = _best(grey, _starts(grey, centre, radius))
+    refusal = _refusal(wall, judged)
+    if refusal:
+        raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusal}")
+    found = placed(grey, wall, bright)
+    free = _outline(found.points, wall_sd(grey, wall), judged, found.moved)
+    return free if shape == "free" else _fitted(free, shape, grey)
+
+
+def outlines_of(
+    frames: Frames,
+    *,
+    centre: Sequence[float] | Floats | None = None,
+    radius: float | None = None,
+    shape: Shape = "free",
+    bright: bool = False,
+) -> Contours:
+    """The outline of every image; sd is the root mean square of all.
+
+    Options as in `extract_outline`. Raises `RecordingError` naming the first image without one and
+    how many there are: none is left out silently.
+    """
+    outlines: list[Outline] = []
+    refused: list[str] = []
+    for i, image in enumerate(frames.images):
+        try:
+            outlines.append(
+                extract_outline(
+                    image,
+                    frames.m_per_px,
+                    centre=centre,
+                    radius=radius,
+                    shape=shape,
+                    bright=bright,
+                )
+            )
+        except RecordingError as error:
+            refused.append(f"image {i} (t = {frames.t[i]:.3f} s): {error}")
+    if refused:
+        raise RecordingError(
+            f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
+        )
+    sd = float(np.sqrt(np.mean([o.sd**2 for o in outlines])))
+    return Contours(frames.t, tuple(o.points for o in outlines), sd, frames.pose, frames.frame)
+
+
+def _starts(
+    grey: Grey, centre: Sequence[float] | Floats | None, radius: float | None
+) -> list[tuple[Floats, float]]:
+    if radius is not None and not 0 < radius < np.inf:
+        raise RecordingError(f"rough radius {radius} m: expected a positive number")
+    if centre is None:
+        found = candidates(grey.image, grey.m_per_px)
+        return [(c.centre, c.radius if radius is None else radius) for c in found]
+    place = checked(np.asarray(centre), "rough centre [m]", (2,), error=RecordingError)
+    if np.isnan(grey.at(place[None])).any():
+        raise RecordingError(
+            f"rough centre ({1e3 * place[0]:.2f}, {1e3 * place[1]:.2f}) mm lies outside the image "
+            f"of {_size(grey)}; it is measured from the first pixel"
+        )
+    if radius is not None:
+        return [(place, radius)]
+    sides = np.array(grey.image.shape[::-1]) * np.array(grey.m_per_px)
+    largest = _ROUGH_RADIUS * float(sides.min())
+    return [(place, largest * factor) for factor in (0.25, 0.5, 1.0, 1.5)]
+
+
+def _size(grey: Grey) -> str:
+    height, width = grey.image.shape
+    return f"{1e3 * width * grey.m_per_px[0]:.1f} x {1e3 * height * grey.m_per_px[1]:.1f} mm"
+
+
+def _best(grey: Grey, starts: list[tuple[Floats, float]]) -> tuple[Wall, Quality]:
+    """The start whose wall is closed, apart in grey level and large."""
+    if not starts:
+        raise RecordingError("no closed dark region: no disc is darker than its surroundings")
+    tried: list[tuple[Wall, Quality]] = []
+    for centre, radius in _ranked(grey, starts):
+        wall = trace(grey, centre, radius)
+        tried.append((wall, quality(grey, wall)))
+        if not _refusal(*tried[-1]):
+            return tried[-1]
+    return tried[0]
+
+
+def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats, float]]:
+    """The starts, the most promising first, after two rounds each."""
+    if len(starts) == 1:
+        return starts
+
+    def rank(start: tuple[Floats, float]) -> tuple[bool, float]:
+        wall = trace(grey, *start, rounds=2)
+        q = quality(grey, wall)
+        return not _refusal(wall, q), q.gcnr * q.closed * np.sqrt(max(wall.evidence, 0.0))
+
+    return sorted(starts, key=rank, reverse=True)
+
+
+def _refusal(wall: Wall, judged: Quality) -> str:
+    """Why a wall is none; empty when it is."""
+    radius = 1e3 * float(np.sqrt((wall.radius**2).mean()))
+    place = f"at ({1e3 * wall.centre[0]:.1f}, {1e3 * wall.centre[1]:.1f}) mm, radius {radius:.1f}"
+    if judged.missing > MAX_MISSING:
+        return (
+            f"the one {place} mm is cut by the border, {100 * judged.missing:.0f} % of its wall "
+            "lie outside; take an image with all of it"
+        )
+    if judged.gcnr < MIN_GCNR or wall.evidence < MIN_EVIDENCE:
+        return (
+            f"the best one {place} mm has contrast {judged.gcnr:.2f} (needs {MIN_GCNR:g}) and "
+            f"evidence {wall.evidence:.0f} nats (needs {MIN_EVIDENCE:g}); give its rough centre "
+            "and radius, or raise the gain"
+        )
+    if judged.closed < MIN_CLOSED:
+        return (
+            f"the best one {place} mm is closed along {100 * judged.closed:.0f} % of its wall "
+            f"(needs {100 * MIN_CLOSED:g} %); give its rough centre and radius"
+        )
+    return ""
+
+
+def _outline(points: Floats, sd: float, judged: Quality, moved: float) -> Outline:
+    centre, radius = _enclosed(points)
+    return Outline(points, sd, centre, radius, judged.gcnr, judged.closed, moved, "free")
+
+
+def _enclosed(points: Floats) -> tuple[Floats, float]:
+    """Centroid (2,) and radius of the circle of equal area of a closed outline (k, 2)."""
+    middle = points.mean(axis=0)
+    a, b = points - middle, np.roll(points, -1, axis=0) - middle
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = float(cross.sum()) / 2
+    centroid = middle + ((a + b) * cross[:, None]).sum(axis=0) / (6 * area)
+    return centroid, float(np.sqrt(abs(area) / np.pi))
+
+
+def _fitted(free: Outline, shape: Shape, grey: Grey) -> Outline:
+    """An ellipse or circle through a free outline; what does not fit enters its sd."""
+    fit, freedom = (ellipse_points, 5) if shape == "ellipse" else (circle_points, 3)
+    points = fit(free.points)
+    centre, radius = _enclosed(points)
+    nearest = np.linalg.norm(free.points[:, None] - points[None], axis=-1).min(axis=1)
+    misfit = max(float((nearest**2).mean()) - free.sd**2, 0.0)
+    independent = max(2 * np.pi * free.radius / (4 * np.sqrt(grey.speckle)), freedom)
+    sd = float(np.sqrt(free.sd**2 * freedom / independent + misfit))
+    return replace(free, points=points, sd=sd, centre=centre, radius=radius, shape=shape)

@@ -1,0 +1,189 @@
+"""PNG images, 8-bit grey, encoded and decoded with bounds; image filters. Owns OpenCV.
+
+A PNG is checked before OpenCV sees it: signature, size declared in IHDR, CRC of every chunk, length
+of the unpacked pixels. OpenCV returns half an image for a cut file and prints to standard error;
+only the chunks that make the picture are handed on.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+
+Pixels = NDArray[np.uint8]
+
+MAX_SIDE = 4096  # px
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_CHANNELS = {0: 1, 2: 3, 4: 2, 6: 4}  # PNG colour type -> samples a pixel
+
+
+@dataclass(frozen=True)
+class _Header:
+    width: int
+    height: int
+    channels: int
+
+
+def encode_png(image: Pixels) -> bytes:
+    """A grey image (h, w) uint8 as PNG; raises `RecordingError` for other arrays or sizes."""
+    if image.dtype != np.uint8 or image.ndim != 2:
+        raise RecordingError(f"image {image.shape} {image.dtype}: expected (h, w) uint8")
+    _require_size(image.shape[1], image.shape[0])
+    done, data = cv2.imencode(".png", image)
+    if not done:
+        raise RecordingError(f"image {image.shape} cannot be encoded as PNG")
+    return data.tobytes()
+
+
+def decode_png(data: bytes) -> Pixels:
+    """The grey image (h, w) uint8, read-only, of a PNG with 8 bits a sample.
+
+    Colour is accepted where all pixels are grey (equal channels, opaque). Raises `RecordingError`
+    for a damaged PNG, one over `MAX_SIDE`, interlaced, with a palette or of another depth.
+    """
+    header, packed = _checked(data)
+    _require_unpacked(packed, header.height * (1 + header.width * header.channels))
+    plain = np.frombuffer(_bare(data, packed), dtype=np.uint8)
+    image = cv2.imdecode(plain, cv2.IMREAD_UNCHANGED)
+    if image is None or image.shape[:2] != (header.height, header.width):
+        raise RecordingError("damaged PNG: its pixels cannot be decoded")
+    grey: Pixels = _grey(np.asarray(image, dtype=np.uint8))
+    grey.setflags(write=False)
+    return grey
+
+
+def _checked(data: bytes) -> tuple[_Header, bytes]:
+    """Header and packed pixels of a PNG whose chunks are whole."""
+    if not data.startswith(_SIGNATURE):
+        raise RecordingError("no PNG (wrong first bytes); only PNG images are read")
+    header, packed, ended = None, [], False
+    for kind, content in _chunks(data):
+        if header is None:
+            header = _header(kind, content)
+        elif kind == b"IDAT":
+            packed.append(content)
+        ended = kind == b"IEND"
+    if header is None or not ended:
+        raise RecordingError(f"damaged PNG: {len(data)} bytes without an end")
+    return header, b"".join(packed)
+
+
+def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    at = len(_SIGNATURE)
+    while at < len(data):
+        head = data[at : at + 8]
+        length = int.from_bytes(head[:4], "big")
+        end = at + 8 + length
+        if len(head) < 8 or end + 4 > len(data):
+            raise RecordingError(f"damaged PNG: cut at byte {len(data)}, its chunk ends at {end}")
+        if zlib.crc32(data[at + 4 : end]) != int.from_bytes(data[end : end + 4], "big"):
+            raise RecordingError(f"damaged PNG: wrong CRC of the chunk at byte {at}")
+        yield head[4:], data[at + 8 : end]
+        at = end + 4
+
+
+def _header(kind: bytes, content: bytes) -> _Header:
+    if kind != b"IHDR" or len(content) != 13:
+        raise RecordingError("damaged PNG: it does not begin with a header")
+    width, height, depth, colour, _, _, interlace = struct.unpack(">IIBBBBB", content)
+    _require_size(width, height)
+    if depth != 8 or colour not in _CHANNELS or interlace:
+        raise RecordingError(
+            f"PNG with {depth} bits, colour type {colour}, interlace {interlace}; "
+            "save it as 8-bit grey, not interlaced"
+        )
+    return _Header(width, height, _CHANNELS[colour])
+
+
+def _require_size(width: int, height: int) -> None:
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} a side")
+
+
+def _require_unpacked(packed: bytes, size: int) -> None:
+    unpacker = zlib.decompressobj()
+    try:
+        got = len(unpacker.decompress(packed, size + 1))
+    except zlib.error as error:
+        raise RecordingError(f"damaged PNG: its pixels cannot be unpacked ({error})") from None
+    if got != size or not unpacker.eof:
+        raise RecordingError(f"damaged PNG: {got} bytes of pixels, its header needs {size}")
+
+
+def _bare(data: bytes, packed: bytes) -> bytes:
+    """The same picture without text, profiles and other chunks."""
+    start = len(_SIGNATURE) + 25
+    return data[:start] + _chunk(b"IDAT", packed) + _chunk(b"IEND", b"")
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    crc = zlib.crc32(kind + content).to_bytes(4, "big")
+    return len(content).to_bytes(4, "big") + kind + content + crc
+
+
+def _grey(image: Pixels) -> Pixels:
+    if image.ndim == 2:
+        return image
+    coloured = int((image[..., 1:3] != image[..., :1]).any(axis=-1).sum())
+    clear = int((image[..., 3] != 255).sum()) if image.shape[2] == 4 else 0
+    if coloured or clear:
+        raise RecordingError(
+            f"{coloured} coloured and {clear} transparent pixels; cut the overlay off and save grey"
+        )
+    return np.ascontiguousarray(image[..., 0])
+
+
+def blurred(image: Floats, sd: tuple[float, float]) -> Floats:
+    """Gaussian blur; sd (x, y) in pixels, 0 leaves that axis as it is."""
+    sizes = [2 * int(np.ceil(3.5 * s)) + 1 for s in sd]
+    out = cv2.sepFilter2D(
+        image,
+        cv2.CV_64F,
+        cv2.getGaussianKernel(sizes[0], max(sd[0], 1e-3)),
+        cv2.getGaussianKernel(sizes[1], max(sd[1], 1e-3)),
+        borderType=cv2.BORDER_REFLECT,
+    )
+    return np.asarray(out, dtype=np.float64)
+
+
+def shrunk(image: Floats, shape: tuple[int, int]) -> Floats:
+    """The image (h, w) as means over the areas of `shape` (rows, columns) larger pixels."""
+    small = cv2.resize(image, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.float64)
+
+
+def correlated(image: Floats, kernel: Floats) -> Floats:
+    """Sums of the image under a centred kernel; the border pixels go on outside."""
+    out = cv2.filter2D(image, cv2.CV_64F, kernel, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(out, dtype=np.float64)
+
+
+def sampled(image: Floats, x: Floats, y: Floats) -> Floats:
+    """Bilinear values at pixel places x, y (any shape); NaN outside the image."""
+    values = cv2.remap(
+        image.astype(np.float32),
+        x.astype(np.float32),
+        y.astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    ).astype(np.float64)
+    height, width = image.shape
+    outside = (x < -0.5) | (y < -0.5) | (x > width - 0.5) | (y > height - 0.5)
+    return np.asarray(np.where(outside, np.nan, values))
+
+
+def ellipse_through(points: Floats) -> tuple[Floats, Floats, float]:
+    """Centre (2,), half axes (2,) and turn rad of the least-squares ellipse of points (k, 2)."""
+    scale = float(np.abs(points - points.mean(axis=0)).max())
+    middle = points.mean(axis=0)
+    plain = ((points - middle) / scale).astype(np.float32)
+    (x, y), axes, degrees = cv2.fitEllipseDirect(plain)
+    centre = middle + scale * np.array([x, y])
+    return centre, scale * np.array(axes) / 2, float(np.deg2rad(degrees))

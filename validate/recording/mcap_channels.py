@@ -1,0 +1,123 @@
+"""JSON channels of any schema as one MCAP file: whole or not at all, both CRCs, chunks zstd.
+
+For files that are made to be looked at, such as a report's replay; recordings are written by
+`mcap_write`. Equal channels, messages and metadata give equal bytes.
+"""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from validate.errors import RecordingError
+from validate.recording.schemas import MESSAGE_ENCODING, SCHEMA_ENCODING, Json, to_bytes
+
+LIBRARY = "validate"  # without a version: two versions write the same bytes
+LAST_NS = 2**63 - 1
+
+
+@dataclass(frozen=True)
+class JsonChannel:
+    """A topic whose messages follow the JSON schema `definition`, known to viewers as `schema`."""
+
+    topic: str
+    schema: str
+    definition: Json
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class JsonMessage:
+    """One message of a topic; log time = publish time = `ns`, int64 nanoseconds."""
+
+    topic: str
+    ns: int
+    content: Json
+
+
+def write_channels(
+    path: Path,
+    channels: Sequence[JsonChannel],
+    messages: Iterable[JsonMessage],
+    metadata: Mapping[str, Mapping[str, str]],
+) -> None:
+    """Write `messages`, already in order of time, replacing `path` only when all is written.
+
+    Raises `RecordingError`: a topic declared twice, a schema name with two definitions, a message
+    of an undeclared topic, a time that runs backward or is no int64 nanoseconds, or a path that
+    cannot be written.
+    """
+    _check(path, channels)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("xb") as stream:
+            _write(stream, path.name, channels, messages, metadata)
+        part.replace(path)
+    except OSError as error:
+        raise RecordingError(f"{path.name}: cannot be written ({error.strerror})") from error
+    finally:
+        with suppress(OSError):  # no folder, no leftover
+            part.unlink(missing_ok=True)
+
+
+def _check(path: Path, channels: Sequence[JsonChannel]) -> None:
+    topics = [c.topic for c in channels]
+    twice = sorted({t for t in topics if topics.count(t) > 1})
+    if twice:
+        raise RecordingError(f"{path.name}: topics declared twice: {twice}; rename one")
+    known: dict[str, Json] = {}
+    for channel in channels:
+        if known.setdefault(channel.schema, channel.definition) != channel.definition:
+            raise RecordingError(
+                f"{path.name}: schema '{channel.schema}' of {channel.topic!r} differs from that of "
+                "another topic; one name, one definition"
+            )
+
+
+def _write(
+    stream: BinaryIO,
+    name: str,
+    channels: Sequence[JsonChannel],
+    messages: Iterable[JsonMessage],
+    metadata: Mapping[str, Mapping[str, str]],
+) -> None:
+    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(profile="", library=LIBRARY)
+    for record, values in metadata.items():
+        writer.add_metadata(record, dict(values))
+    numbers = _register(writer, channels)
+    counts, before = dict.fromkeys(numbers, 0), 0
+    for message in messages:
+        topic, ns = message.topic, message.ns
+        if topic not in numbers:
+            raise RecordingError(f"{name}: message of {topic!r}, declared are {sorted(numbers)}")
+        if not before <= ns <= LAST_NS:
+            raise RecordingError(
+                f"{name}: {topic!r} at {ns} ns, expected {before} .. {LAST_NS}: put the messages "
+                "in order of time"
+            )
+        data = to_bytes(message.content)
+        writer.add_message(
+            numbers[topic], log_time=ns, publish_time=ns, sequence=counts[topic], data=data
+        )
+        counts[topic], before = counts[topic] + 1, ns
+    writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _register(writer: Writer, channels: Sequence[JsonChannel]) -> dict[str, int]:
+    """Channel numbers by topic; a schema shared by topics is written once."""
+    definitions = {c.schema: c.definition for c in channels}
+    schemas = {
+        name: writer.register_schema(name, SCHEMA_ENCODING, to_bytes(definition))
+        for name, definition in definitions.items()
+    }
+    return {
+        c.topic: writer.register_channel(
+            c.topic, MESSAGE_ENCODING, schemas[c.schema], dict(c.metadata)
+        )
+        for c in channels
+    }

@@ -1,0 +1,124 @@
+"""The words of testing machines' exports, in the languages they are written in.
+
+Kept without accents and in lower case (`plain`): exports lose accents, and a text decoded with the
+wrong table shows other letters. Chinese and Japanese words are looked for inside a text, the others
+as whole words. The only place that knows words of columns, specimens and kinds of test.
+"""
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from functools import cache
+
+_ROLES = {
+    "stress": """stress spannung druckspannung contrainte naprezenie esfuerzo sforzo napeti
+        напряжение 应力 応力""",
+    "strain": """strain dehnung nominaldehnung odksztalcenie nyulas
+        应变 ひずみ 歪み""",
+    "time": """time t zeit prufzeit pruefzeit testzeit temps duree czas tiempo tempo cas ido
+        время 时间 時間""",
+    "force": """force load f kraft standardkraft prufkraft pruefkraft druckkraft zugkraft last
+        effort charge sila obciazenie fuerza carga forza carico forca zatizeni ero сила нагрузка
+        усилие 力 载荷 负荷 荷重""",
+    "displacement": """displacement disp compression extension crosshead position stroke travel
+        deflection deformation closing indentation weg standardweg traversenweg traverse kolbenweg
+        verformung stauchung verschiebung deplacement course allongement ecrasement enfoncement
+        przemieszczenie droga wydluzenie skrocenie ugiecie deformacja desplazamiento recorrido
+        deformacion compresion deslocamento deformacao spostamento corsa allungamento estensione
+        deformazione draha posuv posunuti prodlouzeni stlaceni deformace elmozdulas перемещение
+        деформация 位移 变形 行程 変位 ストローク""",
+}
+_NOT_MEASURED = """max maximum maximal maximale maxi peak maksymalna maksymalne maximo maxima
+    massimo massima command target setpoint sollwert consigne 最大 峰值"""
+_SPEED = """rate speed velocity geschwindigkeit vitesse predkosc velocidad velocita rychlost
+    velocidade 速度 速率"""
+_NOT = {
+    "stress": "true cauchy rate yield wahre vraie",
+    "strain": "true log logarithmic rate plastic wahre vraie",
+    "time": "cycle date start step day clock datum 日期",
+    "force": "temperature temperatur 温度",
+    "displacement": "corrected korrigiert corrige",
+}
+# A word for a length that some machines write over a column of strain: the unit decides.
+LENGTH_OR_STRAIN = """compression deformation verformung stauchung deformacja deformacion deformacao
+    deformazione deformace compresion деформация 变形 extension"""
+SIZES = {
+    "diameter": """diameter durchmesser probendurchmesser diametre srednica diametro prumer atmero
+        диаметр 直径""",
+    "height": """height hohe hoehe probenhohe hauteur wysokosc altura altezza vyska magassag высота
+        高度 高さ""",
+    "width": """width breite probenbreite largeur szerokosc anchura ancho larghezza largura sirka
+        ширина 宽度""",
+    "thickness": """thickness dicke probendicke epaisseur grubosc espesor spessore espessura
+        tloustka толщина 厚度""",
+    "length": """length lange laenge probenlange longueur dlugosc longitud lunghezza comprimento
+        delka длина 长度""",
+    "area": "area flache querschnitt querschnittsflache superficie powierzchnia plocha 面积",
+    "speed": _SPEED + " prufgeschwindigkeit pruefgeschwindigkeit testgeschwindigkeit",
+}
+OTHER_PARTS = """platen plate anvil probe plunger indenter grip final cell stempel druckplatte
+    druckplatten plateau plytka piston 压盘 压头"""
+COMPRESSION = """compression compressive compressed compress closing druckversuch druckprufung druck
+    stauchversuch ecrasement sciskanie sciskania compresion compressione compressao tlakem tlakova
+    tlakove nyomo nyomovizsgalat сжатие 压缩 圧縮"""
+TENSION = """tensile tension zugversuch zugprufung traction rozciaganie rozciagania traccion
+    trazione tracao tahem tahova tahove растяжение 拉伸 引張"""
+SPECIMEN = """specimen sample test probe prufling eprouvette echantillon essai probka probeta
+    muestra provino campione vzorek amostra proba образец 试样 试件 样品 試験片"""
+UNIT_LABELS = "unit units einheit einheiten unite unites jednostka unidad unita jednotka 单位 単位"
+_ENCODING_EVIDENCE = """prufung prufer prufnorm prufen fur operateur numero prenom annee ecole
+    uzytkownik data badania badanie operator wykonal nazwa probki wartosc modul dlugosci zkouska
+    cislo rychlosti merici rozmery zeleznicni ubytek vzorku numer naprezenia predkosci metoda
+    编号 单位 日期 试验 试样 实验 样品 名称 材料 压缩 操作 测试 単位 試験 試験力 名前 日付
+    дата образца оператор испытание"""
+
+
+def plain(text: str) -> str:
+    """Lower case without accents: `Prüfkraft` -> `prufkraft`, `Siła` -> `sila`."""
+    spread = unicodedata.normalize("NFKD", text.casefold().translate({0x142: "l", 0xF8: "o"}))
+    return "".join(c for c in spread if not unicodedata.combining(c))
+
+
+def words(text: str) -> frozenset[str]:
+    """The words of a text, plain."""
+    return frozenset(re.findall(r"[^\W\d_]+", plain(text)))
+
+
+@cache
+def terms(text: str) -> frozenset[str]:
+    """The plain words of a vocabulary entry."""
+    return frozenset(plain(word) for word in text.split())
+
+
+def holds(text: str, vocabulary: str) -> bool:
+    """Whether one of the vocabulary's words is in the text."""
+    wanted = terms(vocabulary)
+    inside = plain(text)
+    return bool(words(text) & wanted) or any(w in inside for w in wanted if is_ideographic(w))
+
+
+def is_ideographic(word: str) -> bool:
+    return ord(word[0]) >= 0x2E80
+
+
+def role_of_name(name: str) -> str | None:
+    """The role that a column's name gives it, None for a column of no interest here.
+
+    A column has a role when its name holds one of the role's words and none of the words that make
+    it something else; roles are tried from the top.
+    """
+    for role, given in _ROLES.items():
+        if holds(name, given):
+            taken = f"{_NOT[role]} {_NOT_MEASURED} {'' if role == 'time' else _SPEED}"
+            return None if holds(name, taken) else role
+    return None
+
+
+@cache
+def evidence() -> frozenset[str]:
+    """Every word of two letters or more that can tell encodings apart."""
+    texts: Iterable[str] = (
+        *_ROLES.values(), *SIZES.values(), COMPRESSION, TENSION, SPECIMEN, UNIT_LABELS,
+        _NOT_MEASURED, _ENCODING_EVIDENCE,
+    )  # fmt: skip
+    return frozenset(w for text in texts for w in terms(text) if len(w) > 1)

@@ -1,0 +1,91 @@
+"""The outline through the load: the measured one over the simulated one, moving."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from validate.arrays import Floats
+from validate.compare.result import MethodResult, Result
+from validate.register.observe import nearest_sample
+from validate.report.loads import HOW, Instant, in_steps
+from validate.report.numbers import spaced
+from validate.report.observed import outline_seen
+from validate.report.page import Animation
+from validate.report.style import ACCEPTED, MEASURED, film
+
+_MM = 1e3
+_STEPS = 24  # pictures over the whole load, about
+_BEFORE = "#A0A0A0"  # what was measured at an earlier load
+_STILL, _HELD, _MOVING = 2000, 1000, 90  # ms
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """One picture: outlines (k, 2) mm in image coordinates and what stands above them."""
+
+    simulated: Floats
+    measured: Floats
+    held: bool
+    title: str
+
+
+def moving_outline(result: Result, method: MethodResult) -> Animation | None:
+    """The last load first, as the still; then from rest through all loads. None without loads."""
+    seen, registered = outline_seen(method), method.registered[0]
+    count = min(len(registered.holds), len(method.run.u))
+    if seen is None or count < 2:
+        return None
+    instants = in_steps(registered, method.run, max(1, round(_STEPS / (count - 1))))
+    shots, measured = list[_Shot](), seen.outlines[0]
+    for instant in instants:
+        if instant.hold is not None:
+            measured = seen.outlines[nearest_sample(seen.t, instant.t, "outlines")]
+        shots.append(_shot(seen.simulated(instant.u), measured, instant))
+    shots = [shots[-1], *shots[:-1]]
+    times = [_STILL, *(_HELD if shot.held else _MOVING for shot in shots[1:])]
+    label = method.label
+    return Animation(
+        "outline",
+        "The outline through the load, again and again, image coordinates in mm, the probe above. "
+        "Points: measured at the load in the title (black) or at the load before (grey). "
+        f"Line: section of {label}, computed at the loads, {HOW}. Thin line: measured at rest. "
+        f"The still picture shows {shots[0].title}.",
+        f"Animation: the measured outline points over the simulated outline of {label} from rest "
+        f"to {shots[0].title}; the still picture shows the last load.",
+        film(lambda figure: _paint(figure, shots, label), len(shots), 4.6, 4.4),
+        tuple(times),
+    )
+
+
+def _shot(simulated: Floats, measured: Floats, instant: Instant) -> _Shot:
+    if instant.hold is not None:
+        title = spaced(instant.hold.label)
+    else:
+        title = f"{_MM * instant.stage:.1f} mm, interpolated"
+    closed = np.vstack([simulated, simulated[:1]])
+    return _Shot(_MM * closed, _MM * measured, instant.hold is not None, title)
+
+
+def _paint(figure: Figure, shots: list[_Shot], label: str) -> Callable[[int], None]:
+    ax = figure.subplots()
+    rest = np.vstack([shots[1].measured, shots[1].measured[:1]])
+    ax.plot(*rest.T, color="#9A9A9A", lw=0.8, label="measured at rest")
+    (points,) = ax.plot([], [], ".", color=MEASURED, ms=4, label="measured")
+    (line,) = ax.plot([], [], color=ACCEPTED, label=label)
+    everything = np.vstack([o for s in shots for o in (s.simulated, s.measured)])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    ax.set_xlim(low[0] - 3, high[0] + 3)
+    ax.set_ylim(high[1] + 3, low[1] - 3)  # the probe is above
+    ax.set(xlabel="x lateral / mm", ylabel="y depth / mm", aspect="equal")
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+
+    def turn(i: int) -> None:
+        shot = shots[i]
+        line.set_data(*shot.simulated.T)
+        points.set_data(*shot.measured.T)
+        points.set_color(MEASURED if shot.held else _BEFORE)
+        ax.set_title(f"stage at {shot.title}")
+
+    return turn

@@ -1,0 +1,153 @@
+"""replay.mcap: measurement and simulation in one timeline, to be opened in Foxglove.
+
+Topics, after /<recording> where there are several; X is `measured` or `simulated`:
+
+    /stage/measured        validate.Signal           the drive, m
+    /force/X, /pressure/X  validate.Signal           every sample as compared, every step
+    /outline/X             validate.Contour          image plane, as judged; simulated at the loads
+    /outline/X/scene       foxglove.SceneUpdate      the same as lines, the simulated one moving
+    /markers/X             validate.Markers          with names; simulated at the loads
+    /markers/X/scene       foxglove.SceneUpdate      the same as spheres, the simulated ones moving
+    /surface/simulated     foxglove.SceneUpdate      coloured by displacement, moving
+    /image/measured        foxglove.CompressedImage  where the recording has images
+    /tf                    foxglove.FrameTransforms  image and marker frames in the scene's
+
+Time is the recording's own clock, t0_ns + t. Simulated numbers are those of the method that the
+report shows, with sd 0. What is interpolated, thinned or left out stands in the metadata record
+`validate.replay`; the file stays under `MAX_BYTES` by thinning everything more.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validate.compare.result import MethodResult, Result
+from validate.recording.mcap_channels import JsonChannel, JsonMessage, write_channels
+from validate.recording.schemas import CONTOUR, MARKERS, SCHEMAS, SIGNAL
+from validate.report.environment import file_name
+from validate.report.foxglove_schemas import DEFINITIONS
+from validate.report.loads import HOW
+from validate.report.observed import shown_method
+from validate.report.replay_signals import images, signals
+from validate.report.replay_space import markers, outlines, surface, transforms
+from validate.report.replay_view import Track, View
+
+MAX_BYTES = 5_000_000
+RECORD = "validate.replay"
+INPUT = "input/"  # metadata record INPUT + name of every recording
+_NUMBERS = (SIGNAL, CONTOUR, MARKERS)
+_COARSEST = 64
+_ALL = {**SCHEMAS, **DEFINITIONS}
+
+
+def write_replay(result: Result, path: Path) -> None:
+    """Write the replay of `result` to `path`; without recordings it holds metadata only."""
+    coarse = 1
+    while True:
+        _write(result, path, coarse)
+        if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
+            return
+        coarse *= 2
+
+
+def _write(result: Result, path: Path, coarse: int) -> None:
+    found = tuple(t for view in views(result, coarse) for t in tracks(view))
+    channels = [JsonChannel(t.topic, t.schema, _ALL[t.schema]) for t in found]
+    metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
+    metadata |= {name: values for t in found for name, values in t.records}
+    write_channels(path, channels, _in_time(found), metadata)
+
+
+def views(result: Result, coarse: int = 1) -> tuple[View, ...]:
+    """One view per recording, of the accepted method or the first that finished."""
+    method = shown_method(result)
+    registered = method.registered if method else result.registered
+    runs = method.runs if method else (None,) * len(registered)
+    return tuple(
+        View(recording, seen, method, run, prefix, coarse)
+        for recording, seen, run, prefix in zip(
+            result.recordings, registered, runs, _prefixes(result), strict=True
+        )
+    )
+
+
+def _prefixes(result: Result) -> list[str]:
+    names = [r.name for r in result.recordings]
+    if len(names) == 1:
+        return [""]
+    count = Counter(names)
+    return [f"/{n}" if count[n] == 1 else f"/{i}_{n}" for i, n in enumerate(names, start=1)]
+
+
+def tracks(view: View) -> tuple[Track, ...]:
+    """Every topic of one recording, transforms first."""
+    found = [
+        *images(view),
+        *signals(view),
+        *outlines(view),
+        *markers(view),
+        *surface(view),
+    ]
+    return (*transforms(view, found), *found)
+
+
+def _in_time(found: Sequence[Track]) -> Iterator[JsonMessage]:
+    """All messages in order of time, topics in their order when equal."""
+    if not found:
+        return
+    ns = np.concatenate([t.ns for t in found])
+    which = np.repeat(np.arange(len(found)), [len(t.ns) for t in found])
+    number = np.concatenate([np.arange(len(t.ns)) for t in found])
+    for k in np.argsort(ns, kind="stable"):
+        track = found[which[k]]
+        yield JsonMessage(track.topic, int(ns[k]), track.message(int(number[k])))
+
+
+def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, str]:
+    method = shown_method(result)
+    thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
+    if coarse > 1:
+        thinned.append(f"interpolated instants: one in {coarse}")
+    return {
+        "format": "1",
+        "experiment": result.name,
+        "method": method.name if method else "",
+        "method_label": method.label if method else "",
+        "quick": "yes" if result.quick else "no",
+        "same_model": "yes" if result.same_model else "no",
+        "interpolated": f".../simulated/scene and /surface: {HOW}",
+        "thinned": "; ".join(thinned) or "nothing",
+        "left_out": "; ".join(_left_out(result, method, found)) or "nothing",
+    }
+
+
+def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:
+    if method is None:
+        yield "everything simulated: no method finished"
+        return
+    others = [m.name for m in result.methods if m is not method]
+    if others:
+        yield f"other methods: {', '.join(others)}"
+    numbers = [t.topic for t in found if t.schema in _NUMBERS]
+    topics = [topic for topic in numbers if not topic.endswith("/stage/measured")]
+    for topic in topics:
+        other = topic.replace("/measured", "/simulated")
+        if other not in topics:
+            yield f"{other}: the run does not predict it"
+    if method.scene.mesh.dimension != 3:
+        yield "surface: the mesh is planar"
+
+
+def _inputs(result: Result) -> dict[str, dict[str, str]]:
+    prefixes = _prefixes(result) if result.recordings else []
+    return {
+        INPUT + (prefix[1:] or r.name): {
+            "path": file_name(r.source.path),
+            "sha256": r.source.sha256,
+            "bytes": str(r.source.bytes),
+            "integrity": r.source.integrity,
+        }
+        for r, prefix in zip(result.recordings, prefixes, strict=True)
+    }

@@ -1,0 +1,83 @@
+"""Topics of a replay that are no geometry: stage, force, pressure and images over time."""
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.recording.image import encode_png
+from validate.recording.mcap_streams import CALIBRATION
+from validate.recording.mcap_write import CALIBRATION_KEYS
+from validate.recording.schemas import IMAGE, SIGNAL, Json, image_message, signal_message
+from validate.recording.types import Frames
+from validate.report.replay_view import Track, View, pose_records
+
+_SAMPLES = 4000  # messages of one signal, at most
+_IMAGE_BYTES = 1_500_000  # of one stream of images, about
+
+
+def signals(view: View) -> list[Track]:
+    """The stage as measured; every signal as compared, and the run's trace that predicts it."""
+    seen = view.registered
+    found = [_signal(view, "/stage/measured", seen.stage.t, seen.stage.y[:, 0], "m", seen.stage.sd)]
+    for s, name in zip(seen.signals, _names([s.quantity for s in seen.signals]), strict=True):
+        found.append(_signal(view, f"/{name}/measured", s.t, s.y, s.unit, s.sd))
+        if view.run is not None and s.trace in view.run.traces:
+            trace = view.run.traces[s.trace]
+            found.append(_signal(view, f"/{name}/simulated", view.run.t, trace.y, trace.unit, 0.0))
+    return found
+
+
+def _names(quantities: list[str]) -> list[str]:
+    """ "force.plate" is "force" when no other force is measured, else "force/plate"."""
+    first = [q.split(".")[0] for q in quantities]
+    return [
+        f if first.count(f) == 1 else q.replace(".", "/")
+        for f, q in zip(first, quantities, strict=True)
+    ]
+
+
+def _signal(view: View, topic: str, t: Floats, y: Floats, unit: str, sd: float) -> Track:
+    topic, frame = view.prefix + topic, view.registered.stage.frame
+    every = _one_in(len(t), _SAMPLES // view.coarse)
+    ns, kept = view.ns(t[::every], topic), y[::every]
+
+    def message(i: int) -> Json:
+        return signal_message(int(ns[i]), frame, unit, kept[i : i + 1], sd)
+
+    return Track(topic, SIGNAL, ns, message, _note(every, len(t), "samples"))
+
+
+def images(view: View) -> list[Track]:
+    """Every stream of images, thinned to a size in bytes; with calibration and pose."""
+    streams = view.recording.frames
+    several = len(streams) > 1
+    return [
+        _images(view, f"{view.prefix}/image/{topic.strip('/')}/measured", frames)
+        if several
+        else _images(view, f"{view.prefix}/image/measured", frames)
+        for topic, frames in streams.items()
+    ]
+
+
+def _images(view: View, topic: str, frames: Frames) -> Track:
+    size = max(1, len(encode_png(frames.images[0])) * 4 // 3)  # base64
+    every = _one_in(len(frames.t), _IMAGE_BYTES // view.coarse // size)
+    at_loads = {int(np.abs(frames.t - hold.t).argmin()) for hold in view.registered.holds}
+    kept = sorted({*range(0, len(frames.t), every), *at_loads})
+    ns = view.ns(frames.t[kept], topic)
+
+    def message(i: int) -> Json:
+        return image_message(int(ns[i]), frames.frame, frames.images[kept[i]])
+
+    scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
+    calibration = (CALIBRATION + topic, {key: repr(scale) for key, scale in scales})
+    records = (*pose_records(topic, frames.pose), calibration)
+    note = _note(every, len(frames.t), "images, and those at the loads")
+    return Track(topic, IMAGE, ns, message, note, records)
+
+
+def _one_in(count: int, most: int) -> int:
+    return max(1, -(-count // max(1, most)))
+
+
+def _note(every: int, count: int, what: str) -> str:
+    return f"one in {every} of {count} {what}" if every > 1 else ""

@@ -1,0 +1,90 @@
+"""What a replay is made from: one recording with one run, and the topics that come of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.compare.result import MethodResult
+from validate.recording.mcap_write import POSE, POSE_KEY, stamps_ns
+from validate.recording.schemas import Json
+from validate.recording.types import Recording
+from validate.register.observe import Registered
+from validate.report.loads import HOW, Instant, at_times, held
+from validate.report.numbers import spaced
+from validate.solve.types import Run
+
+Records = tuple[tuple[str, dict[str, str]], ...]
+_INSTANTS = 60  # interpolated instants of what is only looked at
+
+
+@dataclass(frozen=True)
+class Track:
+    """A topic: its schema's name, times ns (n,) int64, the message of number i.
+
+    `note` says what was thinned; `records` are the metadata records that belong to it.
+    """
+
+    topic: str
+    schema: str
+    ns: Ints
+    message: Callable[[int], Json]
+    note: str = ""
+    records: Records = ()
+
+
+@dataclass(frozen=True)
+class View:
+    """One recording and the run of the method shown; both None when no method finished.
+
+    `prefix` is empty or "/name"; `coarse` is 1 or by how much more everything is thinned.
+    """
+
+    recording: Recording
+    registered: Registered
+    method: MethodResult | None
+    run: Run | None
+    prefix: str
+    coarse: int
+
+    @property
+    def frame(self) -> str:
+        """The scene's frame: the one that images are posed in, else the stage's."""
+        seen = self.registered.outline
+        if seen is not None:
+            for contours in self.recording.contours.values():
+                if np.array_equal(contours.t, seen.t):
+                    return contours.frame
+        return self.registered.stage.frame
+
+    def local(self, name: str) -> str:
+        """The name of a frame of this recording only, never the scene's."""
+        named = f"{self.prefix[1:]}/{name}" if self.prefix else name
+        return f"{named} as recorded" if named == self.frame else named
+
+    def ns(self, t: Floats | Sequence[float], topic: str) -> Ints:
+        """Times (n,) s on the recording's clock, int64 ns."""
+        return stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), topic)
+
+    def held(self) -> tuple[Instant, ...]:
+        """What the run computed at the loads; empty without a run."""
+        return held(self.registered, self.run) if self.run is not None else ()
+
+    def moving(self) -> tuple[Instant, ...]:
+        """As `held`, with interpolated instants between, evenly spaced in time."""
+        known = self.held()
+        if self.run is None or len(known) < 2:
+            return known
+        times = np.linspace(known[0].t, known[-1].t, max(1, _INSTANTS // self.coarse) + 1)
+        return at_times(self.registered, self.run, times)
+
+
+def load_of(instant: Instant) -> str:
+    """The load of an instant in words."""
+    return spaced(instant.hold.label) if instant.hold else f"{1e3 * instant.stage:.2f} mm, {HOW}"
+
+
+def pose_records(topic: str, pose: Floats) -> Records:
+    """The record in which our readers find T_frame_from_image (4, 4) of a topic."""
+    return ((POSE + topic, {POSE_KEY: " ".join(repr(v) for v in pose.ravel().tolist())}),)

@@ -1,0 +1,177 @@
+"""Shapes a block can hold: what the mesh asks of any of them, and one made of parallel slices."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import map_coordinates
+
+from validate.arrays import Floats, checked
+from validate.errors import SceneError
+
+_TABLE = 400  # places along the axis of the surface's table
+_HALVINGS = 45  # of the ray that is cut with the surface
+
+
+class InclusionShape(Protocol):
+    """A closed surface in scene coordinates, m."""
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """Middle of its bounding box."""
+
+    @property
+    def reach(self) -> Floats:
+        """Half extents (3,) of its bounding box."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the circle of its largest section's area."""
+
+    @property
+    def volume(self) -> float:
+        """m^3."""
+
+    def distance(self, points: Floats) -> Floats:
+        """Signed distance (n,) of points (n, 3), negative inside."""
+
+    def project(self, points: Floats) -> Floats:
+        """Points (n, 3) moved onto the surface."""
+
+
+@dataclass(frozen=True)
+class SlicedShape:
+    """An inclusion between parallel sections: T_scene_from_stack (4, 4), stack z along the axis.
+
+    positions (n,) m along z, growing; centres (n, 2) m; radii (n, a) m of each section at a equally
+    spaced polar angles from x on; ends (2,) m where the inclusion vanishes. Between the sections
+    the centre moves linearly and the squared radius as a monotone cubic that is 0 at the ends:
+    exact for cylinders, ends of spheres within h^2 / 4 of the squared radius. Every section must be
+    star-shaped about its centre. Raises `SceneError` for sections out of order or not positive.
+    """
+
+    pose: Floats
+    positions: Floats
+    centres: Floats
+    radii: Floats
+    ends: Floats
+
+    def __post_init__(self) -> None:
+        n = len(self.positions)
+        shapes = {"pose": (4, 4), "positions": (n,), "centres": (n, 2), "ends": (2,)}
+        for name, shape in [*shapes.items(), ("radii", (n, None))]:
+            value = checked(getattr(self, name), f"slices: {name}", shape, error=SceneError)
+            object.__setattr__(self, name, value)
+        along = np.concatenate([self.ends[:1], self.positions, self.ends[1:]])
+        if n < 2 or (np.diff(along) <= 0).any():
+            raise SceneError(
+                f"{n} slices between {1e3 * self.ends[0]:.2f} and {1e3 * self.ends[1]:.2f} mm: "
+                "two or more with growing positions between the ends are needed"
+            )
+        if (self.radii <= 0).any() or self.radii.shape[1] < 8:
+            raise SceneError(
+                f"slices: radii {self.radii.shape}, smallest {1e3 * self.radii.min():.3g} mm; "
+                "positive ones at 8 or more angles are needed"
+            )
+
+    @cached_property
+    def _squares(self) -> Floats:
+        """Squared radii (_TABLE, a) m^2 at equal steps between the ends."""
+        zero = np.zeros((1, self.radii.shape[1]))
+        along = np.concatenate([self.ends[:1], self.positions, self.ends[1:]])
+        squares = PchipInterpolator(along, np.concatenate([zero, self.radii**2, zero]))
+        return np.asarray(np.maximum(squares(np.linspace(self.ends[0], self.ends[1], _TABLE)), 0.0))
+
+    @cached_property
+    def volume(self) -> float:
+        """m^3 of the surface that `distance` and `project` use."""
+        areas = np.pi * self._squares.mean(axis=1)
+        return float(np.trapezoid(areas, np.linspace(self.ends[0], self.ends[1], _TABLE)))
+
+    @cached_property
+    def radius(self) -> float:
+        return float(np.sqrt(self._squares.mean(axis=1).max()))
+
+    @cached_property
+    def _box(self) -> Floats:
+        points = self.surface()
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        x, y, z = self._box.mean(axis=0).tolist()
+        return x, y, z
+
+    @property
+    def reach(self) -> Floats:
+        return np.asarray(np.diff(self._box, axis=0)[0] / 2)
+
+    def surface(self, along: int = 60, around: int = 72) -> Floats:
+        """Points (along * around, 3) m of the surface in scene coordinates, denser at the ends."""
+        middle, half = self.ends.mean(), np.diff(self.ends)[0] / 2
+        z = middle - half * np.cos(np.linspace(0, np.pi, along))
+        angle = np.arange(around) * (2 * np.pi / around)
+        z, angle = (a.ravel() for a in np.meshgrid(z, angle, indexing="ij"))
+        r = self._radius(z, angle)
+        xy = self._axis(z) + r[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return np.column_stack([xy, z]) @ self.pose[:3, :3].T + self.pose[:3, 3]
+
+    def distance(self, points: Floats) -> Floats:
+        """Signed distance (n,) m along the ray from the axis through each point."""
+        local, foot = self._with_foot(points)
+        away = np.linalg.norm(local - foot, axis=1)
+        return np.asarray(away - self._cut(foot, local - foot))
+
+    def project(self, points: Floats) -> Floats:
+        """Points (n, 3) moved onto the surface along rays from the axis."""
+        local, foot = self._with_foot(points)
+        away = local - foot
+        length = np.linalg.norm(away, axis=1, keepdims=True)
+        moved = foot + self._cut(foot, away)[:, None] * away / np.maximum(length, 1e-300)
+        return np.asarray(moved @ self.pose[:3, :3].T + self.pose[:3, 3])
+
+    def _with_foot(self, points: Floats) -> tuple[Floats, Floats]:
+        """Points in stack coordinates and the axis point that each belongs to, both (n, 3)."""
+        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
+        cap = min(self.radius, float(np.diff(self.ends)[0]) / 2)
+        z = np.clip(local[:, 2], self.ends[0] + cap, self.ends[1] - cap)
+        return local, np.column_stack([self._axis(z), z])
+
+    def _axis(self, z: Floats) -> Floats:
+        """Centres (n, 2) at z (n,), the outer slices' slope continued beyond them."""
+        x = [self._extended(z, self.centres[:, i]) for i in (0, 1)]
+        return np.stack(x, axis=1)
+
+    def _extended(self, z: Floats, values: Floats) -> Floats:
+        p = self.positions
+        i = np.clip(np.searchsorted(p, z) - 1, 0, len(p) - 2)
+        return np.asarray(values[i] + (z - p[i]) * (values[i + 1] - values[i]) / (p[i + 1] - p[i]))
+
+    def _radius(self, z: Floats, angle: Floats) -> Floats:
+        """Radius (n,) of the surface at z and polar angle; 0 beyond the ends."""
+        low, high = self.ends
+        count = self.radii.shape[1]
+        rows = (z - low) / (high - low) * (_TABLE - 1)
+        columns = np.mod(angle, 2 * np.pi) / (2 * np.pi) * count
+        table = np.concatenate([self._squares, self._squares[:, :1]], axis=1)
+        squares = map_coordinates(table, [rows, columns], order=1, mode="constant", cval=0.0)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    def _inside(self, local: Floats) -> Floats:
+        away = local[:, :2] - self._axis(local[:, 2])
+        radius = self._radius(local[:, 2], np.arctan2(away[:, 1], away[:, 0]))
+        return np.asarray(np.linalg.norm(away, axis=1) < radius)
+
+    def _cut(self, foot: Floats, away: Floats) -> Floats:
+        """Distance (n,) from the foot to the surface along `away` (n, 3)."""
+        length = np.linalg.norm(away, axis=1, keepdims=True)
+        ray = away / np.maximum(length, 1e-300)
+        low = np.zeros(len(foot))
+        high = np.full(len(foot), 2 * float(self.radii.max()) + float(np.diff(self.ends)[0]))
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            inside = self._inside(foot + middle[:, None] * ray)
+            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        return np.asarray((low + high) / 2)

@@ -1,0 +1,298 @@
+"""Static Newton for large strain: load steps with cut-back, line search, reused factorisations.
+
+Departures from a textbook Newton: a factorisation is kept, across steps too, while every iteration
+shrinks the error by `contraction` or better (Shamanskii 1967); the last one is remembered together
+with the state it led to, so that stepping on from there needs no new one. Results depend on that
+memory within the tolerance only.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.system import System
+from validate.scene.scene import Scene
+from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
+from validate.solve.types import Ending, State, Stepper, Trace
+
+_VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
+_NEGATIVE, _MADE = "tangent.negative_pivots", "newton.factorisations"
+_NOTHING_DONE = MappingProxyType({_NEGATIVE: 0.0, _MADE: 0.0})
+_HALVINGS = 8  # of a Newton correction in the line search
+
+
+@dataclass(frozen=True)
+class StaticNewton:
+    """Settings. `fluid` "exact" keeps every cavity at volume_ratio V0, "none" leaves it empty.
+
+    `tolerance`: residual relative to the forces that act. `contraction`: the factorisation is kept
+    while iterations shrink the error to this share of the last; 0 makes a new one every time.
+    `watch`: the tangent's inertia is taken anew when drives moved by this share of the body's size.
+    """
+
+    fluid: Literal["exact", "none"] = "exact"
+    volume_ratio: float = 1.0
+    tolerance: float = 1e-9
+    max_iterations: int = 25
+    max_cuts: int = 6
+    contraction: float = 0.2
+    watch: float = 0.01
+
+    def __post_init__(self) -> None:
+        if not self.volume_ratio > 0:
+            raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
+        if not (self.tolerance > 0 and self.max_iterations >= 1 and self.max_cuts >= 0):
+            raise SceneError(
+                f"Newton with tolerance {self.tolerance:g}, {self.max_iterations} iterations, "
+                f"{self.max_cuts} cuts: tolerance and iterations must be positive"
+            )
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for a linear law or a body that can move rigidly."""
+        scene = system.scene
+        sets = [c.facets for c in scene.cavities] + [d.facets for d in scene.drives]
+        if not sets:
+            raise SceneError("scene without drive and cavity: nothing moves")
+        nodes = np.unique(np.concatenate([scene.mesh.facet_nodes(name) for name in sets]))
+        problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
+        rest = _rest(problem)
+        return NewtonStepper(self, problem, nodes, rest.balance, _Memory(rest))
+
+
+@dataclass(frozen=True)
+class Found:
+    """An equilibrium, the tangent near it, and what it took."""
+
+    balance: Balance
+    tangent: Tangent
+    drives: Floats
+    iterations: int = 0
+    factorisations: int = 0
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Why a load step found none; `negative` is the most that a tangent on the way had."""
+
+    ending: Ending
+    why: str
+    negative: int = 0
+
+
+class _Memory:
+    """The last equilibrium that was found: a step from it needs no new tangent. Only one is kept,
+    because a factorisation of a large body takes gigabytes."""
+
+    def __init__(self, last: Found) -> None:
+        self.last = last
+
+
+def _rest(problem: Equilibrium) -> Found:
+    """The body at rest; `SceneError` where it can move rigidly."""
+    cavities, k = len(problem.rest_volumes), len(problem.system.scene.drives)
+    u, ones = np.zeros(len(problem.system.moves)), np.ones(cavities)
+    balance = problem.balance(u, np.zeros(cavities), ones)
+    tangent = problem.tangent(balance, np.zeros(k))
+    if tangent.factor.negative_pivots:
+        raise SceneError(
+            f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an element "
+            "is inverted; refine the mesh"
+        )
+    return Found(balance, tangent, np.zeros(k), factorisations=1)
+
+
+@dataclass(frozen=True)
+class NewtonStepper:
+    """`surface_nodes` (s,) are the nodes that a state's `surface` shows."""
+
+    settings: StaticNewton
+    problem: Equilibrium
+    surface_nodes: Ints
+    start: Balance
+    memory: _Memory
+
+    @property
+    def scene(self) -> Scene:
+        return self.problem.system.scene
+
+    def rest(self) -> State:
+        return self._state(self.start, np.zeros(len(self.scene.drives)))
+
+    def step(self, state: State, drives: Floats) -> State:
+        """From the state's load to `drives` (k,) m, at once or in halves of the way.
+
+        A failure keeps the last load that was reached and says what stopped the body there.
+        """
+        target = np.full(len(state.pressures), self.settings.volume_ratio)
+        good = self._known(state, target)
+        kept = not self.problem.constrained or np.abs(good.balance.ratios - target).max() <= _VOLUME
+        if kept and (drives == state.drives).all():
+            numbers = MappingProxyType({**state.numbers, _MADE: 0.0})
+            return replace(state, updates=0, numbers=numbers)
+        return self._walked(good, np.array(drives, dtype=np.float64), target)
+
+    def _known(self, state: State, target: Floats) -> Found:
+        """The equilibrium of a state: remembered, or its forces and tangent made again."""
+        if state.u is None:
+            raise SceneError("a state without displacements: begin with this stepper's rest()")
+        if self.memory.last.balance.u is state.u:
+            return replace(self.memory.last, iterations=0, factorisations=0)
+        balance = self.problem.balance(state.u, state.pressures, target)
+        tangent = self.problem.tangent(balance, state.drives)
+        return Found(balance, tangent, state.drives, factorisations=1)
+
+    def _walked(self, good: Found, drives: Floats, target: Floats) -> State:
+        """Load steps to `drives`; each failure halves them, to 2^-max_cuts of the way at least."""
+        begin, ratios = good.drives, good.balance.ratios
+        done, size = 0.0, 1.0
+        while done < 1:
+            share = min(done + size, 1.0)
+            load = drives if share == 1 else begin + share * (drives - begin)
+            found = self._load_step(good, load, ratios + share * (target - ratios))
+            if isinstance(found, Found):
+                good, done = _added(good, found), share
+            elif size > 2.0**-self.settings.max_cuts:
+                size /= 2
+            else:
+                return self._found_state(good, _stopped(found, good.drives))
+        self.memory.last = good
+        return self._found_state(good)
+
+    def _load_step(self, good: Found, drives: Floats, target: Floats) -> Found | Failed:
+        """One load step: linear prediction, corrections, and what the result must satisfy."""
+        move = drives - good.drives
+        at = self._forces(self.problem.predicted(good.balance, good.tangent, move, target), target)
+        if isinstance(at, Failed):
+            return replace(at, negative=good.tangent.negative)
+        try:
+            found = self._corrected(replace(good, balance=at, drives=drives), target)
+            return found if isinstance(found, Failed) else self._checked(found)
+        except SceneError as vanished:
+            return Failed("not_converged", str(vanished), negative=1)
+
+    def _corrected(self, start: Found, target: Floats) -> Found | Failed:
+        """Newton: a new tangent only where the old one no longer contracts."""
+        at, tangent, made, negative = start.balance, start.tangent, 0, 0
+        force, own, renew = at.acting, False, self.settings.contraction == 0
+        for iteration in range(self.settings.max_iterations):
+            if self._settled(at):
+                return Found(at, tangent, start.drives, iteration, made)
+            if renew:
+                tangent, made, own = self.problem.tangent(at, start.drives), made + 1, True
+                negative = max(negative, tangent.negative)
+            new = self._searched(at, tangent, target, force, halvings=_HALVINGS if own else 0)
+            if new is None and own:
+                why = f"no step lowers the residual {at.unbalanced / at.acting:.1e}"
+                return Failed("not_converged", why, negative)
+            renew = new is None or new.merit(force) > self.settings.contraction * at.merit(force)
+            at, own = new or at, False
+        if self._settled(at):
+            return Found(at, tangent, start.drives, self.settings.max_iterations, made)
+        why = (
+            f"residual {at.unbalanced / at.acting:.1e} after {self.settings.max_iterations} "
+            f"iterations, tolerance {self.settings.tolerance:.1e}"
+        )
+        return Failed("not_converged", why, negative)
+
+    def _searched(
+        self, at: Balance, tangent: Tangent, target: Floats, force: float, halvings: int
+    ) -> Balance | None:
+        """The correction, halved until it lowers the merit and inverts nothing; None: it never."""
+        full = self.problem.correction(at, tangent, target)
+        for share in 0.5 ** np.arange(halvings + 1):
+            u = at.u + share * (full.u - at.u)
+            pressures = at.pressures + share * (full.pressures - at.pressures)
+            new = self._forces(replace(full, u=u, pressures=pressures), target)
+            if isinstance(new, Balance) and new.merit(force) < at.merit(force):
+                return new
+        return None
+
+    def _forces(self, at: Balance, target: Floats) -> Balance | Failed:
+        """The balance at the displacements and pressures of `at`, unless cells are inverted."""
+        bad = self.problem.body.inverted(at.u)
+        if bad:
+            words = f"{bad.count} of {bad.points} quadrature points inverted (det F <= 0)"
+            return Failed("invalid", f"{words}, first in element {bad.first}")
+        return self.problem.balance(at.u, at.pressures, target)
+
+    def _settled(self, at: Balance) -> bool:
+        return at.unbalanced <= self.settings.tolerance * at.acting and at.gap <= _VOLUME
+
+    def _checked(self, found: Found) -> Found | Failed:
+        """The law must hold there; the tangent is renewed where the body has moved on."""
+        body, least = self.problem.body, self.problem.body.law.least_stretch
+        if least:
+            stretches = body.principal_stretches(found.balance.u).min(axis=1)
+            if stretches.min() < least:
+                words = f"principal stretch {stretches.min():.3f} in element {stretches.argmin()}"
+                return Failed("invalid", f"beyond the law's validity: {words} is below {least:.3f}")
+        size = float(np.ptp(self.scene.mesh.nodes, axis=0).max())
+        moved = np.abs(found.drives - found.tangent.inputs).max(initial=0.0)
+        if moved <= self.settings.watch * size:
+            return found
+        tangent = self.problem.tangent(found.balance, found.drives)
+        return replace(found, tangent=tangent, factorisations=found.factorisations + 1)
+
+    def _found_state(self, found: Found, failure: tuple[Ending, str] | None = None) -> State:
+        did = {_NEGATIVE: float(found.tangent.negative), _MADE: float(found.factorisations)}
+        state = self._state(found.balance, found.drives, did)
+        return replace(state, updates=found.iterations, failure=failure)
+
+    def _state(
+        self, at: Balance, drives: Floats, did: Mapping[str, float] = _NOTHING_DONE
+    ) -> State:
+        scene, forces = self.scene, self.problem.forces(at)
+        numbers = {f"{d.name}.force": float(f) for d, f in zip(scene.drives, forces, strict=True)}
+        for cavity, ratio in zip(scene.cavities, at.ratios, strict=True):
+            numbers[f"{cavity.name}.volume_ratio"] = float(ratio)
+        at.u.setflags(write=False)
+        surface, kept = (
+            at.u.reshape(-1, 3)[self.surface_nodes],
+            MappingProxyType({**numbers, **did}),
+        )
+        return State(drives, at.pressures, 0, surface, None, at.u, kept)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, 3) m of all nodes."""
+        if state.u is None:
+            raise SceneError("a state without displacements: begin with this stepper's rest()")
+        return state.u.reshape(-1, 3)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        """Drives, plate forces, pressures, volumes, and what Newton did, of every step."""
+        traces = {}
+        for j, drive in enumerate(self.scene.drives):
+            traces[f"{drive.name}.displacement"] = Trace(
+                np.array([s.drives[j] for s in states]), "m"
+            )
+        for i, cavity in enumerate(self.scene.cavities):
+            traces[f"{cavity.name}.pressure"] = Trace(
+                np.array([s.pressures[i] for s in states]), "Pa"
+            )
+        for name in self.rest().numbers:
+            unit = "N" if name.endswith(".force") else "1"
+            traces[name] = Trace(np.array([s.numbers[name] for s in states]), unit)
+        return traces
+
+
+def _added(before: Found, found: Found) -> Found:
+    """`found` with the work of the load steps before it."""
+    return replace(
+        found,
+        iterations=before.iterations + found.iterations,
+        factorisations=before.factorisations + found.factorisations,
+    )
+
+
+def _stopped(failed: Failed, drives: Floats) -> tuple[Ending, str]:
+    """The outcome of a step whose smallest load step failed, with the last good load."""
+    load = ", ".join(f"{1e3 * d:.4g}" for d in drives)
+    if failed.negative and "validity" not in failed.why:
+        words = f"tangent not positive definite ({failed.negative} negative pivots)"
+        return "not_converged", f"no static solution beyond {load} mm: {words}; {failed.why}"
+    return failed.ending, f"{failed.why}; last good load {load} mm"

@@ -1,0 +1,110 @@
+"""A static scheme solved on a grid of loads, and interpolated between them.
+
+A body without memory is in one state per load, so a recorded stage that ramps and holds needs no
+solution per sample: cubic Lagrange interpolation between converged states is exact at the grid and
+of fourth order between. Its step time is that of the interpolation, not of a solution.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.system import System
+from validate.scene.scene import Scene
+from validate.solve.types import Ending, Scheme, State, Stepper, Trace
+
+_NODES = 4  # of the interpolation
+_BEYOND = 0.01  # grid steps of extrapolation: the noise of a stage that stands at the last load
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Solves `inner` at whole multiples of `step` m of the one drive."""
+
+    inner: Scheme
+    step: float
+
+    def __post_init__(self) -> None:
+        if not self.step > 0:
+            raise SceneError(f"load grid of {self.step:g} m: it must be positive")
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` unless the scene has exactly one drive."""
+        if len(system.scene.drives) != 1:
+            raise SceneError(f"{len(system.scene.drives)} drives: a load grid is for one")
+        inner = self.inner.prepare(system)
+        return TabulatedStepper(inner, self.step, _Table(inner.rest()))
+
+
+class _Table:
+    """Converged states at 0, 1, 2 ... grid steps, and what ended the last attempt."""
+
+    def __init__(self, rest: State) -> None:
+        self.states = [rest]
+        self.failure: tuple[Ending, str] | None = None
+
+
+@dataclass(frozen=True)
+class TabulatedStepper:
+    inner: Stepper
+    grid: float
+    table: _Table
+
+    @property
+    def scene(self) -> Scene:
+        return self.inner.scene
+
+    def rest(self) -> State:
+        return self.table.states[0]
+
+    def step(self, state: State, drives: Floats) -> State:
+        """The state at `drives` (1,) m; a failure beyond the last load that has a solution."""
+        place = float(drives[0]) / self.grid
+        self._extend(max(int(np.ceil(place - _BEYOND)), _NODES - 1))
+        last = len(self.table.states) - 1
+        if place > last + _BEYOND:
+            return replace(self.table.states[last], failure=self.table.failure)
+        if abs(place - round(place)) < 1e-9 and 0 <= round(place) <= last:
+            return replace(self.table.states[round(place)], drives=drives)
+        first = max(0, min(int(np.floor(place)) - 1, last - _NODES + 1))
+        return self._between(place, first, min(first + _NODES, last + 1), drives)
+
+    def _extend(self, count: int) -> None:
+        table = self.table
+        while len(table.states) <= count and table.failure is None:
+            load = np.array([len(table.states) * self.grid])
+            found = self.inner.step(table.states[-1], load)
+            if found.failure:
+                table.failure = found.failure
+            else:
+                table.states.append(found)
+
+    def _between(self, place: float, first: int, end: int, drives: Floats) -> State:
+        states, nodes = self.table.states[first:end], np.arange(first, end, dtype=float)
+        weights = [float(np.prod([(place - o) / (n - o) for o in nodes if o != n])) for n in nodes]
+
+        def mixed(values: Sequence[Floats]) -> Floats:
+            return np.asarray(sum(w * v for w, v in zip(weights, values, strict=True)))
+
+        numbers = {
+            name: float(sum(w * s.numbers[name] for w, s in zip(weights, states, strict=True)))
+            for name in states[0].numbers
+        }
+        return State(
+            drives,
+            mixed([s.pressures for s in states]),
+            0,
+            mixed([s.surface for s in states]),
+            None,
+            mixed([s.u for s in states if s.u is not None]),
+            numbers,
+        )
+
+    def field(self, state: State) -> Floats:
+        return self.inner.field(state)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        return self.inner.traces(states)
