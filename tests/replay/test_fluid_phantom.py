@@ -194,6 +194,24 @@ SPOILED: tuple[tuple[str, Spoil, type[ValidateError], str], ...] = (
         "'load_cell' is in mm, expected N",
     ),
     (
+        "force of the wrong sign",
+        lambda r: with_signal(r, "load_cell", lambda s: replace(s, y=-s.y)),
+        RegistrationError,
+        "'force.plate' falls by .* N as the stage closes by 9",
+    ),
+    (
+        "pressure of the wrong sign",
+        lambda r: with_signal(r, "pressure", lambda s: replace(s, y=-s.y)),
+        RegistrationError,
+        "'pressure' falls",
+    ),
+    (
+        "markers in mm",
+        lambda r: with_markers(r, lambda m: replace(m, x=1000 * m.x, sd=1000 * m.sd)),
+        RegistrationError,
+        "wrong unit",
+    ),
+    (
         "late signal",
         lambda r: with_signal(r, "pressure", lambda s: replace(s, t=s.t + 1000)),
         ValidateError,
@@ -220,6 +238,43 @@ def test_bad_recordings_are_refused_in_one_line(
     with pytest.raises(error, match=says) as caught:
         judged(phantom, spoil(good))
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("setting", "says"),
+    [
+        ({"loads": "0.0,0.003"}, "above 0"),
+        ({"loads": "0.003,0.003"}, "stand once"),
+        ({"mesh.order": "3"}, "one of 1, 2"),
+        ({"methods.p2_fluid.order": "0"}, "one of 1, 2"),
+        ({"mesh.nodes_x": "100000"}, "at most 100000 are taken"),
+        ({"ranges.E": "-0.5"}, "ranges.E = -0.5"),
+        ({"ranges.friction": "5"}, "ranges.friction = 5"),
+        (
+            {"mesh.finer_x": "7", "mesh.finer_y": "8", "mesh.finer_z": "11"},
+            "the second mesh is not finer",
+        ),
+    ],
+    ids=lambda x: next(iter(x)) if isinstance(x, dict) else "",
+)
+def test_settings_that_mean_nothing_are_refused(
+    phantom: Experiment, setting: dict[str, str], says: str
+) -> None:
+    quick = {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
+    with pytest.raises(ValidateError, match=says):
+        compare(phantom, Options({**quick, **setting}, ("p2_fluid",)))
+
+
+def test_an_inclusion_meshed_elsewhere_is_told(phantom: Experiment) -> None:
+    result = compare(phantom, Options({"inclusion.centre_x": "0.030"}, ("p1_dry",)))
+    assert any("centre is 1.5" in note or "centre is 1.6" in note for note in result.notes)
+    untouched = compare(phantom, Options({}, ("p1_dry",)))
+    assert not any("meshed inclusion" in note for note in untouched.notes)
+
+
+def test_another_order_is_in_the_label(phantom: Experiment) -> None:
+    result = compare(phantom, Options({"mesh.order": "2"}, ("p1_dry",)))
+    assert result.methods[0].label == "P1 without fluid [order 2]"
 
 
 def test_lost_markers_are_left_out_and_counted(phantom: Experiment, good: Recording) -> None:

@@ -121,7 +121,7 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
     found, _ = made(small_result())
     table = next(p for p in found["checks"].parts if p.kind == "table")
     assert [c.text for c in table.rows[0]] == [
-        "soft <cube>", "force.plate@2mm", "N",
+        "soft", "force.plate@2mm", "N",
         "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
         "✓ agrees", "|E| is 0.5 u_val",
     ]  # fmt: skip

@@ -193,5 +193,8 @@ def _volume_axes(figure: Figure, result: Result, drawn: list[tuple[MethodResult,
         ax.plot(_stage(result.registered[0], run.t), run.traces[name].y, color=look.colour,
                 ls=look.dash, lw=look.width, label=method.label)  # fmt: skip
     ax.set(xlabel="stage displacement / mm", ylabel="volume / rest volume")
+    low, high = ax.get_ylim()
+    if high - low < 0.01:  # an axis of rounding errors would look like an effect
+        ax.set_ylim(0.99, 1.01)
     handles, labels = ax.get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=2)

@@ -22,7 +22,7 @@ def checks(result: Result) -> Section | None:
     """Every check of the accepted methods; None when there is none."""
     if not result.checks:
         return None
-    rows = tuple((Cell(m.label), *_row(c)) for m in result.methods for c in m.checks)
+    rows = tuple((Cell(m.name), *_row(c)) for m in result.methods for c in m.checks)
     table = Table(
         "E = simulation less measurement; for many points the part of the rms that noise does not "
         "explain. u_val² = u_D² (measurement) + u_num² (mesh) + u_input² (declared ranges), "
@@ -33,7 +33,7 @@ def checks(result: Result) -> Section | None:
         rows,
         words=(0, 1, 2, 10, 11),
     )  # fmt: skip
-    methods = "; ".join(m.label for m in result.methods if m.checks)
+    methods = "; ".join(f"{m.name} ({m.label})" for m in result.methods if m.checks)
     return section(
         "checks",
         "Checks",
