@@ -150,6 +150,12 @@ def swapped(markers: Markers) -> Markers:
     return replace(markers, x=x)
 
 
+def swapped_late(markers: Markers) -> Markers:
+    x = markers.x.copy()
+    x[2:, [3, 4]] = x[2:, [4, 3]]
+    return replace(markers, x=x)
+
+
 def shuffled(markers: Markers) -> Markers:
     order = np.random.default_rng(5).permutation(len(markers.names))
     return replace(markers, x=markers.x[:, order])
@@ -179,6 +185,12 @@ def mirrored_image(contours: Contours) -> Contours:
 
 SPOILED: tuple[tuple[str, Spoil, type[ValidateError], str], ...] = (
     ("swapped", lambda r: with_markers(r, swapped), RegistrationError, "m04"),
+    (
+        "swapped at a load",
+        lambda r: with_markers(r, swapped_late),
+        RegistrationError,
+        "m04, m05 look swapped at t = ",
+    ),
     ("shuffled", lambda r: with_markers(r, shuffled), RegistrationError, "relabel|permut|swap"),
     ("mirrored", lambda r: with_markers(r, mirrored), RegistrationError, "mirror"),
     ("collinear", lambda r: with_markers(r, collinear), RegistrationError, "line|collinear"),

@@ -15,6 +15,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
 from validate.recording.types import Contours, Markers, Signal
+from validate.register.labels import require_steady_labels
 from validate.register.plane import SurfaceSampler, require_rigid, section
 from validate.register.quality import Registration, register_points
 from validate.scene.mesh import Mesh
@@ -175,6 +176,7 @@ def observe_markers(
     if sampling == "barycentric":
         require_inside(rows, markers.names, 1e-4)
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
+    require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
     tre = registration.tre_at(rest)
     return MarkerObservation(markers.t, markers.names, x, rest, rows, markers.sd, tre, registration)
 

@@ -1,0 +1,39 @@
+"""Labels that change during a recording: markers swapped at a load though right at rest."""
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from validate.arrays import Floats
+from validate.errors import RegistrationError
+
+CLEARLY = 3.0  # times nearer under another label
+BEYOND = 6.0  # standard deviations per axis that noise does not explain
+
+
+def require_steady_labels(
+    names: tuple[str, ...], rest: Floats, x: Floats, t: Floats, sd: float
+) -> None:
+    """Raises `RegistrationError` naming markers of x (nt, k, 3) m that changed places.
+
+    A compressed body moves its surface nearly affinely: rest (k, 3) m is carried to every instant
+    by the affine map that fits best, and each marker must lie nearest to its own image, unless the
+    difference is within the noise sd m. Markers not seen (NaN) are left out.
+    """
+    for ti, frame in zip(t, x, strict=True):
+        seen = np.flatnonzero(np.isfinite(frame).all(axis=1))
+        if len(seen) < 6:
+            continue
+        start = np.hstack([rest[seen], np.ones((len(seen), 1))])
+        expected = start @ np.linalg.lstsq(start, frame[seen], rcond=None)[0]
+        apart = np.linalg.norm(expected[:, None] - frame[seen][None], axis=2)
+        own = np.diag(apart)
+        _, nearest = linear_sum_assignment(apart**2)
+        best = apart[np.arange(len(seen)), nearest]
+        moved = (nearest != np.arange(len(seen))) & (own > BEYOND * sd) & (own > CLEARLY * best)
+        if moved.any():
+            shown = ", ".join(names[i] for i in seen[moved][:6])
+            raise RegistrationError(
+                f"markers {shown} look swapped at t = {ti:.2f} s: {1e3 * own[moved].max():.1f} mm "
+                f"from where the others put them, {1e3 * best[moved].max():.1f} mm after "
+                "relabelling; mend their names"
+            )
