@@ -93,7 +93,7 @@ def recording(name: str, seed: int) -> tuple[Recording, Registered]:
         0,
         signals={"stage": stage, "load_cell": cell},
         clock={"load_cell": clock},
-        metadata={"specimen": {"height_m": "0.02", "origin": "/home/someone/file.csv"}},
+        metadata={"specimen": {"height_m": "0.02", "origin": "/srv/private/file.csv"}},
     )
     seen = SignalObservation("force.plate", "stage.force", TIMES, force, "N", 0.02)
     holds = (Hold("0mm", 0.0, 0.0), Hold("2mm", PRESS, 1.0))
