@@ -270,7 +270,7 @@ def identify(recordings: Sequence[Recording], parameters: Parameters) -> Identif
     )
     headline = (
         f"The modulus lies between {found.mean / bonded / 1e3:.1f} kPa (bonded plates) and "
-        f"{found.mean / slip / 1e3:.1f} kPa (slipping): force alone cannot say which"
+        f"{found.mean / 1e3:.1f} kPa (slipping): force alone cannot say which"
     )
     notes = _notes(found, bonded, half, height)
     return Identified(replace(p, material=material), scores, notes, headline)

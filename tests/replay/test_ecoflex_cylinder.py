@@ -49,6 +49,7 @@ def test_the_checks_hold_and_count_every_sample(result: Result) -> None:
     assert len(result.recordings) == 5
     assert [(p.verdict, p.fault) for p in result.published] == [("reproduced", "")]
     assert any("Whether the plates slipped" in note for note in result.notes)
+    assert "kPa (bonded plates) and 107.7 kPa (slipping)" in result.sentence
 
 
 def test_every_law_is_compared_within_its_validity_and_no_further(result: Result) -> None:
