@@ -215,3 +215,12 @@ def test_check_shows_every_figure_and_fails_when_one_moves(
     assert here("check", "fluid_phantom")[0] == 1
     monkeypatch.setattr(checking, "compare", lambda *_: replace(phantom_result, published=()))
     assert here("check", "fluid_phantom")[0] == 1  # nothing compared
+
+
+def test_check_of_an_experiment_without_printed_figures_rests_on_its_checks(
+    phantom_result: Result,
+) -> None:
+    bare = replace(phantom_result, published=())
+    assert checking._holds(bare, declared=False)
+    assert not checking._holds(bare, declared=True)
+    assert not checking._holds(replace(bare, methods=()), declared=False)
