@@ -1,9 +1,15 @@
-"""Stiffness of linear elasticity (paper 000, eqs 1-5), pointwise or with nodal mean dilatation."""
+"""Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7), by scikit-fem.
+
+The stiffness is pointwise or with nodal mean dilatation; materials may differ from cell to cell.
+"""
+
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 from skfem import (
     Basis,
+    BilinearForm,
     ElementTetP1,
     ElementTetP2,
     ElementTriP1,
@@ -16,6 +22,7 @@ from skfem import (
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.arrays import Floats, Ints
+from validate.errors import SceneError
 from validate.fem.surface import surface_stiffness
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
@@ -39,28 +46,80 @@ def stiffness(scene: Scene) -> sparse.csr_array:
     if scene.dilatation == "nodal_mean":
         K = _nodal_mean_stiffness(scene.mesh, scene.material)
     else:
-        K = _assembled(scene.mesh, scene.material.E, scene.material.nu)
+        lame = scene.per_cell(_lambda), scene.per_cell(_mu)
+        K = _assembled(scene.mesh, *lame)
     for part in surface_stiffness(scene):
         K = K + part
     return sparse.csr_array(K)
 
 
-def _assembled(mesh: Mesh, E: float, nu: float) -> sparse.csr_array:
+def stiffness_damping(scene: Scene) -> sparse.csr_array:
+    """The share of C (N, N) N s/m that is proportional to K: sum over cells of beta_e K_e."""
+    if scene.dilatation == "nodal_mean":
+        return sparse.csr_array(scene.material.stiffness_damping * stiffness(scene))
+    beta = scene.per_cell(lambda m: m.stiffness_damping)
+    return _assembled(scene.mesh, beta * scene.per_cell(_lambda), beta * scene.per_cell(_mu))
+
+
+def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
+    """Consistent M (N, N) kg (2-D: kg per metre); with `damping`, its share of C in N s/m.
+
+    Raises `SceneError` where a material has no density.
+    """
+    materials = (scene.material, *(r.material for r in scene.regions))
+    if any(m.rho is None for m in materials):
+        raise SceneError("a dynamic scheme needs the density; set rho kg/m3 of every material")
+    weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
+    basis = _basis(scene.mesh, vector=False)
+    _require_node_major(basis.doflocs, scene.mesh.nodes, 1)
+    scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
+    return sparse.csr_array(sparse.kron(scalar, np.eye(scene.mesh.dimension)))
+
+
+def _weighted_mass(u: Any, v: Any, w: Any) -> Any:
+    return w["weight"] * u * v
+
+
+def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
+    """Diagonal masses (N,) kg with the body's mass: row sums, for quadratic elements HRZ.
+
+    Row sums of quadratic elements are zero or negative at vertices; Hinton, Rock & Zienkiewicz
+    (1976) scale the diagonal instead.
+    """
+    if scene.mesh.order == 1:
+        return np.asarray(M.sum(axis=1), dtype=np.float64).ravel()
+    diagonal: Floats = M.diagonal()
+    return np.asarray(diagonal * (M.sum() / diagonal.sum()))
+
+
+def _lambda(m: Material) -> float:
+    return float(lame_parameters(m.E, m.nu)[0])
+
+
+def _mu(m: Material) -> float:
+    return float(lame_parameters(m.E, m.nu)[1])
+
+
+def _basis(mesh: Mesh, *, vector: bool) -> Basis:
     library_mesh, element, degree = _ELEMENTS[mesh.kind]
     corners = np.ascontiguousarray(mesh.corners.T)
     vertices = int(mesh.corners.max()) + 1
     domain = library_mesh(np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
-    basis = Basis(domain, ElementVector(element()), intorder=degree)
-    _require_node_major(basis.doflocs, mesh.nodes)
-    K = asm(linear_elasticity(*lame_parameters(E, nu)), basis)
-    return sparse.csr_array(K)
+    if vector:
+        return Basis(domain, ElementVector(element()), intorder=degree)
+    return Basis(domain, element(), intorder=2 * degree)
 
 
-def _require_node_major(places: Floats, nodes: Floats) -> None:
+def _assembled(mesh: Mesh, lam: Floats, mu: Floats) -> sparse.csr_array:
+    """Stiffness with the Lame constants (e,) Pa of every cell."""
+    basis = _basis(mesh, vector=True)
+    _require_node_major(basis.doflocs, mesh.nodes, mesh.dimension)
+    return sparse.csr_array(asm(linear_elasticity(lam[:, None], mu[:, None]), basis))
+
+
+def _require_node_major(places: Floats, nodes: Floats, per_node: int) -> None:
     """The library's unknowns must lie where ours do, or every result would be permuted."""
-    if not np.allclose(
-        places, np.repeat(nodes, nodes.shape[1], axis=0).T, atol=1e-9 * np.ptp(nodes)
-    ):
+    if not np.allclose(places, np.repeat(nodes, per_node, axis=0).T, atol=1e-9 * np.ptp(nodes)):
         raise AssertionError("scikit-fem numbers its unknowns differently from the mesh")
 
 
@@ -75,7 +134,8 @@ def _nodal_mean_stiffness(mesh: Mesh, material: Material) -> sparse.csr_array:
     kappa = material.bulk_modulus
     # A material without volume stiffness shares its deviatoric part with this one.
     pointwise = B.T @ sparse.diags_array(kappa * volumes) @ B
-    K_dev = _assembled(mesh, material.E, material.nu) - pointwise
+    ones = np.ones(len(mesh.cells))
+    K_dev = _assembled(mesh, _lambda(material) * ones, _mu(material) * ones) - pointwise
     share = _cell_to_node(mesh.corners, volumes, len(mesh.nodes))
     V = np.asarray(share.sum(axis=1))
     D = sparse.diags_array(1 / V) @ share @ B

@@ -53,6 +53,8 @@ class Body:
             raise SceneError(f"elements of kind {mesh.kind} have no hyperelastic form; use tet4")
         if scene.membranes:
             raise SceneError("membranes are linear only: drop them, or take the linear law")
+        if scene.regions:
+            raise SceneError("large strain is for one material; drop the regions")
         require_positive_cells(mesh)
         averaged = scene.dilatation == "nodal_mean"
         self.mesh, self.law = mesh, law_of(scene.material, isochoric=averaged)

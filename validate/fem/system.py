@@ -6,27 +6,60 @@ condensed inverse of paper 000, eqs 18-20, for just the inputs that the scene ha
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assemble import stiffness
+from validate.fem.assemble import lumped, mass, stiffness, stiffness_damping
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
 from validate.fem.factor import Factor, factorise
+from validate.fem.loads import load_columns
 from validate.scene.scene import Drive, Scene
 
 
 @dataclass(frozen=True)
 class System:
-    """K (N, N) N/m, `held` and `free` unknowns, moves (N, drives) of a unit drive, cavities."""
+    """A scene with its unknowns: `free` ones, moves (N, drives) of a unit drive, cavities.
+
+    Matrices are assembled when first asked for: what a scheme does not use costs nothing. K, M and
+    C are (N, N) in N/m, kg and N s/m; `masses` (N,) are the lumped ones; `loads` (N, l) are the
+    nodal forces of one newton of each load.
+    """
 
     scene: Scene
-    K: sparse.csr_array
     free: Ints
     moves: Floats
     cavities: tuple[CavitySurface, ...]
+
+    @cached_property
+    def K(self) -> sparse.csr_array:
+        return stiffness(self.scene)
+
+    @cached_property
+    def M(self) -> sparse.csr_array:
+        return mass(self.scene)
+
+    @cached_property
+    def masses(self) -> Floats:
+        return lumped(self.scene, self.M)
+
+    @cached_property
+    def C(self) -> sparse.csr_array:
+        """Rayleigh damping of every cell, alpha M_e + beta K_e (paper 001, eq 7)."""
+        C = mass(self.scene, damping=True) + stiffness_damping(self.scene)
+        return sparse.csr_array(C)
+
+    @cached_property
+    def loads(self) -> Floats:
+        return load_columns(self.scene)
+
+    @property
+    def held(self) -> Ints:
+        """The unknowns that supports, pins and drives prescribe."""
+        return np.setdiff1d(np.arange(len(self.moves)), self.free)
 
     def factor(self) -> Factor:
         """Factorisation of K over the free unknowns; `SceneError` if not positive definite."""
@@ -74,7 +107,7 @@ def build(scene: Scene) -> System:
         held[driven] = True
         moves[driven, j] = sum(drive.direction)
     cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
-    return System(scene, stiffness(scene), np.flatnonzero(~held), moves, cavities)
+    return System(scene, np.flatnonzero(~held), moves, cavities)
 
 
 def responses(system: System) -> Responses:
@@ -85,6 +118,10 @@ def responses(system: System) -> Responses:
     law = system.scene.material.law
     if law != "linear":
         raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
+    if system.scene.loads:
+        raise SceneError(
+            "response columns know drives and cavities; give loads to a dynamic scheme"
+        )
     mesh, factor = system.scene.mesh, system.factor()
     loads = [pressure_load(c, mesh.nodes).ravel() for c in system.cavities]
     columns = [_driven_field(system, factor, move) for move in system.moves.T]

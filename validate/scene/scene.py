@@ -1,10 +1,12 @@
 """The scene: a mesh, what it is made of, how it is held and driven, and the fluid in it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh
 
@@ -16,12 +18,17 @@ LawName = Literal["linear", "svk", "neo_hooke"]
 class Material:
     """Isotropic elasticity: E Pa, nu -, and the law at large strain (`fem.laws`).
 
-    Every law has this E and nu at small strain, which is all that the linear schemes use.
+    Every law has this E and nu at small strain, which is all that the linear schemes use. Dynamic
+    schemes need rho kg/m^3; Rayleigh damping is C = mass_damping M + stiffness_damping K, in 1/s
+    and s (the alpha_0 and alpha_1 of paper 001, eq 7).
     """
 
     E: float
     nu: float
     law: LawName = "linear"
+    rho: float | None = None
+    mass_damping: float = 0.0
+    stiffness_damping: float = 0.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.E) and self.E > 0):
@@ -31,6 +38,11 @@ class Material:
                 f"Poisson ratio nu = {self.nu:g}: displacement elements need -1 < nu < 0.5 "
                 "(1/(1 - 2 nu) is infinite at 0.5); use at most 0.4999"
             )
+        if self.rho is not None and not (np.isfinite(self.rho) and self.rho > 0):
+            raise SceneError(f"density rho = {self.rho:g} kg/m3: it must be positive")
+        for name, value in (("mass", self.mass_damping), ("stiffness", self.stiffness_damping)):
+            if not (np.isfinite(value) and value >= 0):
+                raise SceneError(f"{name} damping {value:g}: a number >= 0")
 
     @property
     def shear_modulus(self) -> float:
@@ -41,6 +53,15 @@ class Material:
     def bulk_modulus(self) -> float:
         """kappa Pa."""
         return self.E / (3 * (1 - 2 * self.nu))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Cells (k,) of another material than the scene's; the law must be the same."""
+
+    name: str
+    cells: Ints
+    material: Material
 
 
 @dataclass(frozen=True)
@@ -69,6 +90,34 @@ class Drive:
     name: str
     facets: str
     direction: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force on a facet set along `direction` (d,), a unit vector, by a named input in N.
+
+    `spread`: "consistent" takes the input as the total force of a uniform traction, "nodal" as a
+    total split equally over the set's nodes, "per_node" as the force on each of its nodes. The
+    direction is dead: it does not turn with the body. In 2-D N per metre of thickness.
+    """
+
+    name: str
+    facets: str
+    direction: tuple[float, ...]
+    spread: Literal["consistent", "nodal", "per_node"] = "consistent"
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.direction))
+        if abs(length - 1) > 1e-9:
+            raise SceneError(f"load '{self.name}': direction of length {length:g}, needs 1")
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A point m whose displacement is traced at every step as `<name>.x`, `.y`, `.z`."""
+
+    name: str
+    point: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -126,6 +175,9 @@ class Scene:
     copies: int = 1
     foundations: tuple[Foundation, ...] = ()
     membranes: tuple[Membrane, ...] = ()
+    regions: tuple[Region, ...] = ()
+    loads: tuple[Load, ...] = ()
+    probes: tuple[Probe, ...] = ()
 
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
@@ -134,10 +186,31 @@ class Scene:
             self.dilatation == "nodal_mean" or self.foundations or self.membranes
         ):
             raise SceneError("mean dilatation, foundations and membranes are for 3-D meshes")
+        if self.dilatation == "nodal_mean" and self.regions:
+            raise SceneError("nodal mean dilatation is for one material; drop the regions")
+        for region in self.regions:
+            if region.material.law != self.material.law:
+                raise SceneError(
+                    f"region '{region.name}' has law '{region.material.law}', the body "
+                    f"'{self.material.law}': one law a scene"
+                )
         if self.copies < 1:
             raise SceneError(f"{self.copies} copies of the mesh: at least 1")
         named = [s.facets for s in self.supports]
         named += [f.facets for f in self.foundations] + [m.facets for m in self.membranes]
         named += [d.facets for d in self.drives] + [c.facets for c in self.cavities]
+        named += [load.facets for load in self.loads]
         for facets in named:
             self.mesh.facet_nodes(facets)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what a step is given: drives in m first, then loads in N."""
+        return tuple(d.name for d in self.drives) + tuple(load.name for load in self.loads)
+
+    def per_cell(self, value: Callable[[Material], float]) -> Floats:
+        """A number of every cell's material (e,)."""
+        numbers = np.full(len(self.mesh.cells), value(self.material))
+        for region in self.regions:
+            numbers[region.cells] = value(region.material)
+        return numbers

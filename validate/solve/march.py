@@ -1,45 +1,84 @@
 """The loop over steps, written once: it steps, times, traces and stops where a step fails."""
 
+from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
-from validate.solve.types import Outcome, Run, State, Stepper, StepTimes, Trace
+from validate.fem.locate import Rows, barycentric_rows
+from validate.solve.types import Outcome, Run, State, Stepper, StepTimes, Trace, Uncertain
 
 _UNTIMED = 20  # first steps left out of the step times: caches and allocators settle
+_AXES = "xyz"
 
 
 def march(
     method: str, stepper: Stepper, t: Floats, drives: Floats, at: Ints, setup_s: float
 ) -> Run:
-    """Steps through drives (nt, k) m at times t (nt,) s; keeps full fields at the steps `at`."""
+    """Steps through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`.
+
+    Inputs are drives in m, then loads in N. The scene's probes are traced at every step.
+    """
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
-    states, seconds, outcome = _walk(stepper, drives)
-    done = len(states)
-    kept = at[at < done]
-    fields = [stepper.field(states[i]) for i in kept]
-    u = np.array(fields) if fields else np.zeros((0, *stepper.scene.mesh.nodes.shape))
-    updates = np.array([float(s.updates) for s in states])
-    traces = {"updates": Trace(updates, "1")} | stepper.traces(states)
+    walk, outcome = _walk(stepper, drives, frozenset(at.tolist()))
+    done = len(walk.states)
+    updates = np.array([float(s.updates) for s in walk.states])
+    traces = {"updates": Trace(updates, "1")} | stepper.traces(walk.states)
+    traces |= _probed(stepper, walk.probes)
+    seconds = np.array(walk.seconds)
     times = _step_times(seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds)
-    return Run(method, t[:done], kept, u, traces, outcome, setup_s, times)
+    u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
+    sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
+    return Run(method, t[:done], at[at < done], u, traces, outcome, setup_s, times, sd)
 
 
-def _walk(stepper: Stepper, drives: Floats) -> tuple[list[State], Floats, Outcome]:
-    state = stepper.rest()
-    states: list[State] = []
-    seconds: list[float] = []
+@dataclass(frozen=True)
+class _Walk:
+    """What is kept of the steps: light states, seconds, probes (p, d) m, fields at the frames."""
+
+    states: list[State] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    probes: list[Floats] = field(default_factory=list)
+    fields: list[Floats] = field(default_factory=list)
+    sd: list[Floats] = field(default_factory=list)
+
+
+def _walk(stepper: Stepper, drives: Floats, at: frozenset[int]) -> tuple[_Walk, Outcome]:
+    walk, state, rows = _Walk(), stepper.rest(), _probe_rows(stepper)
     for i, value in enumerate(drives):
         start = perf_counter()
         state = stepper.step(state, value)
-        seconds.append(perf_counter() - start)
+        walk.seconds.append(perf_counter() - start)
         if state.failure:
-            return states, np.array(seconds), Outcome(state.failure[0], i, state.failure[1])
-        states.append(state)
-    return states, np.array(seconds), Outcome("finished", len(drives))
+            return walk, Outcome(state.failure[0], i, state.failure[1])
+        walk.states.append(state.light)
+        if rows is not None:
+            walk.probes.append(rows.apply(stepper.field(state)))
+        if i in at:
+            walk.fields.append(stepper.field(state))
+            if isinstance(stepper, Uncertain):
+                walk.sd.append(stepper.sd(state))
+    return walk, Outcome("finished", len(drives))
+
+
+def _probe_rows(stepper: Stepper) -> Rows | None:
+    scene = stepper.scene
+    if not scene.probes:
+        return None
+    return barycentric_rows(scene.mesh, np.array([p.point for p in scene.probes]))
+
+
+def _probed(stepper: Stepper, values: list[Floats]) -> dict[str, Trace]:
+    probes, d = stepper.scene.probes, stepper.scene.mesh.dimension
+    u = np.array(values).reshape(len(values), len(probes), d)
+    return {
+        f"{probe.name}.{_AXES[c]}": Trace(u[:, j, c], "m")
+        for j, probe in enumerate(probes)
+        for c in range(d)
+    }
 
 
 def _step_times(seconds: Floats) -> StepTimes:

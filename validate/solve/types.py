@@ -1,9 +1,9 @@
 """States, outcomes and runs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,11 +25,14 @@ class Outcome:
 
 @dataclass(frozen=True)
 class State:
-    """One static step: drives (k,) m, pressures (c,) Pa, updates it took, surface (s, d) m.
+    """One step: drives (k,) m, pressures (c,) Pa, updates it took, surface (s, d) m.
 
     `surface` is the displacement of the cavity and plate nodes, what a haptic tick needs.
     `failure` is empty or the ending and its reason. Schemes whose fields are not sums of fixed
     columns keep the displacements `u` (N,) m of all unknowns and their numbers by trace name.
+    Dynamic schemes keep the number `k` of steps done, velocities `v` (N,) m/s and accelerations
+    `a` (N,) m/s^2, and what else they need in `extra` (a filter its covariance); their `drives`
+    are all inputs: drives in m, then loads in N.
     """
 
     drives: Floats
@@ -39,14 +42,32 @@ class State:
     failure: tuple[Ending, str] | None = None
     u: Floats | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
+    k: int = 0
+    v: Floats | None = None
+    a: Floats | None = None
+    extra: Any = None
 
     @property
     def inputs(self) -> Floats:
         return np.concatenate([self.drives, self.pressures])
 
+    @property
+    def light(self) -> "State":
+        """The state without its fields: what is kept of every step."""
+        return replace(self, u=None, v=None, a=None, extra=None)
+
+
+NOTHING = np.zeros(0)
+NOTHING.setflags(write=False)
+NO_SURFACE = np.zeros((0, 3))
+NO_SURFACE.setflags(write=False)
+
 
 class Stepper(Protocol):
-    """A prepared scheme: steps, and what a state means: field (n, d) m, traces per step."""
+    """A prepared scheme: steps, and what a state means: field (n, d) m, traces per step.
+
+    `traces` gets states without their fields (`State.light`).
+    """
 
     @property
     def scene(self) -> Scene: ...
@@ -58,6 +79,15 @@ class Stepper(Protocol):
     def field(self, state: State) -> Floats: ...
 
     def traces(self, states: Sequence[State]) -> dict[str, "Trace"]: ...
+
+
+@runtime_checkable
+class Uncertain(Protocol):
+    """A stepper that knows how sure it is: a filter."""
+
+    def sd(self, state: State) -> Floats:
+        """Standard deviations (n, d) m of the field."""
+        ...
 
 
 class Scheme(Protocol):
@@ -95,7 +125,7 @@ class Trace:
 class Run:
     """t (nt,) s of the steps done; u (no, n, d) m at the output steps `at`; traces by name.
 
-    `u` keeps the output frames only; `traces` every step.
+    `u` keeps the output frames only, and so does a filter's `sd`; `traces` every step.
     """
 
     method: str
@@ -106,10 +136,13 @@ class Run:
     outcome: Outcome
     setup_s: float
     step_s: StepTimes | None
+    sd: Floats | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", checked(self.t, "run t [s]", (None,)))
         object.__setattr__(self, "u", checked(self.u, "run u [m]", (len(self.at), None, None)))
+        if self.sd is not None:
+            object.__setattr__(self, "sd", checked(self.sd, "run sd [m]", self.u.shape))
         object.__setattr__(self, "traces", MappingProxyType(dict(self.traces)))
 
     @property
