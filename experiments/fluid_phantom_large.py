@@ -6,12 +6,13 @@ elements; linear and large-strain models are judged against it side by side.
 
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from validate.compare.verdict import Accept
-from validate.replay.experiment import EffectSpec, Variant
+from validate.replay.experiment import EffectSpec, Experiment, Variant
 from validate.replay.find import load_file
 
-LINEAR = load_file(Path(__file__).with_name("fluid_phantom.py"))
+LINEAR = cast(Experiment, load_file(Path(__file__).with_name("fluid_phantom.py")))
 _p = LINEAR.parameters
 PARAMETERS = replace(
     _p,

@@ -8,7 +8,8 @@ import pytest
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.road import Options, compare
+from validate.replay.options import Options
+from validate.replay.run import compare
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -12,7 +12,8 @@ from validate.errors import RecordingError, RegistrationError, ValidateError
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.replay.experiment import Experiment
-from validate.replay.road import Options, compare
+from validate.replay.options import Options
+from validate.replay.run import compare
 
 PH_1328 = {
     "inclusion.centre_x": "0.03", "inclusion.centre_y": "0.0225", "inclusion.centre_z": "0.035",

@@ -4,7 +4,8 @@ import pytest
 
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
-from validate.replay.road import Options, compare
+from validate.replay.options import Options
+from validate.replay.run import compare
 
 
 @pytest.fixture(scope="session")

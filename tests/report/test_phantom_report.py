@@ -11,7 +11,8 @@ from report_samples import CHECK
 
 from validate.compare.outline import normal_distances
 from validate.compare.result import Result
-from validate.replay.road import Options, compare
+from validate.replay.options import Options
+from validate.replay.run import compare
 from validate.report.html import SECTIONS
 from validate.report.observed import outline_seen
 from validate.report.page import Section

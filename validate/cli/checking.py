@@ -9,7 +9,8 @@ from validate.cli.main import FAILED
 from validate.compare.result import Result
 from validate.compare.verdict import Published
 from validate.replay.find import experiment_files, find
-from validate.replay.road import Options, compare
+from validate.replay.options import Options
+from validate.replay.run import compare
 
 
 def check(names: tuple[str, ...], as_json: bool) -> int:

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from validate.replay.road import Report
+from validate.replay.options import Report
 
 
 def console(*, error: bool = False) -> Console:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from validate.compare.effects import Effect
+from validate.compare.exhibit import Exhibit
 from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.compare.verdict import Check, Published
@@ -63,6 +64,7 @@ class Result:
     seed: int | None = None
     twin_notice: str = ""
     inputs: tuple[str, ...] = field(default=())
+    exhibits: tuple[Exhibit, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:

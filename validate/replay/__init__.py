@@ -10,18 +10,18 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from validate.compare.result import Result
-from validate.replay import road
-from validate.replay.experiment import Experiment
+from validate.replay import run
 from validate.replay.find import find
+from validate.replay.options import AnyExperiment, Options
 
 
-def load(name: str) -> Experiment:
+def load(name: str) -> AnyExperiment:
     """The experiment of that name, or of that file; raises `UsageError` naming the nearest."""
     return find(name, Path.cwd())
 
 
 def compare(
-    experiment: Experiment,
+    experiment: AnyExperiment,
     values: Mapping[str, str] | None = None,
     methods: tuple[str, ...] = (),
     *,
@@ -31,4 +31,4 @@ def compare(
 
     Raises children of `ValidateError` for bad input.
     """
-    return road.compare(experiment, road.Options(dict(values or {}), methods, quick))
+    return run.compare(experiment, Options(dict(values or {}), methods, quick))

@@ -9,6 +9,8 @@ from pathlib import Path
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
+from validate.replay.options import AnyExperiment
+from validate.replay.tracking import Tracking
 
 
 def experiment_files(start: Path) -> dict[str, Path]:
@@ -20,7 +22,7 @@ def experiment_files(start: Path) -> dict[str, Path]:
     raise UsageError("no experiments/ folder here or above, and none in the installed clone")
 
 
-def find(name: str, start: Path) -> Experiment:
+def find(name: str, start: Path) -> AnyExperiment:
     """The experiment of that name, or of that file when it ends in .py.
 
     Raises `UsageError` naming the nearest ones when there is none.
@@ -33,7 +35,7 @@ def find(name: str, start: Path) -> Experiment:
     return load_file(files[name])
 
 
-def load_file(path: Path) -> Experiment:
+def load_file(path: Path) -> AnyExperiment:
     """Runs an experiment file (it is code) and returns its EXPERIMENT, which knows its path."""
     if not path.is_file():
         raise UsageError(f"no experiment file {path}")
@@ -45,14 +47,14 @@ def load_file(path: Path) -> Experiment:
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     experiment = getattr(module, "EXPERIMENT", None)
-    if not isinstance(experiment, Experiment):
-        raise UsageError(f"{path} defines no EXPERIMENT of type Experiment")
+    if not isinstance(experiment, (Experiment, Tracking)):
+        raise UsageError(f"{path} defines no EXPERIMENT of type Experiment or Tracking")
     if experiment.name != path.stem:
         raise UsageError(f"{path}: EXPERIMENT.name is '{experiment.name}', not the file's name")
     return replace(experiment, path=path.resolve())
 
 
-def root_of(experiment: Experiment, start: Path) -> Path:
+def root_of(experiment: AnyExperiment, start: Path) -> Path:
     """The clone an experiment belongs to, else the folder the command was called from."""
     path = experiment.path
     return path.parents[1] if path is not None and path.parent.name == "experiments" else start

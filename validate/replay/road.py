@@ -1,8 +1,7 @@
-"""The road: recording -> scene -> registration -> system -> run -> comparison."""
+"""The road of experiments at holds: recording -> scene -> registration -> run -> comparison."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,45 +11,22 @@ from validate.compare.residual import Residual, rest_residuals
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score, rms, run_scores, scores_of
 from validate.compare.verdict import SAFETY, Accept, Check, Sensitivity, judge
-from validate.errors import ComparisonError, UsageError
-from validate.parameters import describe, nearest_names, with_values
+from validate.parameters import describe
 from validate.recording.types import Recording
 from validate.replay.experiment import EffectSpec, Experiment, Identified, Variant
+from validate.replay.options import Options, Report, configure, folder_of
 from validate.replay.sentence import verdict_sentence
 from validate.replay.solved import Solved, solve
 from validate.scene.scene import Scene
 from validate.solve.types import Run
 
-Report = Callable[[int, int, str], None]  # done, total, what comes next
 
-
-@dataclass(frozen=True)
-class Options:
-    """What the user changed: values by path, methods to run (none: all), quick."""
-
-    values: Mapping[str, str]
-    methods: tuple[str, ...] = ()
-    quick: bool = False
-
-
-def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Any]]:
-    """Parameters and chosen methods with the user's values; `UsageError` names the nearest."""
-    known = set(experiment.methods)
-    for name in options.methods:
-        if name not in known:
-            raise UsageError(f"unknown method '{name}'; {nearest_names(name, known)}")
-    parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
-    mine = {k: v for k, v in options.values.items() if not k.startswith("methods.")}
-    theirs = {k[8:]: v for k, v in options.values.items() if k.startswith("methods.")}
-    methods = dict(with_values(experiment.methods, theirs))
-    chosen = options.methods or tuple(methods)
-    return with_values(parameters, mine), {name: methods[name] for name in chosen}
-
-
-def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
+def compare_at_holds(
+    experiment: Experiment, options: Options, report: Report | None = None
+) -> Result:
     """Runs the road and judges it. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
-    recordings = experiment.load(parameters, _folder(experiment))
+    recordings = experiment.load(parameters, folder_of(experiment))
     identified = experiment.identify(recordings, parameters) if experiment.identify else None
     used = identified.parameters if identified else parameters
     road = _Road(experiment, methods, recordings, used, report)
@@ -287,9 +263,3 @@ def _shared(
         for key, u_num in errors.items():
             squares[key] = squares.get(key, 0.0) + u_num**2
     return {key: float(np.sqrt(square)) for key, square in squares.items()}
-
-
-def _folder(experiment: Experiment) -> Path:
-    if experiment.path is None:
-        raise ComparisonError(f"experiment '{experiment.name}' was not loaded from a file")
-    return experiment.path.parent

@@ -7,8 +7,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.register.observe import Hold
-from validate.report.numbers import spaced, with_unit
-from validate.report.observed import shown_method
+from validate.report.numbers import significant, spaced, with_unit
+from validate.report.observed import at_loads, shown_method
 from validate.scene.mesh import Mesh
 
 _MM = 1e3
@@ -48,23 +48,26 @@ class Body:
 
 
 def body(result: Result) -> Body | None:
-    """The accepted method's body at its last load; None in 2-D or when nothing finished."""
+    """The accepted method's body at its last load, or where a run over time moves it most.
+
+    None in 2-D or when nothing finished.
+    """
     method = shown_method(result)
     if method is None or len(method.run.u) == 0 or method.scene.mesh.dimension != 3:
         return None
     scene, run = method.scene, method.run
     cavity = scene.cavities[0] if scene.cavities else None
     trace = run.traces.get(f"{cavity.name}.pressure") if cavity else None
-    holds = result.registered[0].holds if result.registered else ()
-    frame = min(len(holds), len(run.u)) - 1
+    frame, load = _frame(method)
     nodes = _MM * scene.mesh.nodes
     wall = nodes[scene.mesh.facet_nodes(cavity.facets)] if cavity else nodes
     normal = _normal(result) if cavity else None
-    toward = np.array(scene.drives[0].direction) if scene.drives else np.array([-1.0, 0.0, 0.0])
+    # Without a plate that is driven, z is upward.
+    toward = np.array(scene.drives[0].direction if scene.drives else (0.0, 0.0, -1.0))
     return Body(
         label=method.label,
         part=f" One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
-        load=_load(holds[frame]) if holds else "the last output",
+        load=load,
         mesh=scene.mesh,
         u=_MM * run.u[frame],
         plates=_plates(method, frame),
@@ -76,6 +79,17 @@ def body(result: Result) -> Body | None:
         up=normal if normal is not None else -toward,
         toward=toward,
     )
+
+
+def _frame(method: MethodResult) -> tuple[int, str]:
+    """The last load; of a run over time the frame with the largest displacement."""
+    run = method.run
+    if at_loads(method):
+        holds = method.registered[0].holds
+        frame = min(len(holds), len(run.u)) - 1
+        return frame, _load(holds[frame])
+    largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
+    return largest, f"t = {significant(float(run.t[run.at[largest]]))} s"
 
 
 def _load(hold: Hold) -> str:
@@ -95,11 +109,12 @@ def _normal(result: Result) -> Floats:
 def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:
     """Flat facet sets across the first drive: the driven one and the held ones."""
     scene = method.scene
-    if not scene.drives:
+    drive = scene.drives[0] if scene.drives else None
+    travelled = method.run.traces.get(f"{drive.name}.displacement") if drive else None
+    if drive is None or travelled is None:
         return ()
-    drive = scene.drives[0]
     axis = int(np.argmax(np.abs(drive.direction)))
-    travel = method.run.traces[f"{drive.name}.displacement"].y[method.run.at[frame]]
+    travel = travelled.y[method.run.at[frame]]
     moved = {drive.facets: _MM * float(travel) * np.array(drive.direction)}
     held = dict.fromkeys(s.facets for s in scene.supports if axis in s.components)
     found = []

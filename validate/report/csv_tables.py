@@ -1,4 +1,7 @@
-"""The tables as CSV files: SI values with a unit column, one header line, empty where missing."""
+"""The tables as CSV files: one header line, empty where missing, SI values with a unit column.
+
+The exhibits' tables and charts hold the numbers as shown, with their units in the header.
+"""
 
 import csv
 import math
@@ -7,17 +10,34 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.compare.exhibit import Chart
 from validate.compare.result import Result
 
 Row = Iterable[object]
 
 
 def write_tables(result: Result, folder: Path) -> None:
-    """Writes every table that has rows into `folder`."""
-    for name, (head, rows) in _TABLES.items():
+    """Writes every table that has rows into `folder`; exhibits may not take a name of these."""
+    for name, (head, rows) in TABLES.items():
         found = list(rows(result))
         if found:
             _write(folder / f"{name}.csv", head, found)
+    for exhibit in result.exhibits:
+        for table in exhibit.tables:
+            _write(folder / f"{table.name}.csv", table.headings, table.rows)
+        for chart in exhibit.charts:
+            head = ("series", "style", f"x: {chart.x}", f"y: {chart.y}", f"upper: {chart.y}")
+            _write(folder / f"chart_{chart.name}.csv", head, _points(chart))
+
+
+def _points(chart: Chart) -> Iterator[Row]:
+    """Every point of every series and, as one row without x, every level."""
+    for s in chart.series:
+        upper = s.upper.tolist() if s.upper is not None else [None] * len(s.x)
+        for x, y, top in zip(s.x.tolist(), s.y.tolist(), upper, strict=True):
+            yield s.label, s.style, x, y, top
+    for name, y in chart.levels:
+        yield name, "level", None, float(y), None
 
 
 def _write(path: Path, head: tuple[str, ...], rows: Iterable[Row]) -> None:
@@ -93,8 +113,10 @@ def _identified(result: Result) -> Iterator[Row]:
 
 
 def _load_displacement(result: Result) -> Iterator[Row]:
-    """Every recorded sample and every method's value at its time."""
+    """Every recorded sample and every method's value at its time, where the stage is in m."""
     for i, registered in enumerate(result.registered):
+        if registered.stage.unit != "m":
+            continue
         name = result.recordings[i].name if i < len(result.recordings) else str(i + 1)
         for s in registered.signals:
             stage = np.interp(s.t, registered.stage.t, registered.stage.y[:, 0])
@@ -108,7 +130,7 @@ def _load_displacement(result: Result) -> Iterator[Row]:
                         yield name, m.name, s.quantity, float(t), float(q), float(y), s.unit
 
 
-_TABLES = {
+TABLES = {
     "scores": (
         ("method", "score", "value", "unit", "count", "against", "definition"), _scores,
     ),

@@ -36,8 +36,13 @@ class _Line:
 
 
 def curves(result: Result) -> Section | None:
-    """A picture per recorded signal, one of the volume; None when no method finished."""
+    """A picture per recorded signal, one of the volume.
+
+    None when no method finished, and where the stage is no displacement: a load over time.
+    """
     if not result.registered or not finished(result):
+        return None
+    if any(r.stage.unit != "m" for r in result.registered):
         return None
     quantities = dict.fromkeys(s.quantity for r in result.registered for s in r.signals)
     return section(

@@ -9,6 +9,7 @@ from validate.report import (
     bodies,
     curves,
     discrimination,
+    exhibits,
     markers,
     outlines,
     provenance,
@@ -21,6 +22,7 @@ from validate.report.page import Section, SectionOf
 
 SECTIONS: tuple[tuple[str, SectionOf], ...] = (
     ("checks", verdicts.checks),
+    ("exhibits", exhibits.exhibits),
     ("outlines", outlines.outlines),
     ("markers", markers.markers),
     ("curves", curves.curves),

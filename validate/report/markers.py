@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.register.observe import Hold, MarkerObservation, nearest_sample
 from validate.report.numbers import spaced, with_unit
-from validate.report.observed import distinct, markers_seen, shown_method
+from validate.report.observed import at_loads, distinct, markers_seen, shown_method
 from validate.report.page import Picture, Section, section
 from validate.report.style import ACCEPTED, MEASURED, Look, draw, looks
 
@@ -19,10 +19,12 @@ _UP = 1
 
 
 def markers(result: Result) -> Section | None:
-    """Vectors and positions at every load, rise against x; None without markers."""
+    """Vectors and positions at every load, rise against x; None without markers at loads."""
     judged = shown_method(result)
     seen = markers_seen(judged) if judged else None
-    if seen is None or judged is None or len(result.registered[0].holds) < 2:
+    if seen is None or judged is None or not at_loads(judged):
+        return None
+    if len(result.registered[0].holds) < 2:
         return None
     holds = result.registered[0].holds
     return section(

@@ -51,6 +51,28 @@ def fixed(value: float, decimals: int) -> str:
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
+def rate(hz: float | None) -> str:
+    """A rate in Hz or kHz, whichever reads better; a dash for None."""
+    if hz is None or not math.isfinite(hz):
+        return MISSING
+    return f"{significant(1e-3 * hz)} kHz" if hz >= 1000 else f"{significant(hz)} Hz"
+
+
+def duration(seconds: float | None) -> str:
+    """A time in µs, ms or s, whichever reads better; a dash for None."""
+    if seconds is None or not math.isfinite(seconds):
+        return MISSING
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{significant(seconds / size)} {unit}"
+    return f"{significant(1e6 * seconds)} µs"
+
+
+def at_load(label: str) -> str:
+    """Where a residual was taken, in words: "at 9 mm", or "over the whole time" for "all"."""
+    return "over the whole time" if label == "all" else f"at {spaced(label)}"
+
+
 def spaced(label: str) -> str:
     """A load label such as "9mm" as text: "9 mm"."""
     number = label.rstrip("abcdefghijklmnopqrstuvwxyzNP%")

@@ -4,6 +4,8 @@ from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import rms
 from validate.register.observe import Hold, MarkerObservation, OutlineObservation
+from validate.report.loads import at_holds
+from validate.solve.types import Run, StepTimes
 
 _APART = 0.08  # share of the largest difference below which two methods draw one line
 
@@ -23,6 +25,17 @@ def shown_method(result: Result) -> MethodResult | None:
 def loaded_holds(result: Result) -> tuple[Hold, ...]:
     """The loads of the first recording after rest."""
     return result.registered[0].holds[1:] if result.registered else ()
+
+
+def at_loads(method: MethodResult) -> bool:
+    """The method's fields are those at the first recording's loads, not frames over time."""
+    seen = method.registered[0] if method.registered else None
+    return seen is not None and at_holds(seen, method.run)
+
+
+def timed(run: Run) -> StepTimes | None:
+    """The run's step times; None when not one step succeeded: a refusal has no rate."""
+    return run.step_s if len(run.t) else None
 
 
 def last_residual(method: MethodResult, quantity: str) -> Residual | None:

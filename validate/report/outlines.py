@@ -13,7 +13,7 @@ from validate.compare.result import MethodResult, Result
 from validate.register.observe import Hold, OutlineObservation, nearest_sample
 from validate.report.animation import moving_outline
 from validate.report.numbers import shown_unit, spaced, text
-from validate.report.observed import distinct, outline_seen, shown_method
+from validate.report.observed import at_loads, distinct, outline_seen, shown_method
 from validate.report.page import Cell, Picture, Section, Table, section
 from validate.report.style import ACCEPTED, MEASURED, NOISE, Look, draw, looks
 
@@ -30,10 +30,10 @@ class _Drawn:
 
 
 def outlines(result: Result) -> Section | None:
-    """Outlines at every load, rivals and errors at the last one; None without outlines."""
+    """Outlines at every load, rivals and errors at the last one; None without outlines at loads."""
     judged = shown_method(result)
     seen = outline_seen(judged) if judged else None
-    if seen is None or judged is None:
+    if seen is None or judged is None or not at_loads(judged):
         return None
     holds = result.registered[0].holds
     measured = tuple(seen.outlines[nearest_sample(seen.t, h.t, "outlines")] for h in holds)

@@ -103,7 +103,15 @@ class Section:
         return tuple(p for p in self.parts if isinstance(p, Animation))
 
 
-SectionOf = Callable[[Result], Section | None]
+Sections = Section | tuple[Section, ...] | None
+SectionOf = Callable[[Result], Sections]
+
+
+def listed(made: Sections) -> tuple[Section, ...]:
+    """The sections that a maker made: none, one or several."""
+    if made is None:
+        return ()
+    return made if isinstance(made, tuple) else (made,)
 
 
 def cells(*texts: str) -> tuple[Cell, ...]:

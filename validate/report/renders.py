@@ -12,9 +12,9 @@ from validate.scene.mesh import EDGES
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
 )
-_SIZE = [1100, 760]
+SIZE = [1100, 760]
 _CELL = {4: 10, 10: 24}  # VTK_TETRA, VTK_QUADRATIC_TETRA: the same local order as ours
-_BAR: dict[str, Any] = {
+BAR: dict[str, Any] = {
     "vertical": True,
     "height": 0.6,
     "width": 0.06,
@@ -32,12 +32,13 @@ def renders(body: Body) -> tuple[Picture, ...]:
         f" The cavity wall is coloured by the pressure, {body.pressure:.4g} Pa."
     )  # fmt: skip
     whole = body.normal is None
+    plates = "; plates grey" if body.plates else ""
     opened = "whole" if whole else "cut open through the inclusion in the image plane"
     cut = "" if whole else " at and behind the cut"
     flat = "from the side" if whole else "against the cut"
     shots = (
         ("render_deformed", f"{body.label} at {body.load}, {opened}, true to scale: displacement "
-         f"magnitude in mm; plates grey.{wall}{body.part}", _shot(body, scale=1.0, oblique=True)),
+         f"magnitude in mm{plates}.{wall}{body.part}", _shot(body, scale=1.0, oblique=True)),
         ("render_rest", f"The same body at rest, seen {flat}, before any load (no "
          "displacement).", _shot(body, scale=0.0, oblique=False)),
         ("render_flat", f"Seen {flat} at {body.load}: displacement magnitude "
@@ -52,7 +53,7 @@ def renders(body: Body) -> tuple[Picture, ...]:
 
 
 def _shot(body: Body, *, scale: float, oblique: bool, edges: bool = False) -> Pixels:
-    plotter: Any = pv.Plotter(off_screen=True, window_size=_SIZE, lighting="light kit")
+    plotter: Any = pv.Plotter(off_screen=True, window_size=SIZE, lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     _add_body(plotter, body, scale, edges)
@@ -84,11 +85,16 @@ def _add_body(plotter: Any, body: Body, scale: float, edges: bool) -> None:
         return
     grid.point_data["displacement"] = np.linalg.norm(moved, axis=1)
     top = max(float(np.linalg.norm(body.u, axis=1).max()), 1e-9)
-    bar: Any = {**_BAR, "title": "displacement / mm\n", "position_x": 0.87, "fmt": "%.1f"}
+    bar: Any = {**BAR, "title": "displacement / mm\n", "position_x": 0.87, "fmt": _decimals(top)}
     plotter.add_mesh(
         grid, scalars="displacement", cmap="viridis", clim=(0.0, top), show_edges=edges,
         edge_color="#303030", line_width=1, ambient=0.3, scalar_bar_args=bar,
     )  # fmt: skip
+
+
+def _decimals(top: float) -> str:
+    """Two significant digits of the bar's upper end."""
+    return f"%.{max(1, 1 - int(np.floor(np.log10(top))))}f" if top > 1e-5 else "%.1e"
 
 
 def _add_wall(plotter: Any, body: Body, scale: float, edges: bool) -> None:
@@ -112,7 +118,7 @@ def _add_wall(plotter: Any, body: Body, scale: float, edges: bool) -> None:
         plotter.add_mesh(wall, color="#B98B5E", ambient=0.3)
         return
     wall.point_data["pressure"] = np.full(wall.n_points, body.pressure)
-    bar: Any = {**_BAR, "title": "pressure / Pa\n", "position_x": 0.05, "fmt": "%.0f"}
+    bar: Any = {**BAR, "title": "pressure / Pa\n", "position_x": 0.05, "fmt": "%.0f"}
     plotter.add_mesh(
         wall,
         scalars="pressure",

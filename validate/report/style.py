@@ -16,6 +16,7 @@ MEASURED = "#000000"
 ACCEPTED = "#0072B2"
 NOISE = "#D9D9D9"
 _RIVALS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
+PALETTE = (ACCEPTED, *_RIVALS)  # Okabe and Ito, without their yellow
 _DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 3)), (0, (2, 3)))
 _POINTS = ("s", "^", "D", "v", "P", "X")
 _SETTINGS: Mapping[str, Any] = {
@@ -59,6 +60,13 @@ def looks(result: Result) -> dict[str, Look]:
         found[method.name] = Look(_RIVALS[i], _DASHES[i], _POINTS[i], 1.2)
         rivals += 1
     return found
+
+
+def free_look(i: int, colour: str) -> Look:
+    """The look of line i that is no method: the first solid, the others dashed in turn."""
+    if i == 0:
+        return Look(colour, "-", "o", 1.5)
+    return Look(colour, _DASHES[(i - 1) % len(_DASHES)], _POINTS[(i - 1) % len(_POINTS)], 1.4)
 
 
 def film(

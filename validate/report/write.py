@@ -9,8 +9,9 @@ from validate.compare.result import Result
 from validate.errors import UsageError
 from validate.report.csv_tables import write_tables
 from validate.report.encode import gif, png
+from validate.report.exhibits import require_distinct
 from validate.report.html import SECTIONS, page
-from validate.report.page import Section
+from validate.report.page import Section, listed
 from validate.report.replay_mcap import write_replay
 from validate.report.store import document, write_json, write_runs
 
@@ -25,8 +26,10 @@ def write_report(
 
     `created` is a UTC time, ISO-8601. The old folder stays until the new one is complete; after any
     failure nothing of the new one is left. Raises `UsageError` when `folder` holds something other
-    than a report, or cannot be written.
+    than a report, or cannot be written; `ComparisonError` when two parts of the exhibits share a
+    name.
     """
+    require_distinct(result.exhibits)
     folder = folder.resolve()
     _require_replaceable(folder)
     fresh = folder.with_name(f".{folder.name}.new-{uuid4().hex[:8]}")
@@ -73,8 +76,7 @@ def _fill(result: Result, folder: Path, created: str, progress: Progress) -> Non
     shown: list[Section] = []
     for name, make in SECTIONS:
         progress(name)
-        section = make(result)
-        if section is not None:
+        for section in listed(make(result)):
             shown.append(section)
             for picture in section.pictures:
                 (folder / "figures" / f"{picture.name}.png").write_bytes(png(picture))

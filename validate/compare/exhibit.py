@@ -1,0 +1,98 @@
+"""What a result shows beside its scores, as plain data: number tables, charts, maps on the mesh."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats, checked
+from validate.errors import ComparisonError
+from validate.scene.mesh import Mesh
+
+Entry = float | int | str | None
+
+
+@dataclass(frozen=True)
+class NumberTable:
+    """Rows under headings that carry their units; None where there is no number, and `note` why.
+
+    Values are as shown (mm where the heading says mm); `name` is the file's in tables/.
+    """
+
+    name: str
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[Entry, ...], ...]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.headings):
+                raise ComparisonError(
+                    f"table '{self.name}': a row of {len(row)} under {len(self.headings)} headings"
+                )
+            if any(isinstance(v, float) and not np.isfinite(v) for v in row):
+                raise ComparisonError(f"table '{self.name}': a number is not finite in {row[0]}")
+
+
+@dataclass(frozen=True)
+class Series:
+    """y (k,) over x (k,), drawn as a line, as points, or as a band to `upper` (k,)."""
+
+    label: str
+    x: Floats
+    y: Floats
+    style: Literal["line", "points", "band"] = "line"
+    upper: Floats | None = None
+
+    def __post_init__(self) -> None:
+        x = checked(self.x, f"series '{self.label}' x", (None,), error=ComparisonError)
+        y = checked(self.y, f"series '{self.label}' y", (len(x),), error=ComparisonError)
+        object.__setattr__(self, "x", x)
+        object.__setattr__(self, "y", y)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One picture: axes with units, series, and named levels (horizontal lines)."""
+
+    name: str
+    title: str
+    x: str
+    y: str
+    series: tuple[Series, ...]
+    levels: tuple[tuple[str, float], ...] = ()
+    log: Literal["", "x", "y", "xy"] = ""
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class NodeMap:
+    """A number at every node (n,) in `unit`, drawn on the mesh's surface.
+
+    Maps of one `scale` share their colour range.
+    """
+
+    name: str
+    title: str
+    mesh: Mesh
+    values: Floats
+    unit: str
+    scale: str = ""
+
+    def __post_init__(self) -> None:
+        n = len(self.mesh.nodes)
+        values = checked(self.values, f"map '{self.name}'", (n,), error=ComparisonError)
+        object.__setattr__(self, "values", values)
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A part of a report: its sentences, then tables, charts and maps in order."""
+
+    anchor: str
+    title: str
+    words: tuple[str, ...] = ()
+    tables: tuple[NumberTable, ...] = ()
+    charts: tuple[Chart, ...] = ()
+    maps: tuple[NodeMap, ...] = ()

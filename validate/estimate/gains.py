@@ -1,0 +1,102 @@
+"""Gains before any data: those of a linear filter depend only on when what is measured."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.estimate.covariance import Claim, Covariance, Gain, start
+from validate.estimate.measured import Timetable
+
+# Change of the gain from one measurement to the next, of its largest entry, below which it is
+# taken as settled: with a memory of a hundred measurements 1e-7 is left, below every noise here.
+SETTLED = 1e-9
+
+Seen = tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class GainSequence:
+    """Gains by step; from step `frozen` on they repeat (None: they never settled).
+
+    `computed` counts the gains that were computed, `claim` is what the last of them left.
+    """
+
+    gains: Mapping[int, Gain]
+    frozen: int | None
+    computed: int
+
+    def at(self, step: int) -> Gain | None:
+        return self.gains.get(step)
+
+
+@dataclass(frozen=True)
+class Event:
+    """A measurement: its step, its gain, what is claimed after it, and if its gain is a repeat."""
+
+    step: int
+    gain: Gain
+    claim: Claim
+    repeated: bool
+
+
+def schedule(timetable: Timetable) -> Mapping[int, Seen]:
+    """Which components are measured at which steps, in order."""
+    rows = sorted(timetable.z.items())
+    return MappingProxyType({k: tuple(np.isfinite(z).tolist()) for k, z in rows})
+
+
+def events(
+    covariance: Covariance, when: Mapping[int, Seen], tolerance: float = SETTLED
+) -> Iterator[Event]:
+    """Gains in order. Once settled they repeat while interval and components stay what they are;
+    after a break the recursion goes on from where it stood."""
+    claim, last, step = start(covariance), None, 0
+    pattern: tuple[int, Seen] | None = None
+    settled = False
+    for k, seen in when.items():
+        same = (k - step, seen) == pattern
+        if last is not None and settled and same:
+            yield Event(k, last, claim, True)
+        else:
+            for _ in range(k - step):
+                claim = covariance.predict(claim)
+            gain, claim = covariance.update(claim, seen)
+            settled = last is not None and same and _close(gain.G, last.G, tolerance)
+            last, pattern = gain, (k - step, seen)
+            yield Event(k, gain, claim, False)
+        step = k
+
+
+def _close(new: Floats, old: Floats, tolerance: float) -> bool:
+    return float(np.abs(new - old).max()) <= tolerance * float(np.abs(new).max())
+
+
+def gain_sequence(
+    covariance: Covariance, when: Mapping[int, Seen], tolerance: float = SETTLED
+) -> GainSequence:
+    """All gains of a schedule; `frozen` is the step after which none was computed any more."""
+    gains, computed, frozen = {}, 0, None
+    for event in events(covariance, when, tolerance):
+        gains[event.step] = event.gain
+        if not event.repeated:
+            computed, frozen = computed + 1, None
+        elif frozen is None:
+            frozen = event.step
+    return GainSequence(MappingProxyType(gains), frozen, computed)
+
+
+def claim_at(
+    covariance: Covariance, when: Mapping[int, Seen], step: int, tolerance: float = SETTLED
+) -> Claim:
+    """What is claimed at the end of a step, recomputed from the start."""
+    claim, last = start(covariance), 0
+    for event in events(covariance, when, tolerance):
+        if event.step > step:
+            break
+        claim, last = event.claim, event.step
+    for _ in range(step - last):
+        claim = covariance.predict(claim)
+    return claim

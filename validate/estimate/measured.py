@@ -1,0 +1,127 @@
+"""What a filter is given: measurements of displacements, and the steps on which they land."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from scipy import sparse
+
+from validate.arrays import Floats, Ints, checked
+from validate.errors import ComparisonError
+from validate.register.observe import Registered
+from validate.scene.mesh import Mesh
+
+OFF_STEP = 0.01  # of a step: clock jitter that moves no estimate; more would be a wrong time
+_FINEST = 1000  # parts of a sampling interval tried as a step when one is looked for
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Displacements z (nt, m) m at times t (nt,) s, NaN = missing; H (m, N) reads them from u (N,).
+
+    Unknowns are node-major; sd (m,) m are standard deviations of white noise, independent between
+    components; names (m,) such as "top.z". Raises `ComparisonError` for shapes that do not fit,
+    times that do not rise, and an sd that is not positive.
+    """
+
+    t: Floats
+    H: sparse.csr_array
+    z: Floats
+    sd: Floats
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        m, nt = self.H.shape[0], len(self.t)
+        fail = ComparisonError
+        object.__setattr__(self, "t", checked(self.t, "measurement t [s]", (None,), error=fail))
+        z = checked(self.z, "measurement z [m]", (nt, m), nan=True, error=fail)
+        object.__setattr__(self, "z", z)
+        object.__setattr__(self, "sd", checked(self.sd, "measurement sd [m]", (m,), error=fail))
+        if len(self.names) != m:
+            raise ComparisonError(f"{len(self.names)} names for {m} measured components")
+        if m == 0 or nt == 0:
+            raise ComparisonError(f"{nt} times of {m} components: nothing measured")
+        if nt > 1 and np.diff(self.t).min() <= 0:
+            raise ComparisonError("measurement times must rise; sort the recording by its stamps")
+        if self.sd.min() <= 0:
+            raise ComparisonError(f"measurement sd {self.sd.min():g} m: it must be positive")
+
+    def free(self, free: Ints) -> Floats:
+        """H over the free unknowns, dense (m, free)."""
+        return np.ascontiguousarray(self.H[:, free].toarray())
+
+
+@dataclass(frozen=True)
+class Timetable:
+    """Measured displacements (m,) m by step number (1, 2, ...); `at_rest` counts those at t = 0,
+    where the state is known."""
+
+    z: Mapping[int, Floats]
+    at_rest: int = 0
+
+    def at(self, step: int) -> Floats | None:
+        """What was measured at a step, NaN = missing; None where nothing was: predict only."""
+        return self.z.get(step)
+
+
+def timetable(measurements: Measurements, dt: float) -> Timetable:
+    """Lands every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
+
+    Raises `ComparisonError` when one lies further off than a hundredth of a step (a measurement is
+    never interpolated) or two share a step.
+    """
+    t = measurements.t
+    steps, off = _nearest(t, dt)
+    if off.max() > OFF_STEP:
+        i = int(off.argmax())
+        raise ComparisonError(
+            f"measurement at t = {t[i]:g} s lies {off[i]:.2g} steps of {dt:g} s off its nearest "
+            f"step; {_landing(t, dt)}"
+        )
+    if len(np.unique(steps)) < len(steps):
+        raise ComparisonError(
+            f"{len(steps)} measurements land on {len(np.unique(steps))} steps of {dt:g} s; take a "
+            f"step of at most {np.diff(t).min():g} s"
+        )
+    seen = np.isfinite(measurements.z).any(axis=1) & (steps > 0)
+    rows = {int(steps[i]): measurements.z[i] for i in np.flatnonzero(seen)}
+    return Timetable(MappingProxyType(rows), int((steps <= 0).sum()))
+
+
+def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:
+    """Numbers of the nearest steps, and the distances from them in steps."""
+    ratio = t / dt
+    steps = np.rint(ratio).astype(np.int64)
+    return steps, np.abs(ratio - steps)
+
+
+def _landing(t: Floats, dt: float) -> str:
+    """The largest step up to `dt` on which all times land, as advice."""
+    gaps = np.diff(np.concatenate([[0.0], t]))
+    gap = float(gaps[gaps > 0].min()) if (gaps > 0).any() else dt
+    first = int(np.ceil(gap / dt))
+    for parts in range(first, first + _FINEST):
+        if _nearest(t, gap / parts)[1].max() <= OFF_STEP:
+            return f"take dt = {gap / parts:.6g} s"
+    return "no step lands on all of them: resample the recording"
+
+
+def measurements(registered: Registered, mesh: Mesh) -> Measurements:
+    """Displacements of the registered markers from their rest layout.
+
+    Raises `ComparisonError` without markers and for rows of another mesh.
+    """
+    seen = registered.markers
+    if seen is None:
+        raise ComparisonError("the recording has no markers: a filter has nothing to measure")
+    n, d = mesh.nodes.shape
+    if seen.rows.weights.shape[1] != n:
+        raise ComparisonError(
+            f"marker rows of {seen.rows.weights.shape[1]} nodes on a mesh of {n}: register again"
+        )
+    H = sparse.csr_array(sparse.kron(seen.rows.weights, sparse.eye_array(d), format="csr"))
+    z = (seen.x - seen.rest).reshape(len(seen.t), -1)
+    names = tuple(f"{name}.{_AXES[c]}" for name in seen.names for c in range(d))
+    return Measurements(seen.t, H, z, np.full(len(names), seen.sd), names)

@@ -1,0 +1,184 @@
+"""Compiled arithmetic of the node-level extended Kalman filter (paper 003, eqs 35-39).
+
+All functions work in place on packed arrays. P is packed by row, one column a component or node:
+"component" 1 row of variances m^2, "companion" 3 rows (U_t, cross, U_{t-dt}) of 2 x 2 covariances,
+"node" 6 rows (xx, yy, zz, xy, xz, yz) of 3 x 3 ones.
+"""
+
+import numba
+import numpy as np
+
+from validate.arrays import Floats, Ints
+
+HUGE = 1e300  # m^2: beyond it the next products would leave the number range
+
+_ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
+_compiled = numba.njit(cache=True, error_model="numpy")
+
+
+@_compiled
+def spread_components(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
+    """P = A^2 P + Q of every component (eq 36), A = c2 - w K_ii; counts those beyond `HUGE`."""
+    count = 0
+    p = P[0]
+    for i in range(p.shape[0]):
+        a = c2[i] - w[i] * K[i]
+        p[i] = a * a * p[i] + Q[i]
+        count += not p[i] < HUGE
+    return count
+
+
+@_compiled
+def spread_companions(
+    P: Floats, c2: Floats, c1: Floats, w: Floats, K: Floats, Q: Floats
+) -> int:  # fmt: skip
+    """P = A P A^T + Q of (U_t, U_{t-dt}), A = [[a, -c1], [1, 0]]; counts those beyond `HUGE`."""
+    count = 0
+    now, cross, before = P[0], P[1], P[2]
+    for i in range(now.shape[0]):
+        a = c2[i] - w[i] * K[i]
+        p, x = now[i], cross[i]
+        now[i] = a * a * p - 2 * a * c1[i] * x + c1[i] * c1[i] * before[i] + Q[i]
+        cross[i] = a * p - c1[i] * x
+        before[i] = p
+        count += not now[i] < HUGE
+    return count
+
+
+@_compiled
+def spread_nodes(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
+    """P = A P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
+
+    K (6, n) is packed like P; c2, w and Q (N,) are those of the node's components.
+    """
+    count = 0
+    for n in range(P.shape[1]):
+        x, y, z = 3 * n, 3 * n + 1, 3 * n + 2
+        xx, xy, xz = c2[x] - w[x] * K[0, n], -w[x] * K[3, n], -w[x] * K[4, n]
+        yx, yy, yz = -w[y] * K[3, n], c2[y] - w[y] * K[1, n], -w[y] * K[5, n]
+        zx, zy, zz = -w[z] * K[4, n], -w[z] * K[5, n], c2[z] - w[z] * K[2, n]
+        a, b, c, d, e, f = P[0, n], P[1, n], P[2, n], P[3, n], P[4, n], P[5, n]
+        # Rows of A P, then their products with the rows of A.
+        x0, x1, x2 = xx * a + xy * d + xz * e, xx * d + xy * b + xz * f, xx * e + xy * f + xz * c
+        y0, y1, y2 = yx * a + yy * d + yz * e, yx * d + yy * b + yz * f, yx * e + yy * f + yz * c
+        z0, z1, z2 = zx * a + zy * d + zz * e, zx * d + zy * b + zz * f, zx * e + zy * f + zz * c
+        P[0, n] = x0 * xx + x1 * xy + x2 * xz + Q[x]
+        P[1, n] = y0 * yx + y1 * yy + y2 * yz + Q[y]
+        P[2, n] = z0 * zx + z1 * zy + z2 * zz + Q[z]
+        P[3, n] = x0 * yx + x1 * yy + x2 * yz
+        P[4, n] = x0 * zx + x1 * zy + x2 * zz
+        P[5, n] = y0 * zx + y1 * zy + y2 * zz
+        count += not (P[0, n] < HUGE and P[1, n] < HUGE and P[2, n] < HUGE)
+    return count
+
+
+@_compiled
+def innovations(
+    u: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, y: Floats, sd: Floats
+) -> int:
+    """y = z - H u and its sd (m,) before the update, zero where z is NaN; counts the measured."""
+    per, count = (3 if P.shape[0] == 6 else 1), 0
+    for m in range(len(rows)):
+        y[m] = sd[m] = 0.0
+        if not np.isnan(z[m]):
+            y[m] = z[m] - u[rows[m]]
+            sd[m] = np.sqrt(P[rows[m] % per, rows[m] // per] + R[m])
+            count += 1
+    return count
+
+
+@_compiled
+def correct_components(
+    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool, shift: bool
+) -> float:  # fmt: skip
+    """Eqs 37-39 at the measured components (m,), NaN = missing; returns NIS.
+
+    `shift` adds the correction to `before` (U_t) too. "printed" P - K P loses all of P where
+    P >> R; "joseph" is (1 - K)^2 P + K^2 R.
+    """
+    nis, p = 0.0, P[0]
+    for m in range(len(rows)):
+        i = rows[m]
+        if np.isnan(z[m]):
+            continue
+        y, S = z[m] - u[i], p[i] + R[m]
+        G = p[i] / S
+        u[i] += G * y
+        if shift:
+            before[i] += G * y
+        p[i] = (1 - G) * p[i] * (1 - G) + G * R[m] * G if joseph else p[i] - G * p[i]
+        nis += y / S * y
+    return nis
+
+
+@_compiled
+def correct_companions(
+    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool
+) -> float:
+    """The update of (U_t, U_{t-dt}) together, measured in U_t; returns NIS."""
+    nis, now, cross, old = 0.0, P[0], P[1], P[2]
+    for m in range(len(rows)):
+        i = rows[m]
+        if np.isnan(z[m]):
+            continue
+        p, x, b = now[i], cross[i], old[i]
+        y, S = z[m] - u[i], p + R[m]
+        G, L = p / S, x / S
+        u[i] += G * y
+        before[i] += L * y
+        if joseph:
+            now[i] = (1 - G) * p * (1 - G) + G * R[m] * G
+            cross[i] = (1 - G) * (x - L * p) + G * R[m] * L
+            old[i] = (b - L * x) - L * (x - L * p) + L * R[m] * L
+        else:
+            now[i], cross[i], old[i] = p - G * p, x - G * x, b - L * x
+        nis += y / S * y
+    return nis
+
+
+@_compiled
+def correct_nodes(
+    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool, shift: bool
+) -> float:  # fmt: skip
+    """The 3 x 3 update of the measured nodes, one component after the other; returns NIS.
+
+    R is diagonal, so this is the joint update of a node's components.
+    """
+    nis, G, T = 0.0, np.empty(3), np.empty((3, 3))
+    for m in range(len(rows)):
+        n, i = divmod(rows[m], 3)
+        if np.isnan(z[m]):
+            continue
+        y, S = z[m] - u[rows[m]], P[i, n] + R[m]
+        for j in range(3):
+            G[j] = P[_ROW[i, j], n] / S
+            u[3 * n + j] += G[j] * y
+            if shift:
+                before[3 * n + j] += G[j] * y
+        for j in range(3):
+            for k in range(3):
+                own = (1 - G[i]) if j == i else 1.0
+                gone = 0.0 if j == i else G[j] * P[_ROW[i, k], n]
+                T[j, k] = own * P[_ROW[j, k], n] - gone
+        for j in range(3):
+            for k in range(j, 3):
+                P[_ROW[j, k], n] = T[j, k]
+                if joseph:
+                    P[_ROW[j, k], n] += G[j] * R[m] * G[k] - T[j, i] * G[k]
+        nis += y / S * y
+    return nis
+
+
+@_compiled
+def clip(P: Floats) -> int:
+    """Scales the covariances beyond `HUGE` back to it; returns how many."""
+    count = 0
+    for i in range(P.shape[1]):
+        top = 0.0
+        for k in range(P.shape[0]):
+            top = max(top, abs(P[k, i]))
+        if top >= HUGE:
+            count += 1
+            for k in range(P.shape[0]):
+                P[k, i] *= HUGE / top
+    return count

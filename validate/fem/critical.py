@@ -1,0 +1,217 @@
+"""How large a step central difference may take: 2/omega_max, and what bounds it.
+
+Sources: Lanczos (1950) on M^-1/2 K M^-1/2; paper 003, eq 16; Gershgorin's circles; the largest
+element frequency (Irons & Treharne 1971), which bounds omega_max where masses add up by cells.
+
+Departures: paper 003 trusts eq 16, which is no bound: on a regular mesh it allows steps above
+2/omega_max, with slivers it is many times too small. It is reported, never recommended.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import eigsh
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.assemble import shape_gradients
+from validate.fem.system import System
+from validate.scene.scene import Material, Scene
+
+MatVec = Callable[[Floats], Floats]
+
+PRODUCTS = 30  # of K with a vector; 15 to 20 settle most meshes, fewer overestimate the step
+_FEWEST = 15
+MARGIN = 0.08  # the limit falls as a body deforms: -17 % at a volume of 1.3
+_BLOCK = 8192  # cells at a time
+
+
+@dataclass(frozen=True)
+class LanczosStep:
+    """`limit` s is 2/omega_max as the products found it, from above; `safe` s lies below it.
+
+    `safe` takes off the margin and what the products left open (the residual of the top value).
+    """
+
+    limit: float
+    safe: float
+    products: int
+
+
+@dataclass(frozen=True)
+class CriticalStep:
+    """Steps s of central difference with lumped masses, undamped or with C of the last velocity.
+
+    `lanczos` is the limit; `recommended` is what to use; `gershgorin` and, for linear cells,
+    `element` are safe bounds; `eq_16_altitude` and `eq_16_edge` are paper 003's eq 16 with the
+    least altitude and the shortest edge over the dilatational wave speed. `cell` limits the step.
+    """
+
+    lanczos: float
+    recommended: float
+    gershgorin: float
+    element: float | None
+    eq_16_altitude: float
+    eq_16_edge: float
+    cell: int
+    altitude: float
+    products: int
+
+    @property
+    def limited_by(self) -> str:
+        """The cell that limits the step, for messages."""
+        return f"cell {self.cell} (altitude {1e3 * self.altitude:.3g} mm) limits it"
+
+
+def critical_step(
+    system: System, *, products: int = PRODUCTS, margin: float = MARGIN
+) -> CriticalStep:
+    """All limits of a system at rest, by its K and lumped masses.
+
+    Raises `SceneError` for a missing density or settings out of range.
+    """
+    scene, free = system.scene, system.free
+    K, masses = sparse.csr_array(system.K[free][:, free]), system.masses[free]
+    found = lanczos_step(lambda x: K @ x, masses, products=products, margin=margin)
+    altitudes, c = cell_altitudes(scene), wave_speeds(scene)
+    linear = scene.mesh.order == 1
+    squares = element_frequencies(scene) ** 2 if linear else (c / altitudes) ** 2
+    worst = int(np.argmax(squares))
+    return CriticalStep(
+        found.limit,
+        found.safe,
+        gershgorin_step(K, masses),
+        2 / float(np.sqrt(squares[worst])) if linear else None,
+        float((altitudes / c).min()),
+        float((shortest_edges(scene) / c).min()),
+        worst,
+        float(altitudes[worst]),
+        found.products,
+    )
+
+
+def lanczos_step(
+    apply: MatVec, masses: Floats, *, products: int = PRODUCTS, margin: float = MARGIN
+) -> LanczosStep:
+    """2/omega_max of M^-1 K from products K x alone, x (m,), with diagonal masses (m,) kg.
+
+    For a tangent at a deformed state as well. A negative tangent eigenvalue does not disturb it.
+    Raises `SceneError` for fewer than 15 products or a margin outside 0..0.5.
+    """
+    if products < _FEWEST or not 0 <= margin <= 0.5:
+        raise SceneError(
+            f"{products} products, margin {margin:g}: at least {_FEWEST} products (fewer "
+            "overestimate the step) and a margin in 0..0.5"
+        )
+    top, open_part, done = _largest(apply, 1 / np.sqrt(masses), products)
+    limit = 2 / float(np.sqrt(top))
+    return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
+
+
+def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float, int]:
+    """Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done."""
+    m = len(scale)
+    q = np.random.default_rng(0).standard_normal(m)
+    basis = np.zeros((min(products, m) + 1, m))
+    basis[0] = q / np.linalg.norm(q)
+    alphas: list[float] = []
+    betas: list[float] = []
+    for k in range(min(products, m)):
+        w = scale * apply(scale * basis[k])
+        alphas.append(float(basis[k] @ w))
+        for _ in range(2):  # full orthogonalisation, twice: no ghosts
+            w = w - basis[: k + 1].T @ (basis[: k + 1] @ w)
+        betas.append(float(np.linalg.norm(w)))
+        if betas[-1] <= 1e-12 * max(map(abs, alphas)):
+            break
+        basis[k + 1] = w / betas[-1]
+    T = np.diag(alphas) + np.diag(betas[:-1], 1) + np.diag(betas[:-1], -1)
+    values, vectors = np.linalg.eigh(T)
+    return float(values[-1]), betas[-1] * abs(float(vectors[-1, -1])), len(alphas)
+
+
+def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:
+    """A safe step s: omega_max^2 <= max_i sum_j |K_ij| / m_i."""
+    sums = np.asarray(abs(K).sum(axis=1)).ravel()
+    return 2 / float(np.sqrt((sums / masses).max()))
+
+
+def wave_speeds(scene: Scene) -> Floats:
+    """Dilatational wave speed sqrt((lambda + 2 mu)/rho) m/s of every cell (e,)."""
+    return np.sqrt(scene.per_cell(_wave_modulus) / scene.per_cell(_density))
+
+
+def cell_altitudes(scene: Scene) -> Floats:
+    """Least altitude m of every cell's corners (e,)."""
+    return np.asarray(1 / np.linalg.norm(shape_gradients(scene.mesh), axis=2).max(axis=1))
+
+
+def shortest_edges(scene: Scene) -> Floats:
+    """Shortest edge m between corners of every cell (e,)."""
+    x = scene.mesh.nodes[scene.mesh.corners]
+    pairs = [(a, b) for b in range(x.shape[1]) for a in range(b)]
+    lengths = [np.linalg.norm(x[:, a] - x[:, b], axis=1) for a, b in pairs]
+    return np.asarray(np.min(lengths, axis=0))
+
+
+def element_frequencies(scene: Scene) -> Floats:
+    """Largest angular frequency 1/s of every free linear cell (e,) with a lumped mass.
+
+    Of the strains' side, (d + 1)/rho B D B^T, which has the eigenvalues that are not zero.
+    """
+    mesh, d = scene.mesh, scene.mesh.dimension
+    gradients = shape_gradients(mesh)
+    lam = scene.per_cell(lambda m: m.bulk_modulus - 2 * m.shear_modulus / 3)
+    mu, rho = scene.per_cell(lambda m: m.shear_modulus), scene.per_cell(_density)
+    squares = np.empty(len(gradients))
+    for start in range(0, len(gradients), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        B, D = _strain_rows(gradients[part]), _elasticity(lam[part], mu[part], d)
+        root = np.linalg.cholesky(D)
+        S = np.swapaxes(root, 1, 2) @ B @ np.swapaxes(B, 1, 2) @ root
+        squares[part] = (d + 1) / rho[part] * np.linalg.eigvalsh(S)[:, -1]
+    return np.sqrt(squares)
+
+
+def _strain_rows(gradients: Floats) -> Floats:
+    """B (e, s, (d + 1) d): strains, engineering shear, of nodal displacements."""
+    e, nodes, d = gradients.shape
+    shears = [(i, j) for j in range(d) for i in range(j)]
+    B = np.zeros((e, d + len(shears), nodes, d))
+    for i in range(d):
+        B[:, i, :, i] = gradients[:, :, i]
+    for s, (i, j) in enumerate(shears, start=d):
+        B[:, s, :, i], B[:, s, :, j] = gradients[:, :, j], gradients[:, :, i]
+    return B.reshape(e, d + len(shears), nodes * d)
+
+
+def _elasticity(lam: Floats, mu: Floats, d: int) -> Floats:
+    """D (e, s, s) Pa of Hooke's law; in 2-D plane strain."""
+    s = d + d * (d - 1) // 2
+    normal = np.zeros(s)
+    normal[:d] = 1
+    weights = np.where(normal > 0, 2.0, 1.0)
+    return np.asarray(
+        lam[:, None, None] * np.outer(normal, normal) + mu[:, None, None] * np.diag(weights)
+    )
+
+
+def frequency_range(system: System) -> tuple[float, float]:
+    """Lowest and highest angular frequency 1/s with the consistent mass."""
+    free = system.free
+    K, M = (sparse.csc_array(X[free][:, free]) for X in (system.K, system.M))
+    lowest = eigsh(K, k=1, M=M, sigma=0.0, which="LM", return_eigenvectors=False)
+    highest = eigsh(K, k=1, M=M, which="LM", return_eigenvectors=False)
+    return float(np.sqrt(lowest[0])), float(np.sqrt(highest[0]))
+
+
+def _wave_modulus(m: Material) -> float:
+    return m.bulk_modulus + 4 * m.shear_modulus / 3
+
+
+def _density(m: Material) -> float:
+    if m.rho is None:
+        raise SceneError("a critical step needs the density; set rho kg/m3 of every material")
+    return m.rho

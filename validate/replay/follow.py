@@ -1,0 +1,197 @@
+"""What every experiment over time shows: displacements, errors, what each method cost."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
+from validate.compare.track import TRACK_METRICS, TrackError, track_error
+from validate.replay.tracking import Followed, Tracking
+
+_MM = 1e3
+_MAPS = 6  # pictures of the mesh in one report
+Cases = Mapping[str, Mapping[str, Followed]]
+
+
+def standard_exhibits(
+    experiment: Tracking, main: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
+) -> tuple[Exhibit, ...]:
+    """Displacements and errors on the recorded case, wrong-model cases, speeds, maps."""
+    scored = {n: f for n, f in main.items() if _whole(f)}
+    found = [_displacements(experiment, scored)] if scored else []
+    if others:
+        found.append(_wrong_models(experiment, scored, others, docs))
+    found.append(_speeds(experiment, main))
+    maps = _maps(scored)
+    return (*found, *((maps,) if maps else ()))
+
+
+def _whole(followed: Followed) -> bool:
+    return len(followed.run.t) == len(followed.seen.stage.t)
+
+
+def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
+    """Estimate less truth at a probe, along an axis, over the whole time."""
+    reference = followed.truth.probes[probe][:, "xyz".index(axis)]
+    return track_error(probe, axis, followed.run.traces[f"{probe}.{axis}"].y, reference)
+
+
+def _displacements(experiment: Tracking, scored: Mapping[str, Followed]) -> Exhibit:
+    first, axis = next(iter(scored.values())), experiment.axis
+    probes = tuple(first.truth.probes)
+    charts = [_track_chart(scored, probe, axis) for probe in probes]
+    charts += [_error_chart(scored, probe, axis) for probe in probes]
+    return Exhibit(
+        "displacements",
+        "Displacements over time",
+        (
+            "The reference is the twin's own displacement, which no method sees. Points are what "
+            "was measured there; only the markers named in a method are given to it.",
+        ),
+        tables=(_error_table(scored, probes, axis),),
+        charts=tuple(charts),
+    )
+
+
+def _track_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
+    first = next(iter(scored.values()))
+    series = [*_measured(first, probe, axis)]
+    series.append(_line("reference (twin)", first, first.truth.probes[probe][:, "xyz".index(axis)]))
+    series += [_line(f.label, f, f.run.traces[f"{probe}.{axis}"].y) for f in scored.values()]
+    return Chart(
+        f"displacement_{probe}", f"Displacement at {probe}", "time / s", f"u_{axis} / mm",
+        tuple(series),
+    )  # fmt: skip
+
+
+def _measured(followed: Followed, probe: str, axis: str) -> list[Series]:
+    seen = followed.seen.markers
+    if seen is None or probe not in seen.names:
+        return []
+    j, c = seen.names.index(probe), "xyz".index(axis)
+    moved = seen.x[:, j, c] - seen.rest[j, c]
+    there = np.isfinite(moved)
+    return [Series("measured", seen.t[there], _MM * moved[there], "points")]
+
+
+def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
+    """Absolute errors, with zero drawn at a thousandth of the largest."""
+    lines = {f.label: np.abs(error_at(f, probe, axis).values) for f in scored.values()}
+    floor = max(float(y.max()) for y in lines.values()) * 1e-5 or 1e-12
+    series = tuple(
+        Series(label, f.run.t, _MM * np.maximum(y, floor))
+        for (label, y), f in zip(lines.items(), scored.values(), strict=True)
+    )
+    return Chart(
+        f"error_{probe}", f"Error at {probe}", "time / s", f"|u_{axis} − reference| / mm", series,
+        log="y", caption=f"Errors below {_MM * floor:.1e} mm are drawn there.",
+    )  # fmt: skip
+
+
+def _line(label: str, followed: Followed, y: Floats) -> Series:
+    return Series(label, followed.run.t, _MM * y)
+
+
+def _error_table(scored: Mapping[str, Followed], probes: tuple[str, ...], axis: str) -> NumberTable:
+    rows = [
+        (f.label, probe, *_statistics(error_at(f, probe, axis)))
+        for f in scored.values()
+        for probe in probes
+    ]
+    return NumberTable(
+        "errors",
+        f"Errors of u_{axis} against the twin's truth. SD: sample standard deviation (ddof 1) of "
+        "the absolute error. NRMSE: RMSE over the range (largest less smallest) of the reference.",
+        ("method", "node", "MAE / mm", "RMSE / mm", "SD / mm", "max / mm", "NRMSE / 1", "times"),
+        tuple(rows),
+    )
+
+
+def _statistics(error: TrackError) -> tuple[Entry, ...]:
+    values = {name: metric(error) for name, metric, _, _ in TRACK_METRICS}
+    lengths = (_MM * values[n] for n in ("mae", "rmse", "sd", "max"))
+    return (*lengths, values["nrmse"], len(error.values))
+
+
+def _wrong_models(
+    experiment: Tracking, scored: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
+) -> Exhibit:
+    axis, probes = experiment.axis, tuple(next(iter(scored.values())).truth.probes)
+    rows: list[tuple[Entry, ...]] = []
+    for name, case in others.items():
+        for followed in case.values():
+            whole = _whole(followed)
+            errors = [error_at(followed, p, axis) for p in probes] if whole else []
+            shown: list[Entry] = [rmse_share(e) for e in errors]
+            shown = shown or [None] * len(probes)
+            ended = "finished" if whole else f"{followed.run.outcome.state}"
+            rows.append((name, followed.label, *shown, _nis(followed), ended))
+    table = NumberTable(
+        "wrong_models",
+        "Truths that the models do not know: RMSE over the range of the reference, per node, and "
+        "NIS per degree of freedom (1: consistent; far above: the model class is wrong).",
+        ("truth", "method", *(f"{p} NRMSE / %" for p in probes), "NIS per dof / 1", "ended"),
+        tuple(rows),
+    )
+    words = tuple(f"{name}: {docs[name]}" for name in others)
+    return Exhibit("wrong-models", "When the model is wrong", words, tables=(table,))
+
+
+def rmse_share(error: TrackError) -> float:
+    """NRMSE in %."""
+    return 100 * float(np.sqrt((error.values**2).mean())) / error.spread
+
+
+def _nis(followed: Followed) -> float | None:
+    nis, dof = followed.run.traces.get("nis"), followed.run.traces.get("nis.dof")
+    if nis is None or dof is None or not dof.y.any():
+        return None
+    return float(nis.y.sum() / dof.y.sum())
+
+
+def _speeds(experiment: Tracking, main: Mapping[str, Followed]) -> Exhibit:
+    base = main.get(experiment.reference)
+    unit = base.run.step_s.p50 if base and base.run.step_s else None
+    rows = [_speed_row(f, unit) for f in main.values()]
+    named = base.label if base else "not run"
+    table = NumberTable(
+        "speeds",
+        "What one step of the recording costs, every method in this run on this machine; the ratio "
+        f"is to '{named}'. Real-time factor: simulated over computing time.",
+        ("method", "set-up / s", "step p50 / ms", "p99 / ms", "ratio / 1", "rate / Hz",
+         "real-time factor / 1", "steps", "ended"),
+        tuple(rows),
+    )  # fmt: skip
+    return Exhibit("speeds", "Time per step", tables=(table,))
+
+
+def _speed_row(f: Followed, unit: float | None) -> tuple[Entry, ...]:
+    times, end = f.run.step_s, f.run.outcome
+    ended = end.state if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
+    if times is None:
+        return (f.label, f.run.setup_s, None, None, None, None, None, 0, ended)
+    t = f.seen.stage.t
+    dt = float(t[1] - t[0]) if len(t) > 1 else float(t[0])
+    ratio = times.p50 / unit if unit else None
+    return (
+        f.label, f.run.setup_s, 1e3 * times.p50, 1e3 * times.p99, ratio, times.rate_hz,
+        dt * times.rate_hz, len(f.run.t), ended,
+    )  # fmt: skip
+
+
+def _maps(scored: Mapping[str, Followed]) -> Exhibit | None:
+    """Rms error over the output frames at every node, where truth and model share a mesh."""
+    maps = []
+    for f in scored.values():
+        u, mesh = f.truth.u, f.scene.mesh
+        same = f.truth.mesh is not None and np.array_equal(f.truth.mesh.nodes, mesh.nodes)
+        if u is None or not same or u.shape != f.run.u.shape:
+            continue
+        error = np.sqrt(((f.run.u - u) ** 2).sum(axis=2).mean(axis=0))
+        if error.any():
+            title = f"{f.label}: rms error over time at every node"
+            maps.append(NodeMap(f"error_{f.method}", title, mesh, _MM * error, "mm", "error"))
+    if not maps:
+        return None
+    return Exhibit("error-maps", "Where the errors are", maps=tuple(maps[:_MAPS]))

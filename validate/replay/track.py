@@ -1,0 +1,286 @@
+"""The road of experiments over time: every method on every case, scored against the truth."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Ints
+from validate.compare.residual import Residual
+from validate.compare.result import MethodResult, Result
+from validate.compare.score import Score, run_scores, scores_of
+from validate.compare.track import track_error, track_scores
+from validate.compare.verdict import Check, Sensitivity, judge
+from validate.errors import ComparisonError
+from validate.fem.system import build as build_system
+from validate.parameters import describe
+from validate.recording.types import Recording
+from validate.register.observe import MarkerObservation, Registered
+from validate.replay.follow import standard_exhibits
+from validate.replay.options import Options, Report, configure, folder_of
+from validate.replay.sentence import verdict_sentence
+from validate.replay.tracking import Case, Followed, Told, Tracking, Truth
+from validate.scene.scene import Scene
+from validate.solve.march import march
+from validate.solve.types import Run
+
+MAIN = ""  # the case that was recorded
+
+
+def track(experiment: Tracking, options: Options, report: Report | None = None) -> Result:
+    """Runs the road and judges it. Raises children of `ValidateError` for bad input."""
+    parameters, methods = configure(experiment, options)
+    cases = () if options.quick else experiment.cases
+    road = _Road(experiment, methods, report, _total(experiment, methods, cases))
+    recordings = experiment.load(parameters, folder_of(experiment))
+    main = road.case(MAIN, recordings[0], parameters, parameters, tuple(methods))
+    others = {case.name: road.other(case, parameters) for case in cases}
+    told = _told(experiment, parameters, main, road, options)
+    results = tuple(_method(experiment, road, parameters, main[n], others) for n in methods)
+    values = {m.name: {s.name: s.value for s in m.scores} for m in results}
+    values["told"] = dict(told.numbers)
+    printed = experiment.published(values) if experiment.published and not options.quick else ()
+    docs = {case.name: case.doc for case in cases}
+    first = main[next(iter(methods))]
+    return Result(
+        name=experiment.name,
+        title=experiment.title,
+        source=experiment.source,
+        sentence=verdict_sentence(results, quick=options.quick),
+        parameters=describe(parameters) + describe(methods, "methods."),
+        methods=results,
+        recordings=recordings,
+        rest=(),
+        effects=(),
+        published=printed,
+        notes=first.seen.findings,
+        quick=options.quick,
+        same_model=experiment.same_model,
+        seed=experiment.seed,
+        twin_notice=experiment.twin_notice,
+        exhibits=(*standard_exhibits(experiment, main, others, docs), *told.exhibits),
+    )
+
+
+def _total(experiment: Tracking, methods: Mapping[str, Any], cases: tuple[Case, ...]) -> int:
+    per_case = [len(_of_case(experiment, methods, case)) for case in cases]
+    return len(methods) + sum(per_case) + 1
+
+
+def _of_case(experiment: Tracking, methods: Mapping[str, Any], case: Case) -> tuple[str, ...]:
+    """The methods a case is run with: those it names, or all that are not only timed."""
+    whole = [n for n, m in methods.items() if getattr(m, "steps", None) is None]
+    return tuple(n for n in whole if not case.methods or n in case.methods)
+
+
+class _Road:
+    """Runs methods on cases and counts them for the progress bar."""
+
+    def __init__(
+        self, experiment: Tracking, methods: Mapping[str, Any], report: Report | None, total: int
+    ) -> None:
+        self.experiment, self.methods, self._report = experiment, methods, report
+        self._done, self._total = 0, total
+
+    def tell(self, what: str) -> None:
+        if self._report:
+            self._report(min(self._done, self._total), self._total, what)
+
+    def other(self, case: Case, parameters: Any) -> dict[str, Followed]:
+        true = case.change(parameters)
+        experiment = self.experiment
+        if case.shipped:
+            recording = experiment.load(true, folder_of(experiment))[0]
+        else:
+            recording = experiment.record(true, self.tell)
+        names = _of_case(experiment, self.methods, case)
+        return self.case(case.name, recording, parameters, true, names)
+
+    def case(
+        self, name: str, recording: Recording, parameters: Any, true: Any, methods: tuple[str, ...]
+    ) -> dict[str, Followed]:
+        """Every method, with `parameters`, on a recording that the twin made with `true` ones."""
+        found: dict[str, Followed] = {}
+        truth: Truth | None = None
+        for method in methods:
+            self.tell(f"{method} {name}".strip())
+            scene, seen, run = self.run(method, recording, parameters)
+            truth = truth or self.experiment.truth(true, seen)
+            label = str(self.methods[method].label)
+            found[method] = Followed(method, label, name, scene, seen, run, truth)
+            self._done += 1
+        return found
+
+    def run(
+        self, method: str, recording: Recording, parameters: Any
+    ) -> tuple[Scene, Registered, Run]:
+        settings = self.methods[method]
+        start = perf_counter()
+        scene = self.experiment.build(recording, parameters, settings)
+        system = build_system(scene)
+        built = perf_counter() - start
+        seen = self.experiment.place(recording, parameters, scene)
+        start = perf_counter()
+        stepper = self.experiment.stepper(settings, parameters, system, seen)
+        setup = built + perf_counter() - start
+        t, inputs = seen.stage.t, seen.stage.y
+        steps = getattr(settings, "steps", None) or len(t)
+        at = output_frames(len(t), self.experiment.frames)
+        run = march(method, stepper, t[:steps], inputs[:steps], at[at < steps], setup)
+        return scene, seen, run
+
+
+def output_frames(steps: int, frames: int) -> Ints:
+    """Evenly spaced steps whose fields are kept, the last one among them."""
+    return np.unique(np.linspace(0, steps - 1, min(frames, steps)).round().astype(np.int64))
+
+
+def _told(
+    experiment: Tracking,
+    parameters: Any,
+    main: Mapping[str, Followed],
+    road: _Road,
+    options: Options,
+) -> Told:
+    if experiment.tell is None or options.quick or set(main) != set(experiment.methods):
+        return Told()
+    return experiment.tell(parameters, main, road.tell)
+
+
+def _method(
+    experiment: Tracking,
+    road: _Road,
+    parameters: Any,
+    mine: Followed,
+    others: Mapping[str, Mapping[str, Followed]],
+) -> MethodResult:
+    accepted = mine.method in experiment.accepted
+    residuals = held_out(mine)
+    runs = [mine, *(case[mine.method] for case in others.values() if mine.method in case)]
+    return MethodResult(
+        name=mine.method,
+        label=mine.label,
+        accepted=accepted,
+        scene=mine.scene,
+        registered=(mine.seen,),
+        runs=(mine.run,),
+        residuals=residuals,
+        scores=(
+            *(s for f in runs for s in truth_scores(f, experiment.axis)),
+            *(s for r in residuals.values() for s in scores_of(r, "measured recording")),
+            *run_scores(mine.run),
+            *(s for f in runs for s in consistency_scores(f)),
+        ),
+        checks=_checks(experiment, road, parameters, mine, residuals) if accepted else (),
+    )
+
+
+def truth_scores(followed: Followed, axis: str) -> tuple[Score, ...]:
+    """Errors at every probe against the truth; none for a run that did not reach the end."""
+    found: list[Score] = []
+    for name, reference in followed.truth.probes.items():
+        estimate = followed.run.traces.get(f"{name}.{axis}")
+        if estimate is None or len(estimate.y) != len(reference):
+            continue
+        error = track_error(name, axis, estimate.y, reference[:, "xyz".index(axis)])
+        found += track_scores(error, "truth of the twin", followed.case)
+    return tuple(found)
+
+
+def held_out(followed: Followed) -> dict[str, Residual]:
+    """Estimate less measured of every marker that is a probe of the scene, over the whole time."""
+    markers = followed.seen.markers
+    probes = {p.name for p in followed.scene.probes}
+    if markers is None or len(followed.run.t) != len(followed.seen.stage.t):
+        return {}
+    rows = [_residual(followed, markers, n) for n in markers.names if n in probes]
+    return {r.name: r for r in rows if r is not None}
+
+
+def _residual(followed: Followed, markers: MarkerObservation, name: str) -> Residual | None:
+    j, run = markers.names.index(name), followed.run
+    moved = markers.x[:, j] - markers.rest[j]
+    inside = (markers.t >= run.t[0] - 1e-9) & (markers.t <= run.t[-1] + 1e-9)
+    seen = np.isfinite(moved).all(axis=1) & inside
+    if not seen.any():
+        return None
+    t = markers.t[seen]
+    estimate = np.stack([np.interp(t, run.t, run.traces[f"{name}.{c}"].y) for c in "xyz"], axis=1)
+    words = "estimate less measured displacement of the marker, at the times it was seen"
+    tre = float(markers.tre[j])
+    return Residual(name, "all", estimate - moved[seen], markers.sd, tre, "m", words)
+
+
+def _checks(
+    experiment: Tracking,
+    road: _Road,
+    parameters: Any,
+    mine: Followed,
+    residuals: Mapping[str, Residual],
+) -> tuple[Check, ...]:
+    finer, inputs, refinement = _uncertain(experiment, road, parameters, residuals)
+    found = []
+    for accept in experiment.accept:
+        key = f"{accept.quantity}@all"
+        if key not in residuals:
+            found.append(_nothing(accept.quantity, accept.limit, mine.run))
+            continue
+        found.append(
+            judge(residuals[key], accept.limit, finer.get(key), refinement, inputs.get(key, []))
+        )
+    return tuple(found)
+
+
+def _uncertain(
+    experiment: Tracking, road: _Road, parameters: Any, residuals: Mapping[str, Residual]
+) -> tuple[Mapping[str, Residual], dict[str, list[Sensitivity]], float]:
+    """What the mesh and the inputs do to the residuals, by the surrogate.
+
+    A twin of the same model on the same mesh has no discretisation error: u_num is zero there.
+    """
+    uncertainty = experiment.uncertainty
+    if uncertainty is None:
+        if not experiment.same_model:
+            raise ComparisonError(f"{experiment.name}: no uncertainty is declared; u_val unknown")
+        return residuals, {}, 1.0
+    recording = experiment.load(parameters, folder_of(experiment))[0]
+
+    def moved(changed: Any) -> dict[str, Residual]:
+        scene, seen, run = road.run(uncertainty.surrogate, recording, changed)
+        return held_out(Followed(uncertainty.surrogate, "", "", scene, seen, run, Truth({})))
+
+    base, fine = moved(parameters), moved(uncertainty.finer(parameters))
+    finer = {
+        k: replace(r, values=r.values + fine[k].values - base[k].values)
+        for k, r in residuals.items()
+        if k in fine and k in base
+    }
+    found: dict[str, list[Sensitivity]] = {}
+    for source in uncertainty.inputs:
+        other = moved(source.change(parameters))
+        for key in base.keys() & other.keys():
+            step = replace(base[key], values=other[key].values - base[key].values, sd=0.0)
+            found.setdefault(key, []).append(
+                Sensitivity(source.name, step, source.scale(parameters))
+            )
+    return finer, found, uncertainty.refinement(parameters)
+
+
+def _nothing(quantity: str, limit: float, run: Run) -> Check:
+    ending = "" if run.finished else f"{run.outcome.state}: {run.outcome.why}"
+    why = f"compared nothing: {ending or 'no such marker in the recording'}"
+    return Check(quantity, 0.0, limit, 0.0, 0.0, 0.0, 0.0, "m", 0, "cannot decide", why)
+
+
+def consistency_scores(followed: Followed) -> tuple[Score, ...]:
+    """NIS per degree of freedom of a filter's run; none for a solver."""
+    nis, dof = followed.run.traces.get("nis"), followed.run.traces.get("nis.dof")
+    if nis is None or dof is None or not dof.y.any():
+        return ()
+    end = f"@{followed.case}" if followed.case else ""
+    count = int(dof.y.sum())
+    words = "normalised innovation squared over its degrees of freedom; 1 for a consistent filter"
+    value = float(nis.y.sum() / dof.y.sum())
+    return (Score(f"nis.per_dof{end}", value, "1", count, "measured recording", words),)

@@ -1,0 +1,90 @@
+"""Meshes as files: npz of plain arrays, read without pickle, sizes bounded before memory is taken.
+
+Arrays: "kind" (text), "nodes" (n, d) float64 m, "cells" (e, k) int32, one "facets.<set>" (f, m)
+int32 per facet set, and "provenance" (text), which is for people.
+"""
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import SceneError
+from validate.scene.mesh import Kind, Mesh, require_positive_cells
+
+MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
+_FACETS = "facets."
+_TEXT = 4000  # characters of a text array
+
+
+def write_mesh(mesh: Mesh, path: Path, provenance: str = "") -> None:
+    """The mesh with a note of where it comes from; raises `SceneError` when it is too large."""
+    arrays: dict[str, NDArray[Any]] = {
+        "kind": np.array(mesh.kind),
+        "nodes": mesh.nodes,
+        "cells": mesh.cells.astype(np.int32),
+        "provenance": np.array(provenance[:_TEXT]),
+        **{f"{_FACETS}{name}": f.astype(np.int32) for name, f in mesh.facets.items()},
+    }
+    size = sum(a.nbytes for a in arrays.values())
+    if size > MAX_BYTES:
+        raise SceneError(f"mesh of {size} bytes, the limit of a mesh file is {MAX_BYTES}")
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def read_mesh(path: Path) -> Mesh:
+    """The mesh of a file that `write_mesh` wrote.
+
+    Raises `SceneError`, one line that names the file, for one that is missing, damaged, too large
+    or no such mesh, and for inverted elements.
+    """
+    try:
+        mesh = _mesh(_arrays(path))
+        require_positive_cells(mesh)
+        return mesh
+    except SceneError as error:
+        raise SceneError(f"{path.name}: {error}") from error
+    except OSError as error:
+        raise SceneError(f"cannot read mesh {path.name}: {error.strerror or error}") from error
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Every array of the file, once their declared sizes are known to be small."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > MAX_BYTES:
+            raise SceneError(f"{size} bytes unpacked, the limit is {MAX_BYTES}")
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (ValueError, EOFError, KeyError, zipfile.BadZipFile, RuntimeError, zlib.error) as error:
+        raise SceneError(f"no mesh file, or a damaged one ({_line(error)})") from error
+
+
+def _mesh(arrays: dict[str, NDArray[Any]]) -> Mesh:
+    missing = [name for name in ("kind", "nodes", "cells") if name not in arrays]
+    if missing:
+        raise SceneError(f"no {missing} among its arrays {sorted(arrays)[:8]}: not a mesh file")
+    facets = {k.removeprefix(_FACETS): v for k, v in arrays.items() if k.startswith(_FACETS)}
+    for name, a in {"cells": arrays["cells"], **facets}.items():
+        if a.dtype.kind not in "iu":
+            raise SceneError(f"'{name}' holds {a.dtype}, expected integers")
+    if arrays["nodes"].dtype.kind != "f":
+        raise SceneError(f"'nodes' holds {arrays['nodes'].dtype}, expected floats")
+    return Mesh(arrays["nodes"], arrays["cells"], _kind(arrays["kind"]), facets)
+
+
+def _kind(value: NDArray[Any]) -> Kind:
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    for kind in kinds:
+        if value.dtype.kind == "U" and value.shape == () and str(value) == kind:
+            return kind
+    raise SceneError(f"kind {str(value)[:40]!r}: one of {', '.join(kinds)}")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:80] or type(error).__name__

@@ -1,0 +1,246 @@
+"""One step of Newmark's family over the free unknowns, as a state equation of the displacement.
+
+Every rule here reads u' = u + h v + h^2 (b0 a + b1 a'), v' = v + h (g0 a + g1 a'), with balance
+
+    (1 - am) M a' + am M a + (1 - af) (C v' + K u') + af (C v + K u) = (1 - af) f' + af f
+
+so that u' = J^-1 (A u + L v + M_a a + f_w) as in paper 001, eqs 8-14 (where am = af = 0).
+
+Departures: the paper has average acceleration only. Backward Euler (first order, L-stable) and
+generalised alpha (Chung & Hulbert 1993; second order, spectral radius rho_inf at high frequency)
+do not ring as it does. Prescribed unknowns enter as forces on the free ones (`Excitation`).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.system import System
+from validate.solve.linear_solvers import Solver, SolverName, solver_of
+
+RuleName = Literal["average", "backward_euler", "generalised_alpha"]
+MassName = Literal["consistent", "lumped"]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Step h s, the weights of the old and new acceleration in u' and v', and the alphas."""
+
+    h: float
+    b0: float
+    b1: float
+    g0: float
+    g1: float
+    am: float = 0.0
+    af: float = 0.0
+
+    def rates(self, u_new: Floats, u: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
+        """v', a' that lead to u' (paper 001, eqs 8 and 9, solved for them)."""
+        h = self.h
+        a_new = (u_new - u - h * v - (h * h * self.b0) * a) / (h * h * self.b1)
+        return v + (h * self.g0) * a + (h * self.g1) * a_new, a_new
+
+    def weighted(self, new: Floats, old: Floats) -> Floats:
+        """A force, u or v at the instant of the balance: `new` itself unless af > 0."""
+        return new if self.af == 0 else (1 - self.af) * new + self.af * old
+
+    def weighted_a(self, new: Floats, old: Floats) -> Floats:
+        """An acceleration at the instant of the balance: `new` itself unless am != 0."""
+        return new if self.am == 0 else (1 - self.am) * new + self.am * old
+
+
+def rule_of(name: RuleName, dt: float, rho_inf: float = 0.8) -> Rule:
+    """The rule by name; raises `SceneError` for dt <= 0 or rho_inf outside 0..1."""
+    if not (np.isfinite(dt) and dt > 0):
+        raise SceneError(f"time step {dt:g} s: it must be positive")
+    if not 0 <= rho_inf <= 1:
+        raise SceneError(f"rho_inf = {rho_inf:g}: the spectral radius must lie in 0..1")
+    if name == "average":
+        return Rule(dt, 0.25, 0.25, 0.5, 0.5)
+    if name == "backward_euler":
+        return Rule(dt, 0.0, 1.0, 0.0, 1.0)
+    am, af = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
+    beta, gamma = (1 - am + af) ** 2 / 4, 0.5 - am + af
+    return Rule(dt, 0.5 - beta, beta, 1 - gamma, gamma, am, af)
+
+
+@dataclass(frozen=True)
+class Propagation:
+    """The step of a rule; all vectors (m,) and matrices (m, m) are over the `free` unknowns."""
+
+    rule: Rule
+    free: Ints
+    M: sparse.csr_array
+    C: sparse.csr_array
+    K: sparse.csr_array
+    solver: Solver
+
+    def predict(self, u: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
+        """u' (m,) m of the next step under forces f (m,) N: one solve (paper 001, eq 11).
+
+        f acts at the instant of the balance: f' of the step's end, except that generalised alpha
+        takes `rule.weighted(f', f)`.
+        """
+        return self.solver.solve(self.history(u, v, a) + f)
+
+    def history(self, u: Floats, v: Floats, a: Floats) -> Floats:
+        """A u + L v + M_a a (m,) N, by one product with M and one with C."""
+        (mu, mv, ma), (cu, cv, ca), ku = _weights(self.rule)
+        damped = cu * u + cv * v if ca == 0 else cu * u + cv * v + ca * a
+        total = self.M @ (mu * u + mv * v + ma * a) + self.C @ damped
+        return np.asarray(total if ku == 0 else total + self.K @ (ku * u))
+
+    def rates(self, u_new: Floats, u: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
+        """v', a' (m,) that belong to u' whatever made it: a solution or a filter's estimate."""
+        return self.rule.rates(u_new, u, v, a)
+
+    def transition(self) -> Floats:
+        """J^-1 A (m, m), dense: what paper 001 takes as the filter's transition."""
+        return self.solver.solve(self.A.toarray())
+
+    @cached_property
+    def A(self) -> sparse.csr_array:
+        """Paper 001, eq 12."""
+        return self._mixed(0, _weights(self.rule)[2])
+
+    @cached_property
+    def L(self) -> sparse.csr_array:
+        """Paper 001, eq 14."""
+        return self._mixed(1, 0.0)
+
+    @cached_property
+    def M_a(self) -> sparse.csr_array:
+        """The matrix of a: M itself for average acceleration."""
+        return self._mixed(2, 0.0)
+
+    @cached_property
+    def J(self) -> sparse.csr_array:
+        """Paper 001, eq 13."""
+        return _system_matrix(self.rule, self.M, self.C, self.K)
+
+    def _mixed(self, column: int, k: float) -> sparse.csr_array:
+        m, c, _ = _weights(self.rule)
+        return sparse.csr_array(m[column] * self.M + c[column] * self.C + k * self.K)
+
+
+def propagation(
+    system: System,
+    rule: Rule,
+    mass: MassName = "consistent",
+    solver: SolverName = "prefactored",
+) -> Propagation:
+    """The step's matrices over the free unknowns, with J factorised or as the solver takes it.
+
+    Raises `SceneError` for missing densities, or a J that is not positive definite.
+    """
+    free = system.free
+    M, C, K = (
+        sparse.csr_array(X[free][:, free]) for X in (mass_of(system, mass), system.C, system.K)
+    )
+    J, mesh = _system_matrix(rule, M, C, K), system.scene.mesh
+    ready = solver_of(solver, J, free // mesh.dimension, mesh.nodes)
+    return Propagation(rule, free, M, C, K, ready)
+
+
+def _system_matrix(
+    rule: Rule, M: sparse.csr_array, C: sparse.csr_array, K: sparse.csr_array
+) -> sparse.csr_array:
+    m = (1 - rule.am) / (rule.h**2 * rule.b1)
+    c = (1 - rule.af) * rule.g1 / (rule.h * rule.b1)
+    return sparse.csr_array(m * M + c * C + (1 - rule.af) * K)
+
+
+def per_mode(rule: Rule, c: Floats, k: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Factors (m,) of q, q', q'' and force in the next q, for q'' + c q' + k q = f per mode."""
+    masses, dampings, ku = _weights(rule)
+    h, w = rule.h, 1 - rule.af
+    J = (1 - rule.am) / (h * h * rule.b1) + w * rule.g1 / (h * rule.b1) * c + w * k
+    q, v, a = ((m + d * c) / J for m, d in zip(masses, dampings, strict=True))
+    return q + ku * k / J, v, a, 1 / J
+
+
+def _weights(r: Rule) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
+    """Weights of M and of C in A, L, M_a, and of K in A (paper 001, eqs 12 and 14)."""
+    c, d = 1 / (r.h**2 * r.b1), r.g1 / (r.h * r.b1)
+    m, w = 1 - r.am, 1 - r.af
+    masses = (m * c, m * c * r.h, m * r.b0 / r.b1 - r.am)
+    dampings = (w * d, w * (r.h * d - 1) - r.af, w * r.h * (r.h * r.b0 * d - r.g0))
+    return masses, dampings, -r.af
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Drives q (k,) m with their rates m/s and accelerations m/s^2."""
+
+    q: Floats
+    rate: Floats
+    acceleration: Floats
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What inputs do to the free unknowns: columns of loads (m, l) and of drives (m, k).
+
+    Prescribed unknowns are coupled by K, C and M; `by_rule` gives their rates the rule's formulas
+    (which average acceleration makes ring, growing, on a ramp), else backward differences: the
+    rate of second order, the acceleration one step late.
+    """
+
+    rule: Rule
+    loads: Floats
+    stiffness: Floats
+    damping: Floats
+    mass: Floats
+    by_rule: bool = False
+
+    @property
+    def drives(self) -> int:
+        return int(self.stiffness.shape[1])
+
+    def rest(self) -> Motion:
+        zeros = np.zeros(self.drives)
+        return Motion(zeros, zeros, zeros)
+
+    def moved(self, motion: Motion, q: Floats) -> Motion:
+        """The drives at the end of a step that takes them to q (k,) m."""
+        h = self.rule.h
+        if self.by_rule:
+            rates = self.rule.rates(q, motion.q, motion.rate, motion.acceleration)
+            return Motion(q, *rates)
+        mean, last = (q - motion.q) / h, motion.rate - h / 2 * motion.acceleration
+        acceleration = (mean - last) / h
+        return Motion(q, mean + h / 2 * acceleration, acceleration)
+
+    def force(self, new: Floats, old: Floats, moved: Motion, motion: Motion) -> Floats:
+        """Forces (m,) N at the balance of a step from the loads `old` to `new` (l,) N."""
+        r, f = self.rule, self.loads @ self.rule.weighted(new, old)
+        if not self.drives:
+            return np.asarray(f)
+        f = f - self.stiffness @ r.weighted(moved.q, motion.q)
+        f -= self.damping @ r.weighted(moved.rate, motion.rate)
+        f -= self.mass @ r.weighted_a(moved.acceleration, motion.acceleration)
+        return np.asarray(f)
+
+
+def excitation(
+    system: System, rule: Rule, mass: MassName = "consistent", *, by_rule: bool = False
+) -> Excitation:
+    """Columns of the system's loads and drives over its free unknowns."""
+    M = mass_of(system, mass)
+    K, C, M_d = (
+        np.ascontiguousarray((X @ system.moves)[system.free]) for X in (system.K, system.C, M)
+    )
+    loads = np.ascontiguousarray(system.loads[system.free])
+    return Excitation(rule, loads, K, C, M_d, by_rule)
+
+
+def mass_of(system: System, mass: MassName) -> sparse.csr_array:
+    """M (N, N) kg as the setting names it."""
+    if mass == "consistent":
+        return system.M
+    return sparse.csr_array(sparse.diags_array(system.masses))

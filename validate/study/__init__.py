@@ -1,0 +1,1 @@
+"""Studies: many runs of an experiment on a grid, on Dask."""
