@@ -8,9 +8,11 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
 from validate.fem.system import System, build
+from validate.scene.box import box
+from validate.scene.scene import Drive, Load, Material, Scene, Support
 from validate.solve.fluid import LINEAR
 from validate.solve.newton import StaticNewton
-from validate.solve.schemes import SCHEMES
+from validate.solve.schemes import INERTIAL, SCHEMES
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
@@ -27,11 +29,27 @@ def large(system: System) -> System:
     return build(replace(scene, material=replace(scene.material, law="neo_hooke")))
 
 
+@pytest.fixture(scope="module")
+def pressed() -> System:
+    """A block with a plate that presses it from above and a load that pulls on its side."""
+    return build(
+        Scene(
+            box((0.02, 0.02, 0.02), (2, 2, 2)),
+            Material(1e4, 0.45, rho=1000.0, stiffness_damping=0.01),
+            (Support("z0", (0, 1, 2)),),
+            drives=(Drive("press", "z1", (0.0, 0.0, -1.0)),),
+            loads=(Load("pull", "x1", (1.0, 0.0, 0.0)),),
+        )
+    )
+
+
 def settings(scheme: type[Scheme]) -> Scheme:
     return Tabulated(StaticNewton(), 0.001) if scheme is Tabulated else scheme()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: s.__name__)
+@pytest.mark.parametrize(
+    "scheme", [s for s in SCHEMES if s not in INERTIAL], ids=lambda s: s.__name__
+)
 def test_a_scheme_steps_and_says_what_its_states_mean(
     scheme: type[Scheme], system: System, large: System
 ) -> None:
@@ -58,7 +76,42 @@ def test_a_scheme_steps_and_says_what_its_states_mean(
         state.updates = 7  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("scheme", LINEAR, ids=lambda s: s.__name__)
+@pytest.mark.parametrize("scheme", INERTIAL, ids=lambda s: s.__name__)
+def test_a_scheme_of_drives_and_loads_steps_and_says_what_its_states_mean(
+    scheme: type[Scheme], pressed: System
+) -> None:
+    stepper = scheme().prepare(pressed)
+    mesh = pressed.scene.mesh
+    rest = stepper.rest()
+    assert (rest.k, np.abs(stepper.field(rest)).max()) == (0, 0.0)
+    state = stepper.step(rest, np.array([0.001, 0.01]))
+    assert state.failure is None
+    assert (state.k, state.updates, state.drives.tolist()) == (1, 0, [0.001, 0.01])
+    u = stepper.field(state)
+    assert u.shape == mesh.nodes.shape
+    plate = mesh.facet_nodes("z1")
+    assert u[plate, 2] == pytest.approx(np.full(len(plate), -0.001))
+    traces = stepper.traces([rest.light, state.light])
+    assert {name: trace.unit for name, trace in traces.items()} == {
+        "press.displacement": "m",
+        "press.force": "N",
+        "pull.force": "N",
+    }
+    assert traces["press.displacement"].y.tolist() == [0.0, 0.001]
+    assert traces["pull.force"].y.tolist() == [0.0, 0.01]
+    assert traces["press.force"].y[0] == 0.0
+    assert traces["press.force"].y[1] > 0.1
+    with pytest.raises(FrozenInstanceError):
+        state.updates = 7  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("scheme", INERTIAL, ids=lambda s: s.__name__)
+def test_a_scheme_of_drives_and_loads_refuses_fluid(scheme: type[Scheme], system: System) -> None:
+    with pytest.raises(SceneError, match="know no fluid in cavities"):
+        scheme().prepare(system)
+
+
+@pytest.mark.parametrize("scheme", LINEAR + INERTIAL, ids=lambda s: s.__name__)
 def test_a_linear_scheme_refuses_a_law_at_large_strain(scheme: type[Scheme], large: System) -> None:
     with pytest.raises(SceneError, match="cannot solve the law 'neo_hooke'"):
         scheme().prepare(large)

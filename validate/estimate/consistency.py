@@ -161,5 +161,7 @@ def _consistency(kind: Literal["NIS", "NEES"], values: ArrayLike, dof: ArrayLike
 
 
 def _band(probability: float, dof: int) -> Band:
-    low, high = (float(chi2.ppf(p, dof)) / dof for p in (0.5 - probability / 2, 0.5 + probability / 2))
+    low, high = (
+        float(chi2.ppf(p, dof)) / dof for p in (0.5 - probability / 2, 0.5 + probability / 2)
+    )
     return Band(probability, low, high)

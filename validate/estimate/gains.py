@@ -1,7 +1,7 @@
 """Gains before any data: those of a linear filter depend only on when what is measured."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -30,6 +30,13 @@ class GainSequence:
 
     def at(self, step: int) -> Gain | None:
         return self.gains.get(step)
+
+    def mapped(self, turn: Callable[[Floats], Floats]) -> "GainSequence":
+        """The same gains in other coordinates; repeats stay one array."""
+        distinct = {id(gain): gain for gain in self.gains.values()}
+        turned = {k: replace(gain, G=turn(gain.G)) for k, gain in distinct.items()}
+        gains = {step: turned[id(gain)] for step, gain in self.gains.items()}
+        return replace(self, gains=MappingProxyType(gains))
 
 
 @dataclass(frozen=True)
@@ -88,15 +95,28 @@ def gain_sequence(
     return GainSequence(MappingProxyType(gains), frozen, computed)
 
 
-def claim_at(
-    covariance: Covariance, when: Mapping[int, Seen], step: int, tolerance: float = SETTLED
-) -> Claim:
-    """What is claimed at the end of a step, recomputed from the start."""
-    claim, last = start(covariance), 0
-    for event in events(covariance, when, tolerance):
-        if event.step > step:
-            break
-        claim, last = event.claim, event.step
-    for _ in range(step - last):
-        claim = covariance.predict(claim)
-    return claim
+class Claims:
+    """What is claimed at the end of any step, recomputed in one walk while steps rise.
+
+    A whole covariance per step would not fit in memory; only the walk's place is kept.
+    """
+
+    def __init__(self, covariance: Covariance, when: Mapping[int, Seen]) -> None:
+        self._covariance, self._when = covariance, when
+        self._restart()
+
+    def at(self, step: int) -> Claim:
+        if step < self._step:
+            self._restart()
+        while self._ahead is not None and self._ahead.step <= step:
+            self._claim, self._step = self._ahead.claim, self._ahead.step
+            self._ahead = next(self._walk, None)
+        for _ in range(step - self._step):
+            self._claim = self._covariance.predict(self._claim)
+        self._step = step
+        return self._claim
+
+    def _restart(self) -> None:
+        self._walk: Iterator[Event] = events(self._covariance, self._when)
+        self._claim, self._step = start(self._covariance), 0
+        self._ahead: Event | None = next(self._walk, None)

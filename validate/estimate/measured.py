@@ -48,6 +48,20 @@ class Measurements:
         if self.sd.min() <= 0:
             raise ComparisonError(f"measurement sd {self.sd.min():g} m: it must be positive")
 
+    def of(self, *markers: str) -> "Measurements":
+        """What these markers measured: all that a filter is given of a recording.
+
+        Raises `ComparisonError` naming a marker that was not measured.
+        """
+        owners = [name.rpartition(".")[0] for name in self.names]
+        absent = [marker for marker in markers if marker not in owners]
+        if absent:
+            known = ", ".join(dict.fromkeys(owners))
+            raise ComparisonError(f"marker '{absent[0]}' was not measured; there are {known}")
+        pick = [i for i, owner in enumerate(owners) if owner in markers]
+        names = tuple(self.names[i] for i in pick)
+        return Measurements(self.t, self.H[pick], self.z[:, pick], self.sd[pick], names)
+
     def free(self, free: Ints) -> Floats:
         """H over the free unknowns, dense (m, free)."""
         return np.ascontiguousarray(self.H[:, free].toarray())

@@ -49,14 +49,14 @@ def spread_companions(
 def spread_nodes(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
     """P = A P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
 
-    K (6, n) is packed like P; c2, w and Q (N,) are those of the node's components.
+    K (n, 6) holds the packed rows of every node; c2, w and Q (N,) are those of the node's components.
     """
     count = 0
     for n in range(P.shape[1]):
         x, y, z = 3 * n, 3 * n + 1, 3 * n + 2
-        xx, xy, xz = c2[x] - w[x] * K[0, n], -w[x] * K[3, n], -w[x] * K[4, n]
-        yx, yy, yz = -w[y] * K[3, n], c2[y] - w[y] * K[1, n], -w[y] * K[5, n]
-        zx, zy, zz = -w[z] * K[4, n], -w[z] * K[5, n], c2[z] - w[z] * K[2, n]
+        xx, xy, xz = c2[x] - w[x] * K[n, 0], -w[x] * K[n, 3], -w[x] * K[n, 4]
+        yx, yy, yz = -w[y] * K[n, 3], c2[y] - w[y] * K[n, 1], -w[y] * K[n, 5]
+        zx, zy, zz = -w[z] * K[n, 4], -w[z] * K[n, 5], c2[z] - w[z] * K[n, 2]
         a, b, c, d, e, f = P[0, n], P[1, n], P[2, n], P[3, n], P[4, n], P[5, n]
         # Rows of A P, then their products with the rows of A.
         x0, x1, x2 = xx * a + xy * d + xz * e, xx * d + xy * b + xz * f, xx * e + xy * f + xz * c

@@ -16,9 +16,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 
 Cells = NDArray[np.int32]
+Springs = tuple[Cells, Cells, Floats]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
@@ -28,7 +29,7 @@ LANES = 16
 ROWS = 11  # of geometry: 9 gradients, 2 moduli
 WORK = 64 * LANES  # length of the workspace
 SVK, NEO_HOOKE = 0, 1
-_U, _V, _OUT = ROWS * LANES, 20 * LANES, 29 * LANES
+_U, _V, _OUT, _TANGENTS = ROWS * LANES, 20 * LANES, 29 * LANES, 38 * LANES
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
 _CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 3 % off
 
@@ -181,11 +182,6 @@ def _first_neo_hooke(H: Nine, a: float, b: float) -> Nine:
 
 
 @_inlined
-def _row(A: Nine, a: int) -> Three:
-    return A[3 * a], A[3 * a + 1], A[3 * a + 2]
-
-
-@_inlined
 def _put_forces(w: Floats, l: int, P: Nine, G: Nine) -> None:
     """Forces V P g of nodes 1-3 in rows 0-8 of the results, 3 i + a - 1."""
     f = _product(P, _transposed(G))
@@ -255,3 +251,293 @@ def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w
         else:
             _forces_neo_hooke(w)
         _scatter(w, cells, block, f)
+
+
+@_inlined
+def _gradient(G: Nine, node: int) -> Three:
+    """dN/dX of a node; node 0 takes minus the sum of the others."""
+    if node == 0:
+        return -(G[0] + G[3] + G[6]), -(G[1] + G[4] + G[7]), -(G[2] + G[5] + G[8])
+    if node == 1:
+        return G[0], G[1], G[2]
+    if node == 2:
+        return G[3], G[4], G[5]
+    return G[6], G[7], G[8]
+
+
+@_inlined
+def _put_block(w: Floats, o: int, rows: int, block: Six) -> None:
+    """Three or all six entries of a symmetric block: xx, yy, zz, xy, xz, yz."""
+    w[o], w[o + 16], w[o + 32] = block[0], block[1], block[2]
+    if rows == 6:
+        w[o + 48], w[o + 64], w[o + 80] = block[3], block[4], block[5]
+
+
+@_inlined
+def _tangents_svk(w: Floats, rows: int) -> None:
+    """V (g.S g I + (lambda + mu) (F g)(F g)^T + mu |g|^2 F F^T) of every node, and the forces."""
+    for l in range(LANES):
+        G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
+        H = _product(_matrix(w, _U + l), G)
+        F, S = _deformation(H), _second(H, a, b)
+        _put_forces(w, l, _product(F, S), G)
+        B = _product(F, _transposed(F))
+        for node in range(4):
+            g = _gradient(G, node)
+            q, s, m = _times(F, g), _dot(g, _times(S, g)), b * _dot(g, g)
+            block = (
+                s + (a + b) * q[0] * q[0] + m * B[0],
+                s + (a + b) * q[1] * q[1] + m * B[4],
+                s + (a + b) * q[2] * q[2] + m * B[8],
+                (a + b) * q[0] * q[1] + m * B[1],
+                (a + b) * q[0] * q[2] + m * B[2],
+                (a + b) * q[1] * q[2] + m * B[5],
+            )
+            _put_block(w, _TANGENTS + node * 6 * LANES + l, rows, block)
+
+
+@_inlined
+def _tangents_neo_hooke(w: Floats, rows: int) -> None:
+    """m |g|^2 I + c h h^T - 2/3 m (q h^T + h q^T), h = F^-T g, q = F g, and the forces."""
+    for l in range(LANES):
+        G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
+        H = _product(_matrix(w, _U + l), G)
+        _put_forces(w, l, _first_neo_hooke(H, a, b), G)
+        F, (dJ, K) = _deformation(H), _volume(H)
+        y = _inverse_cube_root(1 + dJ)
+        m, third = b * y * y, 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
+        c = 5 / 3 * m * third + 0.5 * a * (2 + dJ * (dJ + 2))
+        for node in range(4):
+            g = _gradient(G, node)
+            q, h = _times(F, g), _times(_deformation(K), g)
+            h = h[0] * y * y * y, h[1] * y * y * y, h[2] * y * y * y
+            r = c * h[0] - 4 / 3 * m * q[0], c * h[1] - 4 / 3 * m * q[1], c * h[2] - 4 / 3 * m * q[2]
+            s = m * _dot(g, g)
+            block = (
+                s + r[0] * h[0],
+                s + r[1] * h[1],
+                s + r[2] * h[2],
+                0.5 * (r[0] * h[1] + r[1] * h[0]),
+                0.5 * (r[0] * h[2] + r[2] * h[0]),
+                0.5 * (r[1] * h[2] + r[2] * h[1]),
+            )
+            _put_block(w, _TANGENTS + node * 6 * LANES + l, rows, block)
+
+
+@_inlined
+def _scatter_blocks(w: Floats, cells: Cells, block: int, rows: int, d: Floats) -> None:
+    """Adds the nodes' blocks to d, `rows` numbers a node."""
+    for l in range(LANES):
+        for node in range(4):
+            at = cells[block, node, l] // 3 * rows
+            for k in range(rows):
+                d[at + k] += w[_TANGENTS + (node * 6 + k) * LANES + l]
+
+
+@_compiled
+def add_forces_and_blocks(
+    law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, d: Floats, w: Floats
+) -> None:
+    """Adds the internal forces to f (N,) and the nodes' own blocks of the tangent to d.
+
+    d (3 n,) takes the diagonal; d (6 n,) the blocks as xx, yy, zz, xy, xz, yz.
+    """
+    six = d.size == 2 * f.size
+    for block in range(cells.shape[0]):
+        _load(w, geometry, block)
+        _gather(w, _U, cells, block, u)
+        if law == SVK and six:
+            _tangents_svk(w, 6)
+        elif law == SVK:
+            _tangents_svk(w, 3)
+        elif six:
+            _tangents_neo_hooke(w, 6)
+        else:
+            _tangents_neo_hooke(w, 3)
+        _scatter(w, cells, block, f)
+        if six:
+            _scatter_blocks(w, cells, block, 6, d)
+        else:
+            _scatter_blocks(w, cells, block, 3, d)
+
+
+@_inlined
+def _products_svk(w: Floats) -> None:
+    """V dP = dH V S + F V dS of the direction v, dH = dv/dX."""
+    for l in range(LANES):
+        G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
+        H, D = _product(_matrix(w, _U + l), G), _product(_matrix(w, _V + l), G)
+        F, S = _deformation(H), _second(H, a, b)
+        Q = _product(_transposed(F), D)
+        t = a * (Q[0] + Q[4] + Q[8])
+        xy, xz, yz = b * (Q[1] + Q[3]), b * (Q[2] + Q[6]), b * (Q[5] + Q[7])
+        dS = t + 2 * b * Q[0], xy, xz, xy, t + 2 * b * Q[4], yz, xz, yz, t + 2 * b * Q[8]
+        P, R = _product(D, S), _product(F, dS)
+        _put_forces(w, l, _combined(1.0, P, 1.0, R), G)
+
+
+@_inlined
+def _combined(a: float, A: Nine, b: float, B: Nine) -> Nine:
+    return (
+        a * A[0] + b * B[0], a * A[1] + b * B[1], a * A[2] + b * B[2],
+        a * A[3] + b * B[3], a * A[4] + b * B[4], a * A[5] + b * B[5],
+        a * A[6] + b * B[6], a * A[7] + b * B[7], a * A[8] + b * B[8],
+    )  # fmt: skip
+
+
+@_inlined
+def _products_neo_hooke(w: Floats) -> None:
+    """V dP along v: the tangent of `fem.laws.NeoHooke` times dH, with X = F^-T."""
+    for l in range(LANES):
+        G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
+        H, D = _product(_matrix(w, _U + l), G), _product(_matrix(w, _V + l), G)
+        F, (dJ, K) = _deformation(H), _volume(H)
+        y = _inverse_cube_root(1 + dJ)
+        m, third = b * y * y, 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
+        p = 0.5 * a * dJ * (dJ + 2)
+        X = _combined(y * y * y, _deformation(K), 0.0, F)
+        into, along = _inner(X, D), 2 / 3 * m * _inner(F, D)
+        straight = _combined(-2 / 3 * m * into, F, m, D)
+        c = (2 / 3 * m * third + a * (1 + dJ) * (1 + dJ)) * into - along
+        turned = _product(X, _product(_transposed(D), X))
+        _put_forces(w, l, _combined(1.0, _combined(1.0, straight, c, X), m * third - p, turned), G)
+
+
+@_compiled
+def add_products(
+    law: int, geometry: Floats, cells: Cells, u: Floats, v: Floats, f: Floats, w: Floats
+) -> None:
+    """Adds K_t(u) v to f (N,)."""
+    for block in range(cells.shape[0]):
+        _load(w, geometry, block)
+        _gather(w, _U, cells, block, u)
+        _gather(w, _V, cells, block, v)
+        if law == SVK:
+            _products_svk(w)
+        else:
+            _products_neo_hooke(w)
+        _scatter(w, cells, block, f)
+
+
+@_inlined
+def _energy(law: int, H: Nine, a: float, b: float, dJ: float) -> float:
+    """V W of one cell; logarithms by log1p, so that small strains keep their digits."""
+    if law == SVK:
+        C = _strain(H)
+        trace = C[0] + C[1] + C[2]
+        square = C[0] * C[0] + C[1] * C[1] + C[2] * C[2]
+        square += 2 * (C[3] * C[3] + C[4] * C[4] + C[5] * C[5])
+        return a / 8 * trace * trace + b / 4 * square
+    trace = 2 * (H[0] + H[4] + H[8]) + _inner(H, H)
+    log = np.log1p(dJ)
+    shape = (3 + trace) * np.expm1(-2 / 3 * log) + trace
+    return b / 2 * shape + a / 4 * (dJ * (dJ + 2) - 2 * log)
+
+
+@_compiled
+def looked_at(
+    law: int, count: int, geometry: Floats, cells: Cells, u: Floats, w: Floats
+) -> tuple[float, float, int]:
+    """Strain energy J, least det F and number of det F <= 0 of the first `count` cells."""
+    energy, least, inverted = 0.0, np.inf, 0
+    for block in range(cells.shape[0]):
+        _load(w, geometry, block)
+        _gather(w, _U, cells, block, u)
+        for l in range(min(LANES, count - block * LANES)):
+            H = _product(_matrix(w, _U + l), _matrix(w, l))
+            dJ, _ = _volume(H)
+            least = min(least, 1 + dJ)
+            inverted += not 1 + dJ > 0
+            energy += _energy(law, H, w[144 + l], w[160 + l], dJ)
+    return energy, least, inverted
+
+
+@_inlined
+def _pull(springs: Springs, u: Floats, r: Floats) -> None:
+    """r = K u of springs, rows of a csr matrix; zero without any."""
+    starts, columns, values = springs
+    for i in range(r.size):
+        r[i] = 0.0
+    if values.size > 0:
+        for i in range(r.size):
+            for k in range(starts[i], starts[i + 1]):
+                r[i] += values[k] * u[columns[k]]
+
+
+@_inlined
+def _moved(u: Floats, d: Floats, r: Floats, keep: Floats, gain: Floats) -> None:
+    for i in range(u.size):
+        d[i] = keep[i] * d[i] - gain[i] * r[i]
+        u[i] += d[i]
+
+
+@_inlined
+def _moved_damped(
+    u: Floats, d: Floats, r: Floats, old: Floats, keep: Floats, gain: Floats, lag: float
+) -> float:
+    """The same with damping; returns what it took, J."""
+    taken = 0.0
+    for i in range(u.size):
+        drag = lag * (r[i] - old[i])
+        new = keep[i] * d[i] - gain[i] * (r[i] + drag)
+        if gain[i] > 0:
+            way = (new + d[i]) / 2
+            taken += (1 - keep[i]) / gain[i] * way * way + drag * way
+        d[i], old[i] = new, r[i]
+        u[i] += new
+    return taken
+
+
+@_compiled
+def advance(
+    law: int,
+    geometry: Floats,
+    cells: Cells,
+    springs: Springs,
+    u: Floats,
+    d: Floats,
+    r: Floats,
+    old: Floats,
+    keep: Floats,
+    gain: Floats,
+    lag: float,
+    held: Ints,
+    places: Floats,
+    loaded: Ints,
+    loads: Floats,
+    substeps: int,
+    w: Floats,
+) -> tuple[float, float]:
+    """`substeps` steps of central difference (paper 003, eq 18) in increments d = u - u_before.
+
+    d' = keep d - gain (r + lag (r - old) - f), u' = u + d', with keep = (1 - a)/(1 + a), gain =
+    (dt^2/m)/(1 + a), a = alpha dt/2, lag = beta/dt; zeros where held. u, d, the forces r at u and
+    `old` before it (N,) are overwritten. `places` (2, held) m and `loads` (2, loaded) N are those
+    of the `held` and `loaded` unknowns at both ends, linear between. Returns the work J of loads
+    and prescribed motion, and what damping took, up to half a step before the last time.
+    """
+    work, taken = 0.0, 0.0
+    damped = lag > 0 or bool((keep[gain > 0] < 1).any())
+    for s in range(substeps):
+        start, end = s / substeps, (s + 1) / substeps
+        for j in range(loaded.size):
+            work += (loads[0, j] + start * (loads[1, j] - loads[0, j])) * d[loaded[j]] / 2
+        for j in range(held.size):
+            work += r[held[j]] * d[held[j]] / 2
+        if damped:
+            taken += _moved_damped(u, d, r, old, keep, gain, lag)
+        else:
+            _moved(u, d, r, keep, gain)
+        for j in range(loaded.size):
+            i, f = loaded[j], loads[0, j] + start * (loads[1, j] - loads[0, j])
+            d[i] += gain[i] * f
+            u[i] += gain[i] * f
+            work += f * d[i] / 2
+        for j in range(held.size):
+            i = held[j]
+            d[i] = places[0, j] + end * (places[1, j] - places[0, j]) - u[i]
+            u[i] += d[i]
+            work += r[i] * d[i] / 2
+        _pull(springs, u, r)
+        add_forces(law, geometry, cells, u, r, w)
+    return work, taken

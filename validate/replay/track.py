@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Ints
+from validate.compare.exhibit import Exhibit
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
@@ -21,6 +22,7 @@ from validate.register.observe import MarkerObservation, Registered
 from validate.replay.follow import standard_exhibits
 from validate.replay.options import Options, Report, configure, folder_of
 from validate.replay.sentence import verdict_sentence
+from validate.replay.sureness import consistency_exhibit, consistency_scores
 from validate.replay.tracking import Case, Followed, Told, Tracking, Truth
 from validate.scene.scene import Scene
 from validate.solve.march import march
@@ -42,7 +44,6 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
     values = {m.name: {s.name: s.value for s in m.scores} for m in results}
     values["told"] = dict(told.numbers)
     printed = experiment.published(values) if experiment.published and not options.quick else ()
-    docs = {case.name: case.doc for case in cases}
     first = main[next(iter(methods))]
     return Result(
         name=experiment.name,
@@ -60,8 +61,20 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
         same_model=experiment.same_model,
         seed=experiment.seed,
         twin_notice=experiment.twin_notice,
-        exhibits=(*standard_exhibits(experiment, main, others, docs), *told.exhibits),
+        exhibits=_exhibits(experiment, main, others, told),
     )
+
+
+def _exhibits(
+    experiment: Tracking,
+    main: Mapping[str, Followed],
+    others: Mapping[str, Mapping[str, Followed]],
+    told: Told,
+) -> tuple[Exhibit, ...]:
+    docs = {case.name: case.doc for case in experiment.cases}
+    sure = consistency_exhibit(main, others)
+    standard = standard_exhibits(experiment, main, others, docs)
+    return (*standard, *((sure,) if sure else ()), *told.exhibits)
 
 
 def _total(experiment: Tracking, methods: Mapping[str, Any], cases: tuple[Case, ...]) -> int:
@@ -272,15 +285,3 @@ def _nothing(quantity: str, limit: float, run: Run) -> Check:
     ending = "" if run.finished else f"{run.outcome.state}: {run.outcome.why}"
     why = f"compared nothing: {ending or 'no such marker in the recording'}"
     return Check(quantity, 0.0, limit, 0.0, 0.0, 0.0, 0.0, "m", 0, "cannot decide", why)
-
-
-def consistency_scores(followed: Followed) -> tuple[Score, ...]:
-    """NIS per degree of freedom of a filter's run; none for a solver."""
-    nis, dof = followed.run.traces.get("nis"), followed.run.traces.get("nis.dof")
-    if nis is None or dof is None or not dof.y.any():
-        return ()
-    end = f"@{followed.case}" if followed.case else ""
-    count = int(dof.y.sum())
-    words = "normalised innovation squared over its degrees of freedom; 1 for a consistent filter"
-    value = float(nis.y.sum() / dof.y.sum())
-    return (Score(f"nis.per_dof{end}", value, "1", count, "measured recording", words),)

@@ -6,15 +6,17 @@ they are given. The twin's truth is kept apart: it scores the runs and no method
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
 from validate.compare.verdict import Accept, Published
+from validate.estimate.measured import measurements
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.observe import Registered
 from validate.replay.experiment import Change, Progress, Uncertainty, unchanged
@@ -64,6 +66,28 @@ class Followed:
     seen: Registered
     run: Run
     truth: Truth
+
+
+@dataclass(frozen=True)
+class Follower:
+    """A method: settings of a scheme, or of a filter and the markers that it is given.
+
+    `steps`: run only so many, as a baseline that is timed and not scored.
+    """
+
+    label: str = quantity("", "1", "what reports call it")
+    settings: Any = quantity(None, "1", "of the scheme or filter")
+    markers: tuple[str, ...] = quantity((), "1", "markers that a filter is given")
+    steps: int | None = quantity(None, "1", "steps to run; none: all")
+
+    def prepare(self, system: System, seen: Registered, **changed: Any) -> Stepper:
+        """The prepared scheme or filter, with `changed` settings where it has them."""
+        own = {f.name for f in fields(self.settings)}
+        settings = replace(self.settings, **{k: v for k, v in changed.items() if k in own})
+        if not self.markers:
+            return cast(Stepper, settings.prepare(system))
+        given = measurements(seen, system.scene.mesh).of(*self.markers)
+        return cast(Stepper, settings.prepare(system, given))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from validate.compare.effects import TELLS_APART, Change, Effect
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import rms
-from validate.report.numbers import fixed, scale, shown_unit, spaced, text, with_unit
+from validate.report.numbers import at_load, fixed, scale, shown_unit, text, with_unit
 from validate.report.observed import finished, last_residual
 from validate.report.page import (
     Cell,
@@ -66,9 +66,11 @@ def _noise_picture(result: Result) -> Picture | None:
     if not rows:
         return None
     pixels = draw(lambda f: _dots(f, result, rows), 9.0, 1.5 + 0.42 * len(rows))
+    over_time = all(r.load == "all" for m in finished(result) for r in m.residuals.values())
+    where = at_load("all") if over_time else "at the last load"
     return Picture(
         "errors_over_noise",
-        "Rms error of every model at the last load over the rms that measurement noise alone gives "
+        f"Rms error of every model {where} over the rms that measurement noise alone gives "
         "(no unit, logarithmic). Grey: where noise alone puts 95 % of repetitions (chi-square with "
         "the number of values); right of it the recording sees the model's error. Where all models "
         "lie on grey, that quantity cannot choose between them. Ratios below 0.02 lie at 0.02.",
@@ -163,18 +165,20 @@ def _budget(effects: tuple[Effect, ...]) -> Table | None:
     if not effects:
         return None
     load = effects[0].changes[-1].name.split("@")[-1] if effects[0].changes else ""
-    changes = [[_change(e, f"{q}@{load}") for q in _BUDGET] for e in effects]
-    used = [i for i in range(len(_BUDGET)) if any(row[i] for row in changes)]
+    found = dict.fromkeys(_quantity(c) for e in effects for c in e.changes)
+    columns = [q for q in _BUDGET if q in found] or list(found)
+    changes = [[_change(e, f"{q}@{load}") for q in columns] for e in effects]
+    used = [i for i in range(len(columns)) if any(row[i] for row in changes)]
     rows = []
-    for effect, found in zip(effects, changes, strict=True):
-        figures = [_moved(found[i], _BUDGET[i]) for i in used]
+    for effect, row in zip(effects, changes, strict=True):
+        figures = [_moved(row[i], columns[i]) for i in used]
         seen = ", ".join(dict.fromkeys(n.split("@")[0] for n in effect.seen_by)) or "none"
         would = ", ".join(effect.would_see) or "none of those listed"
         rows.append((Cell(f"{effect.name}: {effect.doc}"), *figures, *cells(seen, would)))
     units = [next((shown_unit(c.unit) for r in changes if (c := r[i])), "") for i in used]
-    heads = [f"{_BUDGET[i]} / {u}" for i, u in zip(used, units, strict=True)]
+    heads = [f"{columns[i]} / {u}" for i, u in zip(used, units, strict=True)]
     return Table(
-        f"Error budget: what each effect moves at {spaced(load)}; rms and, in brackets, largest "
+        f"Error budget: what each effect moves {at_load(load)}; rms and, in brackets, largest "
         "change; a force or pressure has one value.",
         ("effect", *heads, "seen by (any load)", "a sensor that would see it"),
         tuple(rows),

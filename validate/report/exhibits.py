@@ -20,7 +20,6 @@ from validate.report.page import (
     cells,
 )
 
-
 _OURS = tuple(csv_tables.TABLES)  # files of every report
 
 

@@ -117,7 +117,8 @@ def _triad(ax: Axes) -> None:
     """The directions of x, y and z, in the lower left corner."""
     low, high = np.array(ax.get_xlim()), np.array(ax.get_ylim())
     size, start = 0.07 * max(np.ptp(low), np.ptp(high)), np.array([low[0], high[0]])
+    arrow = {"arrowstyle": "->", "color": "#404040"}
     for name, axis in zip("xyz", np.stack(screen(), axis=1), strict=True):
-        end = start + size * axis
-        ax.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": "#404040"})
-        ax.annotate(name, start + 1.35 * size * axis, ha="center", va="center", color="#404040")
+        tip, beyond = start + size * axis, start + 1.35 * size * axis
+        ax.annotate("", tuple(tip), tuple(start), arrowprops=arrow)
+        ax.annotate(name, tuple(beyond), ha="center", va="center", color="#404040")

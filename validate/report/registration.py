@@ -24,6 +24,7 @@ from validate.report.style import MEASURED, draw
 
 _MM = 1e3
 _MAGNIFIED = 5.0
+_NAMED = 60  # markers; the names of more would hide each other
 
 
 def registration(result: Result) -> Section | None:
@@ -82,10 +83,11 @@ def _findings(found: Registration) -> Items | Paragraph:
 
 def _vectors(found: Registration) -> Picture:
     pixels = draw(lambda f: _vector_axes(f, found), 6.4, 5.2)
+    seen = "y" if found.markers.shape[1] == 3 else "the normal of their plane"
     return Picture(
         "registration",
-        "Registration residuals of the markers at rest, mapped less target, on the top face (x "
-        f"along the stage, z lateral, mm); arrows magnified {_MAGNIFIED:g} times. A pattern "
+        "Registration residuals of the markers at rest, mapped less target, in mm, seen along "
+        f"{seen}; arrows magnified {_MAGNIFIED:g} times. A pattern "
         "(all outward, all turned) would mean a wrong scale or rotation; noise has none.",
         "Arrows of the registration residual at each marker, without a common direction if only "
         "noise is left.",
@@ -99,7 +101,8 @@ def _vector_axes(figure: Figure, found: Registration) -> None:
     x, r = _MM * found.markers[:, axes], _MAGNIFIED * _MM * found.residuals[:, axes]
     ax.quiver(*x.T, *r.T, angles="xy", scale_units="xy", scale=1, color=MEASURED, width=0.004)
     ax.plot(*x.T, ".", color="#D55E00", ms=4)
-    for name, (a, b) in zip(found.names, x, strict=True):
+    named = zip(found.names, x, strict=True) if len(x) <= _NAMED else ()
+    for name, (a, b) in named:
         ax.annotate(name, (a, b), xytext=(2, -8), textcoords="offset points", fontsize=6.5,
                     color="#5A5A5A")  # fmt: skip
     ax.set_title(f"residuals, magnified {_MAGNIFIED:g} times")

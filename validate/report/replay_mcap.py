@@ -2,7 +2,7 @@
 
 Topics, after /<recording> where there are several; X is `measured` or `simulated`:
 
-    /stage/measured        validate.Signal           the drive, m
+    /stage/measured        validate.Signal           the drive, m or N
     /force/X, /pressure/X  validate.Signal           every sample as compared, every step
     /outline/X             validate.Contour          image plane, as judged; simulated at the loads
     /outline/X/scene       foxglove.SceneUpdate      the same as lines, the simulated one moving
@@ -14,7 +14,8 @@ Topics, after /<recording> where there are several; X is `measured` or `simulate
 
 Time is the recording's own clock, t0_ns + t. Simulated numbers are those of the method that the
 report shows, with sd 0. What is interpolated, thinned or left out stands in the metadata record
-`validate.replay`; the file stays under `MAX_BYTES` by thinning everything more.
+`validate.replay`; a run over time gives its output frames at their own times in place of loads.
+The file stays under `MAX_BYTES` by thinning everything more.
 """
 
 from collections import Counter
@@ -32,7 +33,7 @@ from validate.report.loads import HOW
 from validate.report.observed import shown_method
 from validate.report.replay_signals import images, signals
 from validate.report.replay_space import markers, outlines, surface, transforms
-from validate.report.replay_view import Track, View
+from validate.report.replay_view import Track, View, over_time
 
 MAX_BYTES = 5_000_000
 RECORD = "validate.replay"
@@ -117,10 +118,16 @@ def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, st
         "method_label": method.label if method else "",
         "quick": "yes" if result.quick else "no",
         "same_model": "yes" if result.same_model else "no",
-        "interpolated": f".../simulated/scene and /surface: {HOW}",
+        "interpolated": _interpolated(result),
         "thinned": "; ".join(thinned) or "nothing",
         "left_out": "; ".join(_left_out(result, method, found)) or "nothing",
     }
+
+
+def _interpolated(result: Result) -> str:
+    if any(over_time(view) for view in views(result)):
+        return "nothing: output frames at their own times"
+    return f".../simulated/scene and /surface: {HOW}"
 
 
 def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:

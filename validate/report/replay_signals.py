@@ -17,7 +17,8 @@ _IMAGE_BYTES = 1_500_000  # of one stream of images, about
 def signals(view: View) -> list[Track]:
     """The stage as measured; every signal as compared, and the run's trace that predicts it."""
     seen = view.registered
-    found = [_signal(view, "/stage/measured", seen.stage.t, seen.stage.y[:, 0], "m", seen.stage.sd)]
+    stage = seen.stage
+    found = [_signal(view, "/stage/measured", stage.t, stage.y[:, 0], stage.unit, stage.sd)]
     for s, name in zip(seen.signals, _names([s.quantity for s in seen.signals]), strict=True):
         found.append(_signal(view, f"/{name}/measured", s.t, s.y, s.unit, s.sd))
         if view.run is not None and s.trace in view.run.traces:
@@ -37,13 +38,13 @@ def _names(quantities: list[str]) -> list[str]:
 
 def _signal(view: View, topic: str, t: Floats, y: Floats, unit: str, sd: float) -> Track:
     topic, frame = view.prefix + topic, view.registered.stage.frame
-    every = _one_in(len(t), _SAMPLES // view.coarse)
+    every = one_in(len(t), _SAMPLES // view.coarse)
     ns, kept = view.ns(t[::every], topic), y[::every]
 
     def message(i: int) -> Json:
         return signal_message(int(ns[i]), frame, unit, kept[i : i + 1], sd)
 
-    return Track(topic, SIGNAL, ns, message, _note(every, len(t), "samples"))
+    return Track(topic, SIGNAL, ns, message, thinned(every, len(t), "samples"))
 
 
 def images(view: View) -> list[Track]:
@@ -60,7 +61,7 @@ def images(view: View) -> list[Track]:
 
 def _images(view: View, topic: str, frames: Frames) -> Track:
     size = max(1, len(encode_png(frames.images[0])) * 4 // 3)  # base64
-    every = _one_in(len(frames.t), _IMAGE_BYTES // view.coarse // size)
+    every = one_in(len(frames.t), _IMAGE_BYTES // view.coarse // size)
     at_loads = {int(np.abs(frames.t - hold.t).argmin()) for hold in view.registered.holds}
     kept = sorted({*range(0, len(frames.t), every), *at_loads})
     ns = view.ns(frames.t[kept], topic)
@@ -71,13 +72,15 @@ def _images(view: View, topic: str, frames: Frames) -> Track:
     scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
     calibration = (CALIBRATION + topic, {key: repr(scale) for key, scale in scales})
     records = (*pose_records(topic, frames.pose), calibration)
-    note = _note(every, len(frames.t), "images, and those at the loads")
+    note = thinned(every, len(frames.t), "images, and those at the loads")
     return Track(topic, IMAGE, ns, message, note, records)
 
 
-def _one_in(count: int, most: int) -> int:
+def one_in(count: int, most: int) -> int:
+    """The step that leaves at most `most` of `count`."""
     return max(1, -(-count // max(1, most)))
 
 
-def _note(every: int, count: int, what: str) -> str:
+def thinned(every: int, count: int, what: str) -> str:
+    """What a step left out, in words; empty when nothing."""
     return f"one in {every} of {count} {what}" if every > 1 else ""

@@ -5,6 +5,7 @@ and at the loads; `.../scene` topics are to look at and add interpolated instant
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import matplotlib as mpl
@@ -17,6 +18,7 @@ from validate.register.observe import MarkerObservation
 from validate.report import foxglove
 from validate.report.foxglove import Rgba
 from validate.report.foxglove_schemas import SCENE, TRANSFORMS
+from validate.report.replay_signals import one_in, thinned
 from validate.report.replay_view import Track, View, load_of, pose_records
 from validate.report.skin import OUTSIDE, skins
 
@@ -28,6 +30,8 @@ COLOURS: dict[Who, Rgba] = {  # both seen on dark and on light
 _TRIANGLES = 4000  # of the surface, at most
 _SEE_THROUGH = 0.3  # opacity of the outside, so that the cavity is seen
 _BALL = 0.015  # diameter of a marker over the size of their layout
+_ONE_BALL = 0.002  # m: diameter of a marker that stands alone
+_MARKER_FRAMES = 1500  # instants of measured markers, at most
 
 
 def transforms(view: View, others: Sequence[Track]) -> list[Track]:
@@ -109,9 +113,12 @@ def markers(view: View) -> list[Track]:
     recorded = _recorded(view)
     frame = view.local(recorded.frame) if recorded else view.frame
     x, words = (recorded.x if recorded else seen.x), ["as measured"] * len(seen.t)
+    every = one_in(len(seen.t), _MARKER_FRAMES // view.coarse)
+    t, x, words = seen.t[::every], x[::every], words[::every]
+    note = thinned(every, len(seen.t), "instants")
     found = [
-        _named(view, "measured", frame, seen.t, x, seen),
-        _balls(view, "measured", frame, seen.t, x, seen, words),
+        replace(_named(view, "measured", frame, t, x, seen), note=note),
+        replace(_balls(view, "measured", frame, t, x, seen, words), note=note),
     ]
     if view.held():
         at, moving = view.held(), view.moving()
@@ -158,7 +165,7 @@ def _balls(
     loads: Sequence[str],
 ) -> Track:
     topic, name = f"{view.prefix}/markers/{who}/scene", f"markers {who}"
-    ns, size = view.ns(t, topic), _BALL * float(np.ptp(seen.rest, axis=0).max())
+    ns, size = view.ns(t, topic), _BALL * float(np.ptp(seen.rest, axis=0).max()) or _ONE_BALL
 
     def message(i: int) -> Json:
         colour, load = COLOURS[who], loads[i]
@@ -201,8 +208,10 @@ def surface(view: View) -> list[Track]:
         )  # fmt: skip
 
     drawn, whole = sum(len(p.triangles) for p in parts), sum(p.whole for p in parts)
-    note = f"{drawn} of {whole} triangles" if drawn < whole else ""
-    return [Track(topic, SCENE, ns, message, note)]
+    notes_of = [f"{drawn} of {whole} triangles"] if drawn < whole else []
+    if len(moving) < len(view.held()):
+        notes_of.append(f"{len(moving)} of {len(view.held())} output frames")
+    return [Track(topic, SCENE, ns, message, ", ".join(notes_of))]
 
 
 def _shades(u: Floats, top: float, part: str) -> Floats:

@@ -11,12 +11,12 @@ from validate.recording.mcap_write import POSE, POSE_KEY, stamps_ns
 from validate.recording.schemas import Json
 from validate.recording.types import Recording
 from validate.register.observe import Registered
-from validate.report.loads import HOW, Instant, at_times, held
-from validate.report.numbers import spaced
+from validate.report.loads import HOW, Instant, at_holds, at_times, held
+from validate.report.numbers import significant, spaced
 from validate.solve.types import Run
 
 Records = tuple[tuple[str, dict[str, str]], ...]
-_INSTANTS = 60  # interpolated instants of what is only looked at
+_INSTANTS = 60  # instants of what is only looked at: interpolated, or frames of a run over time
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,14 @@ class View:
         return stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), topic)
 
     def held(self) -> tuple[Instant, ...]:
-        """What the run computed at the loads; empty without a run."""
+        """What the run computed, at the loads or over time; empty without a run."""
         return held(self.registered, self.run) if self.run is not None else ()
 
     def moving(self) -> tuple[Instant, ...]:
-        """As `held`, with interpolated instants between, evenly spaced in time."""
+        """As `held`, with interpolated instants between, evenly spaced in time.
+
+        Of a run over time only so many of its frames.
+        """
         known = self.held()
         if self.run is None or len(known) < 2:
             return known
@@ -80,9 +83,18 @@ class View:
         return at_times(self.registered, self.run, times)
 
 
+def over_time(view: View) -> bool:
+    """The run's fields are output frames at their own times, not those at loads."""
+    return view.run is not None and not at_holds(view.registered, view.run)
+
+
 def load_of(instant: Instant) -> str:
-    """The load of an instant in words."""
-    return spaced(instant.hold.label) if instant.hold else f"{1e3 * instant.stage:.2f} mm, {HOW}"
+    """The load of an instant in words, or its time."""
+    if instant.hold:
+        return spaced(instant.hold.label)
+    if instant.computed:
+        return f"t = {significant(instant.t, 4)} s"
+    return f"{1e3 * instant.stage:.2f} mm, {HOW}"
 
 
 def pose_records(topic: str, pose: Floats) -> Records:

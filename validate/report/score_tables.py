@@ -5,9 +5,13 @@ import re
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Published
-from validate.report.numbers import shown_unit, spaced, text
+from validate.report.numbers import at_load, duration, rate, shown_unit, spaced, text
+from validate.report.observed import timed
 from validate.report.page import Cell, Items, Mark, Section, Table, cells, section
 
+_COSTS = ("setup", "step.p50", "step.p99", "updates.max")
+_COLUMNS = 12  # errors side by side that a page shows without scrolling far
+_OVER_TIME = re.compile(r"^[^@]*\.n?rmse$").match
 _MARKS: dict[str, Mark] = {
     "reproduced": "good",
     "not reproduced": "bad",
@@ -17,27 +21,30 @@ _MARKS: dict[str, Mark] = {
 
 
 def side_by_side(result: Result) -> Section | None:
-    """How each method ended, what it cost and its errors at the last load."""
-    heads = _headline(result)
+    """How each method ended, what it cost and its errors, at the last load or over time."""
+    heads, left_out = _headline(result)
     cost = Table(
         "How each method ended and what it cost. Rate: 1 over the median time of one step; set-up: "
-        "mesh, assembly, factorisation and response columns. Times are of this machine.",
-        ("method", "name", "ended", "rate / kHz", "p99 / µs", "updates", "set-up / s"),
+        "what is done once (mesh, assembly, factorisation). Times are of this machine.",
+        ("method", "name", "ended", "rate", "p99 of a step", "updates", "set-up"),
         tuple(_cost_row(m) for m in result.methods),
         words=(0, 1, 2),
     )
-    last = ", ".join(dict.fromkeys(spaced(name.partition("@")[2]) for name, _ in heads))
     units = (f"{name.partition('@')[0]} / {shown_unit(unit)}" for name, unit in heads)
+    more = f" {left_out} more stand under All scores." if left_out else ""
     errors = Table(
-        f"Errors against the recording at the last load ({last}).",
+        f"Errors {_where(heads)}.{more}",
         ("method", *(u.removesuffix(" / ") for u in units)),
         tuple(_error_row(m, heads) for m in result.methods),
     )
     return section("methods", "Models side by side", cost, errors if heads else None)
 
 
-def _headline(result: Result) -> list[tuple[str, str]]:
-    """Rms and scalar errors at the last load of any method: names and SI units."""
+def _headline(result: Result) -> tuple[list[tuple[str, str]], int]:
+    """Names and SI units of the errors shown, and how many do not fit.
+
+    Rms and scalar errors at the last load of any method; errors over time at named points.
+    """
     found: dict[str, str] = {}
     for method in result.methods:
         last = {r.quantity: r for r in method.residuals.values()}
@@ -45,11 +52,22 @@ def _headline(result: Result) -> list[tuple[str, str]]:
             scalar = residual.values.shape == (1, 1)
             statistic = "" if scalar else ".rms"
             found[f"{residual.quantity}{statistic}@{residual.load}"] = residual.unit
-    return list(found.items())
+    tracked = {s.name: s.unit for m in result.methods for s in m.scores if _OVER_TIME(s.name)}
+    heads = list((found | tracked).items())
+    return heads[:_COLUMNS], max(0, len(heads) - _COLUMNS)
+
+
+def _where(heads: list[tuple[str, str]]) -> str:
+    """At which loads, or over the whole time; scores without a load are those over time."""
+    loads = list(dict.fromkeys(name.partition("@")[2] or "all" for name, _ in heads))
+    held = [spaced(load) for load in loads if load != "all"]
+    at = f"against the recording at the last load ({', '.join(held)})" if held else ""
+    over = at_load("all") if "all" in loads else ""
+    return " and ".join(w for w in (at, over) if w)
 
 
 def _cost_row(method: MethodResult) -> tuple[Cell, ...]:
-    times = method.run.step_s
+    times = timed(method.run)
     updates = next((s.value for s in method.scores if s.name == "updates.max"), None)
     end = next((r.outcome for r in method.runs if not r.finished), method.run.outcome)
     ended = "finished" if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
@@ -58,10 +76,10 @@ def _cost_row(method: MethodResult) -> tuple[Cell, ...]:
         *cells(
             method.name,
             ended,
-            text(1e-3 * times.rate_hz if times else None),
-            text(1e6 * times.p99 if times else None),
+            rate(times.rate_hz if times else None),
+            duration(times.p99 if times else None),
             text(updates),
-            text(method.run.setup_s),
+            duration(method.run.setup_s),
         ),
     )
 
@@ -73,9 +91,37 @@ def _error_row(method: MethodResult, heads: list[tuple[str, str]]) -> tuple[Cell
 
 
 def scores(result: Result) -> Section | None:
-    """Every score of every method, rows quantity and statistic, columns loads."""
+    """Every score of every method, rows quantity and statistic, columns loads; those over time."""
     return section(
-        "scores", "All scores", *(t for m in result.methods if (t := _scores_of(m)) is not None)
+        "scores",
+        "All scores",
+        _over_time(result),
+        *(t for m in result.methods if (t := _scores_of(m)) is not None),
+    )
+
+
+def _over_time(result: Result) -> Table | None:
+    """Scores without a load, one column per method; what a method cost stands elsewhere."""
+    by_name: dict[str, dict[str, Score]] = {}
+    for method in result.methods:
+        for score in method.scores:
+            if "@" not in score.name and score.name not in _COSTS:
+                by_name.setdefault(score.name, {})[method.name] = score
+    if not by_name:
+        return None
+    rows = tuple(
+        (
+            *cells(name, shown_unit(next(iter(found.values())).unit)),
+            *(Cell(_value(found.get(m.name))) for m in result.methods),
+            Cell(", ".join(dict.fromkeys(str(s.count) for s in found.values()))),
+        )
+        for name, found in by_name.items()
+    )
+    return Table(
+        "Over the whole run, every method.",
+        ("score", "unit", *(m.name for m in result.methods), "values"),
+        rows,
+        words=(0, 1),
     )
 
 

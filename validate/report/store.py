@@ -1,7 +1,12 @@
-"""results.json and the runs' arrays: SI with units, no NaN, no infinity, no absolute path."""
+"""results.json and the runs' arrays: SI with units, no NaN, no infinity, no absolute path.
+
+results.json is to be read whole: traces of long runs over time stand in it at the output frames
+only, charts thinned, both rounded to seven digits; runs/ and tables/ hold every number.
+"""
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -10,16 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from validate.arrays import Floats
 from validate.compare.effects import Effect
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Check, Published
 from validate.recording.types import Source
 from validate.report.environment import environment, file_name, without_folder
+from validate.report.observed import timed
+from validate.report.store_exhibits import exhibits, rounded
 from validate.solve.types import Run, StepTimes
 
 SCHEMA_VERSION = 1
 Json = dict[str, Any]
+_STEPS = 1000  # a run over time with more of them gives its traces at the output frames only
+_FRAMES = 100  # fewer frames than these are loads, which traces are not thinned to
+_NUMBERS_ONLY = re.compile(r"\[\s+(-?[\d.eE+-]+(?:,\s+-?[\d.eE+-]+)*)\s+\]")
 
 
 def schema() -> Json:
@@ -59,18 +70,22 @@ def document(result: Result, created: str) -> Json:
         "identified": [_score(s) for s in result.identified],
         "published": [_published(p) for p in result.published],
         "uncertain_inputs": list(result.inputs),
+        "exhibits": exhibits(result.exhibits),
     }  # fmt: skip
 
 
 def write_json(content: Json, path: Path) -> None:
     """The document as text; a NaN that slipped through is a bug and raises `ValueError`."""
     text = json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1)
+    # No string holds a line break, so only arrays match.
+    text = _NUMBERS_ONLY.sub(lambda m: "[" + " ".join(m.group(1).split()) + "]", text)
     path.write_text(text + "\n", encoding="utf-8")
 
 
 def write_runs(result: Result, folder: Path) -> None:
     """<method>.npz: t (nt,) s, u (no, n, d) m at the steps `at`, nodes (n, d) m, cells (e, m).
 
+    `sd` (no, n, d) m where the method knows it; `trace:<name>` (nt,), units in results.json.
     Several recordings: the arrays of the second and later ones end in _2, _3, ...
     """
     for method in result.methods:
@@ -81,6 +96,9 @@ def write_runs(result: Result, folder: Path) -> None:
         for i, run in enumerate(method.runs, start=1):
             end = "" if i == 1 else f"_{i}"
             arrays |= {f"t{end}": run.t, f"u{end}": run.u, f"at{end}": run.at}
+            arrays |= {f"trace:{name}{end}": trace.y for name, trace in run.traces.items()}
+            if run.sd is not None:
+                arrays[f"sd{end}"] = run.sd
         with (folder / f"{method.name}.npz").open("wb") as out:
             np.savez_compressed(out, allow_pickle=False, **arrays)
 
@@ -100,13 +118,11 @@ def _method(method: MethodResult, result: Result) -> Json:
         "accepted": method.accepted,
         "outcome": {"state": end.state, "step": end.step, "why": end.why},
         "setup_s": _finite(first.setup_s),
-        "step_s": _times(first.step_s),
-        "rate_hz": _finite(first.step_s.rate_hz) if first.step_s else None,
-        "t": first.t.tolist(),
-        "traces": _traces(first),
+        "step_s": _times(timed(first)),
+        "rate_hz": _finite(times.rate_hz) if (times := timed(first)) else None,
+        **_traced(first),
         "further_runs": [
-            {"recording": name, "outcome": run.outcome.state, "t": run.t.tolist(),
-             "traces": _traces(run)}
+            {"recording": name, "outcome": run.outcome.state, **_traced(run)}
             for name, run in zip(names[1:], method.runs[1:], strict=False)
         ],
         "scores": [_score(s) for s in method.scores],
@@ -123,8 +139,19 @@ def _times(times: StepTimes | None) -> Json | None:
     return {"p50": times.p50, "p99": times.p99, "max": times.max, "n": times.n}
 
 
-def _traces(run: Run) -> Json:
-    return {k: {"unit": t.unit, "y": t.y.tolist()} for k, t in run.traces.items()}
+def _traced(run: Run) -> Json:
+    """Times and traces, at every step or at the output frames."""
+    thin = len(run.t) > _STEPS and len(run.at) >= _FRAMES
+    at = run.at if thin else np.arange(len(run.t))
+
+    def numbers(values: Floats) -> list[float]:
+        return rounded(values[at]) if thin else values.tolist()
+
+    return {
+        "traces_at": "output frames" if thin else "every step",
+        "t": numbers(run.t),
+        "traces": {k: {"unit": t.unit, "y": numbers(t.y)} for k, t in run.traces.items()},
+    }
 
 
 def _score(score: Score) -> Json:

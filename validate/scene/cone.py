@@ -1,7 +1,5 @@
 """A quarter of an upright truncated cone, for compression between plates."""
 
-import numpy as np
-
 from validate.errors import SceneError
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.mesh import Mesh, require_positive_cells

@@ -33,7 +33,7 @@ def write_mesh(mesh: Mesh, path: Path, provenance: str = "") -> None:
     if size > MAX_BYTES:
         raise SceneError(f"mesh of {size} bytes, the limit of a mesh file is {MAX_BYTES}")
     with path.open("wb") as file:
-        np.savez_compressed(file, **arrays)
+        np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def read_mesh(path: Path) -> Mesh:

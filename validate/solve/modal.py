@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.solve.dynamic import (
     InertialStepper,
@@ -27,29 +26,16 @@ from validate.solve.dynamic import (
     require_linear,
     spread,
 )
+from validate.solve.modal_walk import Walk, exact_walk, walk_by_rule
 from validate.solve.newmark_rule import (
     Excitation,
     Motion,
-    Rule,
     RuleName,
     excitation,
-    per_mode,
+    require_start,
     rule_of,
 )
 from validate.solve.types import State, Stepper
-
-_CLUSTER = 1e-3  # relative distance of frequencies that are taken as one cluster
-_COUPLED = 1e-8  # of the damping: rounding leaves 1e-12, other materials' damping far more
-_DENSE = 1500  # free unknowns up to which all modes together are cheaper than some
-
-
-@dataclass(frozen=True)
-class Modes:
-    """Shapes (m, r), M-orthonormal over the free unknowns, frequencies 1/s and dampings 1/s."""
-
-    shapes: Floats
-    omega: Floats
-    damping: Floats
 
 
 @dataclass(frozen=True)
@@ -74,134 +60,21 @@ class Modal:
             raise SceneError(f"{self.modes} modes: at least 1")
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a law at large strain, cavities, or damping that couples modes."""
+        """Raises `SceneError` for laws at large strain, cavities, damping that couples modes."""
         require_linear(system)
         modes = modes_of(system, self.modes)
         exact = self.propagate in ("linear", "constant")
         name: RuleName = "average" if exact else self.propagate  # type: ignore[assignment]
         rule = rule_of(name, self.dt, self.rho_inf)
+        if not exact and self.a0 == "equilibrium" and system.scene.loads:
+            require_start(system, rule, "consistent")
         excited = excitation(system, rule)
-        walk = _exact(modes, self.dt, self.propagate) if exact else _by_rule(modes, rule)
+        walk = exact_walk(modes, self.dt, self.propagate) if exact else walk_by_rule(modes, rule)
         rest = _left_out(system, modes, excited) if self.static_correction else None
-        rows = reactions(system)
+        rows, at_once = reactions(system), self.a0 == "equilibrium"
+        forces = np.ascontiguousarray(modes.shapes.T @ _columns(excited))
         projected = _projected(system, rows, modes)
-        return ModalStepper(
-            system, rows, modes, excited, walk, rest, projected, self.a0 == "equilibrium"
-        )
-
-
-def modes_of(system: System, count: int | None = None) -> Modes:
-    """The lowest modes, with the whole of the last cluster of equal frequencies.
-
-    Raises `SceneError` for more modes than unknowns or a C that they do not make diagonal.
-    """
-    free = system.free
-    m = len(free)
-    wanted = m if count is None else count
-    if wanted > m:
-        raise SceneError(f"{wanted} modes of {m} unknowns: at most {m}")
-    squares, shapes = _lowest(system, wanted)
-    omega = np.sqrt(squares)
-    end = wanted
-    while end < len(omega) and omega[end] <= omega[wanted - 1] * (1 + _CLUSTER):
-        end += 1
-    shapes, omega = np.ascontiguousarray(shapes[:, :end]), omega[:end]
-    C = shapes.T @ (system.C[free][:, free] @ shapes)
-    damping = np.diag(C).copy()
-    if np.abs(C - np.diag(damping)).max() > _COUPLED * max(float(np.abs(C).max()), 1e-300):
-        raise SceneError(
-            "the damping couples the modes (regions damped differently); use Newmark, or one "
-            "mass_damping and stiffness_damping for all materials"
-        )
-    return Modes(shapes, omega, damping)
-
-
-def _lowest(system: System, wanted: int) -> tuple[Floats, Floats]:
-    """Squares of frequencies and shapes, rising: a few more than wanted, or all."""
-    free = system.free
-    K, M = (X[free][:, free].tocsc() for X in (system.K, system.M))
-    spare = wanted + max(8, wanted // 10)
-    if len(free) <= _DENSE or spare >= len(free) - 1:
-        squares, shapes = eigh(K.toarray(), M.toarray())
-    else:
-        start = np.random.default_rng(0).standard_normal(len(free))
-        squares, shapes = eigsh(K, k=spare, M=M, sigma=0.0, which="LM", v0=start)
-    order = np.argsort(squares)
-    return np.asarray(squares)[order], np.asarray(shapes)[:, order]
-
-
-@dataclass(frozen=True)
-class Walk:
-    """The step of all modes (r,): new q and q' from q, q', q'' and the forces at both ends.
-
-    `q` and `rate` hold one factor (r,) each of q, q', q'', the old and the new force; without
-    `rate` the rule gives q' and q''.
-    """
-
-    modes: Modes
-    q: tuple[Floats, ...]
-    rate: tuple[Floats, ...] | None
-    rule: Rule | None
-
-    def step(
-        self, q: Floats, v: Floats, a: Floats, f_old: Floats, f_new: Floats
-    ) -> tuple[Floats, Floats, Floats]:
-        given = (q, v, a, f_old, f_new)
-        new = _sum(self.q, given)
-        if self.rate is None:
-            assert self.rule is not None
-            return new, *self.rule.rates(new, q, v, a)
-        rate = _sum(self.rate, given)
-        return new, rate, f_new - self.modes.damping * rate - self.modes.omega**2 * new
-
-
-def _sum(factors: tuple[Floats, ...], given: tuple[Floats, ...]) -> Floats:
-    total = factors[0] * given[0]
-    for factor, value in zip(factors[1:], given[1:], strict=True):
-        total += factor * value
-    return total
-
-
-def _by_rule(modes: Modes, rule: Rule) -> Walk:
-    q, v, a, f = per_mode(rule, modes.damping, modes.omega**2)
-    # The excitation has weighted the forces of both ends already: one force a step.
-    return Walk(modes, (q, v, a, 0 * f, f), None, rule)
-
-
-def _exact(modes: Modes, h: float, force: str) -> Walk:
-    """q = p + homogeneous solution from (q - p, q' - p'), p the particular one of f0 + f' t."""
-    c, w2 = modes.damping, modes.omega**2
-    qq, qv, vq, vv = _homogeneous(c, w2, h)
-    still, none = 1 / w2, np.zeros_like(w2)
-    if force == "constant":
-        return Walk(
-            modes, (qq, qv, none, none, still * (1 - qq)), (vq, vv, none, none, -still * vq), None
-        )
-    lag, rise = c / w2**2 / h, 1 / w2 / h
-    # p(0) = f_old/w^2 - lag (f_new - f_old), p(h) = f_new/w^2 - the same, p' = rise (f_new - f_old)
-    q_new = still - lag + qq * lag - qv * rise
-    q_old = lag - qq * (still + lag) + qv * rise
-    v_new = rise + vq * lag - vv * rise
-    v_old = -rise - vq * (still + lag) + vv * rise
-    return Walk(modes, (qq, qv, none, q_old, q_new), (vq, vv, none, v_old, v_new), None)
-
-
-def _homogeneous(c: Floats, w2: Floats, h: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """q, q' after h from q = 1 and from q' = 1 of q'' + c q' + w2 q = 0, overdamped or not.
-
-    The smaller root is w2 over the larger one: their difference would lose its digits.
-    """
-    half = np.sqrt((c / 2).astype(complex) ** 2 - w2)
-    fast = -c / 2 - half
-    slow = w2 / fast
-    e_slow, e_fast = np.exp(slow * h), np.exp(fast * h)
-    gap = slow - fast
-    close = np.abs(gap * h) < 1e-4
-    series = h * np.exp(-c * h / 2) * (1 + (gap * h) ** 2 / 24)
-    phi = np.where(close, series, (e_slow - e_fast) / np.where(close, 1.0, gap))
-    rows = e_fast - fast * phi, phi, -w2 * phi, e_fast + slow * phi
-    qq, qv, vq, vv = (np.ascontiguousarray(x.real) for x in rows)
-    return qq, qv, vq, vv
+        return ModalStepper(system, rows, modes, excited, walk, forces, rest, projected, at_once)
 
 
 def _columns(excited: Excitation) -> Floats:
@@ -238,25 +111,24 @@ class ModalState:
 
 @dataclass(frozen=True)
 class ModalStepper(InertialStepper):
-    """States keep modal coordinates; the field is formed when it is asked for."""
+    """States keep modal coordinates; the field is formed when it is asked for.
+
+    `forces` (r, l + 3 k) are those on the modes, `left_out` (m, l + 3 k) the displacements of the
+    modes cut off, `projected` (k, r) the drives' rows of K, C, M on the shapes.
+    """
 
     modes: Modes
     excitation: Excitation
     walk: Walk
+    forces: Floats
     left_out: Floats | None
     projected: tuple[Floats, Floats, Floats]
     equilibrium: bool
 
-    def __post_init__(self) -> None:
-        modal = np.ascontiguousarray(self.modes.shapes.T @ _columns(self.excitation))
-        object.__setattr__(self, "_forces", modal)
-
-    _forces: Floats = np.zeros((0, 0))
-
     def rest(self) -> State:
         r, motion = len(self.modes.omega), self.excitation.rest()
         zeros, inputs = np.zeros(r), np.zeros(len(self.scene.inputs))
-        signal = np.zeros(self._forces.shape[1])
+        signal = np.zeros(self.forces.shape[1])
         start = ModalState(zeros, zeros, zeros, motion, signal)
         numbers = self.reactions.named(np.zeros(self._drives))
         return self._state(inputs, 0, numbers=numbers, extra=start)
@@ -270,7 +142,7 @@ class ModalStepper(InertialStepper):
         if state.k == 0 and self.equilibrium:
             old = old.copy()
             old[: len(drives) - k] = drives[k:]
-            a = self._forces @ old
+            a = self.forces @ old
         f_old, f_new = self._ends(old, new)
         q, v, a = self.walk.step(last.q, last.v, a, f_old, f_new)
         extra = ModalState(q, v, a, moved, new)
@@ -281,11 +153,11 @@ class ModalStepper(InertialStepper):
         """Modal forces at both ends; for a rule the one force of its balance, given as new."""
         rule = self.walk.rule
         if rule is None:
-            return self._forces @ old, self._forces @ new
+            return self.forces @ old, self.forces @ new
         mixed = rule.weighted(new, old)
         if self._drives and rule.am != 0:
             mixed[-self._drives :] = rule.weighted_a(new, old)[-self._drives :]
-        f = self._forces @ mixed
+        f = self.forces @ mixed
         return f, f
 
     def field(self, state: State) -> Floats:

@@ -31,6 +31,7 @@ from validate.solve.newmark_rule import (
     RuleName,
     excitation,
     propagation,
+    require_start,
     rule_of,
 )
 from validate.solve.types import State, Stepper
@@ -43,8 +44,8 @@ class Newmark:
     """Steps of dt s by one of three rules; rho_inf is for generalised alpha alone.
 
     `a0`: "equilibrium" starts from M a0 = f with the first step's loads, as for a load that is
-    switched on at t = 0; "zero" starts from rest without them (paper 001's matrices leave it
-    open; the first step is twice as long with the former). `drive_rates`: velocities and
+    switched on at t = 0; "zero" starts without them (where damping rules, the first step of average
+    acceleration is then half as long; paper 001 leaves it open). `drive_rates`: velocities and
     accelerations of prescribed unknowns by backward differences of the drives, or by the rule,
     which makes average acceleration ring with growing amplitude on a ramp.
     """
@@ -65,6 +66,8 @@ class Newmark:
         require_linear(system)
         rule = rule_of(self.rule, self.dt, self.rho_inf)
         by_rule = self.drive_rates == "rule"
+        if self.a0 == "equilibrium" and system.scene.loads:
+            require_start(system, rule, self.mass)
         return NewmarkStepper(
             system,
             reactions(system, self.mass),

@@ -1,8 +1,14 @@
 """Every scheme there is. A new one is one file beside this and its name here."""
 
 from validate.solve.fluid import LINEAR
+from validate.solve.modal import Modal
+from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
+from validate.solve.quasi_static import QuasiStatic
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
-SCHEMES: tuple[type[Scheme], ...] = (*LINEAR, StaticNewton, Tabulated)
+# Linear schemes of drives and loads, without cavities.
+INERTIAL: tuple[type[Scheme], ...] = (QuasiStatic, Newmark, Modal)
+
+SCHEMES: tuple[type[Scheme], ...] = (*LINEAR, StaticNewton, Tabulated, *INERTIAL)

@@ -1,0 +1,270 @@
+"""Kalman filter finite elements on a small block under traction: paper 001 as printed.
+
+KF-FEM: 4 x 4 x 7 mm, 200 nodes, 672 tetrahedra, 3 kN/m2 on top, one node measured with white noise.
+The paper measures its own model (same model); what that cannot show stands beside it: truths that
+the models do not know, nodes that nobody measured, other filters, other solvers.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from validate.arrays import Ints
+from validate.compare.verdict import Accept
+from validate.fem.system import System
+from validate.fem.system import build as build_system
+from validate.parameters import quantity
+from validate.recording.mcap_read import read_recording
+from validate.recording.types import Recording, Signal
+from validate.register.observe import Hold, Registered
+from validate.register.placed import placed
+from validate.replay.experiment import Change, Progress
+from validate.replay.tracking import Case, Follower, Tracking, Truth
+from validate.scene.box import box, centroids
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
+from validate.solve.dynamic import StartName
+from validate.solve.march import march
+from validate.solve.newmark import Newmark
+from validate.solve.types import Run, Stepper
+from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+
+RECORDING = Path(__file__).parents[1] / "recordings" / "kf_cube.mcap"
+NODES = {"node_A": (2, 2, 7), "node_B": (2, 2, 5), "corner": (0, 0, 7)}  # in cells
+FIDUCIALS = {"f1": (0, 0, 0), "f2": (4, 0, 0), "f3": (0, 4, 0), "f4": (4, 4, 0)}
+
+
+@dataclass(frozen=True)
+class MaterialCard:
+    E: float = quantity(10e3, "Pa", "Young's modulus of the models")
+    nu: float = quantity(0.47, "1", "Poisson ratio of the models")
+    rho: float = quantity(1068.0, "kg/m3", "density")
+    mass_damping: float = quantity(0.0, "1/s", "Rayleigh alpha_0")
+    stiffness_damping: float = quantity(0.1, "s", "Rayleigh alpha_1")
+
+
+@dataclass(frozen=True)
+class Body:
+    cell: float = quantity(1e-3, "m", "edge of a cell")
+    across: int = quantity(4, "1", "cells across")
+    high: int = quantity(7, "1", "cells high")
+
+
+@dataclass(frozen=True)
+class Loading:
+    traction: float = quantity(3000.0, "Pa", "on the top face, upward")
+    spread: Literal["consistent", "nodal"] = quantity("consistent", "1", "nodal: equal forces")
+    a0: StartName = quantity("equilibrium", "1", "first acceleration: M^-1 f, or zero")
+    off: float = quantity(0.0, "s", "time at which the traction is released; 0: never")
+
+
+@dataclass(frozen=True)
+class Clock:
+    dt: float = quantity(0.002, "s", "time step")
+    steps: int = quantity(500, "1", "steps")
+
+
+@dataclass(frozen=True)
+class TwinCard:
+    """What made the recording; the models do not know it."""
+
+    seed: int = quantity(2019, "1", "seed of the noise")
+    noise: float = quantity(1e-9, "m2", "variance of the white noise per component (.001 mm2)")
+    stiffness: float = quantity(1.0, "1", "its modulus over that of the models")
+    nu: float | None = quantity(None, "1", "its Poisson ratio; none: that of the models")
+    inside: Literal["nothing", "layer", "inclusion"] = quantity(
+        "nothing", "1", "stiff layer at mid-height, or stiff inclusion"
+    )
+    contrast: float = quantity(5.0, "1", "modulus of layer or inclusion over the rest")
+    every: int = quantity(1, "1", "steps between two looks of the tracker")
+    missing: float = quantity(0.0, "1", "share of the looks at which a marker is not seen")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    material: MaterialCard = MaterialCard()
+    body: Body = Body()
+    loading: Loading = Loading()
+    clock: Clock = Clock()
+    twin: TwinCard = TwinCard()
+    recording: str = quantity(str(RECORDING), "1", "the recording")
+
+
+def _mesh(p: Parameters) -> Mesh:
+    b = p.body
+    cells = (b.across, b.across, b.high)
+    return box(tuple(n * b.cell for n in cells), cells)
+
+
+def _places(p: Parameters, which: dict[str, tuple[int, int, int]]) -> dict[str, tuple[float, ...]]:
+    """Points m from places on the 4 x 4 x 7 grid, whatever cells the block has."""
+    b = p.body
+    unit = (b.across / 4 * b.cell, b.across / 4 * b.cell, b.high / 7 * b.cell)
+    return {k: tuple(i * u for i, u in zip(ijk, unit, strict=True)) for k, ijk in which.items()}
+
+
+def _scene(p: Parameters, E: float, nu: float, regions: tuple[Region, ...] = ()) -> Scene:
+    m = p.material
+    material = Material(E, nu, "linear", m.rho, m.mass_damping, m.stiffness_damping)
+    return Scene(
+        _mesh(p),
+        material,
+        (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "z1", (0.0, 0.0, 1.0), p.loading.spread),),
+        probes=tuple(Probe(name, at) for name, at in _places(p, NODES).items()),
+        regions=regions,
+    )
+
+
+def build(recording: Recording, parameters: Parameters, method: Follower) -> Scene:
+    m = parameters.material
+    return _scene(parameters, m.E, m.nu)
+
+
+# --- the twin ------------------------------------------------------------------------------------
+
+
+def _true_scene(p: Parameters) -> Scene:
+    twin, m = p.twin, p.material
+    E, nu = twin.stiffness * m.E, m.nu if twin.nu is None else twin.nu
+    scene = _scene(p, E, nu)
+    if twin.inside == "nothing":
+        return scene
+    stiff = replace(scene.material, E=twin.contrast * E)
+    cells = _stiff_cells(p, scene.mesh)
+    return replace(scene, regions=(Region(twin.inside, cells, stiff),))
+
+
+def _stiff_cells(p: Parameters, mesh: Mesh) -> Ints:
+    """The middle two rows of seven, or the upper middle half of the block."""
+    share = centroids(mesh) / mesh.nodes.max(axis=0)
+    layer = (share[:, 2] > 2.99 / 7) & (share[:, 2] < 5.01 / 7)
+    if p.twin.inside == "layer":
+        return np.flatnonzero(layer)
+    middle = np.abs(share[:, :2] - 0.5).max(axis=1) < 0.2501
+    return np.flatnonzero(layer & middle)
+
+
+def _inputs(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
+    """Times (nt,) s of the steps' ends and the traction's total force (nt,) N there."""
+    t = p.clock.dt * np.arange(1, p.clock.steps + 1)
+    side = p.body.across * p.body.cell
+    on = np.where((p.loading.off > 0) & (t > p.loading.off), 0.0, 1.0)
+    return t, p.loading.traction * side**2 * on
+
+
+def _true_run(p: Parameters, at: Ints) -> tuple[Scene, Run]:
+    scene, (t, force) = _true_scene(p), _inputs(p)
+    stepper = Newmark(p.clock.dt, a0=p.loading.a0).prepare(build_system(scene))
+    return scene, march("twin", stepper, t, force[:, None], at, 0.0)
+
+
+def record(parameters: Parameters, progress: Progress) -> Recording:
+    p = parameters
+    progress("simulate")
+    scene, run = _true_run(p, np.array([0]))
+    progress("measure")
+    twin = p.twin
+    declared = {
+        "element": f"P1 tetrahedra, {len(scene.mesh.nodes)} nodes, {len(scene.mesh.cells)} cells",
+        "law": "linear elasticity, Rayleigh damping, average acceleration",
+        "E_Pa": repr(scene.material.E),
+        "nu": repr(scene.material.nu),
+        "inside": twin.inside,
+    }
+    fiducials = {k: np.array(v) for k, v in _places(p, FIDUCIALS).items()}
+    same = twin == replace(TwinCard(), seed=twin.seed, noise=twin.noise)
+    return record_tracked(
+        Origin("kf_cube", twin.seed, same, declared),
+        points_of(run, scene),
+        fiducials,
+        Camera(float(np.sqrt(twin.noise)), twin.every, twin.missing, still=10_000),
+        {"pull": Reading(run.traces["pull.force"].y, "N")},
+    )
+
+
+def truth(parameters: Parameters, seen: Registered) -> Truth:
+    """The twin's displacements at the steps, and its fields at 200 of them."""
+    from validate.replay.track import output_frames
+
+    at = output_frames(parameters.clock.steps, 200)
+    scene, run = _true_run(parameters, at)
+    probes = {
+        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in "xyz"], axis=1)
+        for p in scene.probes
+    }
+    return Truth(probes, run.u, scene.mesh)
+
+
+# --- the road ------------------------------------------------------------------------------------
+
+
+def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
+    return (read_recording(Path(parameters.recording)),)
+
+
+def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
+    pull = recording.signal("pull", "N")
+    later = pull.t > 0
+    t = pull.t[later]
+    stage = Signal(t, pull.y[later], "N", pull.sd, pull.frame)
+    holds = (Hold("start", 0.0, float(t[0])), Hold("end", float(pull.y[-1, 0]), float(t[-1])))
+    return Registered(stage, holds, placed(recording, scene.mesh), None, ())
+
+
+def stepper(method: Follower, parameters: Parameters, system: System, seen: Registered) -> Stepper:
+    p = parameters
+    return method.prepare(system, seen, dt=p.clock.dt, a0=p.loading.a0)
+
+
+METHODS = {
+    "fem": Follower("FEM, average acceleration, factorised once", Newmark()),
+}
+
+
+def _twin(**changes: Any) -> Change:
+    def change(p: Parameters) -> Parameters:
+        return replace(p, twin=replace(p.twin, **changes))
+
+    return change
+
+
+CASES = (
+    Case("stiff_model", "the models are 20 % stiffer than the truth", _twin(stiffness=1 / 1.2)),
+    Case("soft_model", "the models are 20 % softer than the truth", _twin(stiffness=1 / 0.8)),
+    Case("layer", "the truth has a stiff layer at mid-height", _twin(inside="layer")),
+    Case("inclusion", "the truth has a stiff inclusion", _twin(inside="inclusion")),
+    Case("nu", "the truth has a Poisson ratio of 0.30", _twin(nu=0.30)),
+)
+
+
+def quick(parameters: Parameters) -> Parameters:
+    return parameters
+
+
+EXPERIMENT = Tracking(
+    name="kf_cube",
+    title="Kalman filter finite elements on a block under traction",
+    source="paper 001 (KF-FEM), section 3, Table 1",
+    parameters=Parameters(),
+    methods=METHODS,
+    accepted=("fem",),
+    accept=(
+        Accept("node_B", 0.1e-3, "a twelfth of the largest displacement there (ours)"),
+        Accept("corner", 0.2e-3, "a tenth of the largest displacement there (ours)"),
+    ),
+    load=load,
+    record=record,
+    truth=truth,
+    build=build,
+    place=place,
+    stepper=stepper,
+    axis="z",
+    reference="fem",
+    cases=CASES,
+    same_model=True,
+    seed=TwinCard().seed,
+    twin_notice="The recording is a twin: the same mesh and law as the models, plus white noise.",
+)

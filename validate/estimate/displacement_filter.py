@@ -1,0 +1,246 @@
+"""Kalman filters whose state is the displacement vector: paper 001's, in two sets of coordinates.
+
+The state equation is Newmark's step, u' = J^-1 A u + J^-1 (L v + M a + f) (paper 001, eqs 11-14):
+velocity and acceleration are inputs, recursed beside the filter and not part of its state, so P
+knows nothing of them. Its transition J^-1 A alone decides P, hence the gains need no data.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.estimate.covariance import Claim, Covariance, Gain, start
+from validate.estimate.gains import Claims, GainSequence, Seen
+from validate.estimate.innovation import Innovation, innovation, innovation_traces, nothing
+from validate.estimate.measured import Timetable
+from validate.fem.system import System
+from validate.solve.dynamic import InertialStepper, spread
+from validate.solve.newmark_rule import Excitation, Motion, Propagation, Rule
+from validate.solve.types import State, Trace
+
+Recursion = Literal["prior", "posterior"]
+Structure = Literal["white", "load"]
+
+
+class Coordinates(Protocol):
+    """In what the state (n,) is kept: nodal displacements or modal amplitudes."""
+
+    def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
+        """x' under forces f (m,) N on the free unknowns."""
+        ...
+
+    def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]: ...
+
+    def free(self, x: Floats) -> Floats:
+        """Values (m,) of the free unknowns."""
+        ...
+
+    def amplitudes(self, u: Floats) -> Floats:
+        """The coordinates of u (m,) or (m, k)."""
+        ...
+
+    def variances(self, P: Floats) -> Floats:
+        """Diagonal (m,) of the free unknowns' covariance."""
+        ...
+
+
+@dataclass(frozen=True)
+class Nodal:
+    """The free unknowns themselves."""
+
+    propagation: Propagation
+
+    def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
+        return self.propagation.predict(x, v, a, f)
+
+    def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
+        return self.propagation.rates(new, x, v, a)
+
+    def free(self, x: Floats) -> Floats:
+        return x
+
+    def amplitudes(self, u: Floats) -> Floats:
+        return u
+
+    def variances(self, P: Floats) -> Floats:
+        return np.diag(P)
+
+
+@dataclass(frozen=True)
+class InModes:
+    """Amplitudes of all modes: `shapes` (m, r), M-orthonormal, `dual` = M shapes.
+
+    `factors` (r,) each of q, v, a and the modal force make the step.
+    """
+
+    shapes: Floats
+    dual: Floats
+    factors: tuple[Floats, Floats, Floats, Floats]
+    rule: Rule
+
+    def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
+        fq, fv, fa, ff = self.factors
+        return np.asarray(fq * x + fv * v + fa * a + ff * (self.shapes.T @ f))
+
+    def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
+        return self.rule.rates(new, x, v, a)
+
+    def free(self, x: Floats) -> Floats:
+        return self.shapes @ x
+
+    def amplitudes(self, u: Floats) -> Floats:
+        return self.dual.T @ u
+
+    def variances(self, P: Floats) -> Floats:
+        return np.asarray(np.einsum("ij,ij->i", self.shapes @ P, self.shapes))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Where measurements land, and rows: H (m, n) of the coordinates, `driven` (m, k) of drives."""
+
+    names: tuple[str, ...]
+    table: Timetable
+    H: Floats
+    driven: Floats
+
+
+@dataclass(frozen=True)
+class Inner:
+    """State (n,) with its rates, the drives' motion, and what is claimed (None: precomputed)."""
+
+    x: Floats
+    v: Floats
+    a: Floats
+    motion: Motion
+    claim: Claim | None
+
+
+class Spread:
+    """Standard deviations (m,) of the free unknowns; those of the last claim are kept, since a
+    settled claim is asked for at every output frame."""
+
+    def __init__(self, coordinates: Coordinates, covariance: Covariance) -> None:
+        self._coordinates, self._covariance = coordinates, covariance
+        self._last: tuple[Claim, Floats] | None = None
+
+    def at(self, claim: Claim) -> Floats:
+        if self._last is None or self._last[0] is not claim:
+            variances = self._coordinates.variances(self._covariance.matrix(claim))
+            self._last = claim, np.sqrt(np.maximum(variances, 0.0))
+        return self._last[1]
+
+
+@dataclass(frozen=True)
+class DisplacementStepper(InertialStepper):
+    """One filter step: predict, correct where something was measured, recurse v and a.
+
+    With `gains` they were computed before; without, the covariance is recursed at every step. It
+    is recursed in the coordinates `claimed`; `starts` (n, l) are accelerations at rest per newton.
+    """
+
+    coordinates: Coordinates
+    excitation: Excitation
+    covariance: Covariance
+    sensor: Sensor
+    when: Mapping[int, Seen]
+    gains: GainSequence | None
+    starts: Floats | None
+    recursion: Recursion
+    claimed: Coordinates
+    _claims: Claims = field(init=False)
+    _spread: "Spread" = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_claims", Claims(self.covariance, self.when))
+        object.__setattr__(self, "_spread", Spread(self.claimed, self.covariance))
+
+    def rest(self) -> State:
+        zeros = np.zeros(len(self.covariance.P0))
+        claim = None if self.gains else start(self.covariance)
+        inner = Inner(zeros, zeros, zeros, self.excitation.rest(), claim)
+        inputs = np.zeros(len(self.scene.inputs))
+        numbers = self.reactions.named(np.zeros(self._drives))
+        return self._state(inputs, 0, numbers=numbers, extra=inner)
+
+    def step(self, state: State, drives: Floats) -> State:
+        """The posterior at the end of a step; `drives` are the inputs there, loads included."""
+        last: Inner = state.extra
+        k, new, old, a = self._drives, drives[self._drives :], state.drives[self._drives :], last.a
+        if state.k == 0 and self.starts is not None:
+            old, a = new, self.starts @ new
+        motion = self.excitation.moved(last.motion, drives[:k])
+        f = self.excitation.force(new, old, motion, last.motion)
+        prior = self.coordinates.predict(last.x, last.v, a, f)
+        step = state.k + 1
+        gain, claim = self._gain(step, last.claim)
+        x, seen = self._corrected(prior, gain, step, motion.q)
+        towards = prior if self.recursion == "prior" else x
+        inner = Inner(x, *self.coordinates.rates(towards, last.x, last.v, a), motion, claim)
+        return self._done(drives, step, inner, seen)
+
+    def _gain(self, step: int, claim: Claim | None) -> tuple[Gain | None, Claim | None]:
+        if self.gains is not None:
+            return self.gains.at(step), None
+        assert claim is not None
+        prior, seen = self.covariance.predict(claim), self.when.get(step)
+        return (None, prior) if seen is None else self.covariance.update(prior, seen)
+
+    def _corrected(
+        self, prior: Floats, gain: Gain | None, step: int, driven: Floats
+    ) -> tuple[Floats, Innovation]:
+        z = self.sensor.table.at(step)
+        if z is None or gain is None:
+            return prior, nothing(len(self.sensor.names))
+        found = innovation(z, self.sensor.H @ prior + self.sensor.driven @ driven, gain.S_yy)
+        return prior + gain.G @ found.y[list(gain.seen)], found
+
+    def _done(self, inputs: Floats, step: int, inner: Inner, seen: Innovation) -> State:
+        if not np.isfinite(inner.a.sum() + inner.x.sum()):
+            why = ("diverged", f"the estimate is not finite at step {step}")
+            return self._state(inputs, step, extra=inner, failure=why)
+        numbers = {**seen.numbers(self.sensor.names)}
+        if self._drives:
+            m, of = inner.motion, self.coordinates.free
+            full = [
+                spread(self.system, of(free), driven)
+                for free, driven in ((inner.x, m.q), (inner.v, m.rate), (inner.a, m.acceleration))
+            ]
+            numbers |= self.reactions.numbers(*full, inputs[self._drives :])
+        return self._state(inputs, step, numbers=numbers, extra=inner)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes."""
+        inner: Inner = state.extra
+        u = spread(self.system, self.coordinates.free(inner.x), inner.motion.q)
+        return u.reshape(self.scene.mesh.nodes.shape)
+
+    def sd(self, state: State) -> Floats:
+        """Claimed standard deviations (n, d) m; prescribed unknowns have none."""
+        inner: Inner = state.extra
+        claim = self._claims.at(state.k) if inner.claim is None else inner.claim
+        full = np.zeros(len(self.system.moves))
+        full[self.system.free] = self._spread.at(claim)
+        return full.reshape(self.scene.mesh.nodes.shape)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        """Of the inputs and drives, NIS with its degrees, innovations with their sd."""
+        return super().traces(states) | innovation_traces(self.sensor.names, states)
+
+
+def load_shapes(system: System, H: Floats) -> Floats:
+    """Static displacements (m, l) of every load, each 1 where it moves a measured component most.
+
+    Raises `SceneError` for a scene without loads, or one whose loads move nothing that is measured.
+    """
+    if not system.scene.loads:
+        raise SceneError("a load-shaped Q needs a load in the scene; use the white one")
+    shapes = system.factor().solve(np.ascontiguousarray(system.loads[system.free]))
+    most = np.abs(H @ shapes).max(axis=0)
+    if most.min() <= 1e-9 * np.abs(shapes).max():
+        raise SceneError("a load moves no measured component: its shape cannot be estimated there")
+    return np.asarray(shapes / most)

@@ -1,0 +1,151 @@
+"""Does each filter know how wrong it is? Innovations, NIS and node errors against their bands."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.stats import chi2
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.compare.score import Score
+from validate.estimate.consistency import (
+    Consistency,
+    Whiteness,
+    nees_consistency,
+    nis_consistency,
+    whiteness,
+)
+from validate.fem.locate import barycentric_rows
+from validate.replay.tracking import Followed
+
+_LAGS = 10
+_HEADS = (
+    "case", "filter", "what", "per dof / 1", "95 % band from / 1", "to / 1", "steps", "dof",
+    "verdict", "alarm",
+)  # fmt: skip
+Cases = Mapping[str, Mapping[str, Followed]]
+
+
+def consistency_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
+    """Tables and the NIS over time; None where no method is a filter that measured anything."""
+    filters = {n: f for n, f in main.items() if nis_of(f)}
+    if not filters:
+        return None
+    rows = [row for f in filters.values() for row in _rows(f)]
+    rows += [row for case in others.values() for f in case.values() for row in _rows(f)]
+    table = NumberTable(
+        "consistency",
+        "NIS (innovations) and NEES at the nodes (error against the twin's truth over the filter's "
+        "own standard deviation), per degree of freedom, with the 95 % chi-square band: above it a "
+        "filter is over-confident, below it under-confident.",
+        _HEADS, tuple(rows),
+        "NEES of one run is correlated in time, which widens its spread beyond the band.",
+    )  # fmt: skip
+    white = NumberTable(
+        "whiteness",
+        f"Whiteness of the innovations, Ljung-Box over {_LAGS} lags: a small p means that the "
+        "innovation has memory, so model or Q is wrong.",
+        ("filter", "component", "p / 1", "lag-1 correlation / 1", "samples", "white"),
+        tuple(row for f in filters.values() for row in _white_rows(f)),
+    )
+    words = (
+        "NIS sees measured components only: a filter can look consistent while unmeasured nodes "
+        "are wrong, so read it beside the errors at the other nodes.",
+    )
+    charts = tuple(_chart(f) for f in list(filters.values())[:4])
+    return Exhibit("consistency", "Does the filter know its error?", words, (table, white), charts)
+
+
+def nis_of(followed: Followed) -> Consistency | None:
+    """NIS of a filter's run; None for a solver, or where nothing was measured."""
+    nis, dof = followed.run.traces.get("nis"), followed.run.traces.get("nis.dof")
+    if nis is None or dof is None or not dof.y.any():
+        return None
+    return nis_consistency(nis.y, dof.y)
+
+
+def nees_of(followed: Followed) -> dict[str, Consistency]:
+    """NEES by probe: all components over the output frames, error against the filter's own sd."""
+    run, mesh = followed.run, followed.scene.mesh
+    if run.sd is None or not len(run.at) or run.at[-1] >= len(followed.seen.stage.t):
+        return {}
+    found = {}
+    for probe in followed.scene.probes:
+        reference = followed.truth.probes.get(probe.name)
+        if reference is None or len(reference) <= run.at[-1]:
+            continue
+        rows = barycentric_rows(mesh, np.array([probe.point]))
+        error = np.array([rows.apply(u)[0] for u in run.u]) - reference[run.at]
+        sd = np.array([rows.apply(s)[0] for s in run.sd])
+        sure = sd > 0
+        if sure.any():
+            terms = np.where(sure, error / np.where(sure, sd, 1.0), 0.0) ** 2
+            found[probe.name] = nees_consistency(terms.sum(axis=1), sure.sum(axis=1))
+    return found
+
+
+def consistency_scores(followed: Followed) -> tuple[Score, ...]:
+    """`nis.per_dof` and `<probe>.nees.per_dof` of a filter's run; none for a solver."""
+    end = f"@{followed.case}" if followed.case else ""
+    words = "over its degrees of freedom; 1 for a consistent filter"
+    found = []
+    nis = nis_of(followed)
+    if nis:
+        text = f"normalised innovation squared {words}"
+        found.append(Score(f"nis.per_dof{end}", nis.mean, "1", nis.dof, "measured recording", text))
+    for probe, nees in nees_of(followed).items():
+        text = f"squared error over the claimed variance at {probe}, {words}"
+        name = f"{probe}.nees.per_dof{end}"
+        found.append(Score(name, nees.mean, "1", nees.dof, "truth of the twin", text))
+    return tuple(found)
+
+
+def _rows(followed: Followed) -> list[tuple[Entry, ...]]:
+    nis = nis_of(followed)
+    if nis is None:
+        return []
+    parts = [("NIS", nis)] + [(f"NEES at {p}", c) for p, c in nees_of(followed).items()]
+    return [(followed.case or "recorded", followed.label, *_row(what, c)) for what, c in parts]
+
+
+def _row(what: str, c: Consistency) -> tuple[Entry, ...]:
+    band = c.band_95
+    return (what, c.mean, band.low, band.high, c.samples, c.dof, c.verdict, c.alarm or "none")
+
+
+def _white_rows(followed: Followed) -> list[tuple[Entry, ...]]:
+    traces = followed.run.traces
+    names = [n for n in traces if n.startswith("innovation.") and not n.endswith(".sd")]
+    rows: list[tuple[Entry, ...]] = []
+    for name in names:
+        sd = traces[f"{name}.sd"].y
+        if (sd > 0).sum() < 3 * _LAGS:
+            continue
+        white = whiteness(traces[name].y, sd, _LAGS)
+        rows.append((followed.label, name.removeprefix("innovation."), *_white(white)))
+    return rows
+
+
+def _white(w: Whiteness) -> tuple[Entry, ...]:
+    return (w.p, float(w.autocorrelation[0]), w.samples, "yes" if w.white else "no")
+
+
+def _chart(followed: Followed) -> Chart:
+    """NIS of every measured step per degree of freedom, with the band of one step."""
+    traces, t = followed.run.traces, followed.run.t
+    dof = traces["nis.dof"].y
+    seen = dof > 0
+    per = traces["nis"].y[seen] / dof[seen]
+    low, high = (_band(dof[seen], p) for p in (0.025, 0.975))
+    return Chart(
+        f"nis_{followed.method}", f"NIS of {followed.label}", "time / s", "NIS per dof / 1",
+        (
+            Series("95 % band of one step", t[seen], low, "band", high),
+            Series("NIS", t[seen], np.maximum(per, 1e-6), "points"),
+        ),
+        levels=(("expected", 1.0),), log="y",
+    )  # fmt: skip
+
+
+def _band(dof: Floats, probability: float) -> Floats:
+    return np.asarray(chi2.ppf(probability, dof) / dof)

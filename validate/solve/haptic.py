@@ -1,0 +1,67 @@
+"""Rates that hands and eyes need, and the force in between where a model cannot keep up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats, checked
+from validate.errors import UsageError
+
+HAPTIC_HZ = 1000.0  # force updates that a stiff contact needs to feel steady (paper 003, 3.5)
+VISUAL_HZ = 30.0  # pictures a second (paper 003, 3.3)
+
+
+@dataclass(frozen=True)
+class RealTime:
+    """Steps of dt s done at rate_hz 1/s; critical_dt s is the limit of stability.
+
+    A rate says nothing without its dt: `factor` is simulated over elapsed time, `ratio` how much
+    of the stable step dt uses. Raises `UsageError` for numbers that are not positive.
+    """
+
+    rate_hz: float
+    dt: float
+    critical_dt: float
+
+    def __post_init__(self) -> None:
+        if not all(x > 0 for x in (self.rate_hz, self.dt, self.critical_dt)):
+            raise UsageError(
+                f"rate {self.rate_hz:g} Hz, dt {self.dt:g} s, critical step {self.critical_dt:g} "
+                "s: all must be positive"
+            )
+
+    @property
+    def factor(self) -> float:
+        """Seconds simulated per second; real time needs at least 1."""
+        return self.rate_hz * self.dt
+
+    @property
+    def ratio(self) -> float:
+        """dt over the critical step; a sound explicit run needs less than 1."""
+        return self.dt / self.critical_dt
+
+    @property
+    def force_hz(self) -> float:
+        """New forces a second when the model runs in step with the clock, at most 1/dt."""
+        return min(self.rate_hz, 1 / self.dt)
+
+    @property
+    def haptic(self) -> bool:
+        """Whether every haptic tick gets a force of its own; else `extrapolate` fills in."""
+        return self.factor >= 1 and self.force_hz >= HAPTIC_HZ
+
+
+def extrapolate(times: Floats, forces: Floats, t: float) -> Floats:
+    """The force (d,) N at t s, linearly from the last two of forces (k, d) at times (k,) s.
+
+    Paper 003, section 3.5: when 1 kHz is missed, force is extrapolated from previous steps. A
+    single force is held. Raises `UsageError` for times that do not rise or a t before the last.
+    """
+    at = checked(times, "times [s]", (None,), error=UsageError)
+    f = checked(forces, "forces [N]", (len(at), None), error=UsageError)
+    if len(at) == 0 or (len(at) > 1 and np.diff(at).min() <= 0) or t < at[-1]:
+        raise UsageError(f"force at t = {t:g} s from {len(at)} times: rising ones, none after t")
+    if len(at) == 1:
+        return np.asarray(f[0])
+    slope = (f[-1] - f[-2]) / (at[-1] - at[-2])
+    return np.asarray(f[-1] + (t - at[-1]) * slope)
