@@ -17,16 +17,22 @@ from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.recording.mcap_read import read_recording
-from validate.recording.types import Recording, Signal
-from validate.register.observe import Hold, Registered
-from validate.register.placed import placed
+from validate.recording.types import Recording
+from validate.register.observe import Registered
 from validate.replay.experiment import Change, Progress
-from validate.replay.tracking import Case, Follower, Tracking, Truth
+from validate.replay.tracking import (
+    Case,
+    Follower,
+    Tracking,
+    Truth,
+    followed_load,
+    truth_of,
+)
 from validate.scene.box import box, centroids
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
 from validate.solve.dynamic import StartName
-from validate.solve.march import march
+from validate.solve.march import march, output_frames
 from validate.solve.newmark import Newmark
 from validate.solve.types import Run, Stepper
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
@@ -187,15 +193,8 @@ def record(parameters: Parameters, progress: Progress) -> Recording:
 
 def truth(parameters: Parameters, seen: Registered) -> Truth:
     """The twin's displacements at the steps, and its fields at 200 of them."""
-    from validate.replay.track import output_frames
-
-    at = output_frames(parameters.clock.steps, 200)
-    scene, run = _true_run(parameters, at)
-    probes = {
-        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in "xyz"], axis=1)
-        for p in scene.probes
-    }
-    return Truth(probes, run.u, scene.mesh)
+    scene, run = _true_run(parameters, output_frames(parameters.clock.steps, 200))
+    return truth_of(run, scene)
 
 
 # --- the road ------------------------------------------------------------------------------------
@@ -206,12 +205,7 @@ def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
 
 
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
-    pull = recording.signal("pull", "N")
-    later = pull.t > 0
-    t = pull.t[later]
-    stage = Signal(t, pull.y[later], "N", pull.sd, pull.frame)
-    holds = (Hold("start", 0.0, float(t[0])), Hold("end", float(pull.y[-1, 0]), float(t[-1])))
-    return Registered(stage, holds, placed(recording, scene.mesh), None, ())
+    return followed_load(recording, scene, "pull", "N")
 
 
 def stepper(method: Follower, parameters: Parameters, system: System, seen: Registered) -> Stepper:

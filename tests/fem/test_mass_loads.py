@@ -1,4 +1,4 @@
-"""Mass, damping, loads and regions: exact entries, totals, and the cube that five codes agree on."""
+"""Mass, damping, loads and regions: exact entries, totals, the cube that other codes agree on."""
 
 from dataclasses import replace
 from math import factorial
@@ -71,7 +71,7 @@ def test_a_linear_cells_mass_is_exact() -> None:
 
 
 def test_a_quadratic_cells_mass_is_exact() -> None:
-    """Vertex L(2L - 1) and edge 4 L_a L_b functions, by the integrals of monomials; HRZ of those."""
+    """Functions L(2L - 1) and 4 L_a L_b by the integrals of monomials; HRZ of those."""
     corners = np.vstack([np.zeros(3), np.diag(SIZE)])
     mesh = quadratic(Mesh(corners, np.array([[0, 1, 2, 3]]), "tet4", {}))
     V = float(np.prod(SIZE)) / 6
@@ -128,12 +128,12 @@ def test_regions_add_their_stiffness_and_their_damping(order: int) -> None:
     system = build(scene)
     soft, hard = parts(mesh, SOFT, HARD)
     scale = np.abs(system.K).max()
-    assert system.K.toarray() == pytest.approx(soft + hard, abs=1e-9 * scale)
+    assert np.abs(system.K - (soft + hard)).max() <= 1e-9 * scale
     whole = build(Scene(mesh, replace(SOFT, rho=1.0))).M.toarray()
     dense = build(replace(scene, material=replace(SOFT, rho=1e-12))).M.toarray()
     light = 1000 * (whole - dense / 1500)
     expected = 0.1 * soft + 0.02 * hard + 2.0 * light + 5.0 * dense
-    assert system.C.toarray() == pytest.approx(expected, abs=1e-9 * 0.1 * scale)
+    assert np.abs(system.C - expected).max() <= 1e-10 * scale
 
 
 def test_one_material_has_rayleigh_damping() -> None:

@@ -7,10 +7,12 @@ import shutil
 import subprocess
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
 from report_samples import small_result
+from tracking_samples import tracking_result
 
 from validate.report.write import write_report
 
@@ -25,6 +27,10 @@ FINDINGS = """<script>addEventListener("load", () => {
                         return box.width > 100 && box.height > 10; };
   const found = {pictures: [...document.images].map(i => i.naturalWidth),
                  verdict: shown("verdict"), title: document.querySelector("h1").innerText,
+                 spilt: [...document.querySelectorAll("td, th")]
+                   .filter(c => c.scrollWidth > c.clientWidth + 1).map(c => c.innerText),
+                 anchors: [...document.querySelectorAll("nav a")]
+                   .map(a => document.querySelectorAll(a.getAttribute("href")).length),
                  overflow: document.documentElement.scrollWidth - innerWidth};
   const pre = document.createElement("pre"); pre.id = "found";
   pre.textContent = JSON.stringify(found); document.body.append(pre); });</script></body>"""
@@ -58,20 +64,39 @@ def run(browser: str, page: Path, profile: Path, *more: str) -> subprocess.Compl
     )
 
 
-def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
-    probe = tmp_path / "probe.html"
-    probe.write_text(report.read_text().replace("</body>", FINDINGS))
-    done = run(browser, probe, tmp_path / "profile", "--window-size=1280,1000", "--dump-dom")
+def look(browser: str, page: Path, folder: Path) -> tuple[dict[str, Any], str]:
+    """What `FINDINGS` found on a page, and the page's text; the console stays empty."""
+    probe = folder / "probe.html"
+    probe.write_text(page.read_text().replace("</body>", FINDINGS))
+    done = run(browser, probe, folder / "profile", "--window-size=1280,1000", "--dump-dom")
     match = re.search(r'<pre id="found">(.*?)</pre>', done.stdout)
     assert match, done.stdout[-500:]
-    found = json.loads(unescape(match.group(1)))
+    assert "CONSOLE" not in done.stderr
+    found: dict[str, Any] = json.loads(unescape(match.group(1)))
+    return found, unescape(done.stdout)
+
+
+def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
+    found, text = look(browser, report, tmp_path)
     assert found["title"] == "A cube <between> plates"
     assert found["verdict"] is True
     assert len(found["pictures"]) >= 3
     assert all(width > 300 for width in found["pictures"])
     assert found["overflow"] <= 0
-    assert small_result().sentence in unescape(done.stdout)
-    assert "CONSOLE" not in done.stderr
+    assert small_result().sentence in text
+
+
+def test_dom_of_a_result_over_time(
+    browser: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    page = write_report(tracking_result(), tmp_path / "box", created="2026-11-21T04:00:00Z")
+    found, _ = look(browser, page, tmp_path)
+    assert len(found["pictures"]) == 8  # 3 charts, 2 maps, errors over noise, body, registration
+    assert all(width > 300 for width in found["pictures"])
+    assert found["overflow"] <= 0
+    assert found["spilt"] == []  # no text of a cell lies on the next one
+    assert set(found["anchors"]) == {1}
 
 
 def test_screenshot(browser: str, report: Path, tmp_path: Path) -> None:

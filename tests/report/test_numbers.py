@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from validate.report.numbers import significant, spaced, text, with_unit
+from validate.report.numbers import (
+    at_load,
+    duration,
+    rate,
+    significant,
+    spaced,
+    text,
+    with_unit,
+)
 
 
 @pytest.mark.parametrize(
@@ -46,3 +54,24 @@ def test_loads_as_text() -> None:
     assert spaced("0.5mm") == "0.5 mm"
     assert spaced("10pct") == "10 %"
     assert spaced("end") == "end"
+
+
+@pytest.mark.parametrize(
+    ("hz", "shown"),
+    [(2.0, "2.00 Hz"), (999.0, "999 Hz"), (1000.0, "1.00 kHz"), (2e5, "200 kHz"), (None, "–")],
+)
+def test_rate(hz: float | None, shown: str) -> None:
+    assert rate(hz) == shown
+
+
+@pytest.mark.parametrize(
+    ("seconds", "shown"),
+    [(5e-6, "5.00 µs"), (1e-3, "1.00 ms"), (0.42, "420 ms"), (12.0, "12.0 s"), (None, "–")],
+)
+def test_duration(seconds: float | None, shown: str) -> None:
+    assert duration(seconds) == shown
+
+
+def test_at_load() -> None:
+    assert at_load("9mm") == "at 9 mm"
+    assert at_load("all") == "over the whole time"

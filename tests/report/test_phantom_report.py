@@ -41,7 +41,7 @@ def sections(result: Result) -> dict[str, Section]:
 
 def test_all_sections_that_apply(result: Result, sections: dict[str, Section]) -> None:
     left_out = {name for name, _ in SECTIONS} - set(sections) - {"published"}
-    assert left_out == {"checks"}
+    assert left_out == {"checks", "exhibits"}
     assert ("published" in sections) == bool(result.published)
 
 

@@ -1,7 +1,9 @@
 """Tables and progress bars on the terminal; plain lines when it is not one."""
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -57,3 +59,9 @@ def shown(value: float, unit: str) -> str:
     if unit == "s":
         return f"{1e6 * value:.1f} us" if value < 1e-2 else f"{value:.2f} s"
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def relative(path: Path) -> str:
+    """The path from here when it lies below, else whole."""
+    text = os.path.relpath(path)
+    return str(path.resolve()) if text.startswith("..") else text

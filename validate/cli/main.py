@@ -91,6 +91,46 @@ def check(names: tuple[str, ...], as_json: bool) -> int:
 
 
 @cli.command()
+@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def compare(runs: tuple[Path, ...], as_json: bool) -> None:
+    """Stored runs (report folders) side by side; nothing is run again."""
+    from validate.cli import comparing
+
+    comparing.compare(runs, as_json)
+
+
+@cli.group()
+def study() -> None:
+    """Many runs on a grid of values, on Dask; goes on where it was stopped."""
+
+
+@study.command("filters")
+@click.argument("name", metavar="NAME|FILE.py")
+@click.option(
+    "--sweep",
+    "sweeps",
+    multiple=True,
+    metavar="PATH=VALUES",
+    help="log:1e-6:1e-1:7, lin:0:1:5 or a,b,c of a parameter or setting; several make a grid.",
+)
+@click.option("--seeds", default="10", show_default=True, metavar="N|A,B,C", help="Noise samples.")
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+@click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
+@click.option("--by", default="all.rmse", show_default=True, metavar="SCORE", help="Rank by it.")
+@click.option("--quick", is_flag=True, help="Coarser and shorter; a banner says so.")
+@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
+@click.option("--workers", type=int, help="Local processes (default: one a core).")
+@click.option("--scheduler", default="", metavar="ADDRESS", help="A Dask scheduler that runs.")
+@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+def filters(name: str, **options: Any) -> None:
+    """Settings, rates, noise and seeds of filters: ranking, Pareto front, consistency."""
+    from validate.cli import studying
+
+    studying.filters(name, **options)
+
+
+@cli.command()
 @click.argument("file", type=_FILE)
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def inspect(file: Path, as_json: bool) -> None:

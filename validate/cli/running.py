@@ -1,11 +1,10 @@
 """`validate run`."""
 
-import os
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from validate.cli.display import console, progress, shown, table
+from validate.cli.display import console, progress, relative, shown, table
 from validate.cli.main import FAILED, pairs
 from validate.compare.result import Result
 from validate.replay.find import experiment_files, find, root_of
@@ -59,10 +58,4 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     if rows:
         screen.print(table("Checks", head, rows))
     screen.print(f"\n{result.sentence}", soft_wrap=True)
-    screen.print(f"{seconds:.1f} s wall time; report: {_relative(page)}", soft_wrap=True)
-
-
-def _relative(path: Path) -> str:
-    """The path from here when it lies below, else whole."""
-    text = os.path.relpath(path)
-    return str(path.resolve()) if text.startswith("..") else text
+    screen.print(f"{seconds:.1f} s wall time; report: {relative(page)}", soft_wrap=True)

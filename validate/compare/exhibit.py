@@ -87,8 +87,33 @@ class NodeMap:
 
 
 @dataclass(frozen=True)
+class Heat:
+    """Numbers over two axes: values (rows, columns) under the axes' own texts, NaN = none.
+
+    `centre` is the value that colours turn at (None: they only rise); all numbers above 0 are
+    coloured by their logarithms.
+    """
+
+    name: str
+    title: str
+    x: str
+    y: str
+    columns: tuple[str, ...]
+    rows: tuple[str, ...]
+    values: Floats
+    quantity: str
+    centre: float | None = None
+
+    def __post_init__(self) -> None:
+        shape = (len(self.rows), len(self.columns))
+        fail = ComparisonError
+        values = checked(self.values, f"heat '{self.name}'", shape, nan=True, error=fail)
+        object.__setattr__(self, "values", values)
+
+
+@dataclass(frozen=True)
 class Exhibit:
-    """A part of a report: its sentences, then tables, charts and maps in order."""
+    """A part of a report: its sentences, then tables, charts, heats and maps in order."""
 
     anchor: str
     title: str
@@ -96,3 +121,4 @@ class Exhibit:
     tables: tuple[NumberTable, ...] = ()
     charts: tuple[Chart, ...] = ()
     maps: tuple[NodeMap, ...] = ()
+    heats: tuple[Heat, ...] = ()

@@ -90,7 +90,7 @@ def run_scores(run: Run) -> tuple[Score, ...]:
     if run.step_s is not None:
         n = run.step_s.n
         rows += [
-            ("step.p50", run.step_s.p50, "s", n, "median time of one condensed step"),
+            ("step.p50", run.step_s.p50, "s", n, "median time of one step"),
             ("step.p99", run.step_s.p99, "s", n, "99 % quantile of the time of one step"),
         ]
     updates = run.traces["updates"].y

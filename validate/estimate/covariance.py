@@ -38,28 +38,36 @@ class Gain:
     seen: tuple[bool, ...]
 
 
-class Covariance(Protocol):
-    """A recursion in some coordinates; H (m, n) reads measured components from them."""
+class Recursion(Protocol):
+    """What gains come from; H (m, n) reads measured components from the coordinates."""
 
     @property
     def H(self) -> Floats: ...
 
-    @property
-    def P0(self) -> Floats: ...
+    def start(self) -> Claim:
+        """What is claimed before the first step."""
+        ...
 
     def predict(self, claim: Claim) -> Claim: ...
 
     def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]: ...
+
+
+class Covariance(Recursion, Protocol):
+    """A recursion of the whole covariance."""
+
+    @property
+    def P0(self) -> Floats: ...
 
     def matrix(self, claim: Claim) -> Floats:
         """P (n, n) with the last update in it."""
         ...
 
 
-def start(covariance: Covariance) -> Claim:
-    """What is claimed before the first step."""
-    P0, none = covariance.P0, np.zeros((len(covariance.P0), 0))
-    return Claim(P0, P0 @ covariance.H.T, none, none)
+def claimed(P: Floats, PHt: Floats) -> Claim:
+    """A claim without an update to come."""
+    none = np.zeros((len(P), 0))
+    return Claim(P, PHt, none, none)
 
 
 def best_gain(PHt: Floats, H: Floats, R: Floats, seen: tuple[bool, ...]) -> Gain:
@@ -81,14 +89,17 @@ class Dense:
     R: Floats
     P0: Floats
 
+    def start(self) -> Claim:
+        return claimed(self.P0, self.P0 @ self.H.T)
+
     def predict(self, claim: Claim) -> Claim:
         P = self.A @ claim.P @ self.A.T + self.Q
-        return Claim(P, P @ self.H.T, claim.G, claim.B)
+        return claimed(P, P @ self.H.T)
 
     def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]:
         gain, i = best_gain(claim.PHt, self.H, self.R, seen), np.array(seen)
         P = joseph(claim.P, gain.G, self.H[i], np.diag(self.R[i]))
-        return gain, Claim((P + P.T) / 2, claim.PHt, claim.G, claim.B)
+        return gain, claimed((P + P.T) / 2, claim.PHt)
 
     def matrix(self, claim: Claim) -> Floats:
         return claim.P
@@ -104,10 +115,11 @@ class Modal:
     R: Floats
     P0: Floats
 
+    def start(self) -> Claim:
+        return claimed(self.P0, self.P0 @ self.H.T)
+
     def predict(self, claim: Claim) -> Claim:
-        P, PHt = advance(claim.P, claim.G, claim.B, self.f, self.Q, self.H)
-        none = np.zeros((len(P), 0))
-        return Claim(P, PHt, none, none)
+        return claimed(*advance(claim.P, claim.G, claim.B, self.f, self.Q, self.H))
 
     def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]:
         gain, i = best_gain(claim.PHt, self.H, self.R, seen), np.array(seen)

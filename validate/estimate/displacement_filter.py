@@ -7,13 +7,14 @@ knows nothing of them. Its transition J^-1 A alone decides P, hence the gains ne
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, Protocol
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.covariance import Claim, Covariance, Gain, start
+from validate.estimate.covariance import Claim, Covariance, Gain
 from validate.estimate.gains import Claims, GainSequence, Seen
 from validate.estimate.innovation import Innovation, innovation, innovation_traces, nothing
 from validate.estimate.measured import Timetable
@@ -81,6 +82,11 @@ class InModes:
     dual: Floats
     factors: tuple[Floats, Floats, Floats, Floats]
     rule: Rule
+
+    @cached_property
+    def white(self) -> Floats:
+        """What equal variance of every unknown is in amplitudes (r, r)."""
+        return np.asarray(self.dual.T @ self.dual)
 
     def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
         fq, fv, fa, ff = self.factors
@@ -161,7 +167,7 @@ class DisplacementStepper(InertialStepper):
 
     def rest(self) -> State:
         zeros = np.zeros(len(self.covariance.P0))
-        claim = None if self.gains else start(self.covariance)
+        claim = None if self.gains else self.covariance.start()
         inner = Inner(zeros, zeros, zeros, self.excitation.rest(), claim)
         inputs = np.zeros(len(self.scene.inputs))
         numbers = self.reactions.named(np.zeros(self._drives))
@@ -206,11 +212,11 @@ class DisplacementStepper(InertialStepper):
         numbers = {**seen.numbers(self.sensor.names)}
         if self._drives:
             m, of = inner.motion, self.coordinates.free
-            full = [
+            u, v, a = (
                 spread(self.system, of(free), driven)
                 for free, driven in ((inner.x, m.q), (inner.v, m.rate), (inner.a, m.acceleration))
-            ]
-            numbers |= self.reactions.numbers(*full, inputs[self._drives :])
+            )
+            numbers |= self.reactions.numbers(u, v, a, inputs[self._drives :])
         return self._state(inputs, step, numbers=numbers, extra=inner)
 
     def field(self, state: State) -> Floats:

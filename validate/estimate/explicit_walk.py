@@ -12,16 +12,19 @@ from typing import Protocol
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.estimate import node_ekf_kernel as kernel
 from validate.fem.critical import critical_step
+from validate.fem.explicit import ExplicitBody
 from validate.fem.system import System
 
 FAR = 10  # body lengths
 
 
 class ExplicitModel(Protocol):
-    """A body's internal forces (N,) N at displacements u (N,) m, and the tangent's diagonal."""
+    """A body's internal forces (N,) N at displacements u (N,) m, and what the tangent has of every
+    node: `ExplicitBody`."""
 
     def force(self, u: Floats) -> Floats: ...
 
@@ -29,15 +32,18 @@ class ExplicitModel(Protocol):
         """Forces (N,) N and K_ii (N,) N/m of the tangent at u."""
         ...
 
-    def tangent_blocks(self, u: Floats) -> Floats:
-        """K_nn (6, n) N/m of every node: xx, yy, zz, xy, xz, yz."""
+    def force_and_blocks(self, u: Floats) -> tuple[Floats, Floats]:
+        """Forces (N,) N and K_nn (n, 6) N/m of every node: xx, yy, zz, xy, xz, yz."""
         ...
 
 
 @dataclass(frozen=True)
 class Walk:
-    """U' = c2 U - c1 U_{t-h} + w (F - R(U)) + moves q, all (N,); held unknowns have zeros in c2,
-    c1 and w. `parts` steps of h s make one step of `march`."""
+    """U' = c2 U - c1 U_{t-h} + w (F - R(U)), all (N,); held unknowns have zeros in c2, c1 and w.
+
+    `parts` steps of h s make one step of `march`. Loads reach the `loaded` unknowns by `columns`,
+    drives the `driven` ones by `moves`.
+    """
 
     system: System
     model: ExplicitModel
@@ -46,6 +52,10 @@ class Walk:
     c2: Floats
     c1: Floats
     w: Floats
+    loaded: Ints
+    columns: Floats
+    driven: Ints
+    moves: Floats
 
     @cached_property
     def far(self) -> float:
@@ -66,18 +76,16 @@ class Walk:
 
     def following(self, u: Floats, before: Floats, R: Floats, start: Floats, end: Floats) -> Floats:
         """U_{t+h} (N,) m from inputs at t and t + h; R (N,) N are the internal forces at t."""
-        drives = self.system.moves.shape[1]
-        f = self.system.loads @ start[drives:] - R
-        u_new = self.c2 * u
-        u_new -= self.c1 * before
-        f *= self.w
-        u_new += f
-        return u_new + self.system.moves @ end[:drives] if drives else u_new
+        k = self.system.moves.shape[1]
+        return kernel.follow(
+            u, before, R, self.c2, self.c1, self.w,
+            self.loaded, self.columns, start[k:], self.driven, self.moves, end[:k],
+        )  # fmt: skip
 
 
 def explicit_model(system: System) -> ExplicitModel:
     """The compiled body of a scene."""
-    raise NotImplementedError
+    return ExplicitBody(system.scene)
 
 
 def walk(system: System, model: ExplicitModel, dt: float, parts: int) -> Walk:
@@ -91,9 +99,12 @@ def walk(system: System, model: ExplicitModel, dt: float, parts: int) -> Walk:
     half = material.mass_damping * h / 2
     free = np.zeros(len(system.moves))
     free[system.free] = 1 / (1 + half)
+    loaded, driven = (np.flatnonzero(X.any(axis=1)) for X in (system.loads, system.moves))
     return Walk(
-        system, model, h, parts, 2 * free, (1 - half) * free, free * h * h / system.masses
-    )
+        system, model, h, parts, 2 * free, (1 - half) * free, free * h * h / system.masses,
+        loaded, np.ascontiguousarray(system.loads[loaded]),
+        driven, np.ascontiguousarray(system.moves[driven]),
+    )  # fmt: skip
 
 
 def beyond(system: System, h: float) -> str:

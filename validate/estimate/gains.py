@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.covariance import Claim, Covariance, Gain, start
+from validate.estimate.covariance import Claim, Covariance, Gain, Recursion
 from validate.estimate.measured import Timetable
 
 # Change of the gain from one measurement to the next, of its largest entry, below which it is
@@ -56,11 +56,11 @@ def schedule(timetable: Timetable) -> Mapping[int, Seen]:
 
 
 def events(
-    covariance: Covariance, when: Mapping[int, Seen], tolerance: float = SETTLED
+    recursion: Recursion, when: Mapping[int, Seen], tolerance: float = SETTLED
 ) -> Iterator[Event]:
     """Gains in order. Once settled they repeat while interval and components stay what they are;
     after a break the recursion goes on from where it stood."""
-    claim, last, step = start(covariance), None, 0
+    claim, last, step = recursion.start(), None, 0
     pattern: tuple[int, Seen] | None = None
     settled = False
     for k, seen in when.items():
@@ -69,8 +69,8 @@ def events(
             yield Event(k, last, claim, True)
         else:
             for _ in range(k - step):
-                claim = covariance.predict(claim)
-            gain, claim = covariance.update(claim, seen)
+                claim = recursion.predict(claim)
+            gain, claim = recursion.update(claim, seen)
             settled = last is not None and same and _close(gain.G, last.G, tolerance)
             last, pattern = gain, (k - step, seen)
             yield Event(k, gain, claim, False)
@@ -82,11 +82,11 @@ def _close(new: Floats, old: Floats, tolerance: float) -> bool:
 
 
 def gain_sequence(
-    covariance: Covariance, when: Mapping[int, Seen], tolerance: float = SETTLED
+    recursion: Recursion, when: Mapping[int, Seen], tolerance: float = SETTLED
 ) -> GainSequence:
     """All gains of a schedule; `frozen` is the step after which none was computed any more."""
     gains, computed, frozen = {}, 0, None
-    for event in events(covariance, when, tolerance):
+    for event in events(recursion, when, tolerance):
         gains[event.step] = event.gain
         if not event.repeated:
             computed, frozen = computed + 1, None
@@ -103,6 +103,10 @@ class Claims:
 
     def __init__(self, covariance: Covariance, when: Mapping[int, Seen]) -> None:
         self._covariance, self._when = covariance, when
+        self._walk: Iterator[Event]
+        self._ahead: Event | None
+        self._claim: Claim
+        self._step = 0
         self._restart()
 
     def at(self, step: int) -> Claim:
@@ -117,6 +121,6 @@ class Claims:
         return self._claim
 
     def _restart(self) -> None:
-        self._walk: Iterator[Event] = events(self._covariance, self._when)
-        self._claim, self._step = start(self._covariance), 0
-        self._ahead: Event | None = next(self._walk, None)
+        self._walk = events(self._covariance, self._when)
+        self._claim, self._step = self._covariance.start(), 0
+        self._ahead = next(self._walk, None)

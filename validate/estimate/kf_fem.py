@@ -26,11 +26,13 @@ from validate.estimate.displacement_filter import (
     load_shapes,
 )
 from validate.estimate.gains import GainSequence, gain_sequence, schedule
-from validate.estimate.measured import Measurements, timetable
+from validate.estimate.measured import Measurements, Timetable, timetable
+from validate.estimate.observed import observed
 from validate.fem.factor import factorise
+from validate.fem.modes import modes_of
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.solve.dynamic import StartName, reactions, require_linear
-from validate.solve.modal import modes_of
 from validate.solve.newmark_rule import (
     Rule,
     RuleName,
@@ -53,15 +55,15 @@ class DisplacementNoise:
     displacement of each load as a whole, Q where it moves a measured component most.
     """
 
-    dt: float = 0.002
-    Q: float = 1e-9
-    R: float | None = None
-    P0: float = 1e-9
-    recursion: Recursion = "prior"
-    structure: Structure = "white"
-    gains: Gains = "shared"
-    rule: RuleName = "average"
-    a0: StartName = "equilibrium"
+    dt: float = quantity(0.002, "s", "time step")
+    Q: float = quantity(1e-9, "m^2", "model error of a step; the paper's .001, read as mm^2")
+    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+    P0: float = quantity(1e-9, "m^2", "variance at the start")
+    recursion: Recursion = quantity("prior", "1", "which displacement v and a follow")
+    structure: Structure = quantity("white", "1", "where the model errs")
+    gains: Gains = quantity("shared", "1", "computed beforehand, or at every step")
+    rule: RuleName = quantity("average", "1", "Newmark's rule")
+    a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
 
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt)
@@ -95,7 +97,7 @@ class KfFem(DisplacementNoise):
             covariance = self._dense(system, measurements, nodal)
             return stepper_of(self, system, measurements, nodal, covariance, nodal, None)
         claimed, covariance = self._shared(system, measurements, nodal)
-        gains = gain_sequence(covariance, schedule(timetable(measurements, self.dt)))
+        gains = shared_gains(covariance, timetable(measurements, self.dt))
         in_nodes = gains.mapped(claimed.free)
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
 
@@ -113,6 +115,13 @@ class KfFem(DisplacementNoise):
         except SceneError:  # damping couples the modes
             return nodal, self._dense(system, measurements, nodal)
         return modes, modal_covariance(self, system, measurements, modes)
+
+
+def shared_gains(covariance: Covariance, table: Timetable) -> GainSequence:
+    """All gains of the measurements, from the narrowest recursion that gives them."""
+    when = schedule(table)
+    narrow = observed(covariance, max(when, default=1)) if isinstance(covariance, Modal) else None
+    return gain_sequence(narrow or covariance, when)
 
 
 def in_modes(system: System, rule: Rule) -> InModes:
@@ -137,8 +146,9 @@ def noise_shape(
     settings: DisplacementNoise, system: System, coordinates: Coordinates, H: Floats
 ) -> Floats:
     """What one m^2 of Q or P0 means in the coordinates (n, n)."""
-    white = settings.structure == "white"
-    roots = coordinates.amplitudes(np.eye(len(system.free)) if white else load_shapes(system, H))
+    if settings.structure == "white":
+        return coordinates.white if isinstance(coordinates, InModes) else np.eye(len(system.free))
+    roots = coordinates.amplitudes(load_shapes(system, H))
     return np.asarray(roots @ roots.T)
 
 

@@ -7,16 +7,18 @@ dense in amplitudes: shapes are orthonormal in M, not in the unknowns).
 
 from dataclasses import dataclass
 
-from validate.estimate.gains import gain_sequence, schedule
+from validate.estimate.displacement_filter import DisplacementStepper, InModes
 from validate.estimate.kf_fem import (
     DisplacementNoise,
     Gains,
     in_modes,
     modal_covariance,
+    shared_gains,
     stepper_of,
 )
 from validate.estimate.measured import Measurements, timetable
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.solve.dynamic import require_linear
 from validate.solve.newmark_rule import rule_of
 from validate.solve.types import Stepper
@@ -26,13 +28,18 @@ from validate.solve.types import Stepper
 class ModalKf(DisplacementNoise):
     """`gains`: "every_step" is the exact recursion as it goes, "shared" the same beforehand."""
 
-    gains: Gains = "every_step"
+    gains: Gains = quantity("every_step", "1", "computed beforehand, or at every step")
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what linear schemes refuse and for damping that couples modes."""
         require_linear(system)
-        modes = in_modes(system, rule_of(self.rule, self.dt))
+        return self.with_modes(system, measurements, in_modes(system, rule_of(self.rule, self.dt)))
+
+    def with_modes(
+        self, system: System, measurements: Measurements, modes: InModes
+    ) -> DisplacementStepper:
+        """`prepare` with modes that are known: many settings of one system share them."""
         covariance = modal_covariance(self, system, measurements, modes)
-        when = schedule(timetable(measurements, self.dt))
-        gains = gain_sequence(covariance, when) if self.gains == "shared" else None
+        table = timetable(measurements, self.dt)
+        gains = shared_gains(covariance, table) if self.gains == "shared" else None
         return stepper_of(self, system, measurements, modes, covariance, modes, gains)

@@ -142,7 +142,9 @@ class NodeStepper:
     def sd(self, state: State) -> Floats:
         """Standard deviations (n, 3) m of the nodes."""
         P = state.extra.P
-        return np.sqrt(P[:3].T if self.settings.block == "node" else P[0].reshape(-1, 3))
+        return np.asarray(
+            np.sqrt(P[:3].T if self.settings.block == "node" else P[0].reshape(-1, 3))
+        )
 
     def traces(self, states: Sequence[State]) -> dict[str, Trace]:
         """Innovations, NIS, and how many covariances are held at the end of the number range."""
@@ -155,7 +157,7 @@ class NodeStepper:
         """Eqs 35 and 36; P is changed in place, the caller owns it."""
         w, P, c = self.walk, memory.P, self.settings
         if c.block == "node":
-            R, K = w.model.force(u), w.model.tangent_blocks(u)
+            R, K = w.model.force_and_blocks(u)
             count = kernel.spread_nodes(P, w.c2, w.w, K, self.Q)
         elif c.block == "companion":
             R, K = w.model.force_and_diagonal(u)

@@ -1,6 +1,6 @@
-"""Compiled arithmetic of the node-level extended Kalman filter (paper 003, eqs 35-39).
+"""Compiled arithmetic of the nonlinear filters: the explicit step and the node-level update.
 
-All functions work in place on packed arrays. P is packed by row, one column a component or node:
+Paper 003, eqs 35-39. P is changed in place and packed by row, one column a component or node:
 "component" 1 row of variances m^2, "companion" 3 rows (U_t, cross, U_{t-dt}) of 2 x 2 covariances,
 "node" 6 rows (xx, yy, zz, xy, xz, yz) of 3 x 3 ones.
 """
@@ -14,6 +14,28 @@ HUGE = 1e300  # m^2: beyond it the next products would leave the number range
 
 _ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
 _compiled = numba.njit(cache=True, error_model="numpy")
+
+
+@_compiled
+def follow(
+    u: Floats, before: Floats, R: Floats, c2: Floats, c1: Floats, w: Floats,
+    loaded: Ints, columns: Floats, loads: Floats, held: Ints, moves: Floats, drives: Floats,
+) -> Floats:  # fmt: skip
+    """U_{t+h} = c2 U_t - c1 U_{t-h} + w (F - R) (eq 35), a new array (N,).
+
+    F has rows `columns` (k, l) of loads (l,) at the `loaded` unknowns; those `held` take `moves`
+    (k, drives) of drives.
+    """
+    following = np.empty_like(u)
+    for i in range(u.size):
+        following[i] = c2[i] * u[i] - c1[i] * before[i] - w[i] * R[i]
+    for k in range(loaded.size):
+        for j in range(loads.size):
+            following[loaded[k]] += w[loaded[k]] * columns[k, j] * loads[j]
+    for k in range(held.size):
+        for j in range(drives.size):
+            following[held[k]] += moves[k, j] * drives[j]
+    return following
 
 
 @_compiled
@@ -49,7 +71,7 @@ def spread_companions(
 def spread_nodes(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
     """P = A P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
 
-    K (n, 6) holds the packed rows of every node; c2, w and Q (N,) are those of the node's components.
+    K (n, 6) holds the packed rows; c2, w and Q (N,) are those of the nodes' components.
     """
     count = 0
     for n in range(P.shape[1]):
@@ -89,7 +111,8 @@ def innovations(
 
 @_compiled
 def correct_components(
-    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool, shift: bool
+    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
+    joseph: bool, shift: bool,
 ) -> float:  # fmt: skip
     """Eqs 37-39 at the measured components (m,), NaN = missing; returns NIS.
 
@@ -138,7 +161,8 @@ def correct_companions(
 
 @_compiled
 def correct_nodes(
-    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool, shift: bool
+    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
+    joseph: bool, shift: bool,
 ) -> float:  # fmt: skip
     """The 3 x 3 update of the measured nodes, one component after the other; returns NIS.
 
@@ -171,14 +195,18 @@ def correct_nodes(
 
 @_compiled
 def clip(P: Floats) -> int:
-    """Scales the covariances beyond `HUGE` back to it; returns how many."""
+    """Scales the covariances beyond `HUGE` back to it; returns how many. One that has left the
+    number range altogether becomes `HUGE` in its variances, uncorrelated."""
     count = 0
     for i in range(P.shape[1]):
-        top = 0.0
+        top, lost = 0.0, False
         for k in range(P.shape[0]):
             top = max(top, abs(P[k, i]))
-        if top >= HUGE:
+            lost = lost or not np.isfinite(P[k, i])
+        if lost or top >= HUGE:
             count += 1
             for k in range(P.shape[0]):
-                P[k, i] *= HUGE / top
+                cross = (k == 1 and P.shape[0] == 3) or k > 2
+                whole = 0.0 if cross else HUGE
+                P[k, i] = whole if lost else P[k, i] * (HUGE / top)
     return count

@@ -67,7 +67,9 @@ def pod(walk: Walk, r: int, force: float) -> Basis:
     V = np.linalg.svd(root[:, None] * np.hstack(runs), full_matrices=False)[0][:, :r]
     V = V / root[:, None]
     squares, turn = eigh(V.T @ (system.K @ V))
-    return Basis(V @ turn, np.asarray(squares))
+    Phi = V @ turn
+    Phi[system.held] = 0.0  # up to rounding they are
+    return Basis(Phi, np.asarray(squares))
 
 
 def _snapshots(walk: Walk, load: int, force: float) -> Floats:

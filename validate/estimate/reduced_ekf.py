@@ -18,14 +18,17 @@ from typing import Literal
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import solve, solve_discrete_are
+from scipy.linalg import solve
 
 from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.estimate.explicit_walk import Walk, beyond, explicit_model, walk
 from validate.estimate.innovation import Innovation, innovation, innovation_traces, nothing
+from validate.estimate.linear_model import LinearModel
 from validate.estimate.measured import Measurements, Timetable, timetable
 from validate.estimate.reduced_basis import Basis, modes, pod
+from validate.estimate.small import joseph
+from validate.estimate.steady import steady_claim
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
@@ -58,8 +61,9 @@ class ReducedEKF:
             raise UsageError("load_walk, load_sd and process are standard deviations >= 0")
 
     def prepare(self, system: System, measurements: Measurements) -> "ReducedStepper":
-        """Raises `SceneError` for what the explicit step cannot do, `UsageError` for a basis or a
-        steady gain that does not exist, `ComparisonError` for times between the steps."""
+        """Raises `SceneError` for what the explicit step cannot do, `UsageError` for a basis that
+        does not exist, `ComparisonError` for a steady gain that does not, or times off the steps.
+        """
         steps = walk(system, explicit_model(system), self.dt, self.substeps)
         refusal = beyond(system, steps.h) if self.beyond_limit == "refuse" else ""
         pods = self.basis == "pod" and not refusal
@@ -70,7 +74,7 @@ class ReducedEKF:
         jumps = {int(gap): model.over(int(gap)) for gap in np.unique(gaps)}
         fixed = None
         if self.gain == "steady" and len(gaps):
-            fixed = steady(jumps[int(np.median(gaps))], model)
+            fixed = steady(model, int(np.median(gaps)))
         return ReducedStepper(
             self, steps, measurements.names, measurements.H, times, model, jumps, fixed, refusal
         )
@@ -118,8 +122,7 @@ class ReducedModel:
 
     def updated(self, P: Floats, G: Floats, seen: Floats | slice = slice(None)) -> Floats:
         """Joseph's form: positive for any G."""
-        left = np.eye(len(P)) - G @ self.H[seen]
-        return np.asarray(left @ P @ left.T + G @ self.R[seen][:, seen] @ G.T)
+        return joseph(P, G, self.H[seen], self.R[seen][:, seen])
 
 
 def reduced_model(
@@ -166,15 +169,13 @@ class Steady:
     P: Floats
 
 
-def steady(jump: Jump, model: ReducedModel) -> Steady:
-    """From the discrete algebraic Riccati equation; raises `UsageError` where it has no solution."""
-    try:
-        P = solve_discrete_are(jump.A.T, model.H.T, jump.Q, model.R)
-    except (np.linalg.LinAlgError, ValueError) as none:
-        raise UsageError(
-            f"no steady gain for {model.r} shapes and this noise: undamped shapes need noise "
-            "'white' with process > 0; or take gain='recursive'"
-        ) from none
+def steady(model: ReducedModel, gap: int) -> Steady:
+    """That of updates every `gap` explicit steps; raises `ComparisonError` where there is none."""
+    s, one = len(model.P0), model.one
+    linear = LinearModel(
+        one.A, np.zeros((s, 0)), model.H, one.Q, model.R, np.zeros(s), model.P0
+    )  # fmt: skip
+    P = steady_claim(linear, gap).P
     G = model.gain(P)
     return Steady(G, model.updated(P, G))
 
@@ -251,7 +252,8 @@ class ReducedStepper:
         beside, model = state.extra, self.model
         jump = model.over(state.k * self.walk.parts - beside.at)
         P = (jump.A @ beside.P @ jump.A.T + jump.Q)[: model.r, : model.r]
-        return np.sqrt(np.maximum(((model.Phi @ P) * model.Phi).sum(axis=1), 0)).reshape(-1, 3)
+        variances = np.maximum(((model.Phi @ P) * model.Phi).sum(axis=1), 0)
+        return np.asarray(np.sqrt(variances).reshape(-1, 3))
 
     def traces(self, states: Sequence[State]) -> dict[str, Trace]:
         """Innovations, NIS, and `<load>.bias` N."""

@@ -4,6 +4,7 @@ The element loops are in `fem.explicit_kernels`; this is their packing and their
 `Body` it takes regions: moduli are per cell.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,32 +34,44 @@ class Look:
 
 @dataclass(frozen=True)
 class Motion:
-    """u (N,) m, the last increment d, forces r at u and `old` one step before (N,) N."""
+    """Rows (6, N): u m, last increment d m, forces r at u and `old` one step before N, v, a."""
 
-    u: Floats
-    d: Floats
-    r: Floats
-    old: Floats
+    rows: Floats
 
-    def copy(self) -> "Motion":
-        return Motion(self.u.copy(), self.d.copy(), self.r.copy(), self.old.copy())
+    @property
+    def u(self) -> Floats:
+        return self.rows[0]
+
+    @property
+    def d(self) -> Floats:
+        return self.rows[1]
+
+    @property
+    def r(self) -> Floats:
+        return self.rows[2]
+
+    @property
+    def v(self) -> Floats:
+        return self.rows[4]
+
+    @property
+    def a(self) -> Floats:
+        return self.rows[5]
 
 
 @dataclass(frozen=True)
 class Rule:
-    """d' = keep d - gain (r + lag (r - old) - f), all (N,): see `explicit_kernels.advance`."""
+    """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `explicit_kernels.advance`.
 
+    `held` unknowns move by `moves` (held, k) times the drives, `loaded` take `loads` (loaded, l).
+    """
+
+    dt: float
     keep: Floats
     gain: Floats
     lag: float
-
-
-@dataclass(frozen=True)
-class Ends:
-    """Places (2, held) m of held unknowns, loads (2, loaded) N, at both ends of some steps."""
-
     held: Ints
-    places: Floats
+    moves: Floats
     loaded: Ints
     loads: Floats
 
@@ -77,14 +90,15 @@ class ExplicitBody:
         self.scene, self.law, self.size = scene, _LAWS[scene.material.law], mesh.nodes.size
         self.geometry, self.cells = _packed(scene)
         self.work = np.zeros(kernels.WORK)
-        springs = [foundation_stiffness(mesh, f) for f in scene.foundations]
-        self.springs: sparse.csr_array | None = sum(springs[1:], springs[0]) if springs else None
-        K = self.springs if springs else sparse.csr_array((self.size, self.size))
-        self._springs = (K.indptr.astype(np.int32), K.indices.astype(np.int32), K.data)
+        springs = sparse.csr_array((self.size, self.size))
+        for foundation in scene.foundations:
+            springs = sparse.csr_array(springs + foundation_stiffness(mesh, foundation))
+        self.springs = springs
+        self._rows = springs.indptr.astype(np.int32), springs.indices.astype(np.int32), springs.data
 
     def force(self, u: Floats) -> Floats:
         """Internal nodal forces (N,) N."""
-        f = np.zeros(self.size) if self.springs is None else self.springs @ u
+        f = self._pull(u)
         kernels.add_forces(self.law, self.geometry, self.cells, u, f, self.work)
         return f
 
@@ -94,9 +108,7 @@ class ExplicitBody:
 
     def force_and_diagonal(self, u: Floats) -> tuple[Floats, Floats]:
         """Internal forces (N,) N and the diagonal (N,) N/m of K_t, in one pass."""
-        f, d = np.zeros(self.size), np.zeros(self.size)
-        if self.springs is not None:
-            f, d = self.springs @ u, self.springs.diagonal()
+        f, d = self._pull(u), np.asarray(self.springs.diagonal())
         self._blocks(u, f, d)
         return f, d
 
@@ -107,16 +119,15 @@ class ExplicitBody:
 
     def force_and_blocks(self, u: Floats) -> tuple[Floats, Floats]:
         """Internal forces (N,) N and the nodes' own blocks (n, 6): xx, yy, zz, xy, xz, yz N/m."""
-        f, d = np.zeros(self.size), np.zeros(2 * self.size)
-        if self.springs is not None:
-            f = self.springs @ u
+        f, d = self._pull(u), np.zeros(2 * self.size)
+        if self.springs.nnz:
             d.reshape(-1, 6)[:, :3] = self.springs.diagonal().reshape(-1, 3)
         self._blocks(u, f, d)
         return f, d.reshape(-1, 6)
 
     def tangent_product(self, u: Floats, v: Floats) -> Floats:
         """K_t(u) v (N,) N."""
-        f = np.zeros(self.size) if self.springs is None else self.springs @ v
+        f = self._pull(v)
         kernels.add_products(self.law, self.geometry, self.cells, u, v, f, self.work)
         return f
 
@@ -126,19 +137,28 @@ class ExplicitBody:
         energy, least, inverted = kernels.looked_at(
             self.law, count, self.geometry, self.cells, u, self.work
         )
-        springs = 0.0 if self.springs is None else float(u @ (self.springs @ u)) / 2
-        return Look(energy + springs, least, inverted, count)
+        return Look(energy + float(u @ self._pull(u)) / 2, least, inverted, count)
 
-    def advance(self, motion: Motion, rule: Rule, ends: Ends, substeps: int) -> tuple[float, float]:
-        """Central-difference steps in one compiled call; `motion` is overwritten.
+    def advance(
+        self, motion: Motion, rule: Rule, begin: Floats, end: Floats, substeps: int
+    ) -> tuple[Motion, float, float, bool]:
+        """Central-difference steps from inputs `begin` to `end` (k + l,), in one compiled call.
 
-        Returns work J of the loads and prescribed motion, and J taken by damping.
+        Returns the new motion; work J of loads and prescribed motion and J taken by damping, both
+        up to half a step before the end; whether all displacements are finite.
         """
-        return kernels.advance(
-            self.law, self.geometry, self.cells, self._springs,
-            motion.u, motion.d, motion.r, motion.old, rule.keep, rule.gain, rule.lag,
-            ends.held, ends.places, ends.loaded, ends.loads, substeps, self.work,
+        rows = np.empty((6, self.size))
+        rows[:4] = motion.rows[:4]
+        work, taken, size = kernels.advance(
+            self.law, self.geometry, self.cells, self._rows, rows,
+            rule.keep, rule.gain, rule.lag, rule.dt,
+            rule.held, rule.moves, rule.loaded, rule.loads, begin, end, substeps, self.work,
         )  # fmt: skip
+        return Motion(rows), work, taken, math.isfinite(size)
+
+    def _pull(self, u: Floats) -> Floats:
+        """Forces (N,) N of the springs alone."""
+        return np.asarray(self.springs @ u) if self.springs.nnz else np.zeros(self.size)
 
     def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
         kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, u, f, d, self.work)
@@ -159,7 +179,7 @@ def _require(scene: Scene) -> None:
 
 
 def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
-    """Geometry (blocks, 11 x 16) and cells (blocks, 4, 16), filled up with cells of no stiffness."""
+    """Geometry (blocks, 11 x 16) and cells (blocks, 4, 16), the rest filled up with soft cells."""
     mesh = scene.mesh
     e, blocks = len(mesh.cells), -(-len(mesh.cells) // LANES)
     rows, cells = np.zeros((blocks * LANES, ROWS)), np.zeros((blocks * LANES, 4), np.int32)

@@ -10,7 +10,7 @@ The numpy reference is `fem.hyperelastic.Body`.
 """
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -35,13 +35,13 @@ _CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 
 
 
 def _compiled(function: _Function) -> _Function:
-    made: _Function = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")(function)
-    return made
+    made = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")(function)
+    return cast(_Function, made)
 
 
 def _inlined(function: _Function) -> _Function:
-    made: _Function = njit(fastmath=_FAST, error_model="numpy", forceinline=True)(function)
-    return made
+    made = njit(fastmath=_FAST, error_model="numpy", forceinline=True)(function)
+    return cast(_Function, made)
 
 
 @_inlined
@@ -311,7 +311,8 @@ def _tangents_neo_hooke(w: Floats, rows: int) -> None:
             g = _gradient(G, node)
             q, h = _times(F, g), _times(_deformation(K), g)
             h = h[0] * y * y * y, h[1] * y * y * y, h[2] * y * y * y
-            r = c * h[0] - 4 / 3 * m * q[0], c * h[1] - 4 / 3 * m * q[1], c * h[2] - 4 / 3 * m * q[2]
+            k = 4 / 3 * m
+            r = c * h[0] - k * q[0], c * h[1] - k * q[1], c * h[2] - k * q[2]
             s = m * _dot(g, g)
             block = (
                 s + r[0] * h[0],
@@ -429,8 +430,8 @@ def _energy(law: int, H: Nine, a: float, b: float, dJ: float) -> float:
         square += 2 * (C[3] * C[3] + C[4] * C[4] + C[5] * C[5])
         return a / 8 * trace * trace + b / 4 * square
     trace = 2 * (H[0] + H[4] + H[8]) + _inner(H, H)
-    log = np.log1p(dJ)
-    shape = (3 + trace) * np.expm1(-2 / 3 * log) + trace
+    log = float(np.log1p(dJ))
+    shape = (3 + trace) * float(np.expm1(-2 / 3 * log)) + trace
     return b / 2 * shape + a / 4 * (dJ * (dJ + 2) - 2 * log)
 
 
@@ -488,40 +489,65 @@ def _moved_damped(
     return taken
 
 
+@_inlined
+def _rates(rows: Floats, keep: Floats, gain: Floats, lag: float, dt: float) -> float:
+    """v and a at u (paper 003, eqs 13-14), which know the next increment; sum of d^2."""
+    u, d, r, old, v, a = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
+    total = 0.0
+    for i in range(u.size):
+        drag = r[i] if lag == 0.0 else r[i] + lag * (r[i] - old[i])
+        new = keep[i] * d[i] - gain[i] * drag
+        v[i], a[i] = (new + d[i]) / (2 * dt), (new - d[i]) / (dt * dt)
+        total += d[i] * d[i] + u[i] * 0.0
+    return total
+
+
+@_inlined
+def _input(columns: Floats, j: int, begin: Floats, end: Floats, share: float, first: int) -> float:
+    """Row j of `columns` (., k) times the inputs from `first` on, a share of the way."""
+    total = 0.0
+    for c in range(columns.shape[1]):
+        total += columns[j, c] * (begin[first + c] + share * (end[first + c] - begin[first + c]))
+    return total
+
+
 @_compiled
 def advance(
     law: int,
     geometry: Floats,
     cells: Cells,
     springs: Springs,
-    u: Floats,
-    d: Floats,
-    r: Floats,
-    old: Floats,
+    rows: Floats,
     keep: Floats,
     gain: Floats,
     lag: float,
+    dt: float,
     held: Ints,
-    places: Floats,
+    moves: Floats,
     loaded: Ints,
     loads: Floats,
+    begin: Floats,
+    end: Floats,
     substeps: int,
     w: Floats,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """`substeps` steps of central difference (paper 003, eq 18) in increments d = u - u_before.
 
-    d' = keep d - gain (r + lag (r - old) - f), u' = u + d', with keep = (1 - a)/(1 + a), gain =
-    (dt^2/m)/(1 + a), a = alpha dt/2, lag = beta/dt; zeros where held. u, d, the forces r at u and
-    `old` before it (N,) are overwritten. `places` (2, held) m and `loads` (2, loaded) N are those
-    of the `held` and `loaded` unknowns at both ends, linear between. Returns the work J of loads
-    and prescribed motion, and what damping took, up to half a step before the last time.
+    d' = keep d - gain (r + lag (r - old) - f), u' = u + d', with keep = (1 - b)/(1 + b), gain =
+    (dt^2/m)/(1 + b), b = alpha dt/2, lag = beta/dt; zeros where held. `rows` (6, N) are u, d, the
+    forces r at u and `old` before it, v and a: overwritten, the last two from nothing. `held`
+    unknowns move by `moves` (held, k) times the first inputs, `loaded` ones take `loads`
+    (loaded, l) times the others; inputs go linearly from `begin` to `end` (k + l,). Returns the
+    work J of loads and prescribed motion and what damping took, up to half a step before the last
+    time, and the sum of d^2, not finite where any unknown is not.
     """
+    u, d, r, old, v, a = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
+    k = moves.shape[1]
     work, taken = 0.0, 0.0
     damped = lag > 0 or bool((keep[gain > 0] < 1).any())
     for s in range(substeps):
-        start, end = s / substeps, (s + 1) / substeps
         for j in range(loaded.size):
-            work += (loads[0, j] + start * (loads[1, j] - loads[0, j])) * d[loaded[j]] / 2
+            work += _input(loads, j, begin, end, s / substeps, k) * d[loaded[j]] / 2
         for j in range(held.size):
             work += r[held[j]] * d[held[j]] / 2
         if damped:
@@ -529,15 +555,22 @@ def advance(
         else:
             _moved(u, d, r, keep, gain)
         for j in range(loaded.size):
-            i, f = loaded[j], loads[0, j] + start * (loads[1, j] - loads[0, j])
+            i, f = loaded[j], _input(loads, j, begin, end, s / substeps, k)
             d[i] += gain[i] * f
             u[i] += gain[i] * f
             work += f * d[i] / 2
         for j in range(held.size):
             i = held[j]
-            d[i] = places[0, j] + end * (places[1, j] - places[0, j]) - u[i]
+            d[i] = _input(moves, j, begin, end, (s + 1) / substeps, 0) - u[i]
             u[i] += d[i]
             work += r[i] * d[i] / 2
         _pull(springs, u, r)
         add_forces(law, geometry, cells, u, r, w)
-    return work, taken
+    size = _rates(rows, keep, gain, lag, dt)
+    for j in range(loaded.size):
+        i, more = loaded[j], gain[loaded[j]] * _input(loads, j, begin, end, 1.0, k)
+        v[i] += more / (2 * dt)
+        a[i] += more / (dt * dt)
+    for j in range(held.size):
+        v[held[j]], a[held[j]] = d[held[j]] / dt, 0.0
+    return work, taken, size

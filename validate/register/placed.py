@@ -9,9 +9,11 @@ from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.recording.types import Recording
 from validate.register.observe import MarkerObservation, Sampling, observe_markers
+from validate.register.quality import LINE
 from validate.register.transform import spread
-from validate.register.two_step import PLANAR
 from validate.scene.mesh import Mesh
+
+_FLAT = 1e-6  # third over first rms spread of exact points in a plane
 
 
 def placed(
@@ -24,7 +26,7 @@ def placed(
 ) -> MarkerObservation:
     """`observe_markers` with the records "marker_layout" (m) and "camera" ("up" is the scene's z).
 
-    `up` is used for a layout that is nearly a plane; any other shows itself whether it is mirrored.
+    `up` is used for a layout that is a plane within the noise; any other shows a mirror itself.
     Raises `RecordingError` for an absent record, `RegistrationError` for one that is no vector, and
     whatever `observe_markers` does.
     """
@@ -34,15 +36,13 @@ def placed(
     }
     up = _vector(recording.record("camera").get("up", ""), "camera 'up'")
     markers = recording.marker(topic)
-    axes = (up, np.array([0.0, 0.0, 1.0])) if _planar(layout) else None
+    axes = (up, np.array([0.0, 0.0, 1.0])) if _planar(layout, markers.sd) else None
     return observe_markers(markers, layout, mesh, method=method, sampling=sampling, up=axes)
 
 
-def _planar(layout: Mapping[str, Floats]) -> bool:
+def _planar(layout: Mapping[str, Floats], sd: float) -> bool:
     points = np.array(list(layout.values()))
-    if len(points) < 3:
-        return False
-    return bool(spread(points)[2] <= PLANAR * spread(points)[1])
+    return len(points) >= 3 and bool(spread(points)[2] <= LINE * sd + _FLAT * spread(points)[0])
 
 
 def _vector(text: str, what: str) -> Floats:

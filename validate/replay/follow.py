@@ -4,21 +4,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.compare.track import TRACK_METRICS, TrackError, track_error
-from validate.replay.tracking import Followed, Tracking
+from validate.replay.tracking import Cases, Followed, Tracking
 
 _MM = 1e3
 _MAPS = 6  # pictures of the mesh in one report
-Cases = Mapping[str, Mapping[str, Followed]]
 
 
 def standard_exhibits(
     experiment: Tracking, main: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
 ) -> tuple[Exhibit, ...]:
     """Displacements and errors on the recorded case, wrong-model cases, speeds, maps."""
-    scored = {n: f for n, f in main.items() if _whole(f)}
+    scored = {n: f for n, f in main.items() if f.scored}
     found = [_displacements(experiment, scored)] if scored else []
     if others:
         found.append(_wrong_models(experiment, scored, others, docs))
@@ -27,13 +25,9 @@ def standard_exhibits(
     return (*found, *((maps,) if maps else ()))
 
 
-def _whole(followed: Followed) -> bool:
-    return len(followed.run.t) == len(followed.seen.stage.t)
-
-
 def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
     """Estimate less truth at a probe, along an axis, over the whole time."""
-    reference = followed.truth.probes[probe][:, "xyz".index(axis)]
+    reference = followed.reference(probe)[:, "xyz".index(axis)]
     return track_error(probe, axis, followed.run.traces[f"{probe}.{axis}"].y, reference)
 
 
@@ -49,7 +43,7 @@ def _displacements(experiment: Tracking, scored: Mapping[str, Followed]) -> Exhi
             "The reference is the twin's own displacement, which no method sees. Points are what "
             "was measured there; only the markers named in a method are given to it.",
         ),
-        tables=(_error_table(scored, probes, axis),),
+        tables=(_error_table(scored, axis),),
         charts=tuple(charts),
     )
 
@@ -57,8 +51,13 @@ def _displacements(experiment: Tracking, scored: Mapping[str, Followed]) -> Exhi
 def _track_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
     first = next(iter(scored.values()))
     series = [*_measured(first, probe, axis)]
-    series.append(_line("reference (twin)", first, first.truth.probes[probe][:, "xyz".index(axis)]))
-    series += [_line(f.label, f, f.run.traces[f"{probe}.{axis}"].y) for f in scored.values()]
+    truth = _MM * first.truth.probes[probe][:, "xyz".index(axis)]
+    series.append(Series("reference (twin)", first.seen.stage.t, truth))
+    series += [
+        Series(f.label, f.run.t, _MM * f.run.traces[f"{probe}.{axis}"].y)
+        for f in scored.values()
+        if probe in f.scored
+    ]
     return Chart(
         f"displacement_{probe}", f"Displacement at {probe}", "time / s", f"u_{axis} / mm",
         tuple(series),
@@ -76,12 +75,13 @@ def _measured(followed: Followed, probe: str, axis: str) -> list[Series]:
 
 
 def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
-    """Absolute errors, with zero drawn at a thousandth of the largest."""
-    lines = {f.label: np.abs(error_at(f, probe, axis).values) for f in scored.values()}
-    floor = max(float(y.max()) for y in lines.values()) * 1e-5 or 1e-12
+    """Absolute errors; those far below the largest are drawn at a floor."""
+    mine = [f for f in scored.values() if probe in f.scored]
+    lines = [np.abs(error_at(f, probe, axis).values) for f in mine]
+    floor = max((float(y.max()) for y in lines), default=0.0) * 1e-5 or 1e-12
     series = tuple(
-        Series(label, f.run.t, _MM * np.maximum(y, floor))
-        for (label, y), f in zip(lines.items(), scored.values(), strict=True)
+        Series(f.label, f.run.t, _MM * np.maximum(y, floor))
+        for f, y in zip(mine, lines, strict=True)
     )
     return Chart(
         f"error_{probe}", f"Error at {probe}", "time / s", f"|u_{axis} − reference| / mm", series,
@@ -89,15 +89,11 @@ def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     )  # fmt: skip
 
 
-def _line(label: str, followed: Followed, y: Floats) -> Series:
-    return Series(label, followed.run.t, _MM * y)
-
-
-def _error_table(scored: Mapping[str, Followed], probes: tuple[str, ...], axis: str) -> NumberTable:
+def _error_table(scored: Mapping[str, Followed], axis: str) -> NumberTable:
     rows = [
         (f.label, probe, *_statistics(error_at(f, probe, axis)))
         for f in scored.values()
-        for probe in probes
+        for probe in f.scored
     ]
     return NumberTable(
         "errors",
@@ -121,11 +117,11 @@ def _wrong_models(
     rows: list[tuple[Entry, ...]] = []
     for name, case in others.items():
         for followed in case.values():
-            whole = _whole(followed)
-            errors = [error_at(followed, p, axis) for p in probes] if whole else []
-            shown: list[Entry] = [rmse_share(e) for e in errors]
-            shown = shown or [None] * len(probes)
-            ended = "finished" if whole else f"{followed.run.outcome.state}"
+            shown: list[Entry] = [
+                rmse_share(error_at(followed, p, axis)) if p in followed.scored else None
+                for p in probes
+            ]
+            ended = followed.run.outcome.state
             rows.append((name, followed.label, *shown, _nis(followed), ended))
     table = NumberTable(
         "wrong_models",
@@ -171,8 +167,7 @@ def _speed_row(f: Followed, unit: float | None) -> tuple[Entry, ...]:
     ended = end.state if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
     if times is None:
         return (f.label, f.run.setup_s, None, None, None, None, None, 0, ended)
-    t = f.seen.stage.t
-    dt = float(t[1] - t[0]) if len(t) > 1 else float(t[0])
+    dt = float(f.run.t[0])  # the first step starts at 0
     ratio = times.p50 / unit if unit else None
     return (
         f.label, f.run.setup_s, 1e3 * times.p50, 1e3 * times.p99, ratio, times.rate_hz,

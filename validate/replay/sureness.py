@@ -16,14 +16,13 @@ from validate.estimate.consistency import (
     whiteness,
 )
 from validate.fem.locate import barycentric_rows
-from validate.replay.tracking import Followed
+from validate.replay.tracking import Cases, Followed
 
 _LAGS = 10
 _HEADS = (
     "case", "filter", "what", "per dof / 1", "95 % band from / 1", "to / 1", "steps", "dof",
     "verdict", "alarm",
 )  # fmt: skip
-Cases = Mapping[str, Mapping[str, Followed]]
 
 
 def consistency_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
@@ -67,13 +66,13 @@ def nis_of(followed: Followed) -> Consistency | None:
 def nees_of(followed: Followed) -> dict[str, Consistency]:
     """NEES by probe: all components over the output frames, error against the filter's own sd."""
     run, mesh = followed.run, followed.scene.mesh
-    if run.sd is None or not len(run.at) or run.at[-1] >= len(followed.seen.stage.t):
+    if run.sd is None or not len(run.at):
         return {}
     found = {}
     for probe in followed.scene.probes:
-        reference = followed.truth.probes.get(probe.name)
-        if reference is None or len(reference) <= run.at[-1]:
+        if probe.name not in followed.truth.probes:
             continue
+        reference = followed.reference(probe.name)
         rows = barycentric_rows(mesh, np.array([probe.point]))
         error = np.array([rows.apply(u)[0] for u in run.u]) - reference[run.at]
         sd = np.array([rows.apply(s)[0] for s in run.sd])

@@ -7,25 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from validate.arrays import Ints
 from validate.compare.exhibit import Exhibit
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
-from validate.compare.track import track_error, track_scores
+from validate.compare.track import track_scores
 from validate.compare.verdict import Check, Sensitivity, judge
 from validate.errors import ComparisonError
 from validate.fem.system import build as build_system
 from validate.parameters import describe
 from validate.recording.types import Recording
-from validate.register.observe import MarkerObservation, Registered
-from validate.replay.follow import standard_exhibits
+from validate.register.observe import MarkerObservation, Registered, SignalObservation
+from validate.replay.follow import error_at, standard_exhibits
 from validate.replay.options import Options, Report, configure, folder_of
 from validate.replay.sentence import verdict_sentence
 from validate.replay.sureness import consistency_exhibit, consistency_scores
-from validate.replay.tracking import Case, Followed, Told, Tracking, Truth
+from validate.replay.tracking import Case, Cases, Followed, Told, Tracking, Truth
 from validate.scene.scene import Scene
-from validate.solve.march import march
+from validate.solve.march import march, output_frames
 from validate.solve.types import Run
 
 MAIN = ""  # the case that was recorded
@@ -39,7 +38,7 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
     recordings = experiment.load(parameters, folder_of(experiment))
     main = road.case(MAIN, recordings[0], parameters, parameters, tuple(methods))
     others = {case.name: road.other(case, parameters) for case in cases}
-    told = _told(experiment, parameters, main, road, options)
+    told = _told(experiment, parameters, {MAIN: main, **others}, road, options)
     results = tuple(_method(experiment, road, parameters, main[n], others) for n in methods)
     values = {m.name: {s.name: s.value for s in m.scores} for m in results}
     values["told"] = dict(told.numbers)
@@ -68,7 +67,7 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
 def _exhibits(
     experiment: Tracking,
     main: Mapping[str, Followed],
-    others: Mapping[str, Mapping[str, Followed]],
+    others: Cases,
     told: Told,
 ) -> tuple[Exhibit, ...]:
     docs = {case.name: case.doc for case in experiment.cases}
@@ -138,28 +137,22 @@ class _Road:
         start = perf_counter()
         stepper = self.experiment.stepper(settings, parameters, system, seen)
         setup = built + perf_counter() - start
-        t, inputs = seen.stage.t, seen.stage.y
+        stride = getattr(settings, "stride", 1)
+        t, inputs = seen.stage.t[stride - 1 :: stride], seen.stage.y[stride - 1 :: stride]
         steps = getattr(settings, "steps", None) or len(t)
         at = output_frames(len(t), self.experiment.frames)
         run = march(method, stepper, t[:steps], inputs[:steps], at[at < steps], setup)
         return scene, seen, run
 
 
-def output_frames(steps: int, frames: int) -> Ints:
-    """Evenly spaced steps whose fields are kept, the last one among them."""
-    return np.unique(np.linspace(0, steps - 1, min(frames, steps)).round().astype(np.int64))
-
-
 def _told(
-    experiment: Tracking,
-    parameters: Any,
-    main: Mapping[str, Followed],
-    road: _Road,
-    options: Options,
+    experiment: Tracking, parameters: Any, cases: Cases, road: _Road, options: Options
 ) -> Told:
-    if experiment.tell is None or options.quick or set(main) != set(experiment.methods):
+    """What the experiment adds; only when all of it was run."""
+    whole = set(cases[MAIN]) == set(experiment.methods)
+    if experiment.tell is None or options.quick or not whole:
         return Told()
-    return experiment.tell(parameters, main, road.tell)
+    return experiment.tell(parameters, cases, road.tell)
 
 
 def _method(
@@ -167,7 +160,7 @@ def _method(
     road: _Road,
     parameters: Any,
     mine: Followed,
-    others: Mapping[str, Mapping[str, Followed]],
+    others: Cases,
 ) -> MethodResult:
     accepted = mine.method in experiment.accepted
     residuals = held_out(mine)
@@ -192,24 +185,36 @@ def _method(
 
 def truth_scores(followed: Followed, axis: str) -> tuple[Score, ...]:
     """Errors at every probe against the truth; none for a run that did not reach the end."""
-    found: list[Score] = []
-    for name, reference in followed.truth.probes.items():
-        estimate = followed.run.traces.get(f"{name}.{axis}")
-        if estimate is None or len(estimate.y) != len(reference):
-            continue
-        error = track_error(name, axis, estimate.y, reference[:, "xyz".index(axis)])
-        found += track_scores(error, "truth of the twin", followed.case)
-    return tuple(found)
+    return tuple(
+        score
+        for name in followed.scored
+        for score in track_scores(
+            error_at(followed, name, axis), "truth of the twin", followed.case
+        )
+    )
 
 
 def held_out(followed: Followed) -> dict[str, Residual]:
-    """Estimate less measured of every marker that is a probe of the scene, over the whole time."""
-    markers = followed.seen.markers
-    probes = {p.name for p in followed.scene.probes}
-    if markers is None or len(followed.run.t) != len(followed.seen.stage.t):
+    """Simulated less measured over the whole time: markers that are probes of the scene, signals
+    that the run traces."""
+    if not followed.whole:
         return {}
-    rows = [_residual(followed, markers, n) for n in markers.names if n in probes]
+    markers, probes = followed.seen.markers, {p.name for p in followed.scene.probes}
+    rows = (
+        [_residual(followed, markers, n) for n in markers.names if n in probes] if markers else []
+    )
+    rows += [_signal(followed, s) for s in followed.seen.signals if s.trace in followed.run.traces]
     return {r.name: r for r in rows if r is not None}
+
+
+def _signal(followed: Followed, seen: SignalObservation) -> Residual | None:
+    run = followed.run
+    inside = (seen.t >= run.t[0] - 1e-9) & (seen.t <= run.t[-1] + 1e-9)
+    if not inside.any():
+        return None
+    off = np.interp(seen.t[inside], run.t, run.traces[seen.trace].y) - seen.y[inside]
+    words = "simulated less measured signal, every sample"
+    return Residual(seen.quantity, "all", off[:, None], seen.sd, 0.0, seen.unit, words)
 
 
 def _residual(followed: Followed, markers: MarkerObservation, name: str) -> Residual | None:

@@ -11,14 +11,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
+import numpy as np
+
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
 from validate.compare.verdict import Accept, Published
 from validate.estimate.measured import measurements
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.recording.types import Recording
-from validate.register.observe import Registered
+from validate.recording.types import Recording, Signal
+from validate.register.observe import Hold, Registered
+from validate.register.placed import placed
 from validate.replay.experiment import Change, Progress, Uncertainty, unchanged
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
@@ -38,6 +41,18 @@ class Truth:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "probes", MappingProxyType(dict(self.probes)))
+
+
+Cases = Mapping[str, Mapping[str, "Followed"]]
+
+
+def truth_of(run: Run, scene: Scene) -> Truth:
+    """What a twin's run says of its own probes and nodes."""
+    probes = {
+        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in "xyz"], axis=1)
+        for p in scene.probes
+    }
+    return Truth(probes, run.u, scene.mesh)
 
 
 @dataclass(frozen=True)
@@ -67,18 +82,39 @@ class Followed:
     run: Run
     truth: Truth
 
+    @property
+    def whole(self) -> bool:
+        """Whether the run reached the last recorded time."""
+        t = self.seen.stage.t
+        return self.run.finished and bool(self.run.t[-1] >= t[-1] - 1e-9)
+
+    def reference(self, probe: str) -> Floats:
+        """The truth (nt, d) m at the times of the run's own steps."""
+        at = np.searchsorted(self.seen.stage.t, self.run.t - 1e-9)
+        return self.truth.probes[probe][at]
+
+    @property
+    def scored(self) -> tuple[str, ...]:
+        """Probes of the truth that the run traced to the end."""
+        if not self.whole:
+            return ()
+        mine = {p.name for p in self.scene.probes}
+        return tuple(name for name in self.truth.probes if name in mine)
+
 
 @dataclass(frozen=True)
 class Follower:
     """A method: settings of a scheme, or of a filter and the markers that it is given.
 
-    `steps`: run only so many, as a baseline that is timed and not scored.
+    `steps`: run only so many, as a baseline that is timed and not scored. `stride` above 1: a
+    longer step than the recording's.
     """
 
     label: str = quantity("", "1", "what reports call it")
     settings: Any = quantity(None, "1", "of the scheme or filter")
     markers: tuple[str, ...] = quantity((), "1", "markers that a filter is given")
     steps: int | None = quantity(None, "1", "steps to run; none: all")
+    stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
 
     def prepare(self, system: System, seen: Registered, **changed: Any) -> Stepper:
         """The prepared scheme or filter, with `changed` settings where it has them."""
@@ -88,6 +124,19 @@ class Follower:
             return cast(Stepper, settings.prepare(system))
         given = measurements(seen, system.scene.mesh).of(*self.markers)
         return cast(Stepper, settings.prepare(system, given))
+
+
+def followed_load(recording: Recording, scene: Scene, signal: str, unit: str) -> Registered:
+    """A recording whose one input is a signal, with its markers placed by their records.
+
+    Steps begin after t = 0, where everything is at rest.
+    """
+    seen = recording.signal(signal, unit)
+    later = seen.t > 0
+    t, y = seen.t[later], seen.y[later]
+    stage = Signal(t, y, unit, seen.sd, seen.frame)
+    holds = (Hold("start", 0.0, float(t[0])), Hold("end", float(y[-1, 0]), float(t[-1])))
+    return Registered(stage, holds, placed(recording, scene.mesh), None, ())
 
 
 @dataclass(frozen=True)
@@ -106,7 +155,7 @@ class Tracking:
     a baseline that is timed, not scored). `stepper` prepares a method: schemes ignore what was
     measured, filters take the markers they are given. `truth` repeats the twin. `axis` is the
     component that scores follow, `reference` the method that speeds are compared with. `tell` adds
-    what this experiment shows besides.
+    what this experiment shows besides, from all runs by case ("" is the recorded one) and method.
     """
 
     name: str
@@ -126,7 +175,7 @@ class Tracking:
     reference: str
     cases: tuple[Case, ...] = ()
     uncertainty: Uncertainty | None = None
-    tell: Callable[[Any, Mapping[str, Followed], Progress], Told] | None = None
+    tell: Callable[[Any, Cases, Progress], Told] | None = None
     published: Callable[[Mapping[str, Mapping[str, float]]], tuple[Published, ...]] | None = None
     frames: int = 200
     quick: Change = unchanged

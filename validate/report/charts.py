@@ -19,6 +19,7 @@ _WIDTH, _HEIGHT = 8.6, 4.3  # inches without the legend
 _LEGEND_WIDTH = 96  # characters of a legend's row at this width
 _FEW = 16  # points of a line that are marked, so that a sweep shows what was run
 _MANY = 400  # points drawn smaller from here on
+_SPARSE = 60  # points that lie on the lines; more of them would hide these
 _GAP = 0.058  # between the names of two levels, share of the axes' height
 
 
@@ -62,15 +63,21 @@ def _styled(result: Result, chart: Chart) -> list[_Drawn]:
 
 def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Look]]:
     known = _known(result)
-    unknown = [s for s in series if s.label not in known and not _measured(s, series)]
+    unknown = [s for s in series if s.label not in known and not _is_given(s, series)]
     taken = {known[s.label].colour for s in series if s.label in known}
     free = [c for c in PALETTE if c not in taken] or list(PALETTE)
     if len(unknown) > len(free):  # a sweep: its order becomes the order of the colours
         shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(unknown)))
         free = [mpl.colors.to_hex(c) for c in shades]
     others = {id(s): free_look(i, free[i]) for i, s in enumerate(unknown)}
-    black = Look(MEASURED, "-", "o", 1.2)
-    return [(s, known.get(s.label) or others.get(id(s), black)) for s in series]
+    return [(s, known.get(s.label) or others.get(id(s)) or _given(s)) for s in series]
+
+
+def _given(series: Series) -> Look:
+    """A reference is a wide grey line under the others, what was measured black points."""
+    if series.style == "line":
+        return Look("#9A9A9A", "-", "o", 3.6)
+    return Look(MEASURED, "-", "o", 1.2)
 
 
 def _known(result: Result) -> Mapping[str, Look]:
@@ -78,10 +85,10 @@ def _known(result: Result) -> Mapping[str, Look]:
     return {**styles, **{m.label: styles[m.name] for m in result.methods}}
 
 
-def _measured(one: Series, series: list[Series]) -> bool:
-    """Points that say so, or the only points beside lines."""
-    if one.style != "points":
-        return False
+def _is_given(one: Series, series: list[Series]) -> bool:
+    """A line named a reference; points that say measured, or the only points beside lines."""
+    if one.style == "line":
+        return one.label.lower().startswith("reference")
     alone = sum(s.style == "points" for s in series) == 1 and len(series) > 1
     return alone or "measured" in one.label.lower()
 
@@ -100,19 +107,25 @@ def _fill(figure: Figure, chart: Chart, drawn: list[_Drawn]) -> None:
         ax.set_xscale("log", nonpositive="mask")
     if "y" in chart.log:
         ax.set_yscale("log", nonpositive="mask")
-    for d in sorted(drawn, key=lambda d: ("band", "line", "points").index(d.series.style)):
+    for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
         _draw_one(ax, d)
     ax.set(xlabel=chart.x, ylabel=chart.y)
     _levels(ax, chart)
     _readable(ax, chart)
+    ax.set_title(chart.title, loc="left")
     handles, labels = ax.get_legend_handles_labels()
     order = [labels.index(name) for name in dict.fromkeys(d.series.label for d in drawn)]
     if len(order) > 1:
-        columns = _columns([labels[i] for i in order])
-        figure.legend([handles[i] for i in order], [labels[i] for i in order],
-                      loc="outside lower center", ncols=columns)  # fmt: skip
-    else:
-        ax.set_title(labels[0] if labels else "")
+        named = [labels[i] for i in order]
+        figure.legend([handles[i] for i in order], named, loc="outside lower center",
+                      ncols=_columns(named))  # fmt: skip
+
+
+def _layer(series: Series) -> int:
+    """Bands lie lowest, then crowded points, lines, single points."""
+    if series.style == "points":
+        return 3 if len(series.x) <= _SPARSE else 1
+    return 0 if series.style == "band" else 2
 
 
 def _draw_one(ax: Axes, drawn: _Drawn) -> None:
@@ -121,12 +134,19 @@ def _draw_one(ax: Axes, drawn: _Drawn) -> None:
         shade: dict[str, Any] = {"color": look.colour, "alpha": 1.0 if look.width == 0 else 0.2}
         ax.fill_between(s.x, s.y, _upper(s), lw=0, label=s.label, **shade)
     elif s.style == "points":
-        size = 5.0 if len(s.x) <= 60 else 3.0 if len(s.x) <= _MANY else 1.6
+        size = 4.5 if len(s.x) <= _SPARSE else 3.0 if len(s.x) <= _MANY else 1.6
         ax.plot(s.x, s.y, look.point, color=look.colour, ms=size, mew=0.6, label=s.label)
     else:
         marker = look.point if len(s.x) <= _FEW else ""
-        ax.plot(s.x, s.y, color=look.colour, ls=look.dash, lw=look.width, marker=marker, ms=4.5,
+        dash, width = ("-", min(look.width, 0.9)) if _jagged(s) else (look.dash, look.width)
+        ax.plot(s.x, s.y, color=look.colour, ls=dash, lw=width, marker=marker, ms=4.5,
                 label=s.label)  # fmt: skip
+
+
+def _jagged(series: Series) -> bool:
+    """A line that turns so often that dashes could not be told from its turns."""
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(series.y))))
+    return bool(len(series.y) > _MANY and turns > 0.1 * len(series.y))
 
 
 def _upper(band: Series) -> Any:
@@ -143,8 +163,7 @@ def _levels(ax: Axes, chart: Chart) -> None:
     ax.set_ylim(*ax.get_ylim())  # the names belong to these limits
     shown.sort(key=lambda pair: pair[1])
     to_axes = (ax.transData + ax.transAxes.inverted()).transform
-    at = _apart([float(to_axes((1.0, y))[1]) if "x" not in chart.log
-                 else float(to_axes((ax.get_xlim()[1], y))[1]) for _, y in shown])  # fmt: skip
+    at = _apart([float(to_axes((1.0, y))[1]) for _, y in shown])
     for (name, _), height in zip(shown, at, strict=True):
         ax.text(1.012, height, name, transform=ax.transAxes, va="center", fontsize=8.5,
                 color="#404040")  # fmt: skip

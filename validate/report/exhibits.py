@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from validate.compare.exhibit import Entry, Exhibit, NodeMap, NumberTable
 from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.report import charts, csv_tables, gl
+from validate.report import charts, csv_tables, gl, heat
 from validate.report.maps import Range, drawn, ranges
 from validate.report.numbers import MISSING, significant, text
 from validate.report.page import (
@@ -37,6 +37,7 @@ def require_distinct(found: tuple[Exhibit, ...]) -> None:
         "exhibits with the anchor": [e.anchor for e in found],
         "tables": [*_OURS, *(t.name for e in found for t in e.tables)],
         "charts": [c.name for e in found for c in e.charts],
+        "heats": [h.name for e in found for h in e.heats],
         "maps": [m.name for e in found for m in e.maps],
     }
     for kind, names in kinds.items():
@@ -57,6 +58,7 @@ def _section(result: Result, exhibit: Exhibit, scales: dict[str, Range]) -> Sect
             *spoken,
             *map(_table, exhibit.tables),
             *(charts.picture(result, c) for c in exhibit.charts),
+            *map(heat.picture, exhibit.heats),
             *(_map(m, scales[m.scale or m.name]) for m in exhibit.maps),
         ),
     )

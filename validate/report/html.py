@@ -38,15 +38,23 @@ SECTIONS: tuple[tuple[str, SectionOf], ...] = (
 )
 
 
-def page(result: Result, shown: tuple[Section, ...], created: str) -> str:
-    """The whole report as one HTML text that needs no other file and no script."""
+def page(
+    result: Result,
+    shown: tuple[Section, ...],
+    created: str,
+    band: tuple[str, str] | None = None,
+) -> str:
+    """The whole report as one HTML text that needs no other file and no script.
+
+    `band` is the colour class and the word before the sentence; None: by the checks.
+    """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True,
                               lstrip_blocks=True)  # fmt: skip
     environment.filters["data_uri"] = data_uri
     environment.filters["gif_uri"] = gif_uri
     environment.filters["breakable"] = _breakable
     source = files("validate.report").joinpath("report.html").read_text(encoding="utf-8")
-    colour, word = verdicts.band(result)
+    colour, word = band or verdicts.band(result)
     return environment.from_string(source).render(
         result=result, sections=shown, created=created, colour=colour, word=word
     )

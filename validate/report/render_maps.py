@@ -31,7 +31,7 @@ def _shot(shown: NodeMap, span: Range) -> Pixels:
     surface.point_data["value"] = values(shown)
     bar: Any = {**BAR, "title": f"{bar_title(shown)}\n", "position_x": 0.88, "fmt": "%.3g"}
     plotter.add_mesh(
-        surface, scalars="value", cmap=colours(span), clim=span, ambient=0.35,
+        surface, scalars="value", cmap=colours(span), clim=span, ambient=0.6, diffuse=0.45,
         show_edges=len(facets) <= _EDGES, edge_color="#505050", line_width=0.5,
         scalar_bar_args=bar,
     )  # fmt: skip

@@ -1,5 +1,6 @@
 """Off-screen renders of the simulated body by pyvista. Import only after `gl.available()`."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,20 @@ BAR: dict[str, Any] = {
 }
 
 
+@dataclass(frozen=True)
+class _View:
+    """Displacements times `scale`, seen obliquely or flat, with element edges or without."""
+
+    scale: float = 1.0
+    oblique: bool = True
+    edges: bool = False
+
+
 def renders(body: Body) -> tuple[Picture, ...]:
-    """The body opened and deformed, from above at rest and deformed, and with element edges."""
+    """The body opened and deformed, from above at rest and deformed, and with element edges.
+
+    Two of them for a whole body without plates.
+    """
     wall = "" if body.pressure is None else (
         f" The cavity wall is coloured by the pressure, {body.pressure:.4g} Pa."
     )  # fmt: skip
@@ -36,35 +49,43 @@ def renders(body: Body) -> tuple[Picture, ...]:
     opened = "whole" if whole else "cut open through the inclusion in the image plane"
     cut = "" if whole else " at and behind the cut"
     flat = "from the side" if whole else "against the cut"
-    shots = (
-        ("render_deformed", f"{body.label} at {body.load}, {opened}, true to scale: displacement "
-         f"magnitude in mm{plates}.{wall}{body.part}", _shot(body, scale=1.0, oblique=True)),
-        ("render_rest", f"The same body at rest, seen {flat}, before any load (no "
-         "displacement).", _shot(body, scale=0.0, oblique=False)),
-        ("render_flat", f"Seen {flat} at {body.load}: displacement magnitude "
-         f"in mm.{wall}", _shot(body, scale=1.0, oblique=False)),
-        ("render_mesh", f"The mesh of {body.label} at {body.load}: {len(body.mesh.cells)} "
-         f"elements, {len(body.mesh.nodes)} nodes; edges of the elements{cut}.",
-         _shot(body, scale=1.0, oblique=True, edges=True)),
+    deformed = (
+        "render_deformed", f"{body.label} at {body.load}, {opened}, true to scale: displacement "
+        f"magnitude in mm{plates}.{wall}{body.part}", _View(),
     )  # fmt: skip
+    rest = (
+        "render_rest", f"The same body at rest, seen {flat}, before any load (no displacement).",
+        _View(scale=0.0, oblique=False),
+    )  # fmt: skip
+    across = (
+        "render_flat", f"Seen {flat} at {body.load}: displacement magnitude in mm.{wall}",
+        _View(oblique=False),
+    )  # fmt: skip
+    mesh = (
+        "render_mesh", f"The mesh of {body.label} at {body.load}: {len(body.mesh.cells)} "
+        f"elements, {len(body.mesh.nodes)} nodes; edges of the elements{cut}.", _View(edges=True),
+    )  # fmt: skip
+    alone = whole and not body.plates  # then nothing shows how far it moved from rest
     return tuple(
-        Picture(n, words, "Render: " + words, shot, photo=True) for n, words, shot in shots
+        Picture(name, words, "Render: " + words, _shot(body, view), photo=True)
+        for name, words, view in ((deformed, mesh) if alone else (deformed, rest, across, mesh))
     )
 
 
-def _shot(body: Body, *, scale: float, oblique: bool, edges: bool = False) -> Pixels:
+def _shot(body: Body, view: _View) -> Pixels:
     plotter: Any = pv.Plotter(off_screen=True, window_size=SIZE, lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    _add_body(plotter, body, scale, edges)
-    _add_wall(plotter, body, scale, edges)
+    _add_body(plotter, body, view.scale, view.edges)
+    _add_wall(plotter, body, view.scale, view.edges)
     for plate in body.plates:
         x, y, z = plate.sizes
-        box = pv.Cube(center=plate.centre + scale * plate.shift, x_length=x, y_length=y, z_length=z)
+        box = pv.Cube(center=plate.centre + view.scale * plate.shift, x_length=x, y_length=y,
+                      z_length=z)  # fmt: skip
         if body.normal is not None:
             box = box.clip(normal=body.normal, origin=body.origin)
         plotter.add_mesh(box, color="#A9B0B7", ambient=0.3)
-    _aim(plotter, body, oblique)
+    _aim(plotter, body, view.oblique)
     pixels = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
     plotter.close()
     return pixels[..., :3].copy()
@@ -143,8 +164,13 @@ _QUARTERS = _quarters()
 
 
 def _aim(plotter: Any, body: Body, oblique: bool) -> None:
-    """A camera fixed by the body at rest, so that a wrong size shows."""
+    """A camera fixed by the body at rest, so that a wrong size shows.
+
+    Without plates to see it by, the deformed body is kept in the picture.
+    """
     nodes = 1e3 * body.mesh.nodes
+    if body.normal is None and not body.plates:
+        nodes = np.vstack([nodes, nodes + body.u])
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
     up, along = body.up, -body.toward

@@ -22,7 +22,6 @@ _MARKS: dict[str, Mark] = {
 
 def side_by_side(result: Result) -> Section | None:
     """How each method ended, what it cost and its errors, at the last load or over time."""
-    heads, left_out = _headline(result)
     cost = Table(
         "How each method ended and what it cost. Rate: 1 over the median time of one step; set-up: "
         "what is done once (mesh, assembly, factorisation). Times are of this machine.",
@@ -30,21 +29,11 @@ def side_by_side(result: Result) -> Section | None:
         tuple(_cost_row(m) for m in result.methods),
         words=(0, 1, 2),
     )
-    units = (f"{name.partition('@')[0]} / {shown_unit(unit)}" for name, unit in heads)
-    more = f" {left_out} more stand under All scores." if left_out else ""
-    errors = Table(
-        f"Errors {_where(heads)}.{more}",
-        ("method", *(u.removesuffix(" / ") for u in units)),
-        tuple(_error_row(m, heads) for m in result.methods),
-    )
-    return section("methods", "Models side by side", cost, errors if heads else None)
+    return section("methods", "Models side by side", cost, _at_last(result), _tracked(result))
 
 
-def _headline(result: Result) -> tuple[list[tuple[str, str]], int]:
-    """Names and SI units of the errors shown, and how many do not fit.
-
-    Rms and scalar errors at the last load of any method; errors over time at named points.
-    """
+def _at_last(result: Result) -> Table | None:
+    """Rms and scalar errors against the recording at the last load of any method."""
     found: dict[str, str] = {}
     for method in result.methods:
         last = {r.quantity: r for r in method.residuals.values()}
@@ -52,18 +41,33 @@ def _headline(result: Result) -> tuple[list[tuple[str, str]], int]:
             scalar = residual.values.shape == (1, 1)
             statistic = "" if scalar else ".rms"
             found[f"{residual.quantity}{statistic}@{residual.load}"] = residual.unit
-    tracked = {s.name: s.unit for m in result.methods for s in m.scores if _OVER_TIME(s.name)}
-    heads = list((found | tracked).items())
-    return heads[:_COLUMNS], max(0, len(heads) - _COLUMNS)
+    loads = dict.fromkeys(name.partition("@")[2] for name in found)
+    held = ", ".join(spaced(load) for load in loads if load != "all")
+    where = [f"at the last load ({held})"] if held else []
+    where += [at_load("all")] if "all" in loads else []
+    return _errors(result, found, f"against the recording {' and '.join(where)}")
 
 
-def _where(heads: list[tuple[str, str]]) -> str:
-    """At which loads, or over the whole time; scores without a load are those over time."""
-    loads = list(dict.fromkeys(name.partition("@")[2] or "all" for name, _ in heads))
-    held = [spaced(load) for load in loads if load != "all"]
-    at = f"against the recording at the last load ({', '.join(held)})" if held else ""
-    over = at_load("all") if "all" in loads else ""
-    return " and ".join(w for w in (at, over) if w)
+def _tracked(result: Result) -> Table | None:
+    """Errors over time at named points against what their scores name."""
+    scores = [s for m in result.methods for s in m.scores if _OVER_TIME(s.name)]
+    against = " and ".join(dict.fromkeys(s.against for s in scores))
+    names = {s.name: s.unit for s in scores}
+    return _errors(result, names, f"against the {against} {at_load('all')}")
+
+
+def _errors(result: Result, found: dict[str, str], where: str) -> Table | None:
+    """One row per method, one column per score of that name and SI unit; None without any."""
+    if not found:
+        return None
+    shown = list(found.items())[:_COLUMNS]
+    more = f" {len(found) - _COLUMNS} more stand under All scores." if len(found) > _COLUMNS else ""
+    heads = (f"{name.partition('@')[0]} / {shown_unit(unit)}" for name, unit in shown)
+    return Table(
+        f"Errors {where}.{more}",
+        ("method", *(h.removesuffix(" / ") for h in heads)),
+        tuple(_error_row(m, [name for name, _ in shown]) for m in result.methods),
+    )
 
 
 def _cost_row(method: MethodResult) -> tuple[Cell, ...]:
@@ -84,9 +88,9 @@ def _cost_row(method: MethodResult) -> tuple[Cell, ...]:
     )
 
 
-def _error_row(method: MethodResult, heads: list[tuple[str, str]]) -> tuple[Cell, ...]:
+def _error_row(method: MethodResult, names: list[str]) -> tuple[Cell, ...]:
     values = {s.name: s for s in method.scores}
-    errors = [values.get(name) for name, _ in heads]
+    errors = [values.get(name) for name in names]
     return Cell(method.label, "strong"), *(Cell(_value(e)) for e in errors)
 
 

@@ -8,6 +8,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,16 @@ SCHEMA_VERSION = 1
 Json = dict[str, Any]
 _STEPS = 1000  # a run over time with more of them gives its traces at the output frames only
 _FRAMES = 100  # fewer frames than these are loads, which traces are not thinned to
+_VALUES = 60_000  # of all traces together: about 800 kB
 _NUMBERS_ONLY = re.compile(r"\[\s+(-?[\d.eE+-]+(?:,\s+-?[\d.eE+-]+)*)\s+\]")
+
+
+@dataclass(frozen=True)
+class _Share:
+    """How much of its traces a run over time gives: output frames only, one in `every`."""
+
+    frames_only: bool
+    every: int
 
 
 def schema() -> Json:
@@ -42,6 +52,7 @@ def schema() -> Json:
 
 def document(result: Result, created: str) -> Json:
     """The content of results.json. Numbers that are not finite become null with a `why`."""
+    share = _share(result)
     return {
         "schema_version": SCHEMA_VERSION,
         "experiment": result.name,
@@ -60,7 +71,7 @@ def document(result: Result, created: str) -> Json:
             p.path: {"value": _plain(p.default), "unit": p.unit} for p in result.parameters
         },
         "environment": environment(),
-        "methods": [_method(m, result) for m in result.methods],
+        "methods": [_method(m, result, share) for m in result.methods],
         "effects": [_effect(e) for e in result.effects],
         "rest": [
             {"name": r.name, "unit": r.unit, "sd": _finite(r.sd), "count": r.count,
@@ -108,7 +119,7 @@ def _input(source: Source) -> Json:
             "integrity": source.integrity}  # fmt: skip
 
 
-def _method(method: MethodResult, result: Result) -> Json:
+def _method(method: MethodResult, result: Result, share: _Share) -> Json:
     first = method.run
     end = next((r.outcome for r in method.runs if not r.finished), first.outcome)
     names = [r.name for r in result.recordings]
@@ -120,9 +131,9 @@ def _method(method: MethodResult, result: Result) -> Json:
         "setup_s": _finite(first.setup_s),
         "step_s": _times(timed(first)),
         "rate_hz": _finite(times.rate_hz) if (times := timed(first)) else None,
-        **_traced(first),
+        **_traced(first, share),
         "further_runs": [
-            {"recording": name, "outcome": run.outcome.state, **_traced(run)}
+            {"recording": name, "outcome": run.outcome.state, **_traced(run, share)}
             for name, run in zip(names[1:], method.runs[1:], strict=False)
         ],
         "scores": [_score(s) for s in method.scores],
@@ -139,10 +150,10 @@ def _times(times: StepTimes | None) -> Json | None:
     return {"p50": times.p50, "p99": times.p99, "max": times.max, "n": times.n}
 
 
-def _traced(run: Run) -> Json:
-    """Times and traces, at every step or at the output frames."""
-    thin = len(run.t) > _STEPS and len(run.at) >= _FRAMES
-    at = run.at if thin else np.arange(len(run.t))
+def _traced(run: Run, share: _Share) -> Json:
+    """Times and traces, at every step or at the output frames that the share leaves."""
+    thin = len(run.at) >= _FRAMES and (len(run.t) > _STEPS or share.frames_only)
+    at = run.at[:: share.every] if thin else np.arange(len(run.t))
 
     def numbers(values: Floats) -> list[float]:
         return rounded(values[at]) if thin else values.tolist()
@@ -152,6 +163,14 @@ def _traced(run: Run) -> Json:
         "t": numbers(run.t),
         "traces": {k: {"unit": t.unit, "y": numbers(t.y)} for k, t in run.traces.items()},
     }
+
+
+def _share(result: Result) -> _Share:
+    """What keeps all traces together at about `_VALUES`."""
+    runs = [r for m in result.methods for r in m.runs]
+    whole = sum(len(r.traces) * len(r.t) for r in runs)
+    framed = sum(len(r.traces) * len(r.at) for r in runs)
+    return _Share(whole > _VALUES, max(1, -(-framed // _VALUES)))
 
 
 def _score(score: Score) -> Json:

@@ -25,7 +25,7 @@ class Solver(Protocol):
 
 @dataclass(frozen=True)
 class GaussianElimination:
-    """Textbook elimination of the dense J (m, m), row by row, done anew at every solve.
+    """Textbook elimination of the dense J (m, m), pivot by pivot, done anew at every solve.
 
     The baseline of paper 001 ("Gauss elimination"); no pivoting, J is positive definite.
     """
@@ -36,10 +36,9 @@ class GaussianElimination:
         A, x = self.J.copy(), np.array(b, dtype=np.float64)
         m = len(A)
         for k in range(m):
-            for i in range(k + 1, m):
-                share = A[i, k] / A[k, k]
-                A[i, k:] -= share * A[k, k:]
-                x[i] -= share * x[k]
+            share = A[k + 1 :, k] / A[k, k]
+            A[k + 1 :, k + 1 :] -= np.multiply.outer(share, A[k, k + 1 :])
+            x[k + 1 :] -= np.multiply.outer(share, x[k])
         for k in reversed(range(m)):
             x[k] = (x[k] - A[k, k + 1 :] @ x[k + 1 :]) / A[k, k]
         return x

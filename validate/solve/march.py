@@ -29,7 +29,8 @@ def march(
     traces = {"updates": Trace(updates, "1")} | stepper.traces(walk.states)
     traces |= _probed(stepper, walk.probes)
     seconds = np.array(walk.seconds)
-    times = _step_times(seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds)
+    seconds = seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds[:done]
+    times = _step_times(seconds) if done else None
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     return Run(method, t[:done], at[at < done], u, traces, outcome, setup_s, times, sd)
@@ -79,6 +80,11 @@ def _probed(stepper: Stepper, values: list[Floats]) -> dict[str, Trace]:
         for j, probe in enumerate(probes)
         for c in range(d)
     }
+
+
+def output_frames(steps: int, frames: int) -> Ints:
+    """Evenly spaced steps whose fields are kept, the last one among them."""
+    return np.unique(np.linspace(0, steps - 1, min(frames, steps)).round().astype(np.int64))
 
 
 def _step_times(seconds: Floats) -> StepTimes:

@@ -1,0 +1,137 @@
+"""The contract of every filter: prepare, rest, step, field, sd, traces; it never sees the truth."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cubes import DT, Case, case
+
+from validate.errors import ComparisonError
+from validate.estimate.filters import LINEAR_FILTERS, Filter
+from validate.estimate.kf_fem import KfFem
+from validate.estimate.measured import Measurements
+from validate.estimate.modal_kf import ModalKf
+from validate.estimate.steady import ReducedKf
+from validate.solve.types import Uncertain
+
+SETTINGS: tuple[Filter, ...] = (
+    *(make() for make in LINEAR_FILTERS),
+    KfFem(gains="every_step"),
+    KfFem(structure="load"),
+    ModalKf(gains="shared", recursion="posterior"),
+    ReducedKf(gains="steady"),
+)
+
+
+@pytest.fixture(scope="module")
+def pulled() -> Case:
+    return case()
+
+
+def without(measurements: Measurements, steps: slice | None = None) -> Measurements:
+    """The same with nothing seen at all, or not at some of its times."""
+    z = measurements.z.copy()
+    z[steps if steps is not None else slice(None)] = np.nan
+    return replace(measurements, z=z)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_a_filter_steps_and_says_what_its_states_mean(settings: Filter, pulled: Case) -> None:
+    stepper = settings.prepare(pulled.system, pulled.measured(1))
+    mesh = pulled.system.scene.mesh
+    assert isinstance(stepper, Uncertain)
+    rest = stepper.rest()
+    assert np.abs(stepper.field(rest)).max() == 0.0
+    state = stepper.step(rest, pulled.inputs[0])
+    again = stepper.step(rest, pulled.inputs[0])
+    assert state.failure is None
+    assert state.k == 1
+    assert state.drives.tolist() == pulled.inputs[0].tolist()
+    assert np.array_equal(stepper.field(state), stepper.field(again))
+    assert stepper.field(state).shape == mesh.nodes.shape
+    sd = stepper.sd(state)
+    assert sd.shape == mesh.nodes.shape
+    assert (sd >= 0).all()
+    assert np.abs(sd[mesh.facet_nodes("z0")]).max() == 0.0
+    assert sd.max() > 0
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_traces_hold_nis_and_innovations(settings: Filter, pulled: Case) -> None:
+    seen = pulled.measured(1, every=3)
+    z = seen.z.copy()
+    z[4] = np.nan
+    run = pulled.march(settings.prepare(pulled.system, replace(seen, z=z)))
+    assert run.outcome.state == "finished"
+    dof = run.traces["nis.dof"].y
+    assert dof.sum() == 3 * (len(pulled.t) // 3 - 1)
+    assert set(np.flatnonzero(dof)) == {k for k in range(2, 60, 3) if k != 14}
+    assert (run.traces["nis"].y[dof == 0] == 0).all()
+    assert (run.traces["nis"].y[dof > 0] > 0).all()
+    for name in seen.names:
+        sd = run.traces[f"innovation.{name}.sd"]
+        assert sd.unit == "m"
+        assert ((sd.y > 0) == (dof > 0)).all()
+        assert np.abs(run.traces[f"innovation.{name}"].y).max() > 0
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_without_a_measurement_a_filter_is_its_model(settings: Filter, pulled: Case) -> None:
+    """The displacement filters are Newmark itself; the reduced ones have its static end."""
+    plain = pulled.march(settings.prepare(pulled.system, without(pulled.measured(1))))
+    other = pulled.march(settings.prepare(pulled.system, without(pulled.measured(2, every=2))))
+    assert np.array_equal(plain.u, other.u)
+    exact = isinstance(settings, KfFem | ModalKf)
+    off = np.abs(plain.u - pulled.truth.u).max() / np.abs(pulled.truth.u).max()
+    assert off < (1e-10 if exact else 0.02)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_a_filter_sees_what_is_measured_and_no_later(settings: Filter, pulled: Case) -> None:
+    """Another future leaves the past as it is; another present moves the estimate."""
+    seen = pulled.measured(1)
+    z = seen.z.copy()
+    z[30:] += 0.001
+    runs = [
+        pulled.march(settings.prepare(pulled.system, m), at=(29, 35))
+        for m in (seen, replace(seen, z=z))
+    ]
+    assert np.array_equal(runs[0].u[0], runs[1].u[0])
+    assert np.abs(runs[0].u[1] - runs[1].u[1]).max() > 1e-6
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+@pytest.mark.parametrize("sd", [1e-9, 1.0])
+def test_extreme_noise_leaves_a_filter_finite(settings: Filter, sd: float, pulled: Case) -> None:
+    """R of 1e-18 and of 1 m^2: finite, and a claim that is finite too."""
+    seen = pulled.measured(1, every=2)
+    stepper = settings.prepare(pulled.system, replace(seen, sd=np.full(3, sd)))
+    run = pulled.march(stepper, at=(9, 59))
+    assert run.outcome.state == "finished"
+    assert run.sd is not None
+    assert np.isfinite(run.sd).all()
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_measurements_that_land_on_no_step_are_refused(settings: Filter, pulled: Case) -> None:
+    seen = pulled.measured(1)
+    late = replace(seen, t=seen.t + DT / 4)
+    with pytest.raises(ComparisonError, match=r"steps of 0.002 s off its nearest step; take dt"):
+        settings.prepare(pulled.system, late)
+
+
+def test_every_filter_is_in_the_tuple(project_root: Path) -> None:
+    """A class with `prepare` is a filter; other floors find it in FILTERS."""
+    from validate.estimate.filters import FILTERS
+
+    written = {
+        node.name
+        for path in (project_root / "validate" / "estimate").glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+        and any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
+        and "Protocol" not in [ast.unparse(b) for b in node.bases]
+    }
+    assert written == {f.__name__ for f in FILTERS}

@@ -1,0 +1,350 @@
+"""Exhibits: sections, legible charts, honest tables and files; results over time in every place."""
+
+import csv
+import json
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from report_samples import small_result
+from tracking_samples import AT, STEPS, WHY, T, failed_result, shown, swing, tracking_result
+
+from validate.compare.exhibit import Chart, NodeMap, NumberTable, Series
+from validate.compare.result import Result
+from validate.errors import ComparisonError
+from validate.recording.mcap_read import read_recording
+from validate.report import charts, gl
+from validate.report.exhibits import exhibits, require_distinct
+from validate.report.html import SECTIONS, page
+from validate.report.loads import at_holds, at_times, held
+from validate.report.maps import ranges, values
+from validate.report.page import Section, Table, listed
+from validate.report.store import document, schema, write_json, write_runs
+from validate.report.store_exhibits import rounded, thinned
+from validate.report.style import ACCEPTED, MEASURED
+from validate.report.write import write_report
+from validate.scene.box import box
+
+CREATED = "2026-11-21T04:00:00Z"
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return tracking_result()
+
+
+@pytest.fixture(scope="module")
+def folder(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VALIDATE_NO_GL", "1")
+        path = write_report(result, tmp_path_factory.mktemp("track") / "box", created=CREATED)
+    return path.parent
+
+
+def sections(result: Result) -> dict[str, Section]:
+    return {s.anchor: s for _, make in SECTIONS for s in listed(make(result))}
+
+
+@pytest.fixture(scope="module")
+def made(result: Result) -> dict[str, Section]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VALIDATE_NO_GL", "1")
+        return sections(result)
+
+
+def table(section: Section, caption: str) -> Table:
+    return next(p for p in section.parts if isinstance(p, Table) and p.caption.startswith(caption))
+
+
+# --- sections ------------------------------------------------------------------------------------
+
+
+def test_exhibits_follow_the_checks(made: dict[str, Section]) -> None:
+    assert list(made)[:3] == ["checks", "exhibit-displacements", "exhibit-maps"]
+    assert [p.kind for p in made["exhibit-displacements"].parts] == [
+        "items", "table", "picture", "picture", "picture",
+    ]  # fmt: skip
+
+
+def test_sections_that_need_loads_are_absent(made: dict[str, Section]) -> None:
+    assert set(made) >= {"body", "methods", "scores", "registration", "recording"}
+    assert not {"markers", "outlines", "curves"} & set(made)
+
+
+def test_results_without_exhibits_have_none() -> None:
+    assert exhibits(small_result()) is None
+
+
+def test_a_failed_result_still_says_why() -> None:
+    failed = failed_result()
+    text = unescape(page(failed, tuple(sections(failed).values()), CREATED))
+    assert f"refused at step 0: {WHY}" in text
+    assert "diverged at step 12: u beyond 1e3 m" in text
+
+
+def test_side_by_side_has_units_and_no_rate_of_a_refusal(made: dict[str, Section]) -> None:
+    rows = table(made["methods"], "How each method ended").rows
+    assert [[c.text for c in (row[1], row[3], row[4])] for row in rows] == [
+        ["kf", "167 kHz", "9.00 µs"], ["loop", "2.38 Hz", "500 ms"], ["euler", "–", "–"],
+        ["large", "100 kHz", "20.0 µs"],
+    ]  # fmt: skip
+
+
+def test_errors_over_time_stand_beside_those_of_the_recording(made: dict[str, Section]) -> None:
+    measured = table(made["methods"], "Errors against the recording over the whole time.")
+    assert measured.headings == ("method", "node_B.rms / mm")
+    truth = table(made["methods"], "Errors against the truth of the twin over the whole time.")
+    assert truth.headings[1:3] == ("node_A.rmse / mm", "node_A.nrmse")
+    expected = 1e3 * 0.02 * np.sqrt((swing(T) ** 2).mean())
+    assert float(truth.rows[0][1].text) == pytest.approx(expected, rel=0.01)
+    assert [c.text for c in truth.rows[2][1:]] == ["–"] * (len(truth.headings) - 1)
+
+
+def test_scores_without_a_load_are_listed(made: dict[str, Section]) -> None:
+    found = table(made["scores"], "Over the whole run")
+    assert found.headings == ("score", "unit", "kf", "loop", "euler", "large", "values")
+    assert {"node_A.mae", "node_D.max"} <= {row[0].text for row in found.rows}
+    assert not any(row[0].text.startswith(("step.", "setup")) for row in found.rows)
+
+
+def test_body_at_its_largest_displacement(made: dict[str, Section]) -> None:
+    (picture,) = made["body"].pictures
+    largest = T[AT][np.abs(swing(T[AT])).argmax()]
+    assert f"Kalman filter at t = {largest:.4f} s: side view" in picture.caption
+
+
+def test_number_table_rounds_and_names_what_is_missing(made: dict[str, Section]) -> None:
+    found = table(made["exhibit-displacements"], "Errors against the twin's truth. explicit Euler")
+    assert found.words == (0, 1)
+    assert [c.text for c in found.rows[0][2:]] == ["0.0123", "166\u202f667", "1\u202f200"]
+    assert [c.text for c in found.rows[1][2:]] == ["–", "–", "0"]
+
+
+def test_frames_are_told_from_loads(result: Result) -> None:
+    follows, soft = result.methods[0], small_result().methods[0]
+    assert at_holds(soft.registered[0], soft.run)
+    assert not at_holds(follows.registered[0], follows.run)
+    assert [i.hold for i in held(soft.registered[0], soft.run)] == list(soft.registered[0].holds)
+    few = at_times(follows.registered[0], follows.run, np.array([0.0, 0.5, 1.2]))
+    assert [i.t for i in few] == pytest.approx([0.001, 0.5, 1.2], abs=0.005)
+    assert all(i.computed and i.hold is None for i in few)
+
+
+# --- charts --------------------------------------------------------------------------------------
+
+
+def drawn(result: Result, chart: Chart) -> Figure:
+    figure = Figure(figsize=(8.6, 4.9), layout="constrained")
+    charts._fill(figure, chart, charts._styled(result, chart))
+    figure.draw_without_rendering()
+    return figure
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_legend_and_level_names_hide_nothing(result: Result, number: int) -> None:
+    figure = drawn(result, shown()[0].charts[number])
+    (legend,), (ax,) = figure.legends, figure.axes
+    inside = ax.get_window_extent()
+    below = ax.get_tightbbox()
+    assert below is not None
+    assert legend.get_window_extent().y1 <= below.y0 + 1
+    names = [t.get_window_extent() for t in ax.texts]
+    assert all(n.x0 >= inside.x1 and n.x1 <= figure.bbox.x1 for n in names)
+    assert all(not a.overlaps(b) for i, a in enumerate(names) for b in names[:i])
+    assert len(names) == len(shown()[0].charts[number].levels)
+
+
+def test_methods_keep_their_colour_and_measured_points_are_black(result: Result) -> None:
+    looks = {d.series.label: d.look.colour for d in charts._styled(result, shown()[0].charts[0])}
+    assert looks["Kalman filter"] == ACCEPTED
+    assert looks["measured"] == MEASURED
+    assert len({looks[k] for k in looks}) == len(looks)
+
+
+def test_band_has_the_colour_of_its_line(result: Result) -> None:
+    x = np.linspace(0, 1, 5)
+    chart = Chart("c", "c", "t / s", "u / mm", (
+        Series("open loop ± 2 sd", x, x, "band", x + 1), Series("Kalman filter", x, x),
+        Series("open loop", x, x),
+    ))  # fmt: skip
+    band, _, line = charts._styled(result, chart)
+    assert band.look.colour == line.look.colour
+
+
+def test_more_lines_than_colours_are_ordered_by_shade(result: Result) -> None:
+    found = charts._styled(result, shown()[0].charts[1])
+    assert len({d.look.colour for d in found}) == 10
+
+
+def test_a_jagged_line_is_not_dashed(result: Result) -> None:
+    x = np.linspace(0, 1, 1000)
+    rough = np.random.default_rng(0).standard_normal(1000)
+    series = [Series("first", x, x), Series("smooth", x, 2 * x), Series("rough", x, rough)]
+    (ax,) = drawn(result, Chart("c", "c", "t / s", "u / mm", tuple(series))).axes
+    assert [line.get_linestyle() for line in ax.get_lines()] == ["-", "--", "-"]
+
+
+def test_a_log_axis_leaves_out_what_is_not_positive(result: Result) -> None:
+    x = np.array([0.0, 1.0, 10.0])
+    chart = Chart("c", "c", "h / mm", "e / mm", (Series("a", x, x - 1), Series("b", x, x)),
+                  (("none", 0.0), ("one", 1.0)), "xy")  # fmt: skip
+    (ax,) = drawn(result, chart).axes
+    assert ax.get_xlim()[0] > 0
+    assert ax.get_ylim()[0] > 0
+    assert [t.get_text() for t in ax.texts] == ["one"]
+
+
+# --- maps ----------------------------------------------------------------------------------------
+
+
+def test_maps_of_one_scale_share_their_colours_in_the_unit_shown() -> None:
+    mesh = box((0.1, 0.1, 0.1), (1, 1, 1))
+    ramp = mesh.nodes[:, 0]
+    maps = [
+        NodeMap("a", "a", mesh, ramp, "m", "s"), NodeMap("b", "b", mesh, 3 * ramp, "m", "s"),
+        NodeMap("c", "c", mesh, ramp - 0.02, "m"), NodeMap("d", "d", mesh, 0 * ramp, "mm"),
+    ]  # fmt: skip
+    found = ranges(maps)
+    assert found["s"] == pytest.approx((0.0, 300.0))
+    assert found["c"] == pytest.approx((-80.0, 80.0))
+    assert found["d"] == (0.0, 1.0)
+    assert values(maps[0]).max() == pytest.approx(100.0)
+
+
+def test_captions_of_maps_have_units(made: dict[str, Section]) -> None:
+    one, other = made["exhibit-maps"].pictures
+    assert one.caption.startswith("Kalman filter: rms error, mm: 0 to 0.01 at 64 nodes")
+    assert "Mean error along x, mm: −0.01 to 0.01" in other.caption
+
+
+def test_maps_are_rendered_where_gl_is(result: Result) -> None:
+    if not gl.available():
+        pytest.skip("no OpenGL")
+    from validate.report.render_maps import rendered
+
+    shown_map = result.exhibits[1].maps[0]
+    low = rendered(shown_map, (0.0, 0.01)).pixels
+    high = rendered(replace(shown_map, values=shown_map.values / 2), (0.0, 0.01)).pixels
+    assert low.shape == high.shape == (660, 960, 3)
+    assert (low != high).any()
+    white = (low == 255).all(axis=2)
+    moved = white[:, :700] != (high == 255).all(axis=2)[:, :700]
+    assert moved.mean() < 1e-3  # smoothed edges only: the camera does not follow the numbers
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+def test_files(folder: Path) -> None:
+    names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+    assert names >= {
+        "figures/chart_displacement_node_A.png", "figures/map_error_kf.png",
+        "tables/errors_by_node.csv", "tables/chart_nis.csv", "replay.mcap",
+    }  # fmt: skip
+    assert "tables/load_displacement.csv" not in names
+
+
+def test_tables_and_charts_as_csv(folder: Path) -> None:
+    with (folder / "tables" / "errors_by_node.csv").open(newline="", encoding="utf-8") as lines:
+        head, first, second = csv.reader(lines)
+    assert head == ["method", "node", "RMSE / mm", "rate / Hz", "times"]
+    assert float(first[2]) == 0.0123456
+    assert second[2:] == ["", "", "0"]
+    path = folder / "tables" / "chart_displacement_node_A.csv"
+    with path.open(newline="", encoding="utf-8") as lines:
+        rows = list(csv.DictReader(lines))
+    assert list(rows[0]) == ["series", "style", "x: time / s", "y: u_x / mm", "upper: u_x / mm"]
+    reference = [float(r["y: u_x / mm"]) for r in rows if r["series"] == "reference (twin)"]
+    np.testing.assert_array_equal(reference, 1e3 * swing(T))
+
+
+def test_names_must_differ(result: Result, tmp_path: Path) -> None:
+    twice = (*result.exhibits, replace(result.exhibits[0], anchor="again", tables=()))
+    with pytest.raises(ComparisonError, match="2 charts 'displacement_node_A'; give each"):
+        write_report(replace(result, exhibits=twice), tmp_path / "box", created=CREATED)
+    scores = NumberTable("scores", "mine", ("a",), ())
+    with pytest.raises(ComparisonError, match="2 tables 'scores'"):
+        require_distinct((replace(result.exhibits[0], tables=(scores,)),))
+
+
+def test_document_is_valid_and_small(result: Result, tmp_path: Path) -> None:
+    content = document(result, CREATED)
+    jsonschema.Draft202012Validator(schema()).validate(content)
+    kf, _, euler, large = content["methods"]
+    assert (kf["traces_at"], len(kf["t"]), len(kf["traces"]["nis"]["y"])) == (
+        "output frames", len(AT), len(AT),
+    )  # fmt: skip
+    assert kf["traces"]["node_A.x"]["y"][7] == pytest.approx(0.98 * swing(T)[AT[7]], rel=1e-6)
+    assert (euler["rate_hz"], euler["step_s"], euler["t"]) == (None, None, [])
+    assert (large["traces_at"], len(large["t"])) == ("every step", 12)
+    first = content["exhibits"][0]
+    assert [c["name"] for c in first["charts"]] == ["displacement_node_A", "rate_error", "nis"]
+    assert first["tables"][0]["rows"][1] == ["explicit Euler", "node_A", None, None, 0]
+    write_json(content, tmp_path / "r.json")
+    text = (tmp_path / "r.json").read_text(encoding="utf-8")
+    assert json.loads(text) == content
+    assert len(text) < 250_000
+    assert max(text.count("\n"), 1) < 3_000
+
+
+def test_long_and_many_series_stay_below_two_megabytes(result: Result, tmp_path: Path) -> None:
+    t = np.linspace(0, 10, 20_000)
+    line = tuple(Series(f"s{i}", t, np.sin(t + i)) for i in range(8))
+    many = tuple(Chart(f"c{i}", "c", "t / s", "u / mm", line) for i in range(20))
+    exhibit = replace(result.exhibits[0], charts=many)
+    write_json(document(replace(result, exhibits=(exhibit,)), CREATED), tmp_path / "r.json")
+    assert (tmp_path / "r.json").stat().st_size < 1_200_000
+
+
+def test_many_methods_share_the_traces(result: Result) -> None:
+    kf = result.methods[0]
+    many = tuple(replace(kf, name=f"m{i}", accepted=False) for i in range(60))
+    content = document(replace(result, methods=many), CREATED)
+    found = [m for m in content["methods"] if m["traces_at"] == "output frames"]
+    assert len(found) == 60
+    values_kept = sum(len(trace["y"]) for m in found for trace in m["traces"].values())
+    assert 20_000 < values_kept <= 62_000
+
+
+def test_thinning_keeps_the_extremes() -> None:
+    y = np.random.default_rng(0).standard_normal(5003)
+    at = thinned(y, 400)
+    assert len(at) <= 400
+    assert (np.diff(at) > 0).all()
+    assert y[at].min() == y.min()
+    assert y[at].max() == y.max()
+    assert rounded(np.array([1 / 3])) == [0.3333333]
+
+
+def test_runs_hold_every_step_and_the_sd(result: Result, tmp_path: Path) -> None:
+    write_runs(result, tmp_path)
+    with np.load(tmp_path / "kf.npz", allow_pickle=False) as stored:
+        assert stored["sd"].shape == stored["u"].shape == (len(AT), 64, 3)
+        np.testing.assert_array_equal(stored["trace:node_A.x"], 0.98 * swing(T))
+        assert len(stored["trace:nis"]) == len(stored["t"]) == STEPS
+    with np.load(tmp_path / "euler.npz", allow_pickle=False) as stored:
+        assert stored["u"].shape == (0, 64, 3)
+        assert "sd" not in stored.files
+
+
+def test_replay_shows_frames_at_their_own_times(folder: Path) -> None:
+    path = folder / "replay.mcap"
+    assert path.stat().st_size < 1_000_000
+    replay = read_recording(path)
+    simulated = replay.markers["/markers/simulated"]
+    np.testing.assert_allclose(np.diff(simulated.t), np.diff(T[AT]), atol=1e-9)
+    moved = simulated.x[:, 0, 0] - 0.1
+    np.testing.assert_allclose(moved, 0.98 * swing(T[AT]), atol=1e-9)
+    assert np.isnan(replay.markers["/markers/measured"].x).any()
+    assert replay.signals["/stage/measured"].unit == "N"
+    told = replay.metadata["validate.replay"]
+    assert told["interpolated"] == "nothing: output frames at their own times"
+    assert f"of {len(AT)} output frames" in told["thinned"]
+
+
+def test_page_is_small(folder: Path) -> None:
+    assert (folder / "report.html").stat().st_size < 1_000_000

@@ -1,0 +1,102 @@
+"""Many seeds of one experiment in one walk: they share the gains, which no measurement changes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats, checked
+from validate.errors import ComparisonError
+from validate.estimate.displacement_filter import DisplacementStepper, InModes
+from validate.estimate.gains import GainSequence
+
+
+@dataclass(frozen=True)
+class Batch:
+    """values (seeds, nt, p) m read from the estimates; nis (seeds, nt) with its degrees (nt,)."""
+
+    values: Floats
+    nis: Floats
+    dof: Floats
+
+
+def shared_gain_run(stepper: DisplacementStepper, inputs: Floats, z: Floats, rows: Floats) -> Batch:
+    """Filters z (seeds, nt, m) m, NaN = missing, one row for each step of inputs (nt, k).
+
+    `stepper` is a `ModalKf(gains="shared")` prepared with measurements of the same schedule;
+    rows (p, N) read what is wanted. Raises `ComparisonError` for other steppers and schedules.
+    """
+    modes, gains = stepper.coordinates, stepper.gains
+    if not isinstance(modes, InModes) or gains is None:
+        raise ComparisonError('seeds share a walk of ModalKf(gains="shared"); prepare that')
+    m, nt = len(stepper.sensor.names), len(inputs)
+    z = checked(z, "z [m]", (None, nt, m), nan=True, error=ComparisonError)
+    _require_schedule(stepper, z)
+    walk = _Walk(stepper, modes, gains, len(z))
+    free = stepper.system.free
+    read, driven = rows[:, free] @ modes.shapes, rows @ stepper.system.moves
+    values, nis = np.empty((len(z), nt, len(rows))), np.zeros((len(z), nt))
+    for k in range(nt):
+        nis[:, k] = walk.step(inputs[k], z[:, k])
+        values[:, k] = (read @ walk.x + (driven @ inputs[k][: driven.shape[1]])[:, None]).T
+    dof = np.array([float(sum(stepper.when.get(k + 1, ()))) for k in range(nt)])
+    return Batch(values, nis, dof)
+
+
+def _require_schedule(stepper: DisplacementStepper, z: Floats) -> None:
+    """The gains are those of one schedule: every seed must have been measured by it."""
+    planned = np.zeros(z.shape[1:], dtype=bool)
+    for step, seen in stepper.when.items():
+        if step <= len(planned):
+            planned[step - 1] = seen
+    other = (np.isfinite(z) != planned).any(axis=(1, 2))
+    if other.any():
+        raise ComparisonError(
+            f"{int(other.sum())} of {len(z)} seeds miss other samples than the gains were made "
+            "for; run those one by one"
+        )
+
+
+class _Walk:
+    """Amplitudes (n, seeds) with their rates; they change in place."""
+
+    def __init__(
+        self, stepper: DisplacementStepper, modes: InModes, gains: GainSequence, seeds: int
+    ) -> None:
+        n = len(modes.factors[0])
+        self.stepper, self.modes, self.gains = stepper, modes, gains
+        self.x, self.v, self.a = (np.zeros((n, seeds)) for _ in range(3))
+        self.motion, self.loads, self.k = stepper.excitation.rest(), np.zeros(0), 0
+        self.fq, self.fv, self.fa, self.ff = (f[:, None] for f in modes.factors)
+
+    def step(self, inputs: Floats, z: Floats) -> Floats:
+        """NIS (seeds,) of the step, whose estimates are then in `x`."""
+        f = self._force(inputs)
+        prior = self.fq * self.x
+        prior += self.fv * self.v
+        prior += self.fa * self.a
+        prior += self.ff * f[:, None]
+        x, nis = self._corrected(prior, z)
+        towards = prior if self.stepper.recursion == "prior" else x
+        self.v, self.a = self.modes.rates(towards, self.x, self.v, self.a)
+        self.x = x
+        return nis
+
+    def _force(self, inputs: Floats) -> Floats:
+        s = self.stepper
+        drives = len(s.scene.drives)
+        new, old = inputs[drives:], self.loads if self.k else np.zeros(len(inputs) - drives)
+        if self.k == 0 and s.starts is not None:
+            old, self.a = new, np.repeat((s.starts @ new)[:, None], self.x.shape[1], axis=1)
+        motion = s.excitation.moved(self.motion, inputs[:drives])
+        f = s.excitation.force(new, old, motion, self.motion)
+        self.motion, self.loads, self.k = motion, new, self.k + 1
+        return self.modes.shapes.T @ f
+
+    def _corrected(self, prior: Floats, z: Floats) -> tuple[Floats, Floats]:
+        gain, s = self.gains.at(self.k), self.stepper.sensor
+        if gain is None:
+            return prior, np.zeros(len(z))
+        i = np.array(gain.seen)
+        y = z.T[i] - s.H[i] @ prior - (s.driven[i] @ self.motion.q)[:, None]
+        nis = np.einsum("is,is->s", y, np.linalg.solve(gain.S_yy[np.ix_(i, i)], y))
+        return prior + gain.G @ y, nis

@@ -1,0 +1,218 @@
+"""filterpy's filters as guests: any of them runs in an experiment, behind our shape checks.
+
+filterpy accepts a P of the wrong size, and a 1-D z beside a column x turns x into a matrix: both
+are refused here, before the first step and after every one.
+"""
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError
+from validate.estimate.core_stepper import CoreStepper, require_loads
+from validate.estimate.filterpy_door import (
+    EnsembleKalmanFilter,
+    KalmanFilter,
+    MerweScaledSigmaPoints,
+    UnscentedKalmanFilter,
+    seeded,
+)
+from validate.estimate.innovation import Innovation, innovation, nothing
+from validate.estimate.linear_model import LinearModel, require_symmetric
+from validate.estimate.measured import Measurements, timetable
+from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
+from validate.fem.system import System
+from validate.parameters import quantity
+from validate.solve.dynamic import reactions, require_linear
+from validate.solve.types import Stepper
+
+Make = Callable[[LinearModel], Any]
+
+_MEMBERS = 50  # of the ensemble that is made by name
+
+
+def kalman(model: LinearModel) -> Any:
+    """filterpy's `KalmanFilter` of a model."""
+    guest = KalmanFilter(model.size, len(model.H), model.B.shape[1])
+    guest.F, guest.B, guest.H = model.F.copy(), model.B.copy(), model.H.copy()
+    return _filled(guest, model)
+
+
+def unscented(model: LinearModel) -> Any:
+    """filterpy's `UnscentedKalmanFilter`; its roots are symmetric ones, since P0 may be singular.
+
+    Its f takes the loads as keyword `u` of `predict`.
+    """
+    points = MerweScaledSigmaPoints(model.size, 1.0, 2.0, 0.0, sqrt_method=_root)
+
+    def f(x: Floats, _: float, u: Floats) -> Floats:
+        return model.F @ x + model.B @ u
+
+    m = len(model.H)
+    return _filled(
+        UnscentedKalmanFilter(model.size, m, 1.0, lambda x: model.H @ x, f, points), model
+    )
+
+
+def ensemble(model: LinearModel) -> Any:
+    """filterpy's `EnsembleKalmanFilter` with 50 members, whose `predict` takes the loads."""
+    guest = _Ensemble(model)
+    guest.Q, guest.R = model.Q.copy(), model.R.copy()
+    return guest
+
+
+class _Ensemble(EnsembleKalmanFilter):  # type: ignore[misc]
+    def __init__(self, model: LinearModel) -> None:
+        self.loads = np.zeros(model.B.shape[1])
+        m = len(model.H)
+        super().__init__(
+            model.x0, model.P0, m, 1.0, _MEMBERS, lambda x: model.H @ x, lambda x, _: self._moved(x)
+        )
+        self.model = model
+
+    def _moved(self, x: Floats) -> Floats:
+        return self.model.F @ x + self.model.B @ self.loads
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Ensemble":
+        other = _Ensemble(self.model)  # its functions must be bound to the copy
+        own = {k: v for k, v in vars(self).items() if k not in ("fx", "hx", "model")}
+        other.__dict__.update(copy.deepcopy(own, memo))
+        return other
+
+    def predict(self, u: Floats) -> None:
+        self.loads = u
+        super().predict()
+
+
+GUESTS: dict[str, Make] = {
+    "KalmanFilter": kalman,
+    "UnscentedKalmanFilter": unscented,
+    "EnsembleKalmanFilter": ensemble,
+}
+
+
+def _filled(guest: Any, model: LinearModel) -> Any:
+    guest.x, guest.P = model.x0.copy(), model.P0.copy()
+    guest.Q, guest.R = model.Q.copy(), model.R.copy()
+    return guest
+
+
+def _root(P: Floats) -> Floats:
+    """U (n, n) with U^T U = P, also where P is singular."""
+    values, vectors = np.linalg.eigh((P + P.T) / 2)
+    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T)
+
+
+@dataclass(frozen=True)
+class Guest:
+    """A filterpy filter of the reduced model (`reduced_linear`), named or made by `make`.
+
+    `make` takes the `LinearModel` and gives a filter with x (n,), P, Q, R set, whose `predict`
+    takes the loads (l,) N as `u` and whose `update` takes z (m,). Everything must have been
+    measured or nothing: steps with some components missing are predicted only. `seed` is that of
+    filters which draw from numpy's global generator.
+    """
+
+    make: Make | str = quantity("KalmanFilter", "1", "name, or a function of the model")
+    dt: float = quantity(0.002, "s", "time step")
+    modes: int = quantity(5, "1", "lowest modes kept")
+    load_start: float = quantity(0.1, "N", "sd of every load's bias at the start")
+    load_walk: float = quantity(0.1, "N/s^0.5", "random walk of every load's bias")
+    load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
+    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+    seed: int = quantity(0, "1", "of filters that draw")
+
+    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+        """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
+        shapes are not the model's."""
+        require_linear(system)
+        require_loads(system)
+        R = measurements.sd**2 if self.R is None else np.full(len(measurements.sd), self.R)
+        doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
+        reduced = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
+        with seeded(self.seed):
+            first = _made(self.make)(reduced.model)
+        require_shapes(first, reduced.model)
+        core = GuestCore(reduced, first, self.seed)
+        table = timetable(measurements, self.dt)
+        return CoreStepper(system, reactions(system), core, measurements.names, table)
+
+
+def _made(make: Make | str) -> Make:
+    if not isinstance(make, str):
+        return make
+    if make not in GUESTS:
+        raise ComparisonError(
+            f"no guest '{make}'; by name: {', '.join(GUESTS)}, or give a function"
+        )
+    return GUESTS[make]
+
+
+def require_shapes(guest: Any, model: LinearModel) -> None:
+    """Raises `ComparisonError` unless the guest's arrays fit the model and each other."""
+    n, m = model.size, len(model.H)
+    wanted = {"x": (n,), "P": (n, n), "Q": (n, n), "R": (m, m), "F": (n, n), "H": (m, n)}
+    for name, shape in wanted.items():
+        value = getattr(guest, name, None)
+        if value is None and name in ("F", "H"):
+            continue  # filters with functions have none
+        got = np.shape(value) if value is not None else None
+        if got != shape:
+            raise ComparisonError(
+                f"guest {type(guest).__name__}.{name}: shape {got}, expected {shape}; filterpy "
+                "itself would take it and go on"
+            )
+        if not np.isfinite(np.asarray(value, dtype=float)).all():
+            raise ComparisonError(f"guest {type(guest).__name__}.{name}: not finite")
+    for name in ("P", "Q", "R"):
+        require_symmetric(np.asarray(getattr(guest, name)), f"guest {name}")
+    for name in ("predict", "update"):
+        if not callable(getattr(guest, name, None)):
+            raise ComparisonError(f"guest {type(guest).__name__} has no `{name}`: not a filter")
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A guest after a step."""
+
+    guest: Any
+
+
+@dataclass(frozen=True)
+class GuestCore:
+    """Every step works on a copy of the guest: a state is never changed from behind."""
+
+    reduced: ReducedModel
+    first: Any
+    seed: int
+
+    def start(self) -> Visit:
+        return Visit(copy.deepcopy(self.first))
+
+    def step(
+        self, inner: Visit, k: int, loads: Floats, z: Floats | None
+    ) -> tuple[Visit, Innovation]:
+        guest, model = copy.deepcopy(inner.guest), self.reduced.model
+        with seeded(self.seed + k):
+            guest.predict(u=loads)
+            if z is None or not np.isfinite(z).all():
+                return Visit(guest), nothing(len(model.H))
+            S_yy = model.H @ guest.P @ model.H.T + model.R
+            found = innovation(z, model.H @ guest.x, S_yy)
+            guest.update(z)
+        require_shapes(guest, model)
+        return Visit(guest), found
+
+    def free(self, inner: Visit) -> Floats:
+        return np.asarray(self.reduced.lift @ inner.guest.x)
+
+    def variances(self, inner: Visit) -> Floats:
+        lift = self.reduced.lift
+        return np.asarray(np.einsum("ij,ij->i", lift @ inner.guest.P, lift))
+
+    def numbers(self, inner: Visit) -> dict[str, tuple[float, str]]:
+        return {}

@@ -1,0 +1,100 @@
+"""The smallest sound filter of a quasi-static scene: one shape, its amplitude, the load's scale.
+
+u = a s with the static displacement s of the load; a follows scale * a_static with the shape's own
+time constant (science note 001: all modes of paper 001's cube share it). A wrong modulus is a wrong
+scale, which one measured node shows and every node then gains from. No inertia: where the shape
+would swing, `prepare` refuses.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.estimate.core_stepper import CoreStepper, require_loads
+from validate.estimate.displacement_filter import load_shapes
+from validate.estimate.innovation import Innovation, innovation, nothing
+from validate.estimate.measured import Measurements, timetable
+from validate.estimate.small import Gaussian, kf_predict, kf_update
+from validate.fem.system import System
+from validate.parameters import quantity
+from validate.solve.dynamic import reactions, require_linear
+from validate.solve.types import Stepper
+
+_OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
+
+
+@dataclass(frozen=True)
+class LoadScale:
+    """`scale_sd` is the doubt of the scale at the start (1 = none), `walk` its growth per sqrt(s);
+    `Q` m^2 the variance that a step adds to the amplitude, R m^2 (None: the measurements' own)."""
+
+    dt: float = quantity(0.002, "s", "time step")
+    scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")
+    walk: float = quantity(0.0, "1/s^0.5", "random walk of the scale")
+    Q: float = quantity(1e-14, "m^2", "variance that a step adds to the amplitude")
+    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+
+    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+        """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
+        require_linear(system)
+        require_loads(system)
+        if len(system.scene.loads) != 1:
+            raise SceneError(f"{len(system.scene.loads)} loads: one shape is for one load")
+        H = measurements.free(system.free)
+        shape = load_shapes(system, H)[:, 0]
+        R = measurements.sd**2 if self.R is None else np.full(len(measurements.sd), self.R)
+        core = _core(self, system, shape, H @ shape, R)
+        table = timetable(measurements, self.dt)
+        return CoreStepper(system, reactions(system), core, measurements.names, table)
+
+
+def _core(settings: LoadScale, system: System, s: Floats, seen: Floats, R: Floats) -> "ScaleCore":
+    free = system.free
+    m, c, k = (float(s @ (X[free][:, free] @ s)) for X in (system.M, system.C, system.K))
+    ratio = c / (2 * np.sqrt(m * k))
+    if ratio < _OVERDAMPED:
+        raise SceneError(
+            f"the load's shape has damping ratio {ratio:.2g}, it swings: a filter without inertia "
+            f"needs {_OVERDAMPED:g}; use ReducedKf"
+        )
+    per_newton = float(s @ system.loads[free, 0]) / k
+    return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton)
+
+
+@dataclass(frozen=True)
+class ScaleCore:
+    """`keep` of the amplitude stays over a step; `per_newton` m/N is its static value."""
+
+    settings: LoadScale
+    shape: Floats
+    seen: Floats
+    R: Floats
+    keep: float
+    per_newton: float
+
+    def start(self) -> Gaussian:
+        return Gaussian(np.array([0.0, 1.0]), np.diag([0.0, self.settings.scale_sd**2]))
+
+    def step(
+        self, inner: Gaussian, k: int, loads: Floats, z: Floats | None
+    ) -> tuple[Gaussian, Innovation]:
+        static = (1 - self.keep) * self.per_newton * loads[0]
+        A = np.array([[self.keep, static], [0.0, 1.0]])
+        s = self.settings
+        prior = kf_predict(inner, A, np.diag([s.Q, s.walk**2 * s.dt]))
+        if z is None:
+            return prior, nothing(len(self.seen))
+        H, i = np.outer(self.seen, [1.0, 0.0]), np.isfinite(z)
+        found = innovation(z, H @ prior.x, H @ prior.P @ H.T + np.diag(self.R))
+        return kf_update(prior, z[i], H[i], np.diag(self.R[i])).posterior, found
+
+    def free(self, inner: Gaussian) -> Floats:
+        return np.asarray(self.shape * inner.x[0])
+
+    def variances(self, inner: Gaussian) -> Floats:
+        return np.asarray(self.shape**2 * inner.P[0, 0])
+
+    def numbers(self, inner: Gaussian) -> dict[str, tuple[float, str]]:
+        return {"load.scale": (float(inner.x[1]), "1")}

@@ -1,0 +1,294 @@
+"""Explicit dynamics at large strain: central difference on lumped masses (paper 003, eqs 13-20).
+
+The step is written in increments, d' = keep d - gain (R - f), which is eq 18 with C = alpha M and
+keeps its digits where steps are small. Loads act at the start of a step, drives at its end.
+
+Departures: eq 15 prints one U too many. Eq 16 is no bound on the step: the limit is 2/omega_max by
+Lanczos, taken anew as the body deforms. Stiffness damping (beta K of eq 18) would need a solve; it
+is taken at the last half step ("lagged"), which costs no solve and lowers the limit.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.assemble import lumped, mass
+from validate.fem.critical import lanczos_step
+from validate.fem.explicit import ExplicitBody, Look, Motion, Rule
+from validate.fem.system import System
+from validate.scene.scene import Scene
+from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
+
+_EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
+_DEFORMED = 0.02  # of the body's size: the critical step is taken anew after such a motion
+_UNITS = {"displacement": "m", "force": "N", "strain": "J", "kinetic": "J", "external": "J"}
+_UNITS |= {"damped": "J", "critical_step": "s"}
+
+Damping = Literal["none", "mass", "lagged"]
+
+
+@dataclass(frozen=True)
+class CentralDifference:
+    """Steps of dt s in `substeps` equal parts, inputs linear between.
+
+    `damping`: "mass" is eq 18 with C = alpha M and refuses a scene with stiffness damping, "lagged"
+    takes that too, "none" is eq 19. A substep above (1 - margin) of the critical step is refused
+    before the first step, or with `beyond_limit` "run" goes on. Every `watch` steps energies, det F
+    and, when the body has deformed further, the critical step are looked at; traces hold between.
+    """
+
+    dt: float = 1e-4
+    substeps: int = 1
+    damping: Damping = "mass"
+    beyond_limit: Literal["refuse", "run"] = "refuse"
+    margin: float = 0.05
+    watch: int = 20
+
+    def __post_init__(self) -> None:
+        if not (self.dt > 0 and self.substeps >= 1 and self.watch >= 1):
+            raise SceneError(
+                f"dt {self.dt:g} s, {self.substeps} substeps, a watch every {self.watch} steps: "
+                "all must be positive"
+            )
+        if not 0 <= self.margin < 1:
+            raise SceneError(f"margin {self.margin:g}: a share of the critical step, 0 to 1")
+
+    @property
+    def step(self) -> float:
+        """The step s of the integration."""
+        return self.dt / self.substeps
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for what has no explicit form, a missing density, cavities."""
+        if system.scene.cavities:
+            raise SceneError("explicit dynamics knows no fluid in cavities; drop them")
+        beta = self._beta(system.scene)
+        still = np.zeros(len(system.moves))
+        past = Past(Motion(np.zeros((6, len(still)))), still)
+        plates = system.moves[system.held]
+        feels_loads = bool(system.loads[system.held].any())
+        body, masses = ExplicitBody(system.scene), system.masses[system.free]
+        rule = self._rule(system, beta)
+        stepper = CentralStepper(
+            self, system, body, rule, beta, system.held, plates, feels_loads, masses, past
+        )
+        stepper.warm()
+        return replace(stepper, start=stepper.limited(stepper.start))
+
+    def _beta(self, scene: Scene) -> float:
+        betas = set(scene.per_cell(lambda m: m.stiffness_damping))
+        if self.damping == "none" or betas == {0.0}:
+            return 0.0
+        if self.damping == "mass":
+            raise SceneError(
+                f"stiffness damping {max(betas):g} s has no explicit form; take damping='lagged', "
+                "or 'none' to leave all damping out"
+            )
+        if len(betas) > 1:
+            raise SceneError(f"lagged damping is for one stiffness damping, got {sorted(betas)} s")
+        return float(betas.pop())
+
+    def _rule(self, system: System, beta: float) -> Rule:
+        alpha = np.zeros(len(system.moves))
+        if self.damping != "none":
+            alpha = lumped_damping(system) / system.masses
+        half, free = alpha * self.step / 2, np.zeros(len(alpha))
+        free[system.free] = 1.0
+        loaded = np.intersect1d(np.flatnonzero(system.loads.any(axis=1)), system.free)
+        return Rule(
+            self.step,
+            free * (1 - half) / (1 + half),
+            free * self.step**2 / system.masses / (1 + half),
+            beta / self.step,
+            system.held,
+            system.moves[system.held],
+            loaded,
+            system.loads[loaded],
+        )
+
+
+@dataclass(frozen=True)
+class Past:
+    """What a step needs besides the state; `limit` s was taken at the displacements `limit_u`."""
+
+    motion: Motion
+    limit_u: Floats
+    limit: float = np.inf
+    work: float = 0.0
+    taken: float = 0.0
+    most: float = 0.0
+
+
+@dataclass(frozen=True)
+class CentralStepper:
+    """`plates` (held, k) m/m are the moves of the `held` unknowns, which may feel loads, too."""
+
+    settings: CentralDifference
+    system: System
+    body: ExplicitBody
+    rule: Rule
+    beta: float
+    held: Ints
+    plates: Floats
+    feels_loads: bool
+    masses: Floats
+    start: Past
+
+    @property
+    def scene(self) -> Scene:
+        return self.system.scene
+
+    def warm(self) -> None:
+        """Compiles: no step is charged with it."""
+        inputs = np.zeros(len(self.scene.inputs))
+        self.body.advance(self.start.motion, self.rule, inputs, inputs, 1)
+        self.body.look(self.start.motion.u)
+
+    def rest(self) -> State:
+        u, inputs = self.start.motion.u, np.zeros(len(self.scene.inputs))
+        seen = self._seen(self.start, self.body.look(u))
+        numbers = {**seen, **self._forces(u, inputs)}
+        return State(
+            inputs, NOTHING, 0, NO_SURFACE, u=u, numbers=numbers, v=u, a=u, extra=self.start
+        )
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
+        past: Past = state.extra
+        if state.k == 0 and self._refused(past.limit, self.settings.margin):
+            return replace(state, failure=("refused", self._too_large(past.limit)))
+        k, substeps = state.k + 1, self.settings.substeps
+        motion, work, taken, finite = self.body.advance(
+            past.motion, self.rule, state.drives, inputs, substeps
+        )
+        if not finite:
+            ratio = self.rule.dt / past.limit
+            words = f"step {k}: displacements not finite; dt is {ratio:.3g} of the critical step"
+            return replace(state, failure=("diverged", words))
+        new = _worked(past, motion, work, taken)
+        numbers, failure = dict(state.numbers), None
+        if k % self.settings.watch == 0 or k == 1:
+            new, seen, failure = self._watched(new, k)
+            numbers |= seen
+        numbers |= self._forces(motion.r, inputs)
+        return State(
+            inputs, NOTHING, substeps, NO_SURFACE, failure, motion.u, numbers, k,
+            motion.v, motion.a, new,
+        )  # fmt: skip
+
+    def _forces(self, r: Floats, inputs: Floats) -> Mapping[str, float]:
+        """Forces N of the plates on the whole body (eq 32), compression positive, no inertia."""
+        if not self.scene.drives:
+            return {}
+        acting = r[self.held]
+        if self.feels_loads:
+            acting = acting - self.system.loads[self.held] @ inputs[len(self.scene.drives) :]
+        forces = self.scene.copies * (acting @ self.plates)
+        return {f"{d.name}.force": float(f) for d, f in zip(self.scene.drives, forces, strict=True)}
+
+    def _watched(
+        self, past: Past, k: int
+    ) -> tuple[Past, Mapping[str, float], tuple[Ending, str] | None]:
+        """The state half a step before, where all energies are known: numbers, and what fails."""
+        past = self.limited(past)
+        look = self.body.look(past.motion.u - past.motion.d / 2)
+        seen = self._seen(past, look)
+        pushed = self._pushed(past.motion)
+        excess = seen["energy.strain"] + seen["energy.kinetic"] + past.taken - past.work - pushed
+        ratio = self.rule.dt / past.limit
+        most = past.most + abs(pushed)
+        if not excess <= _EXCESS * most:
+            times = 1 + excess / most if most else np.inf
+            words = f"step {k}: energy {times:.3g} times the work done, dt is {ratio:.3g}"
+            return past, seen, ("diverged", f"{words} of the critical step {past.limit:.3g} s")
+        if look.inverted:
+            words = f"step {k}: {look.inverted} of {look.cells} elements inverted (det F <= 0)"
+            return past, seen, ("invalid", words)
+        if self._refused(past.limit, 0.0):
+            return past, seen, ("refused", f"step {k}: as deformed, {self._too_large(past.limit)}")
+        return past, seen, None
+
+    def _pushed(self, motion: Motion) -> float:
+        """Energy J that half an increment of the prescribed motion holds, and not yet its work."""
+        change = motion.r - self.body.force(motion.u - motion.d)
+        return float(motion.d[self.held] @ change[self.held]) / 8
+
+    def limited(self, past: Past) -> Past:
+        """The critical step of the body as it is deformed now, if that has changed much."""
+        u, size = past.motion.u, float(np.ptp(self.scene.mesh.nodes, axis=0).max())
+        if np.isfinite(past.limit) and np.abs(u - past.limit_u).max() < _DEFORMED * size:
+            return past
+        full, free = np.zeros(len(u)), self.system.free
+
+        def apply(x: Floats) -> Floats:
+            full[free] = x
+            return self.body.tangent_product(u, full)[free]
+
+        undamped = lanczos_step(apply, self.masses).limit
+        limit = float(np.hypot(undamped, self.beta)) - self.beta
+        return replace(past, limit=limit, limit_u=u)
+
+    def _seen(self, past: Past, look: Look) -> dict[str, float]:
+        d = past.motion.d[self.system.free]
+        kinetic = float(self.masses @ (d * d)) / (2 * self.rule.dt**2)
+        return {
+            "energy.strain": look.energy,
+            "energy.kinetic": kinetic,
+            "energy.external": past.work,
+            "energy.damped": past.taken,
+            "det_F.min": look.det_F,
+            "inverted": float(look.inverted),
+            "critical_step": past.limit,
+        }
+
+    def _refused(self, limit: float, margin: float) -> bool:
+        return self.settings.beyond_limit == "refuse" and self.rule.dt > (1 - margin) * limit
+
+    def _too_large(self, limit: float) -> str:
+        dt, settings = self.rule.dt, self.settings
+        safe = (1 - settings.margin) * limit
+        need = int(np.ceil(settings.dt / safe))
+        return (
+            f"dt {dt:.3g} s is {dt / limit:.3g} times the critical step {limit:.3g} s; take "
+            f"substeps={need} or dt below {safe:.3g} s"
+        )
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, 3) m of all nodes."""
+        assert state.u is not None
+        return state.u.reshape(-1, 3)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        """Inputs, plate forces, energies J half a step before the last watch, det F, limit."""
+        return numbered(self.scene, self.rest().numbers, states)
+
+
+def _worked(past: Past, motion: Motion, more: float, taken: float) -> Past:
+    work = past.work + more
+    return Past(
+        motion, past.limit_u, past.limit, work, past.taken + taken, max(past.most, abs(work))
+    )
+
+
+def lumped_damping(system: System) -> Floats:
+    """alpha M (N,) N s/m of every unknown, lumped as the masses are."""
+    scene = system.scene
+    if not scene.regions:
+        return scene.material.mass_damping * system.masses
+    return lumped(scene, mass(scene, damping=True))
+
+
+def numbered(scene: Scene, names: Iterable[str], states: Sequence[State]) -> dict[str, Trace]:
+    """Traces of the inputs and of the states' numbers, with units by the last word of the name."""
+    traces = {}
+    for j, name in enumerate(scene.inputs):
+        kind = "displacement" if j < len(scene.drives) else "force"
+        traces[f"{name}.{kind}"] = Trace(np.array([s.drives[j] for s in states]), _UNITS[kind])
+    for name in names:
+        unit = _UNITS.get(name.rpartition(".")[2], "1")
+        traces[name] = Trace(np.array([s.numbers[name] for s in states]), unit)
+    return traces

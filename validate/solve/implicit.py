@@ -1,0 +1,232 @@
+"""Implicit dynamics at large strain by Newton's method, and statics under loads.
+
+R(u) + C v + M a = f at the end of every step, with the rates of the rule: the trapezoidal one
+("average", Newmark 1959), backward Euler, or none at all ("static"). The tangent and its
+factorisation are made anew at every iteration: this is the reference of the explicit schemes, and
+what paper 003's rates for the plain finite elements correspond to.
+
+Departures: stiffness damping is that of the body at rest, not of K(U).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.assemble import stiffness_damping
+from validate.fem.factor import elimination_order, factorise, factorise_indefinite
+from validate.fem.hyperelastic import Body
+from validate.fem.system import System
+from validate.scene.scene import Scene
+from validate.solve.central import lumped_damping, numbered
+from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
+
+RateRule = Literal["average", "backward_euler", "static"]
+_HALVINGS = 6  # of a Newton correction that does not lower the residual
+_ROUNDING = 1e-15  # of the body's unit force: below it a residual is nothing but rounding
+
+
+@dataclass(frozen=True)
+class NewtonDynamics:
+    """Steps of dt s. `mass` "lumped" is what the explicit schemes use.
+
+    `tolerance`: residual relative to the forces that act. `cuts`: a static load step that finds no
+    equilibrium is halved up to so many times; a dynamic step fails at once: take a smaller dt.
+    """
+
+    dt: float = 0.01
+    rule: RateRule = "average"
+    mass: Literal["lumped", "consistent"] = "lumped"
+    tolerance: float = 1e-9
+    max_iterations: int = 20
+    cuts: int = 6
+
+    def __post_init__(self) -> None:
+        if not (self.dt > 0 and self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):
+            raise SceneError(
+                f"dt {self.dt:g} s, tolerance {self.tolerance:g}, {self.max_iterations} "
+                "iterations: all must be positive"
+            )
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for a linear law, cavities, regions, or a missing density, and in
+        statics for a body that can move rigidly."""
+        scene = system.scene
+        if scene.cavities:
+            raise SceneError("Newton dynamics knows no fluid in cavities; use StaticNewton")
+        N = len(system.moves)
+        M = C = sparse.csr_array((N, N))
+        if self.rule != "static" and self.mass == "lumped":
+            M = sparse.csr_array(sparse.diags_array(system.masses))
+            C = sparse.csr_array(sparse.diags_array(lumped_damping(system)))
+            C = sparse.csr_array(C + stiffness_damping(scene))
+        elif self.rule != "static":
+            M, C = system.M, system.C
+        body, free = Body(scene), system.free
+        K = body.tangent(np.zeros(N))[free][:, free]
+        if self.rule == "static":
+            factorise(K, free // 3, scene.mesh.nodes)  # a body that can move rigidly ends here
+        order = elimination_order(K, free // 3, scene.mesh.nodes)
+        return ImplicitStepper(self, system, body, M, C, order)
+
+
+@dataclass(frozen=True)
+class _Rates:
+    """v = p (u - u_n) + v_0, a = q (u - u_n) + a_0."""
+
+    p: float
+    q: float
+    v: Floats
+    a: Floats
+
+
+@dataclass(frozen=True)
+class ImplicitStepper:
+    """`M` kg and `C` N s/m (N, N) are zero in statics; `order` (free,) is that of elimination."""
+
+    settings: NewtonDynamics
+    system: System
+    body: Body
+    M: sparse.csr_array
+    C: sparse.csr_array
+    order: Ints
+
+    @property
+    def scene(self) -> Scene:
+        return self.system.scene
+
+    def rest(self) -> State:
+        u, inputs = np.zeros(len(self.system.moves)), np.zeros(len(self.scene.inputs))
+        numbers = self._numbers(u, u, u, inputs)
+        return State(inputs, NOTHING, 0, NO_SURFACE, u=u, numbers=numbers, v=u, a=u)
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
+        at, k = replace(state, updates=0), state.k + 1
+        done, size = 0.0, 1.0
+        static = self.settings.rule == "static"
+        while done < 1:
+            share = min(done + size, 1.0)
+            new = self._solved(at, state.drives + share * (inputs - state.drives))
+            if new.failure is None:
+                at, done = replace(new, updates=at.updates + new.updates), share
+            elif static and size > 0.5**self.settings.cuts:
+                size /= 2
+            else:
+                return replace(state, failure=_stopped(new, k, done))
+        return replace(at, k=k, drives=inputs)
+
+    def _solved(self, state: State, inputs: Floats) -> State:
+        """One load step by Newton from the state's displacements."""
+        assert state.u is not None
+        rates, drives = self._rates(state), len(self.scene.drives)
+        f, free = self.system.loads @ inputs[drives:], self.system.free
+        move = self.system.moves @ (inputs - state.drives)[:drives]
+        u = state.u
+        residual, acting = self._residual(u, state, rates, f)
+        for iteration in range(self.settings.max_iterations + 1):
+            small = self.settings.tolerance * acting + _ROUNDING * self.body.unit_force
+            if np.linalg.norm(residual[free]) <= small and not move.any():
+                return self._found(state, u, rates, inputs, iteration)
+            if iteration == self.settings.max_iterations:
+                break
+            try:
+                correction, negative = self._correction(u, residual, rates, move)
+            except SceneError as vanished:
+                return replace(state, failure=("not_converged", str(vanished)))
+            if negative:
+                words = f"tangent not positive definite ({negative} negative pivots)"
+                return replace(state, failure=("not_converged", words))
+            u, residual, acting = self._searched(u, correction, residual, state, rates, f, move)
+            move = np.zeros_like(move)
+        size = float(np.linalg.norm(residual[free])) / acting if acting else np.inf
+        words = f"residual {size:.1e} after {self.settings.max_iterations} iterations"
+        return replace(state, failure=("not_converged", words))
+
+    def _rates(self, state: State) -> _Rates:
+        assert state.v is not None
+        assert state.a is not None
+        dt, zero = self.settings.dt, np.zeros(len(self.system.moves))
+        if self.settings.rule == "average":
+            return _Rates(2 / dt, 4 / dt**2, -state.v, -4 / dt * state.v - state.a)
+        if self.settings.rule == "backward_euler":
+            return _Rates(1 / dt, 1 / dt**2, zero, -state.v / dt)
+        return _Rates(0.0, 0.0, zero, zero)
+
+    def _residual(self, u: Floats, state: State, rates: _Rates, f: Floats) -> tuple[Floats, float]:
+        """R + C v + M a - f (N,) N, and the size of what acts."""
+        assert state.u is not None
+        d = u - state.u
+        R, inertia = self.body.force(u), self.M @ (rates.q * d + rates.a)
+        acting = max(float(np.linalg.norm(x)) for x in (R, inertia, f))
+        return R + inertia + self.C @ (rates.p * d + rates.v) - f, acting
+
+    def _correction(
+        self, u: Floats, residual: Floats, rates: _Rates, move: Floats
+    ) -> tuple[Floats, int]:
+        """The Newton correction (N,), prescribed motion and all, and negative pivots."""
+        J = sparse.csr_array(self.body.tangent(u) + rates.p * self.C + rates.q * self.M)
+        free = self.system.free
+        factor = factorise_indefinite(J[free][:, free], self.order)
+        correction = move.copy()
+        correction[free] = -factor.solve((residual + J @ move)[free])
+        return correction, factor.negative_pivots
+
+    def _searched(
+        self, u: Floats, correction: Floats, residual: Floats, state: State, rates: _Rates,
+        f: Floats, move: Floats,
+    ) -> tuple[Floats, Floats, float]:  # fmt: skip
+        """The correction, halved while it raises the residual or inverts cells.
+
+        A prescribed motion is taken whole: its residual has nothing to be compared with.
+        """
+        free, before = self.system.free, np.linalg.norm(residual[self.system.free])
+        for share in 0.5 ** np.arange(_HALVINGS + 1):
+            new = u + move + share * (correction - move)
+            after, acting = self._residual(new, state, rates, f)
+            better = np.linalg.norm(after[free]) < before or move.any()
+            if better and not self.body.inverted(new):
+                break
+        return new, after, acting
+
+    def _found(
+        self, state: State, u: Floats, rates: _Rates, inputs: Floats, iterations: int
+    ) -> State:
+        assert state.u is not None
+        d = u - state.u
+        v, a = rates.p * d + rates.v, rates.q * d + rates.a
+        bad = self.body.inverted(u)
+        if bad:
+            words = f"{bad.count} of {bad.points} elements inverted (det F <= 0)"
+            return replace(state, failure=("invalid", words))
+        numbers = self._numbers(u, v, a, inputs)
+        return replace(state, drives=inputs, updates=iterations, u=u, v=v, a=a, numbers=numbers)
+
+    def _numbers(self, u: Floats, v: Floats, a: Floats, inputs: Floats) -> Mapping[str, float]:
+        """Plate forces N on the whole body, compression positive, with inertia; energies J."""
+        scene = self.scene
+        f = self.system.loads @ inputs[len(scene.drives) :]
+        acting = self.body.force(u) + self.C @ v + self.M @ a - f
+        forces = scene.copies * (acting @ self.system.moves)
+        numbers = {f"{d.name}.force": float(x) for d, x in zip(scene.drives, forces, strict=True)}
+        numbers["energy.strain"] = self.body.energy(u)
+        return numbers | {"energy.kinetic": float(v @ (self.M @ v)) / 2}
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, 3) m of all nodes."""
+        assert state.u is not None
+        return state.u.reshape(-1, 3)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        """Inputs, plate forces N, strain and kinetic energy J of every step."""
+        return numbered(self.scene, self.rest().numbers, states)
+
+
+def _stopped(failed: State, k: int, done: float) -> tuple[Ending, str]:
+    assert failed.failure is not None
+    ending, why = failed.failure
+    return ending, f"step {k}: {why}; {100 * done:.3g} % of the step's load was reached"

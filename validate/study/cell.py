@@ -1,0 +1,279 @@
+"""One cell on a worker: the same road as `validate run`, with recordings made in memory.
+
+Scenes, systems, registrations and truths are kept from cell to cell. Seeds change the noise only:
+a linear filter whose gains need no data runs them all at once, everything else one by one.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError, UsageError, ValidateError
+from validate.estimate.batch import shared_gain_run
+from validate.estimate.displacement_filter import DisplacementStepper
+from validate.estimate.gains import schedule
+from validate.estimate.measured import Timetable, measurements, timetable
+from validate.fem.locate import barycentric_rows
+from validate.fem.system import System
+from validate.fem.system import build as build_system
+from validate.parameters import describe
+from validate.register.observe import Registered
+from validate.replay.find import load_file
+from validate.replay.tracking import Tracking, Truth
+from validate.scene.scene import Scene
+from validate.solve.march import march
+from validate.solve.types import Run, Stepper
+from validate.study.kept import Kept, fingerprint
+from validate.study.outcome import CellResult
+from validate.study.plan import Cell, Job, file_sha256, set_up
+from validate.study.score import NIS, error_scores
+from validate.study.shared import sharing
+
+_TIMED = 25  # steps that are timed where the seeds run together
+_TIMED_S = 0.05  # s after which no more of them are
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A cell prepared for one seed."""
+
+    parameters: Any
+    settings: Any
+    system: System
+    seen: Registered
+
+
+class Bench:
+    """One worker's memory of an experiment: what cells share is made once."""
+
+    def __init__(self, experiment: Tracking, job: Job) -> None:
+        self.experiment, self.job = experiment, job
+        self._systems: Kept[System] = Kept(4)
+        self._seen: Kept[Registered] = Kept(4 * len(job.seeds))
+        self._recordings: Kept[Any] = Kept(2 * len(job.seeds))
+        self._truths: Kept[Truth] = Kept(4)
+
+    def ready(self, cell: Cell, seed: int) -> Ready:
+        parameters, settings = set_up(self.experiment, self.job, cell, seed)
+        key = _text(parameters)
+        recording = self._recordings.get(
+            key, lambda: self.experiment.record(parameters, lambda _: None)
+        )
+        scene: Scene = self.experiment.build(recording, parameters, settings)
+        mark = fingerprint(scene)
+        system = self._systems.get(mark, lambda: build_system(scene))
+        seen = self._seen.get(
+            (key, mark), lambda: self.experiment.place(recording, parameters, system.scene)
+        )
+        return Ready(parameters, settings, system, seen)
+
+    def truth(self, ready: Ready) -> Mapping[str, Floats]:
+        """The twin's motion: noise does not touch it, so the first seed's serves all."""
+        return self._truths.get(
+            _text(ready.parameters),
+            lambda: replace(self.experiment.truth(ready.parameters, ready.seen), u=None, mesh=None),
+        ).probes
+
+    def stepper(self, ready: Ready) -> Stepper:
+        return self.experiment.stepper(ready.settings, ready.parameters, ready.system, ready.seen)
+
+
+def run_cells(job: Job, cells: tuple[Cell, ...]) -> list[CellResult]:
+    """The results of some cells; raises `UsageError` when the experiment's file has changed."""
+    bench = _bench(job)
+    return [run_cell(bench, cell) for cell in cells]
+
+
+def run_cell(bench: Bench, cell: Cell) -> CellResult:
+    """A failed cell is a result with one line of reason."""
+    start = perf_counter()
+    try:
+        result = _result(bench, cell)
+    except ValidateError as error:
+        result = CellResult(cell.key, failed=" ".join(str(error).split()))
+    except Exception as error:  # one cell must not end a study of thousands: it becomes a row
+        result = CellResult(cell.key, failed=" ".join(f"{type(error).__name__}: {error}".split()))
+    return replace(result, seconds=perf_counter() - start)
+
+
+@lru_cache(maxsize=2)
+def _bench(job: Job) -> Bench:
+    path = Path(job.path)
+    experiment = load_file(path)
+    if file_sha256(path) != job.sha256:
+        raise UsageError(f"{path.name} is not the file that the study began with; start it again")
+    assert isinstance(experiment, Tracking)
+    return Bench(experiment, job)
+
+
+def _result(bench: Bench, cell: Cell) -> CellResult:
+    first = bench.ready(cell, bench.job.seeds[0])
+    start = perf_counter()
+    stepper = bench.stepper(first)
+    setup = perf_counter() - start
+    if isinstance(stepper, DisplacementStepper):
+        shared = _all_seeds(bench, cell, stepper, first)
+        if shared is not None:
+            return replace(shared, step_s=_step_time(stepper, first.seen.stage.y), setup_s=setup)
+    return _one_by_one(bench, cell, stepper, first, setup)
+
+
+# --- all seeds at once ---------------------------------------------------------------------------
+
+
+def _all_seeds(
+    bench: Bench, cell: Cell, stepper: DisplacementStepper, first: Ready
+) -> CellResult | None:
+    """None where the seeds miss different samples, damping couples the modes, or what the filter
+    was given cannot be told from outside."""
+    z = _measured(bench, cell, stepper, first)
+    shared = sharing(stepper) if z is not None else None
+    if z is None or shared is None or shared.gains is None:
+        return None
+    scene, inputs = first.system.scene, first.seen.stage.y
+    points = barycentric_rows(scene.mesh, np.array([p.point for p in scene.probes]))
+    rows = np.kron(points.weights.toarray(), np.eye(scene.mesh.dimension))
+    found = shared_gain_run(
+        shared, inputs, z, rows["xyz".index(bench.experiment.axis) :: scene.mesh.dimension]
+    )
+    if not (np.isfinite(found.values).all() and np.isfinite(found.nis).all()):
+        return CellResult(cell.key, failed="diverged: the estimate is not finite")
+    names, dof = [p.name for p in scene.probes], int(found.dof.sum())
+    scores = [
+        _scores(bench, first, dict(zip(names, values.T, strict=True)), float(nis.sum()), dof)
+        for values, nis in zip(found.values, found.nis, strict=True)
+    ]
+    return CellResult(
+        cell.key,
+        *_columns(scores),
+        nis=float(found.nis.sum()),
+        nis_dof=dof * len(z),
+        steps=len(inputs),
+        frozen=shared.gains.frozen,
+        shared=True,
+    )
+
+
+def _measured(
+    bench: Bench, cell: Cell, stepper: DisplacementStepper, first: Ready
+) -> Floats | None:
+    """Measurements z (seeds, nt, m) m by step, NaN = none, of the components the filter was given.
+
+    The filter's own table shows which those are: from the first seed's recording it must come out.
+    """
+    sensor, nt = stepper.sensor, len(first.seen.stage.t)
+    own = _given(first, sensor.names)
+    if own is None or not _equal(own, sensor.table):
+        return None
+    others = [_given(bench.ready(cell, seed), sensor.names) for seed in bench.job.seeds[1:]]
+    tables = [own, *(t for t in others if t is not None)]
+    if any(schedule(t) != stepper.when for t in tables):
+        return None
+    z = np.full((len(tables), nt, len(sensor.names)), np.nan)
+    for s, table in enumerate(tables):
+        for step, row in table.z.items():
+            if step <= nt:
+                z[s, step - 1] = row
+    return z
+
+
+def _given(ready: Ready, names: tuple[str, ...]) -> Timetable | None:
+    """Those components' timetable, on the steps of the recorded inputs."""
+    if ready.seen.markers is None:
+        return None
+    seen = measurements(ready.seen, ready.system.scene.mesh)
+    if any(name not in seen.names for name in names):
+        return None
+    pick = [seen.names.index(name) for name in names]
+    given = replace(seen, H=seen.H[pick], z=seen.z[:, pick], sd=seen.sd[pick], names=names)
+    return timetable(given, float(ready.seen.stage.t[0]))
+
+
+def _equal(one: Timetable, other: Timetable) -> bool:
+    return one.z.keys() == other.z.keys() and all(
+        np.array_equal(z, other.z[k], equal_nan=True) for k, z in one.z.items()
+    )
+
+
+def _step_time(stepper: Stepper, inputs: Floats) -> float:
+    """Median s of the first steps, run as they are alone; the very first only warms up."""
+    state, seconds = stepper.rest(), list[float]()
+    for row in inputs[: _TIMED + 1]:
+        start = perf_counter()
+        state = stepper.step(state, row)
+        seconds.append(perf_counter() - start)
+        if sum(seconds) > _TIMED_S and len(seconds) > 5:
+            break
+    return float(np.median(seconds[1:] or seconds))
+
+
+# --- seed by seed --------------------------------------------------------------------------------
+
+
+def _one_by_one(
+    bench: Bench, cell: Cell, stepper: Stepper, first: Ready, setup: float
+) -> CellResult:
+    rows, times, nis, dof, steps = [], [], 0.0, 0, 0
+    for i, seed in enumerate(bench.job.seeds):
+        ready = first if i == 0 else bench.ready(cell, seed)
+        run = _march(cell, stepper if i == 0 else bench.stepper(ready), ready)
+        if not run.finished:
+            end = run.outcome
+            why = f"seed {seed}: {end.state} at step {end.step}: {end.why}"
+            return CellResult(cell.key, failed=" ".join(why.split()), setup_s=setup)
+        own, degrees = _nis(run)
+        names = [p.name for p in ready.system.scene.probes]
+        traces = {n: run.traces[f"{n}.{bench.experiment.axis}"].y for n in names}
+        rows.append(_scores(bench, first, traces, own, degrees))
+        nis, dof, steps = nis + own, dof + degrees, len(run.t)
+        times.append(run.step_s.p50 if run.step_s else 0.0)
+    return CellResult(
+        cell.key,
+        *_columns(rows),
+        nis=nis if dof else None,
+        nis_dof=dof,
+        step_s=float(np.median(times)),
+        setup_s=setup,
+        steps=steps,
+    )
+
+
+def _march(cell: Cell, stepper: Stepper, ready: Ready) -> Run:
+    t, inputs = ready.seen.stage.t, ready.seen.stage.y
+    return march(cell.method, stepper, t, inputs, np.array([len(t) - 1]), 0.0)
+
+
+def _nis(run: Run) -> tuple[float, int]:
+    nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
+    return (0.0, 0) if nis is None or dof is None else (float(nis.y.sum()), int(dof.y.sum()))
+
+
+# --- scores --------------------------------------------------------------------------------------
+
+
+def _scores(
+    bench: Bench, first: Ready, traces: Mapping[str, Floats], nis: float, dof: int
+) -> dict[str, float]:
+    truth = bench.truth(first)
+    if not truth:
+        raise ComparisonError("the twin tells no probe's truth: 0 compared")
+    scores = error_scores(traces, truth, bench.experiment.axis)
+    return scores | ({NIS: nis / dof} if dof else {})
+
+
+def _columns(
+    rows: list[dict[str, float]],
+) -> tuple[dict[str, tuple[float, ...]], dict[str, str]]:
+    names = tuple(rows[0])
+    units = {name: "1" if name == NIS else "m" for name in names}
+    return {name: tuple(row[name] for row in rows) for name in names}, units
+
+
+def _text(parameters: Any) -> str:
+    return repr([(p.path, p.default) for p in describe(parameters)])

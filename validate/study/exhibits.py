@@ -1,0 +1,326 @@
+"""What a filter study shows: the best settings, rankings with ties, Pareto front, NIS maps."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from validate.compare.exhibit import Chart, Entry, Exhibit, Heat, NumberTable, Series
+from validate.estimate.consistency import Consistency, nis_consistency
+from validate.study.filters import Study
+from validate.study.outcome import CellResult
+from validate.study.plan import METHODS, Cell
+from validate.study.ranking import Ranked, Ranking
+from validate.study.score import NIS
+from validate.study.sweep import Axis
+
+_MM = 1e3
+_SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
+_SHOWN_OF_MANY = 8  # places of each where there are many conditions
+_FULL = 12  # conditions whose rankings and charts are shown
+_NAMED = 3  # overlapping places that are named
+
+
+def study_exhibits(study: Study) -> tuple[Exhibit, ...]:
+    """In the order of a reader's questions: which, how sure, at what cost, is it honest."""
+    found = [best_exhibit(study), _ranking_exhibit(study), _pareto_exhibit(study)]
+    found += list(_over_axes(study))
+    failed = _failed_exhibit(study)
+    return (*(e for e in found if e is not None), *((failed,) if failed else ()))
+
+
+def consistency(result: CellResult) -> Consistency | None:
+    """NIS of all seeds together; None for a method without innovations."""
+    if result.nis is None or not result.nis_dof:
+        return None
+    return nis_consistency([result.nis], [result.nis_dof])
+
+
+def named(values: Mapping[str, str] | Sequence[tuple[str, str]]) -> str:
+    """Settings as read: `Q=1e-09, R=1e-09`."""
+    pairs = values.items() if isinstance(values, Mapping) else values
+    return ", ".join(f"{_short(k)}={v}" for k, v in pairs) or "as declared"
+
+
+def ranking_row(r: Ranked, ranking: Ranking) -> tuple[Entry, ...]:
+    """One place: what it is, its score with interval, ties, honesty and cost."""
+    seen = consistency(r.result)
+    half, apart = r.score.half, r.from_best
+    return (
+        r.place,
+        r.cell.method,
+        named(r.cell.settings),
+        _MM * r.score.mean,
+        None if half is None else _MM * half,
+        _overlapping(r),
+        _MM * apart.mean if r.place > 1 else None,
+        _MM * apart.half if r.place > 1 and apart.half is not None else None,
+        _tied(r),
+        seen.mean if seen else None,
+        seen.verdict if seen else None,
+        None if r.result.step_s is None else _MM * r.result.step_s,
+        r.result.frozen,
+        "on the front" if r.dominated_by is None else f"dominated by #{r.dominated_by}",
+    )
+
+
+RANKING = (
+    "place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
+    "less #1's, paired / mm", "± 95 % / mm (paired)", "against #1", "NIS per dof / 1", "filter is",
+    "step / ms", "gains repeat from step", "error against time",
+)  # fmt: skip
+
+
+def best_exhibit(study: Study) -> Exhibit:
+    """The winners as ready commands, with what ties with them."""
+    words, rows = [], []
+    for best in study.best:
+        r = best.ranked
+        half = f" ± {_MM * r.score.half:.3g}" if r.score.half is not None else ""
+        when = f" with {named(r.cell.condition)}" if r.cell.condition else ""
+        ties = f"; {best.ties} others cannot be told from it" if best.ties else ""
+        words.append(
+            f"Best{when}: {r.cell.method} ({named(r.cell.settings)}), "
+            f"{study.by} {_MM * r.score.mean:.4g}{half} mm over {r.score.count} seeds{ties}."
+        )
+        rows.append((named(r.cell.condition), best.line))
+    head = ("condition of the twin", "command")
+    table = NumberTable("best", "The best settings as commands", head, tuple(rows))
+    return Exhibit("best", "Best settings", tuple(words), tables=(table,))
+
+
+def _ranking_exhibit(study: Study) -> Exhibit:
+    seeds = len(study.plan.job.seeds)
+    words = (
+        f"Ranked by the mean of {study.by} over {seeds} seeds of the noise; ± is half of Student's "
+        "95 % interval of that mean, taken over the seeds.",
+        "All cells of a condition see the same seeds, so differences from the first place are "
+        "taken seed by seed (paired): 'cannot tell' means that their 95 % interval holds zero. "
+        "Intervals that overlap may still differ in pairs. Nothing is corrected for the number of "
+        "cells: the winner of many is a little better here than it is."
+        if seeds > 1
+        else "One seed: no interval, so no two places can be told apart.",
+        "Time is the median of one step in this study's workers, one thread each, side by side.",
+    )
+    most = _SHOWN if len(study.rankings) == 1 else _SHOWN_OF_MANY
+    tables = tuple(
+        NumberTable(
+            f"ranking_{i}",
+            f"Ranking{_under(r)}: the first {min(most, len(r.rows))} of {len(r.rows)} places",
+            RANKING,
+            tuple(ranking_row(row, r) for row in r.rows[:most]),
+        )
+        for i, r in enumerate(study.rankings[:_FULL], start=1)
+    )
+    return Exhibit("ranking", "Ranking", words, tables=tables)
+
+
+def _overlapping(r: Ranked) -> str:
+    if r.score.half is None:
+        return "one seed"
+    if not r.overlaps:
+        return "none"
+    shown = ", ".join(f"#{p}" for p in r.overlaps[:_NAMED])
+    more = len(r.overlaps) - _NAMED
+    return shown if more <= 0 else f"{shown} and {more} more"
+
+
+def _tied(r: Ranked) -> str:
+    if r.place == 1:
+        return "best"
+    return "cannot tell" if r.tied else "worse"
+
+
+def _under(ranking: Ranking) -> str:
+    return f" with {named(ranking.condition)}" if ranking.condition else ""
+
+
+def _short(path: str) -> str:
+    """`Q` of `methods.kf.Q`, `twin.noise` as it is."""
+    return path.split(".", 2)[2] if path.startswith(METHODS) else path
+
+
+# --- error against time --------------------------------------------------------------------------
+
+
+def _pareto_exhibit(study: Study) -> Exhibit:
+    shown = study.rankings[:_FULL]
+    charts = tuple(_pareto_chart(study, r, i) for i, r in enumerate(shown, start=1) if r.rows)
+    tables = tuple(
+        NumberTable(
+            f"pareto_{i}",
+            f"Pareto front{_under(r)}, fastest first: nothing here is both less wrong and faster",
+            ("place", "method", "settings", "step / ms", "error / mm", "± 95 % / mm"),
+            tuple(_front_row(row) for row in r.front),
+        )
+        for i, r in enumerate(shown, start=1)
+    )
+    words = tuple(s for r in shown for s in _dominated(r))
+    return Exhibit("pareto", "Error against time per step", words, tables=tables, charts=charts)
+
+
+def _front_row(r: Ranked) -> tuple[Entry, ...]:
+    half = None if r.score.half is None else _MM * r.score.half
+    step = None if r.result.step_s is None else _MM * r.result.step_s
+    return (r.place, r.cell.method, named(r.cell.settings), step, _MM * r.score.mean, half)
+
+
+def _dominated(ranking: Ranking) -> Iterator[str]:
+    """One sentence naming the methods that are nowhere on the front."""
+    methods = dict.fromkeys(r.cell.method for r in ranking.rows)
+    front = {r.cell.method for r in ranking.front}
+    beaten = [m for m in methods if m not in front]
+    if beaten:
+        yield (
+            f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times of "
+            "one step differ by some percent from run to run: look at the chart before dropping "
+            "one that lies near."
+        )
+
+
+def _pareto_chart(study: Study, ranking: Ranking, i: int) -> Chart:
+    rows = [r for r in ranking.rows if r.result.step_s]
+    series = []
+    for method in dict.fromkeys(r.cell.method for r in rows):
+        mine = [r for r in rows if r.cell.method == method]
+        x, y = _points(mine)
+        series.append(Series(method, x, y, "points"))
+    x, y = _points([r for r in ranking.front if r.result.step_s])
+    series.append(Series("Pareto front", x, y))
+    return Chart(
+        f"pareto_{i}",
+        f"Error against time per step{_under(ranking)}",
+        "time of one step / ms",
+        f"{study.by} / mm",
+        tuple(series),
+        log="xy",
+        caption="Each point is one cell: one method with one set of values, mean over the seeds.",
+    )
+
+
+def _points(rows: Sequence[Ranked]) -> tuple[np.ndarray, np.ndarray]:
+    x = np.array([_MM * (r.result.step_s or 0.0) for r in rows])
+    return x, np.array([_MM * r.score.mean for r in rows])
+
+
+# --- over the swept axes -------------------------------------------------------------------------
+
+
+def _over_axes(study: Study) -> Iterator[Exhibit]:
+    """Per method: NIS and error over its first two swept axes, or over the only one."""
+    charts: list[Chart] = []
+    heats: list[Heat] = []
+    words: list[str] = []
+    for method in study.plan.methods:
+        axes = [a for a in _axes_of(study, method) if len(a.values) > 1]
+        if not axes:
+            continue
+        fixed = _fixed(study, method, axes[2:])
+        cells = [c for c in _cells_of(study, method) if fixed.items() <= c.values.items()]
+        if fixed:
+            words.append(f"{method}: the other axes are held at {named(fixed)}, its best cell.")
+        if len(axes) == 1:
+            charts += _curves(study, method, axes[0], cells)
+        else:
+            heats += _heats(study, method, axes[0], axes[1], cells)
+    if charts or heats:
+        yield Exhibit(
+            "axes", "Over the swept values",
+            ("NIS per degree of freedom is 1 for a filter that knows how wrong it is; above it is "
+             "over-confident, below under-confident. It sees measured components only.", *words),
+            charts=tuple(charts), heats=tuple(heats),
+        )  # fmt: skip
+
+
+def _axes_of(study: Study, method: str) -> list[Axis]:
+    own = f"{METHODS}{method}."
+    mine = [a for a in study.plan.axes if a.path.startswith(own)]
+    return mine + [a for a in study.plan.axes if not a.path.startswith(METHODS)]
+
+
+def _cells_of(study: Study, method: str) -> list[Cell]:
+    return [c for c in study.plan.cells if c.method == method]
+
+
+def _fixed(study: Study, method: str, axes: Sequence[Axis]) -> dict[str, str]:
+    rows = [r for ranking in study.rankings for r in ranking.rows if r.cell.method == method]
+    if not rows or not axes:
+        return {}
+    best = min(rows, key=lambda r: r.score.mean).cell.values
+    return {a.path: best[a.path] for a in axes}
+
+
+def _value(study: Study, cell: Cell, what: str) -> float | None:
+    result = study.results.get(cell.key)
+    if result is None or result.failed:
+        return None
+    if what == NIS:
+        seen = consistency(result)
+        return seen.mean if seen else None
+    return _MM * float(np.mean(result.scores[what]))
+
+
+def _heats(study: Study, method: str, x: Axis, y: Axis, cells: Sequence[Cell]) -> Iterator[Heat]:
+    for what, label, centre in ((NIS, "NIS per dof / 1", 1.0), (study.by, "error / mm", None)):
+        at = {(c.values[x.path], c.values[y.path]): _value(study, c, what) for c in cells}
+        values = np.array([[_nan(at.get((i, j))) for i in x.values] for j in y.values])
+        if np.isfinite(values).any():
+            name = "nis" if what == NIS else "error"
+            yield Heat(
+                f"{name}_{method}", f"{method}: {'NIS' if what == NIS else what} over "
+                f"{_short(x.path)} and {_short(y.path)}", _short(x.path), _short(y.path),
+                x.values, y.values, values, label, centre,
+            )  # fmt: skip
+
+
+def _nan(value: float | None) -> float:
+    return np.nan if value is None else value
+
+
+def _curves(study: Study, method: str, axis: Axis, cells: Sequence[Cell]) -> Iterator[Chart]:
+    """Over an axis of numbers; other values have the ranking alone."""
+    numbers = _numbers(axis)
+    if numbers is None:
+        return
+    at = dict(zip(axis.values, numbers, strict=True))
+    log = "x" if min(numbers) > 0 and max(numbers) >= 20 * min(numbers) else ""
+    for what, label in ((NIS, "NIS per dof / 1"), (study.by, f"{study.by} / mm")):
+        pairs = sorted(
+            (at[c.values[axis.path]], value)
+            for c in cells
+            if (value := _value(study, c, what)) is not None
+        )
+        if len(pairs) < 2:
+            continue
+        x, y = (np.array(column) for column in zip(*pairs, strict=True))
+        scale = "xy" if log else "y"
+        name = "nis" if what == NIS else "error"
+        yield Chart(
+            f"{name}_{method}", f"{method}: {name.upper() if name == 'nis' else what} over "
+            f"{_short(axis.path)}", _short(axis.path), label, (Series(method, x, y),),
+            (("consistent", 1.0),) if what == NIS else (),
+            scale if y.min() > 0 else log,  # type: ignore[arg-type]
+        )  # fmt: skip
+
+
+def _numbers(axis: Axis) -> list[float] | None:
+    try:
+        return [float(v) for v in axis.values]
+    except ValueError:
+        return None
+
+
+# --- failures ------------------------------------------------------------------------------------
+
+
+def _failed_exhibit(study: Study) -> Exhibit | None:
+    rows = [
+        (c.method, named(c.settings), named(c.condition), why)
+        for ranking in study.rankings
+        for c, why in ranking.failed
+    ]
+    if not rows:
+        return None
+    head = ("method", "settings", "condition of the twin", "why")
+    title = f"{len(rows)} of {len(study.plan.cells)} cells failed"
+    table = NumberTable("failed", title, head, tuple(rows[:200]))
+    return Exhibit("failed", "Cells that failed", tables=(table,))

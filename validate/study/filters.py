@@ -1,0 +1,161 @@
+"""The filter sweep: every method and setting over common seeds, ranked with intervals.
+
+from validate.study.filters import study
+found = study("kf_cube", ["methods.kf_printed.Q=log:1e-12:1e-6:7"], methods=("kf_printed",))
+print(found.best[0].line)
+"""
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+from validate.errors import ComparisonError, UsageError
+from validate.parameters import nearest_names
+from validate.replay.find import find, root_of
+from validate.replay.options import AnyExperiment, Options
+from validate.study.outcome import CellResult, read_cells, write_cell
+from validate.study.plan import METHODS, Cell, Plan, plan
+from validate.study.ranking import Ranked, Ranking, rankings
+from validate.study.score import POOLED
+from validate.study.sweep import axes
+
+KIND = "study-filters"
+CELLS = "cells"
+SEEDS = 10  # common samples of the noise: a t interval of them is 2.3 standard errors wide
+
+Report = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Best:
+    """The winner of one condition, and the command that runs it."""
+
+    ranked: Ranked
+    line: str
+    ties: int
+
+
+@dataclass(frozen=True)
+class Study:
+    """All cells with their results by key, and the rankings by the score `by`, one a condition.
+
+    `reused` of them were finished before; `seconds` is what this call took.
+    """
+
+    plan: Plan
+    by: str
+    results: Mapping[str, CellResult]
+    rankings: tuple[Ranking, ...]
+    reused: int
+    seconds: float
+    workers: str
+
+    @property
+    def best(self) -> tuple[Best, ...]:
+        return tuple(_best(self.plan, r) for r in self.rankings if r.rows)
+
+    @property
+    def failed(self) -> int:
+        return sum(len(r.failed) for r in self.rankings)
+
+
+def study(
+    experiment: str | AnyExperiment,
+    sweeps: Sequence[str] = (),
+    *,
+    methods: tuple[str, ...] = (),
+    values: Mapping[str, str] | None = None,
+    seeds: int | tuple[int, ...] = SEEDS,
+    by: str = POOLED,
+    quick: bool = False,
+    out: Path | None = None,
+    workers: int | None = None,
+    scheduler: str = "",
+    report: Report | None = None,
+) -> Study:
+    """Runs what is not finished yet in `out`/<name>/study-filters/cells, and ranks everything.
+
+    `sweeps` as for `--sweep`, `values` as for `--set`; `out` is the folder of the reports. Raises
+    `UsageError` for bad names and values before anything runs, `ComparisonError` when no cell has
+    a score.
+    """
+    from validate.study.workers import Where, cores, run_all  # a second to import
+
+    start = perf_counter()
+    found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
+    planned = plan(found, Options(dict(values or {}), methods, quick), axes(sweeps), seeds)
+    folder = cells_folder(found, out)
+    folder.mkdir(parents=True, exist_ok=True)
+    before = read_cells(folder, planned.cells)
+    results = dict(before)
+    left = [c for c in planned.cells if c.key not in before]
+    tell = report or _silent
+
+    def done(cell: Cell, result: CellResult) -> None:
+        results[cell.key] = result
+        if result.lasting:
+            write_cell(folder, cell, result)
+        tell(len(results), len(planned.cells), cell.method)
+
+    tell(len(results), len(planned.cells), "workers")
+    run_all(planned.job, left, Where(workers, scheduler), done)
+    _require_score(planned, results, by)
+    named = f"Dask at {scheduler}" if scheduler else f"{workers or min(cores(), len(left))} local"
+    return Study(
+        planned,
+        by,
+        results,
+        rankings(planned.cells, results, by),
+        len(before),
+        perf_counter() - start,
+        named,
+    )
+
+
+def study_folder(experiment: AnyExperiment, out: Path | None) -> Path:
+    """`out`/<name>/study-filters, by default in the reports/ of the experiment's clone."""
+    reports = out or root_of(experiment, Path.cwd()) / "reports"
+    return reports / experiment.name / KIND
+
+
+def cells_folder(experiment: AnyExperiment, out: Path | None) -> Path:
+    return study_folder(experiment, out) / CELLS
+
+
+def _silent(done: int, total: int, text: str) -> None:
+    pass
+
+
+def _require_score(planned: Plan, results: Mapping[str, CellResult], by: str) -> None:
+    good = [r for r in results.values() if not r.failed]
+    if not good:
+        first = next(iter(results.values()))
+        raise ComparisonError(
+            f"all {len(results)} cells failed, 0 compared; the first: {first.failed}"
+        )
+    for result in good:
+        if by not in result.scores:
+            hint = nearest_names(by, set(result.scores))
+            raise UsageError(f"no score '{by}' to rank by; {hint}")
+
+
+def _best(planned: Plan, ranking: Ranking) -> Best:
+    first = ranking.rows[0]
+    ties = sum(r.tied for r in ranking.rows[1:])
+    return Best(first, run_line(planned, first.cell), ties)
+
+
+def run_line(planned: Plan, cell: Cell) -> str:
+    """The `validate run` command of a cell."""
+    values = {**dict(planned.job.values), **cell.values}
+    kept = {k: v for k, v in values.items() if _concerns(k, cell.method)}
+    parts = ["validate", "run", planned.experiment.name]
+    for path, value in kept.items():
+        parts += ["--set", f"{path}={value}"]
+    return shlex.join([*parts, "--methods", cell.method])
+
+
+def _concerns(path: str, method: str) -> bool:
+    return not path.startswith(METHODS) or path.startswith(f"{METHODS}{method}.")

@@ -1,0 +1,214 @@
+"""What a study will run: cells, each of one method with one set of values, over common seeds."""
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from validate.errors import UsageError
+from validate.parameters import describe, nearest_names, with_values
+from validate.replay.options import AnyExperiment, Options, configure
+from validate.replay.tracking import Tracking
+from validate.study.sweep import Axis, grid
+
+METHODS = "methods."
+_LIBRARIES = ("numpy", "scipy", "numba", "scikit-fem")
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all cells of a study share: the experiment's file, values set, quick, and the seeds."""
+
+    path: str
+    sha256: str
+    values: tuple[tuple[str, str], ...]
+    quick: bool
+    seed_path: str
+    seeds: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One method, its `settings` and the twin's `condition` as texts by path; `key` names all that
+    makes its numbers."""
+
+    method: str
+    settings: tuple[tuple[str, str], ...]
+    condition: tuple[tuple[str, str], ...]
+    key: str
+
+    @property
+    def values(self) -> dict[str, str]:
+        return dict(self.condition) | dict(self.settings)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The job and its cells, method by method in the order of the grid."""
+
+    experiment: Tracking
+    job: Job
+    axes: tuple[Axis, ...]
+    methods: tuple[str, ...]
+    cells: tuple[Cell, ...]
+
+
+def plan(
+    experiment: AnyExperiment, options: Options, axes: Sequence[Axis], seeds: int | tuple[int, ...]
+) -> Plan:
+    """Checks every path and value before anything runs.
+
+    `seeds`: so many from the twin's own seed on, or these. An axis of one method multiplies that
+    method's cells only. Raises `UsageError` for another kind of experiment, unknown paths (naming
+    the nearest), values of another type, methods without a sweep's name, and fewer than one seed.
+    """
+    if not isinstance(experiment, Tracking):
+        raise UsageError(
+            f"'{experiment.name}' has no time: filters are studied on experiments over time"
+        )
+    parameters, _ = configure(experiment, Options(options.values, (), options.quick))
+    methods = _methods(experiment, options.methods)
+    seed_path = _seed_path(parameters)
+    _require(axes, parameters, experiment.methods, methods, seed_path)
+    job = Job(
+        str(experiment.path),
+        file_sha256(Path(str(experiment.path))),
+        tuple(sorted(options.values.items())),
+        options.quick,
+        seed_path,
+        _seeds(seeds, parameters, seed_path),
+    )
+    cells = tuple(c for m in methods for c in _cells(experiment, job, m, axes))
+    return Plan(experiment, job, tuple(axes), methods, cells)
+
+
+def set_up(experiment: Tracking, job: Job, cell: Cell, seed: int) -> tuple[Any, Any]:
+    """Parameters with that seed, and the method's settings, of a cell."""
+    values = {**dict(job.values), **cell.values}
+    if job.seed_path:
+        values[job.seed_path] = str(seed)
+    parameters, methods = configure(experiment, Options(values, (cell.method,), job.quick))
+    return parameters, methods[cell.method]
+
+
+def file_sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@cache
+def code_sha256() -> str:
+    """Of this package's sources and the libraries' versions: what a stored cell rests on."""
+    found = hashlib.sha256()
+    root = Path(__file__).resolve().parents[1]
+    for path in sorted(root.rglob("*.py")):
+        found.update(path.relative_to(root).as_posix().encode())
+        found.update(path.read_bytes())
+    found.update(platform.python_version().encode())
+    found.update(" ".join(f"{name} {version(name)}" for name in _LIBRARIES).encode())
+    return found.hexdigest()
+
+
+def _cells(experiment: Tracking, job: Job, method: str, axes: Sequence[Axis]) -> list[Cell]:
+    own = f"{METHODS}{method}."
+    mine = [a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(own)]
+    found = []
+    for row in grid(mine):
+        settings = tuple((k, v) for k, v in row.items() if k.startswith(METHODS))
+        condition = tuple((k, v) for k, v in row.items() if not k.startswith(METHODS))
+        found.append(_keyed(experiment, job, method, settings, condition))
+    return found
+
+
+def _keyed(
+    experiment: Tracking,
+    job: Job,
+    method: str,
+    settings: tuple[tuple[str, str], ...],
+    condition: tuple[tuple[str, str], ...],
+) -> Cell:
+    """The key holds every parameter and setting of the method as the cell will have it."""
+    bare = Cell(method, settings, condition, "")
+    try:
+        made: Any = _described(*set_up(experiment, job, bare, job.seeds[0]))
+    except UsageError as error:  # a combination that settings refuse: a failed row later
+        made = str(error)
+    content = [job.sha256, code_sha256(), method, made, job.quick, job.seeds, settings, condition]
+    text = json.dumps(content, default=str)
+    return Cell(method, settings, condition, hashlib.sha256(text.encode()).hexdigest()[:32])
+
+
+def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
+    both = (*describe(parameters), *describe(settings, METHODS))
+    return [(p.path, repr(p.default)) for p in both]
+
+
+def _methods(experiment: Tracking, chosen: tuple[str, ...]) -> tuple[str, ...]:
+    """Those named, else all that step through the whole time."""
+    known = experiment.methods
+    for name in chosen:
+        if name not in known:
+            raise UsageError(f"unknown method '{name}'; {nearest_names(name, set(known))}")
+    whole = tuple(n for n, m in known.items() if getattr(m, "steps", None) is None)
+    short = [n for n in chosen if n not in whole]
+    if short:
+        raise UsageError(
+            f"method '{short[0]}' runs {known[short[0]].steps} steps only, to be timed: it has no "
+            "error; leave it out"
+        )
+    return chosen or whole
+
+
+def _seed_path(parameters: Any) -> str:
+    """The path of the twin's seed; "" where there is none."""
+    paths = [p.path for p in describe(parameters)]
+    return next((p for p in ("twin.seed", "seed") if p in paths), "")
+
+
+def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tuple[int, ...]:
+    count = seeds if isinstance(seeds, int) else len(seeds)
+    if count < 1:
+        raise UsageError(f"--seeds {seeds}: at least 1")
+    if not seed_path:
+        if count > 1:
+            raise UsageError(
+                f"{count} seeds, but the experiment has no parameter twin.seed; use --seeds 1"
+            )
+        return (0,)
+    if isinstance(seeds, tuple):
+        if len(set(seeds)) < count:
+            raise UsageError("a seed stands twice: that is no second sample")
+        return seeds
+    first = {p.path: p.default for p in describe(parameters)}[seed_path]
+    return tuple(range(int(first), int(first) + count))
+
+
+def _require(
+    axes: Sequence[Axis],
+    parameters: Any,
+    known: Mapping[str, Any],
+    methods: tuple[str, ...],
+    seed_path: str,
+) -> None:
+    for a in axes:
+        if a.path == seed_path:
+            raise UsageError(f"'{a.path}' is not swept: --seeds N repeats every cell N times")
+        if not a.path.startswith(METHODS):
+            _require_values(parameters, a.path, a)
+            continue
+        short = a.path.removeprefix(METHODS)
+        _require_values(known, short, a)
+        if short.partition(".")[0] not in methods:
+            raise UsageError(
+                f"'{a.path}' is swept, but the method is not among {', '.join(methods)}; add it to "
+                "--methods"
+            )
+
+
+def _require_values(settings: Any, path: str, axis: Axis) -> None:
+    for value in axis.values:
+        with_values(settings, {path: value})

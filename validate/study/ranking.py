@@ -1,0 +1,97 @@
+"""Which cells are best: ranked within a condition of the twin, ties stated, Pareto beside."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from validate.study.interval import Interval, interval, paired
+from validate.study.outcome import CellResult
+from validate.study.plan import Cell
+
+Condition = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A cell's place by one score; `overlaps` are the places whose intervals overlap its own.
+
+    `from_best` is its score less the best one's over common seeds; `tied` when that interval holds
+    zero, or there are too few seeds to say. `dominated_by` is the place of a cell with less error
+    and less time a step; None on the Pareto front.
+    """
+
+    place: int
+    cell: Cell
+    result: CellResult
+    score: Interval
+    overlaps: tuple[int, ...]
+    from_best: Interval
+    tied: bool
+    dominated_by: int | None
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """All cells of one condition, best first, and those that failed."""
+
+    condition: Condition
+    rows: tuple[Ranked, ...]
+    failed: tuple[tuple[Cell, str], ...]
+
+    @property
+    def front(self) -> tuple[Ranked, ...]:
+        """The Pareto front, fastest first."""
+        free = [r for r in self.rows if r.dominated_by is None]
+        return tuple(sorted(free, key=lambda r: (r.result.step_s or 0.0, r.place)))
+
+
+def rankings(
+    cells: Sequence[Cell], results: Mapping[str, CellResult], by: str
+) -> tuple[Ranking, ...]:
+    """One ranking per condition, in the order of the grid."""
+    conditions = dict.fromkeys(c.condition for c in cells)
+    return tuple(
+        _ranking(condition, [c for c in cells if c.condition == condition], results, by)
+        for condition in conditions
+    )
+
+
+def _ranking(
+    condition: Condition, cells: Sequence[Cell], results: Mapping[str, CellResult], by: str
+) -> Ranking:
+    done = [c for c in cells if c.key in results and not results[c.key].failed]
+    failed = [(c, results[c.key].failed) for c in cells if c.key in results and c not in done]
+    scores = {c.key: interval(results[c.key].scores[by]) for c in done}
+    order = sorted(done, key=lambda c: scores[c.key].mean)
+    rows = [
+        Ranked(
+            i + 1,
+            cell,
+            results[cell.key],
+            scores[cell.key],
+            _overlaps(i, [scores[c.key] for c in order]),
+            *_from_best(results[cell.key].scores[by], results[order[0].key].scores[by]),
+            _dominated(i, [results[c.key] for c in order], [scores[c.key] for c in order]),
+        )
+        for i, cell in enumerate(order)
+    ]
+    return Ranking(condition, tuple(rows), tuple(failed))
+
+
+def _overlaps(i: int, scores: Sequence[Interval]) -> tuple[int, ...]:
+    mine = scores[i]
+    return tuple(j + 1 for j, s in enumerate(scores) if j != i and mine.overlaps(s))
+
+
+def _from_best(mine: Sequence[float], best: Sequence[float]) -> tuple[Interval, bool]:
+    apart = paired(mine, best)
+    return apart, apart.half is None or abs(apart.mean) <= apart.half
+
+
+def _dominated(i: int, results: Sequence[CellResult], scores: Sequence[Interval]) -> int | None:
+    """The best-placed cell with at most this error and at most this time, one of them less."""
+    mine = (scores[i].mean, results[i].step_s or 0.0)
+    for j, result in enumerate(results):
+        other = (scores[j].mean, result.step_s or 0.0)
+        if j != i and other[0] <= mine[0] and other[1] <= mine[1] and other != mine:
+            return j + 1
+    return None

@@ -1,0 +1,199 @@
+"""Stored runs side by side: results.json files read again, nothing is run."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from validate.errors import ComparisonError, UsageError
+
+_LARGEST = 500_000_000  # bytes of a results.json: more is none of ours
+
+
+@dataclass(frozen=True)
+class StoredScore:
+    """A score as stored; value None with `why`."""
+
+    value: float | None
+    unit: str
+    count: int
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run read back: scores by (method, score), parameters (value, unit), recordings' sha256."""
+
+    name: str
+    experiment: str
+    created: str
+    methods: tuple[str, ...]
+    scores: Mapping[tuple[str, str], StoredScore]
+    parameters: Mapping[str, tuple[Any, str]]
+    recordings: tuple[str, ...]
+    quick: bool
+
+
+@dataclass(frozen=True)
+class Row:
+    """One score in every column, None where it has none; `changes` are relative to the first."""
+
+    method: str
+    score: str
+    unit: str
+    values: tuple[float | None, ...]
+
+    @property
+    def differences(self) -> tuple[float | None, ...]:
+        """Less the first value there is."""
+        first = next(v for v in self.values if v is not None)
+        return tuple(None if v is None else v - first for v in self.values)
+
+    @property
+    def changes(self) -> tuple[float | None, ...]:
+        """The differences over the first value; None where that is zero."""
+        first = next(v for v in self.values if v is not None)
+        return tuple(None if d is None or first == 0 else d / abs(first) for d in self.differences)
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """`columns` name what each value is of; parameters that differ, by path, text per run."""
+
+    runs: tuple[StoredRun, ...]
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+    parameters: Mapping[str, tuple[str, ...]]
+    warnings: tuple[str, ...]
+
+
+def read_run(path: Path) -> StoredRun:
+    """A report folder, or its results.json; raises `UsageError` for anything else."""
+    file = path / "results.json" if path.is_dir() else path
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise UsageError(f"{file}: {file.stat().st_size} bytes, at most {_LARGEST}")
+        content = json.loads(file.read_text(encoding="utf-8"))
+        return _run(path, content)
+    except OSError as error:
+        raise UsageError(
+            f"no stored run at {path}: {error.strerror}; name a report folder or its results.json"
+        ) from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(f"{file} is no results.json of validate: {error!r:.80}") from error
+
+
+def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
+    """Scores of methods that share a name; where no method does, of scores that do.
+
+    Raises `UsageError` for fewer than two runs, `ComparisonError` when no score is shared.
+    """
+    if len(runs) < 2:
+        raise UsageError(f"{len(runs)} run to compare: name two or more report folders")
+    runs = tuple(runs)
+    names = _distinct([r.name for r in runs])
+    columns, found = _by_method(runs, names)
+    if not found:
+        columns, found = _by_score(runs, names)
+    warnings = list(_warnings(runs, names))
+    rows = []
+    for (method, score), values in found:
+        units = {v.unit for v in values if v is not None}
+        if len(units) > 1:
+            label = f"{method} {score}".strip()
+            warnings.append(f"{label} is in {' and in '.join(sorted(units))}: not compared")
+        elif sum(v is not None and v.value is not None for v in values) >= 2:
+            shown = tuple(None if v is None else v.value for v in values)
+            rows.append(Row(method, score, units.pop(), shown))
+    if not rows:
+        have = "; ".join(
+            f"{n} has {len(r.scores)} scores" for n, r in zip(names, runs, strict=True)
+        )
+        raise ComparisonError(f"0 scores shared, nothing compared: {have}" + _also(warnings))
+    return SideBySide(runs, columns, tuple(rows), _parameters(runs), tuple(warnings))
+
+
+def _also(warnings: Sequence[str]) -> str:
+    return f"; {warnings[-1]}" if warnings else ""
+
+
+Found = list[tuple[tuple[str, str], list[StoredScore | None]]]
+
+
+def _by_method(
+    runs: tuple[StoredRun, ...], names: tuple[str, ...]
+) -> tuple[tuple[str, ...], Found]:
+    keys = dict.fromkeys(k for r in runs for k in r.scores)
+    shared = [k for k in keys if sum(k in r.scores for r in runs) >= 2]
+    return names, [(k, [r.scores.get(k) for r in runs]) for k in shared]
+
+
+def _by_score(runs: tuple[StoredRun, ...], names: tuple[str, ...]) -> tuple[tuple[str, ...], Found]:
+    """Columns are methods of runs; a score must be there in two of the runs."""
+    pairs = [(i, m) for i, r in enumerate(runs) for m in r.methods]
+    of_run = [{score for _, score in r.scores} for r in runs]
+    scores = dict.fromkeys(score for r in runs for _, score in r.scores)
+    shared = [s for s in scores if sum(s in own for own in of_run) >= 2]
+    columns = tuple(f"{names[i]}: {m}" for i, m in pairs)
+    return columns, [(("", s), [runs[i].scores.get((m, s)) for i, m in pairs]) for s in shared]
+
+
+def _warnings(runs: tuple[StoredRun, ...], names: tuple[str, ...]) -> list[str]:
+    found = []
+    if len({r.experiment for r in runs}) > 1:
+        found.append(f"different experiments: {', '.join(r.experiment for r in runs)}")
+    if len({r.recordings for r in runs}) > 1:
+        marks = (", ".join(s[:12] or "made in memory" for s in r.recordings) for r in runs)
+        pairs = "; ".join(f"{n} {m or 'none'}" for n, m in zip(names, marks, strict=True))
+        found.append(f"different recordings (sha256): {pairs}")
+    quick = [n for n, r in zip(names, runs, strict=True) if r.quick]
+    if quick:
+        found.append(f"quick runs, not to be quoted: {', '.join(quick)}")
+    for path in dict.fromkeys(p for r in runs for p in r.parameters):
+        units = {r.parameters[path][1] for r in runs if path in r.parameters}
+        if len(units) > 1:
+            found.append(f"parameter {path} is in {' and in '.join(sorted(units))}")
+    return found
+
+
+def _parameters(runs: tuple[StoredRun, ...]) -> dict[str, tuple[str, ...]]:
+    """Paths whose values differ, or that a run lacks, with every run's value as text."""
+    paths = dict.fromkeys(p for r in runs for p in r.parameters)
+    rows = {p: tuple(_shown(r.parameters.get(p)) for r in runs) for p in paths}
+    return {p: row for p, row in rows.items() if len(set(row)) > 1}
+
+
+def _shown(parameter: tuple[Any, str] | None) -> str:
+    if parameter is None:
+        return "–"
+    value, unit = parameter
+    text = f"{value:.10g}" if isinstance(value, float) else str(value)
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def _run(path: Path, content: dict[str, Any]) -> StoredRun:
+    methods = content["methods"]
+    return StoredRun(
+        (path.parent if path.is_file() else path).resolve().name,
+        str(content["experiment"]),
+        str(content["created"]),
+        tuple(str(m["name"]) for m in methods),
+        {(m["name"], s["name"]): _score(s) for m in methods for s in m["scores"]},
+        {k: (v["value"], v["unit"]) for k, v in content["parameters"].items()},
+        tuple(str(i["sha256"]) for i in content["inputs"]),
+        bool(content.get("quick", False)),
+    )
+
+
+def _score(stored: dict[str, Any]) -> StoredScore:
+    value = None if stored["value"] is None else float(stored["value"])
+    return StoredScore(value, str(stored["unit"]), int(stored["count"]), str(stored.get("why", "")))
+
+
+def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, numbered where two folders share one."""
+    return tuple(
+        name if names.count(name) == 1 else f"{name} ({names[: i + 1].count(name)})"
+        for i, name in enumerate(names)
+    )
