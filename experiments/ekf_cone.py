@@ -1,8 +1,8 @@
 """The Ecoflex cone on its testing machine: paper 003, section 3.4, at 0.15 N and at 15 N.
 
-The recording is a twin of quadratic neo-Hookean elements between bonded plates. Two kinds of models
-follow it: bodies moved by the tracked plate, which predict force and bulging, and the paper's, which
-are pushed by the measured force, with and without filters that see the plate's marker.
+The recording is a twin of quadratic neo-Hookean elements between bonded plates. Two kinds of
+models follow it: bodies moved by the tracked plate, which predict force and bulging, and the
+paper's, pushed by the measured force, with and without filters that see the plate's marker.
 """
 
 from dataclasses import dataclass, replace
@@ -221,7 +221,8 @@ def _ends(stage: Signal) -> tuple[Hold, Hold]:
 def stepper(method: Method, parameters: Parameters, system: System, seen: Registered) -> Stepper:
     p = parameters
     if method.plate:
-        return replace(method.settings, step=p.mesh.load_step).prepare(system)
+        quasi_static: Tabulated = replace(method.settings, step=p.mesh.load_step)
+        return quasi_static.prepare(system)
     dt = float(seen.stage.t[0])
     return method.follower().prepare(system, seen, dt=dt, substeps=p.clock.substeps)
 
@@ -285,7 +286,7 @@ EXPERIMENT = Tracking(
     published=published_cone,
     seed=TwinSettings().seed,
     twin_notice=(
-        "The recording is a twin: it shares its law with the bodies that the plate moves, not their "
-        "mesh; explicit runs have another law, element and loading."
+        "The recording is a twin: it shares its law with the bodies that the plate moves, not "
+        "their mesh; explicit runs have another law, element and loading."
     ),
 )

@@ -19,7 +19,7 @@ from validate.fem.system import System
 
 H = 2e-4  # s
 SD = 3e-5  # m
-PLAIN = 0.92  # mm: the error of the model 25 % too stiff on the small cube, stored
+PLAIN = 0.966  # mm: the error of the model 25 % too stiff on the small cube, stored
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +191,8 @@ def test_one_measured_node_corrects_the_whole_field_of_a_wrong_model(
     at all nodes, and a bias of a quarter of the load."""
     stiff, truth, measured, inputs = wrong_model
     settings = FORMS[form]
-    blind = run(settings.prepare(stiff, unmeasured(stiff)), H, inputs, 25)
+    alone = replace(settings, gain="recursive").prepare(stiff, unmeasured(stiff))
+    blind = run(alone, H, inputs, 25)
     seen = run(settings.prepare(stiff, measured), H, inputs, 25)
     assert error(blind.u, truth) == pytest.approx(PLAIN, abs=0.02)
     assert error(seen.u, truth) < error(blind.u, truth) / 8

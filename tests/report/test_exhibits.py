@@ -205,14 +205,14 @@ def test_maps_of_one_scale_share_their_colours_in_the_unit_shown() -> None:
     mesh = box((0.1, 0.1, 0.1), (1, 1, 1))
     ramp = mesh.nodes[:, 0]
     maps = [
-        NodeMap("a", "a", mesh, ramp, "m", "s"), NodeMap("b", "b", mesh, 3 * ramp, "m", "s"),
+        NodeMap("b", "b", mesh, 3 * ramp, "m", "s"), NodeMap("a", "a", mesh, ramp, "m", "s"),
         NodeMap("c", "c", mesh, ramp - 0.02, "m"), NodeMap("d", "d", mesh, 0 * ramp, "mm"),
     ]  # fmt: skip
     found = ranges(maps)
     assert found["s"] == pytest.approx((0.0, 300.0))
     assert found["c"] == pytest.approx((-80.0, 80.0))
     assert found["d"] == (0.0, 1.0)
-    assert values(maps[0]).max() == pytest.approx(100.0)
+    assert values(maps[1]).max() == pytest.approx(100.0)
 
 
 def test_captions_of_maps_have_units(made: dict[str, Section]) -> None:

@@ -14,6 +14,7 @@ from validate.scene.box import box
 from validate.scene.scene import Drive, Load, Material, Scene
 from validate.solve.linear_solvers import SolverName, solver_of
 from validate.solve.march import march
+from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import RuleName, excitation, propagation, rule_of
 from validate.solve.quasi_static import QuasiStatic
@@ -151,6 +152,19 @@ def test_the_quasi_static_force_is_that_of_the_response_columns() -> None:
     force = stepper.step(stepper.rest(), np.array([0.003])).numbers["press.force"]
     assert force == pytest.approx(0.003 * responses(system).reactions[0, 0], rel=1e-12)
     assert force > 0
+
+
+def test_a_load_on_the_plate_is_not_the_plates() -> None:
+    """A weight of 2 N on the driven side takes 2 N off what the plate has to push."""
+    scene = replace(driven().scene, loads=(Load("weight", "z1", (0.0, 0.0, -1.0)),))
+    system = build(scene)
+    for scheme in (QuasiStatic(), Newmark(), Modal()):
+        stepper = scheme.prepare(system)
+        bare, loaded = (
+            stepper.step(stepper.rest(), np.array([0.003, w])).numbers["press.force"]
+            for w in (0.0, 2.0)
+        )
+        assert bare - loaded == pytest.approx(2.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])

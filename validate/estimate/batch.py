@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats, checked
 from validate.errors import ComparisonError
+from validate.estimate.covariance import Gain
 from validate.estimate.displacement_filter import DisplacementStepper, InModes
 from validate.estimate.gains import GainSequence
 
@@ -66,6 +68,7 @@ class _Walk:
         self.stepper, self.modes, self.gains = stepper, modes, gains
         self.x, self.v, self.a = (np.zeros((n, seeds)) for _ in range(3))
         self.motion, self.loads, self.k = stepper.excitation.rest(), np.zeros(0), 0
+        self._last: tuple[Gain, tuple[NDArray[np.bool_], Floats, Floats, Floats]] | None = None
         self.fq, self.fv, self.fa, self.ff = (f[:, None] for f in modes.factors)
 
     def step(self, inputs: Floats, z: Floats) -> Floats:
@@ -90,13 +93,20 @@ class _Walk:
         motion = s.excitation.moved(self.motion, inputs[:drives])
         f = s.excitation.force(new, old, motion, self.motion)
         self.motion, self.loads, self.k = motion, new, self.k + 1
-        return self.modes.shapes.T @ f
+        return f
 
     def _corrected(self, prior: Floats, z: Floats) -> tuple[Floats, Floats]:
-        gain, s = self.gains.at(self.k), self.stepper.sensor
+        gain = self.gains.at(self.k)
         if gain is None:
             return prior, np.zeros(len(z))
-        i = np.array(gain.seen)
-        y = z.T[i] - s.H[i] @ prior - (s.driven[i] @ self.motion.q)[:, None]
-        nis = np.einsum("is,is->s", y, np.linalg.solve(gain.S_yy[np.ix_(i, i)], y))
-        return prior + gain.G @ y, nis
+        i, H, driven, inverse = self._read(gain)
+        y = z.T[i] - H @ prior - (driven @ self.motion.q)[:, None]
+        return prior + gain.G @ y, (y * (inverse @ y)).sum(axis=0)
+
+    def _read(self, gain: Gain) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
+        """Rows of the seen components and S_yy^-1; kept while the gain repeats."""
+        if self._last is None or self._last[0] is not gain:
+            i, s = np.array(gain.seen), self.stepper.sensor
+            inverse = np.linalg.inv(gain.S_yy[np.ix_(i, i)])
+            self._last = gain, (i, s.H[i], s.driven[i], inverse)
+        return self._last[1]

@@ -74,6 +74,8 @@ def best_gain(PHt: Floats, H: Floats, R: Floats, seen: tuple[bool, ...]) -> Gain
     """G = P H^T S_yy^-1 over the seen components, R (m,) m^2."""
     S_yy = H @ PHt + np.diag(R)
     S_yy = (S_yy + S_yy.T) / 2
+    if all(seen):
+        return Gain(np.ascontiguousarray(cho_solve(cho_factor(S_yy), PHt.T).T), S_yy, seen)
     i = np.array(seen)
     factor = cho_factor(S_yy[np.ix_(i, i)])
     return Gain(np.ascontiguousarray(cho_solve(factor, PHt[:, i].T).T), S_yy, seen)

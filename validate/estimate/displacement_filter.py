@@ -31,7 +31,11 @@ class Coordinates(Protocol):
     """In what the state (n,) is kept: nodal displacements or modal amplitudes."""
 
     def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
-        """x' under forces f (m,) N on the free unknowns."""
+        """x' under forces f (n,) in these coordinates."""
+        ...
+
+    def forces(self, f: Floats) -> Floats:
+        """Forces (m, k) N on the free unknowns, in these coordinates (n, k)."""
         ...
 
     def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]: ...
@@ -57,6 +61,9 @@ class Nodal:
 
     def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
         return self.propagation.predict(x, v, a, f)
+
+    def forces(self, f: Floats) -> Floats:
+        return f
 
     def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
         return self.propagation.rates(new, x, v, a)
@@ -90,7 +97,10 @@ class InModes:
 
     def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
         fq, fv, fa, ff = self.factors
-        return np.asarray(fq * x + fv * v + fa * a + ff * (self.shapes.T @ f))
+        return fq * x + fv * v + fa * a + ff * f
+
+    def forces(self, f: Floats) -> Floats:
+        return np.ascontiguousarray(self.shapes.T @ f)
 
     def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
         return self.rule.rates(new, x, v, a)
@@ -146,7 +156,8 @@ class DisplacementStepper(InertialStepper):
     """One filter step: predict, correct where something was measured, recurse v and a.
 
     With `gains` they were computed before; without, the covariance is recursed at every step. It
-    is recursed in the coordinates `claimed`; `starts` (n, l) are accelerations at rest per newton.
+    is recursed in the coordinates `claimed`; `excitation` is in `coordinates`, and so are `starts`
+    (n, l), accelerations at rest per newton.
     """
 
     coordinates: Coordinates
@@ -158,11 +169,12 @@ class DisplacementStepper(InertialStepper):
     starts: Floats | None
     recursion: Recursion
     claimed: Coordinates
+    settled: float
     _claims: Claims = field(init=False)
     _spread: "Spread" = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_claims", Claims(self.covariance, self.when))
+        object.__setattr__(self, "_claims", Claims(self.covariance, self.when, self.settled))
         object.__setattr__(self, "_spread", Spread(self.claimed, self.covariance))
 
     def rest(self) -> State:

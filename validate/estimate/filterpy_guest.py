@@ -65,22 +65,27 @@ def ensemble(model: LinearModel) -> Any:
     return guest
 
 
+_BOUND = ("fx", "hx", "model", "inv")
+
+
 class _Ensemble(EnsembleKalmanFilter):  # type: ignore[misc]
     def __init__(self, model: LinearModel) -> None:
-        self.loads = np.zeros(model.B.shape[1])
+        self.model, self.loads = model, np.zeros(model.B.shape[1])
         m = len(model.H)
         super().__init__(
             model.x0, model.P0, m, 1.0, _MEMBERS, lambda x: model.H @ x, lambda x, _: self._moved(x)
         )
-        self.model = model
 
     def _moved(self, x: Floats) -> Floats:
         return self.model.F @ x + self.model.B @ self.loads
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "_Ensemble":
-        other = _Ensemble(self.model)  # its functions must be bound to the copy
-        own = {k: v for k, v in vars(self).items() if k not in ("fx", "hx", "model")}
-        other.__dict__.update(copy.deepcopy(own, memo))
+        """Without drawing anew; its functions are bound to the copy."""
+        other = object.__new__(_Ensemble)
+        other.__dict__.update(self.__dict__)
+        own = {k: copy.deepcopy(v, memo) for k, v in self.__dict__.items() if k not in _BOUND}
+        other.__dict__.update(own)
+        other.fx = lambda x, _: other._moved(x)
         return other
 
     def predict(self, u: Floats) -> None:

@@ -10,9 +10,9 @@ from validate.arrays import Floats
 from validate.estimate.covariance import Claim, Covariance, Gain, Recursion
 from validate.estimate.measured import Timetable
 
-# Change of the gain from one measurement to the next, of its largest entry, below which it is
-# taken as settled: with a memory of a hundred measurements 1e-7 is left, below every noise here.
-SETTLED = 1e-9
+# Change of the gain from one measurement to the next, of its largest entry, at which it is taken as
+# settled: with a memory of a hundred measurements 1e-4 is left of it, below every noise's effect.
+SETTLED = 1e-6
 
 Seen = tuple[bool, ...]
 
@@ -101,8 +101,10 @@ class Claims:
     A whole covariance per step would not fit in memory; only the walk's place is kept.
     """
 
-    def __init__(self, covariance: Covariance, when: Mapping[int, Seen]) -> None:
-        self._covariance, self._when = covariance, when
+    def __init__(
+        self, covariance: Covariance, when: Mapping[int, Seen], tolerance: float = SETTLED
+    ) -> None:
+        self._covariance, self._when, self._tolerance = covariance, when, tolerance
         self._walk: Iterator[Event]
         self._ahead: Event | None
         self._claim: Claim
@@ -121,6 +123,6 @@ class Claims:
         return self._claim
 
     def _restart(self) -> None:
-        self._walk = events(self._covariance, self._when)
+        self._walk = events(self._covariance, self._when, self._tolerance)
         self._claim, self._step = self._covariance.start(), 0
         self._ahead = next(self._walk, None)

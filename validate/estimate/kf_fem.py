@@ -7,7 +7,7 @@ range of the reference over steps 1 to 500. P is kept symmetric. White Q carries
 node that is not measured; `structure="load"` does.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -34,6 +34,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic import StartName, reactions, require_linear
 from validate.solve.newmark_rule import (
+    Excitation,
     Rule,
     RuleName,
     excitation,
@@ -63,6 +64,7 @@ class DisplacementNoise:
     structure: Structure = quantity("white", "1", "where the model errs")
     gains: Gains = quantity("shared", "1", "computed beforehand, or at every step")
     rule: RuleName = quantity("average", "1", "Newmark's rule")
+    settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
 
     def __post_init__(self) -> None:
@@ -97,7 +99,7 @@ class KfFem(DisplacementNoise):
             covariance = self._dense(system, measurements, nodal)
             return stepper_of(self, system, measurements, nodal, covariance, nodal, None)
         claimed, covariance = self._shared(system, measurements, nodal)
-        gains = shared_gains(covariance, timetable(measurements, self.dt))
+        gains = shared_gains(covariance, timetable(measurements, self.dt), self.settled)
         in_nodes = gains.mapped(claimed.free)
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
 
@@ -117,11 +119,11 @@ class KfFem(DisplacementNoise):
         return modes, modal_covariance(self, system, measurements, modes)
 
 
-def shared_gains(covariance: Covariance, table: Timetable) -> GainSequence:
+def shared_gains(covariance: Covariance, table: Timetable, settled: float) -> GainSequence:
     """All gains of the measurements, from the narrowest recursion that gives them."""
     when = schedule(table)
     narrow = observed(covariance, max(when, default=1)) if isinstance(covariance, Modal) else None
-    return gain_sequence(narrow or covariance, when)
+    return gain_sequence(narrow or covariance, when, settled)
 
 
 def in_modes(system: System, rule: Rule) -> InModes:
@@ -170,7 +172,7 @@ def stepper_of(
         system,
         reactions(system),
         coordinates,
-        excitation(system, rule),
+        excitation_in(coordinates, excitation(system, rule)),
         covariance,
         Sensor(measurements.names, table, seen, np.asarray(measurements.H @ system.moves)),
         schedule(table),
@@ -178,6 +180,19 @@ def stepper_of(
         None if starts is None else coordinates.amplitudes(starts),
         settings.recursion,
         claimed,
+        settings.settled,
+    )
+
+
+def excitation_in(coordinates: Coordinates, nodal: Excitation) -> Excitation:
+    """What inputs do, in the coordinates: forces are linear in its columns."""
+    of = coordinates.forces
+    return replace(
+        nodal,
+        loads=of(nodal.loads),
+        stiffness=of(nodal.stiffness),
+        damping=of(nodal.damping),
+        mass=of(nodal.mass),
     )
 
 

@@ -41,5 +41,5 @@ class ModalKf(DisplacementNoise):
         """`prepare` with modes that are known: many settings of one system share them."""
         covariance = modal_covariance(self, system, measurements, modes)
         table = timetable(measurements, self.dt)
-        gains = shared_gains(covariance, table) if self.gains == "shared" else None
+        gains = shared_gains(covariance, table, self.settled) if self.gains == "shared" else None
         return stepper_of(self, system, measurements, modes, covariance, modes, gains)

@@ -74,7 +74,7 @@ class ReducedEKF:
         jumps = {int(gap): model.over(int(gap)) for gap in np.unique(gaps)}
         fixed = None
         if self.gain == "steady" and len(gaps):
-            fixed = steady(model, int(np.median(gaps)))
+            fixed = steady(jumps[int(np.median(gaps))], model)
         return ReducedStepper(
             self, steps, measurements.names, measurements.H, times, model, jumps, fixed, refusal
         )
@@ -169,13 +169,11 @@ class Steady:
     P: Floats
 
 
-def steady(model: ReducedModel, gap: int) -> Steady:
-    """That of updates every `gap` explicit steps; raises `ComparisonError` where there is none."""
-    s, one = len(model.P0), model.one
-    linear = LinearModel(
-        one.A, np.zeros((s, 0)), model.H, one.Q, model.R, np.zeros(s), model.P0
-    )  # fmt: skip
-    P = steady_claim(linear, gap).P
+def steady(jump: Jump, model: ReducedModel) -> Steady:
+    """That of updates a `jump` apart; raises `ComparisonError` where there is none."""
+    s = len(model.P0)
+    Q, none = (jump.Q + jump.Q.T) / 2, np.zeros((s, 0))
+    P = steady_claim(LinearModel(jump.A, none, model.H, Q, model.R, np.zeros(s), model.P0)).P
     G = model.gain(P)
     return Steady(G, model.updated(P, G))
 

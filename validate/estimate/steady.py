@@ -43,6 +43,7 @@ class ReducedKf:
     load_walk: float = quantity(0.1, "N/s^0.5", "random walk of every load's bias")
     load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
     R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+    settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
     gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or where it settles")
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
@@ -54,7 +55,9 @@ class ReducedKf:
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         model = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
         table = timetable(measurements, self.dt)
-        core = _core(model, table, steady=self.gains == "steady")
+        core = (
+            _steady(model, table) if self.gains == "steady" else _exact(model, table, self.settled)
+        )
         return CoreStepper(system, reactions(system), core, measurements.names, table)
 
 
@@ -138,13 +141,16 @@ class GainCore:
         return {f"load_bias.{j}": (float(b), "N") for j, b in enumerate(biases)}
 
 
-def _core(reduced: ReducedModel, table: Timetable, *, steady: bool) -> GainCore:
+def _exact(reduced: ReducedModel, table: Timetable, settled: float) -> GainCore:
+    when, covariance = schedule(table), dense_covariance(reduced.model)
+    gains = gain_sequence(covariance, when, settled).gains
+    claims = Claims(covariance, when, settled)
+    return GainCore(reduced, covariance, gains, claims, reduced.model.P0)
+
+
+def _steady(reduced: ReducedModel, table: Timetable) -> GainCore:
     when, model = schedule(table), reduced.model
-    covariance = dense_covariance(model)
-    if not steady:
-        gains = gain_sequence(covariance, when).gains
-        return GainCore(reduced, covariance, gains, Claims(covariance, when), model.P0)
-    claim = steady_claim(model, _interval(when))
+    covariance, claim = dense_covariance(model), steady_claim(model, _interval(when))
     every = {seen: best_gain(claim.PHt, model.H, covariance.R, seen) for seen in {*when.values()}}
     _, after = covariance.update(claim, (True,) * len(model.H))
     by_step = {step: every[seen] for step, seen in when.items()}

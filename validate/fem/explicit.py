@@ -6,6 +6,7 @@ The element loops are in `fem.explicit_kernels`; this is their packing and their
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from scipy import sparse
@@ -19,6 +20,8 @@ from validate.fem.surface import foundation_stiffness
 from validate.scene.mesh import cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
 
+RowName = Literal["u", "d", "r", "old", "v", "a"]
+_ROWS: tuple[RowName, ...] = get_args(RowName)
 _LAWS = {"svk": SVK, "neo_hooke": NEO_HOOKE}
 
 
@@ -38,25 +41,9 @@ class Motion:
 
     rows: Floats
 
-    @property
-    def u(self) -> Floats:
-        return self.rows[0]
-
-    @property
-    def d(self) -> Floats:
-        return self.rows[1]
-
-    @property
-    def r(self) -> Floats:
-        return self.rows[2]
-
-    @property
-    def v(self) -> Floats:
-        return self.rows[4]
-
-    @property
-    def a(self) -> Floats:
-        return self.rows[5]
+    def __getitem__(self, name: RowName) -> Floats:
+        row: Floats = self.rows[_ROWS.index(name)]
+        return row
 
 
 @dataclass(frozen=True)
@@ -99,7 +86,7 @@ class ExplicitBody:
     def force(self, u: Floats) -> Floats:
         """Internal nodal forces (N,) N."""
         f = self._pull(u)
-        kernels.add_forces(self.law, self.geometry, self.cells, u, f, self.work)
+        kernels.add_forces(self.law, self.geometry, self.cells, _own(u), f, self.work)
         return f
 
     def tangent_diagonal(self, u: Floats) -> Floats:
@@ -128,14 +115,14 @@ class ExplicitBody:
     def tangent_product(self, u: Floats, v: Floats) -> Floats:
         """K_t(u) v (N,) N."""
         f = self._pull(v)
-        kernels.add_products(self.law, self.geometry, self.cells, u, v, f, self.work)
+        kernels.add_products(self.law, self.geometry, self.cells, _own(u), _own(v), f, self.work)
         return f
 
     def look(self, u: Floats) -> Look:
         """Stored energy and det F of all cells: not for every step."""
         count = len(self.scene.mesh.cells)
         energy, least, inverted = kernels.looked_at(
-            self.law, count, self.geometry, self.cells, u, self.work
+            self.law, count, self.geometry, self.cells, _own(u), self.work
         )
         return Look(energy + float(u @ self._pull(u)) / 2, least, inverted, count)
 
@@ -152,8 +139,10 @@ class ExplicitBody:
         work, taken, size = kernels.advance(
             self.law, self.geometry, self.cells, self._rows, rows,
             rule.keep, rule.gain, rule.lag, rule.dt,
-            rule.held, rule.moves, rule.loaded, rule.loads, begin, end, substeps, self.work,
+            rule.held, rule.moves, rule.loaded, rule.loads, _own(begin), _own(end), substeps,
+            self.work,
         )  # fmt: skip
+        rows.setflags(write=False)
         return Motion(rows), work, taken, math.isfinite(size)
 
     def _pull(self, u: Floats) -> Floats:
@@ -161,7 +150,12 @@ class ExplicitBody:
         return np.asarray(self.springs @ u) if self.springs.nnz else np.zeros(self.size)
 
     def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
-        kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, u, f, d, self.work)
+        kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, _own(u), f, d, self.work)
+
+
+def _own(x: Floats) -> Floats:
+    """x, or a copy that the kernels are compiled for: each kind of array would be compiled anew."""
+    return x if x.flags.carray else np.array(x, dtype=np.float64, order="C")
 
 
 def _require(scene: Scene) -> None:

@@ -10,7 +10,7 @@ The numpy reference is `fem.hyperelastic.Body`.
 """
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -163,17 +163,23 @@ def _first_svk(H: Nine, a: float, b: float) -> Nine:
 
 
 @_inlined
-def _first_neo_hooke(H: Nine, a: float, b: float) -> Nine:
-    """V P = b J^(-2/3) (F - tr C/3 F^-T) + a/2 (J^2 - 1) F^-T, a = V kappa, b = V mu.
+def _shares(H: Nine, dJ: float, y: float, a: float, b: float) -> Three:
+    """i, h, k of V P = i I + h H + k (cof F - I), y = J^(-1/3).
 
-    Written so that nothing of order 1 cancels at small strain.
+    This is b J^(-2/3) (F - tr C/3 F^-T) + a/2 (J^2 - 1) F^-T, a = V kappa, b = V mu, without the
+    differences of numbers near 1 that it has at small strain.
     """
-    dJ, K = _volume(H)
-    y = _inverse_cube_root(1 + dJ)
     shear = b * y * y * (y * y * y)
     t = (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
     bulk = 0.5 * a * dJ * (dJ + 2) * (y * y * y)
-    h, k, i = shear * (1 + dJ), bulk - shear * (1 + t), shear * (dJ - t) + bulk
+    return shear * (dJ - t) + bulk, shear * (1 + dJ), bulk - shear * (1 + t)
+
+
+@_inlined
+def _first_neo_hooke(H: Nine, a: float, b: float) -> Nine:
+    """V P."""
+    dJ, K = _volume(H)
+    i, h, k = _shares(H, dJ, _inverse_cube_root(1 + dJ), a, b)
     return (
         i + h * H[0] + k * K[0], h * H[1] + k * K[1], h * H[2] + k * K[2],
         h * H[3] + k * K[3], i + h * H[4] + k * K[4], h * H[5] + k * K[5],
@@ -212,32 +218,41 @@ def _load(w: Floats, geometry: Floats, block: int) -> None:
 
 
 @_inlined
+def _corners(cells: Cells, block: int, l: int) -> tuple[Any, Any, Any, Any]:
+    """First unknowns of a cell's nodes. Unsigned: a sign would be tested for at every access."""
+    return (
+        np.uint64(cells[block, 0, l]),
+        np.uint64(cells[block, 1, l]),
+        np.uint64(cells[block, 2, l]),
+        np.uint64(cells[block, 3, l]),
+    )
+
+
+@_inlined
 def _gather(w: Floats, at: int, cells: Cells, block: int, u: Floats) -> None:
     """Edges u_a - u_0 of the block's cells, rows 3 i + a - 1 from `at`."""
     for l in range(LANES):
-        n0, n1 = cells[block, 0, l], cells[block, 1, l]
-        n2, n3 = cells[block, 2, l], cells[block, 3, l]
+        n0, n1, n2, n3 = _corners(cells, block, l)
         for i in range(3):
-            x = u[n0 + i]
-            w[at + 3 * i * LANES + l] = u[n1 + i] - x
-            w[at + (3 * i + 1) * LANES + l] = u[n2 + i] - x
-            w[at + (3 * i + 2) * LANES + l] = u[n3 + i] - x
+            c, o = np.uint64(i), at + 3 * i * LANES + l
+            x = u[n0 + c]
+            w[o] = u[n1 + c] - x
+            w[o + LANES] = u[n2 + c] - x
+            w[o + 2 * LANES] = u[n3 + c] - x
 
 
 @_inlined
 def _scatter(w: Floats, cells: Cells, block: int, f: Floats) -> None:
     """Adds what `_put_forces` left; node 0 takes minus the sum of the others."""
     for l in range(LANES):
-        n0, n1 = cells[block, 0, l], cells[block, 1, l]
-        n2, n3 = cells[block, 2, l], cells[block, 3, l]
+        n0, n1, n2, n3 = _corners(cells, block, l)
         for i in range(3):
-            f1 = w[_OUT + 3 * i * LANES + l]
-            f2 = w[_OUT + (3 * i + 1) * LANES + l]
-            f3 = w[_OUT + (3 * i + 2) * LANES + l]
-            f[n1 + i] += f1
-            f[n2 + i] += f2
-            f[n3 + i] += f3
-            f[n0 + i] -= f1 + f2 + f3
+            c, o = np.uint64(i), _OUT + 3 * i * LANES + l
+            f1, f2, f3 = w[o], w[o + LANES], w[o + 2 * LANES]
+            f[n1 + c] += f1
+            f[n2 + c] += f2
+            f[n3 + c] += f3
+            f[n0 + c] -= f1 + f2 + f3
 
 
 @_compiled
@@ -254,15 +269,27 @@ def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w
 
 
 @_inlined
-def _gradient(G: Nine, node: int) -> Three:
-    """dN/dX of a node; node 0 takes minus the sum of the others."""
-    if node == 0:
-        return -(G[0] + G[3] + G[6]), -(G[1] + G[4] + G[7]), -(G[2] + G[5] + G[8])
-    if node == 1:
-        return G[0], G[1], G[2]
-    if node == 2:
-        return G[3], G[4], G[5]
-    return G[6], G[7], G[8]
+def _row(A: Nine, a: int) -> Three:
+    return A[3 * a], A[3 * a + 1], A[3 * a + 2]
+
+
+@_inlined
+def _plus(x: Three, y: Three) -> Three:
+    return x[0] + y[0], x[1] + y[1], x[2] + y[2]
+
+
+@_inlined
+def _rest(x: Three, y: Three, z: Three) -> Three:
+    """What node 0 has: minus the sum of the others."""
+    return -(x[0] + y[0] + z[0]), -(x[1] + y[1] + z[1]), -(x[2] + y[2] + z[2])
+
+
+@_inlined
+def _put_force(w: Floats, l: int, a: int, f: Three) -> None:
+    """V P g of node a + 1, in the rows of `_put_forces`."""
+    w[_OUT + a * LANES + l] = f[0]
+    w[_OUT + (a + 3) * LANES + l] = f[1]
+    w[_OUT + (a + 6) * LANES + l] = f[2]
 
 
 @_inlined
@@ -274,65 +301,114 @@ def _put_block(w: Floats, o: int, rows: int, block: Six) -> None:
 
 
 @_inlined
+def _node_svk(
+    w: Floats, o: int, rows: int, g: Three, q: Three, s: float, ab: float, b: float, B: Six
+) -> None:
+    """V (g.S g I + (lambda + mu) q q^T + mu |g|^2 F F^T) of one node, q = F g, s = V g.S g."""
+    m = b * _dot(g, g)
+    x, y, z = ab * q[0], ab * q[1], ab * q[2]
+    block = (
+        s + x * q[0] + m * B[0],
+        s + y * q[1] + m * B[1],
+        s + z * q[2] + m * B[2],
+        x * q[1] + m * B[3],
+        x * q[2] + m * B[4],
+        y * q[2] + m * B[5],
+    )
+    _put_block(w, o, rows, block)
+
+
+@_inlined
+def _left(F: Nine) -> Six:
+    """F F^T as xx, yy, zz, xy, xz, yz."""
+    x, y, z = _row(F, 0), _row(F, 1), _row(F, 2)
+    return _dot(x, x), _dot(y, y), _dot(z, z), _dot(x, y), _dot(x, z), _dot(y, z)
+
+
+@_inlined
 def _tangents_svk(w: Floats, rows: int) -> None:
-    """V (g.S g I + (lambda + mu) (F g)(F g)^T + mu |g|^2 F F^T) of every node, and the forces."""
+    """The nodes' own blocks of the tangent, and the forces V F S g."""
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
         H = _product(_matrix(w, _U + l), G)
         F, S = _deformation(H), _second(H, a, b)
-        _put_forces(w, l, _product(F, S), G)
-        B = _product(F, _transposed(F))
-        for node in range(4):
-            g = _gradient(G, node)
-            q, s, m = _times(F, g), _dot(g, _times(S, g)), b * _dot(g, g)
-            block = (
-                s + (a + b) * q[0] * q[0] + m * B[0],
-                s + (a + b) * q[1] * q[1] + m * B[4],
-                s + (a + b) * q[2] * q[2] + m * B[8],
-                (a + b) * q[0] * q[1] + m * B[1],
-                (a + b) * q[0] * q[2] + m * B[2],
-                (a + b) * q[1] * q[2] + m * B[5],
-            )
-            _put_block(w, _TANGENTS + node * 6 * LANES + l, rows, block)
+        B, o = _left(F), _TANGENTS + l
+        g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
+        q1, q2, q3 = _times(F, g1), _times(F, g2), _times(F, g3)
+        t1, t2, t3 = _times(S, g1), _times(S, g2), _times(S, g3)
+        _put_force(w, l, 0, _times(F, t1))
+        _put_force(w, l, 1, _times(F, t2))
+        _put_force(w, l, 2, _times(F, t3))
+        g0, q0, t0 = _rest(g1, g2, g3), _rest(q1, q2, q3), _rest(t1, t2, t3)
+        _node_svk(w, o, rows, g0, q0, _dot(g0, t0), a + b, b, B)
+        _node_svk(w, o + 6 * LANES, rows, g1, q1, _dot(g1, t1), a + b, b, B)
+        _node_svk(w, o + 12 * LANES, rows, g2, q2, _dot(g2, t2), a + b, b, B)
+        _node_svk(w, o + 18 * LANES, rows, g3, q3, _dot(g3, t3), a + b, b, B)
+
+
+@_inlined
+def _node_neo_hooke(
+    w: Floats, o: int, rows: int, g: Three, q: Three, h: Three, m: float, c: float, k: float
+) -> None:
+    """m |g|^2 I + c h h^T - k/2 (q h^T + h q^T) of one node, q = F g, h = cof(F) g."""
+    s = m * _dot(g, g)
+    x, y, z = c * h[0] - k * q[0], c * h[1] - k * q[1], c * h[2] - k * q[2]
+    block = (
+        s + x * h[0],
+        s + y * h[1],
+        s + z * h[2],
+        0.5 * (x * h[1] + y * h[0]),
+        0.5 * (x * h[2] + z * h[0]),
+        0.5 * (y * h[2] + z * h[1]),
+    )
+    _put_block(w, o, rows, block)
 
 
 @_inlined
 def _tangents_neo_hooke(w: Floats, rows: int) -> None:
-    """m |g|^2 I + c h h^T - 2/3 m (q h^T + h q^T), h = F^-T g, q = F g, and the forces."""
+    """The nodes' own blocks of the tangent, and the forces V P g."""
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
         H = _product(_matrix(w, _U + l), G)
-        _put_forces(w, l, _first_neo_hooke(H, a, b), G)
-        F, (dJ, K) = _deformation(H), _volume(H)
+        dJ, K = _volume(H)
         y = _inverse_cube_root(1 + dJ)
-        m, third = b * y * y, 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
-        c = 5 / 3 * m * third + 0.5 * a * (2 + dJ * (dJ + 2))
-        for node in range(4):
-            g = _gradient(G, node)
-            q, h = _times(F, g), _times(_deformation(K), g)
-            h = h[0] * y * y * y, h[1] * y * y * y, h[2] * y * y * y
-            k = 4 / 3 * m
-            r = c * h[0] - k * q[0], c * h[1] - k * q[1], c * h[2] - k * q[2]
-            s = m * _dot(g, g)
-            block = (
-                s + r[0] * h[0],
-                s + r[1] * h[1],
-                s + r[2] * h[2],
-                0.5 * (r[0] * h[1] + r[1] * h[0]),
-                0.5 * (r[0] * h[2] + r[2] * h[0]),
-                0.5 * (r[1] * h[2] + r[2] * h[1]),
-            )
-            _put_block(w, _TANGENTS + node * 6 * LANES + l, rows, block)
+        i, h, k = _shares(H, dJ, y, a, b)
+        g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
+        q1, q2, q3 = _times(H, g1), _times(H, g2), _times(H, g3)
+        h1, h2, h3 = _times(K, g1), _times(K, g2), _times(K, g3)
+        _put_force(w, l, 0, _mixed(i, g1, h, q1, k, h1))
+        _put_force(w, l, 1, _mixed(i, g2, h, q2, k, h2))
+        _put_force(w, l, 2, _mixed(i, g3, h, q3, k, h3))
+        q1, q2, q3 = _plus(g1, q1), _plus(g2, q2), _plus(g3, q3)
+        h1, h2, h3 = _plus(g1, h1), _plus(g2, h2), _plus(g3, h3)
+        g0, q0, h0 = _rest(g1, g2, g3), _rest(q1, q2, q3), _rest(h1, h2, h3)
+        third = 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
+        m, inverse, o = b * y * y, y * y * y, _TANGENTS + l
+        c = (5 / 3 * m * third + 0.5 * a * (2 + dJ * (dJ + 2))) * inverse * inverse
+        k = 4 / 3 * m * inverse
+        _node_neo_hooke(w, o, rows, g0, q0, h0, m, c, k)
+        _node_neo_hooke(w, o + 6 * LANES, rows, g1, q1, h1, m, c, k)
+        _node_neo_hooke(w, o + 12 * LANES, rows, g2, q2, h2, m, c, k)
+        _node_neo_hooke(w, o + 18 * LANES, rows, g3, q3, h3, m, c, k)
+
+
+@_inlined
+def _mixed(a: float, x: Three, b: float, y: Three, c: float, z: Three) -> Three:
+    return (
+        a * x[0] + b * y[0] + c * z[0],
+        a * x[1] + b * y[1] + c * z[1],
+        a * x[2] + b * y[2] + c * z[2],
+    )
 
 
 @_inlined
 def _scatter_blocks(w: Floats, cells: Cells, block: int, rows: int, d: Floats) -> None:
-    """Adds the nodes' blocks to d, `rows` numbers a node."""
+    """Adds the nodes' blocks to d, `rows` numbers a node: 3 or 6."""
     for l in range(LANES):
         for node in range(4):
-            at = cells[block, node, l] // 3 * rows
+            n = np.uint64(cells[block, node, l] * (rows // 3))
             for k in range(rows):
-                d[at + k] += w[_TANGENTS + (node * 6 + k) * LANES + l]
+                d[n + np.uint64(k)] += w[_TANGENTS + (node * 6 + k) * LANES + l]
 
 
 @_compiled

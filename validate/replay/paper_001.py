@@ -61,7 +61,7 @@ def _nrmse(
     reference = followed.truth.probes["node_A"][:, 2]
     off = batch.values[..., 0] - reference
     rms: Floats = np.sqrt((off**2).mean(axis=1))
-    return rms / float(np.ptp(reference))
+    return np.asarray(rms / np.ptp(reference))
 
 
 def _noisy(followed: Followed) -> Floats:
@@ -84,7 +84,7 @@ def _raw(parameters: Any, followed: Followed) -> Floats:
     reference = followed.truth.probes["node_A"][:, 2]
     off = _noisy(followed)[..., 2] - reference
     rms: Floats = np.sqrt((off**2).mean(axis=1))
-    return rms / float(np.ptp(reference))
+    return np.asarray(rms / np.ptp(reference))
 
 
 def _interval(values: Floats) -> tuple[float, float]:

@@ -37,8 +37,8 @@ EXPLICIT, FILTER, REDUCED, IMPLICIT = (
 INTEGRATORS = (
     Integrator(EXPLICIT, lambda s, _, dt: CentralDifference(dt, watch=10_000).prepare(s)),
     Integrator(FILTER, lambda s, z, dt: NodeEKF(dt).prepare(s, z)),
-    Integrator(REDUCED, lambda s, z, dt: ReducedEKF(dt).prepare(s, z), most=20_000),
-    Integrator(IMPLICIT, lambda s, _, dt: NewtonDynamics(dt).prepare(s), PRINTED_STEP, 2000),
+    Integrator(REDUCED, lambda s, z, dt: ReducedEKF(dt).prepare(s, z), None, 100, 20_000),
+    Integrator(IMPLICIT, lambda s, _, dt: NewtonDynamics(dt).prepare(s), PRINTED_STEP, 1, 2000),
 )
 
 

@@ -22,7 +22,7 @@ _NU = (0.45, 0.49, 0.499, 0.4995)
 
 
 def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
-    """Signal against noise, ranking where there is one, elements, inertia, readings of the force."""
+    """Signal against noise, ranking where there is one, elements, inertia, force readings."""
     main = cases[""]
     explicit = main["nfem"]
     progress("readings of the force")
@@ -110,7 +110,9 @@ def _ranking(main: Mapping[str, Followed]) -> NumberTable:
     }
     rms = {k: [_MM * float(np.sqrt((e.values**2).mean())) for e in v] for k, v in errors.items()}
     ordered = sorted(rms.items(), key=lambda item: item[1][0])
-    rows = tuple((i + 1, label, *values) for i, (label, values) in enumerate(ordered))
+    rows: tuple[tuple[Entry, ...], ...] = tuple(
+        (i + 1, label, *values) for i, (label, values) in enumerate(ordered)
+    )
     return NumberTable(
         "ranking",
         "At 15 N, by the error of u_z at node B on the side, which no filter is given.",

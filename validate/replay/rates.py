@@ -28,12 +28,13 @@ _SECONDS = 0.4  # of stepping per row, enough for a median
 
 @dataclass(frozen=True)
 class Integrator:
-    """`make` prepares steps of dt s on a system; `dt` None: as explicit schemes may. `most` cells
-    beyond which it is not run."""
+    """`make` prepares steps of dt s on a system; `dt` None: as explicit schemes may. It is run on
+    meshes of `least` to `most` cells."""
 
     label: str
     make: Callable[[System, Measurements, float], Stepper]
     dt: float | None = None
+    least: int = 1
     most: int = 200_000
 
 
@@ -57,7 +58,7 @@ def measured_rates(
         critical = _critical(system)
         given = _looks(system, _SAFE * critical)
         for one in integrators:
-            if len(system.scene.mesh.cells) > one.most:
+            if not one.least <= len(system.scene.mesh.cells) <= one.most:
                 continue
             dt = one.dt or _SAFE * critical
             seconds = _timed(one.make(system, given, dt), len(system.scene.inputs))

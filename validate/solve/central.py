@@ -146,10 +146,10 @@ class CentralStepper:
         """Compiles: no step is charged with it."""
         inputs = np.zeros(len(self.scene.inputs))
         self.body.advance(self.start.motion, self.rule, inputs, inputs, 1)
-        self.body.look(self.start.motion.u)
+        self.body.look(self.start.motion["u"])
 
     def rest(self) -> State:
-        u, inputs = self.start.motion.u, np.zeros(len(self.scene.inputs))
+        u, inputs = self.start.motion["u"], np.zeros(len(self.scene.inputs))
         seen = self._seen(self.start, self.body.look(u))
         numbers = {**seen, **self._forces(u, inputs)}
         return State(
@@ -174,10 +174,10 @@ class CentralStepper:
         if k % self.settings.watch == 0 or k == 1:
             new, seen, failure = self._watched(new, k)
             numbers |= seen
-        numbers |= self._forces(motion.r, inputs)
+        numbers |= self._forces(motion["r"], inputs)
         return State(
-            inputs, NOTHING, substeps, NO_SURFACE, failure, motion.u, numbers, k,
-            motion.v, motion.a, new,
+            inputs, NOTHING, substeps, NO_SURFACE, failure, motion["u"], numbers, k,
+            motion["v"], motion["a"], new,
         )  # fmt: skip
 
     def _forces(self, r: Floats, inputs: Floats) -> Mapping[str, float]:
@@ -195,7 +195,7 @@ class CentralStepper:
     ) -> tuple[Past, Mapping[str, float], tuple[Ending, str] | None]:
         """The state half a step before, where all energies are known: numbers, and what fails."""
         past = self.limited(past)
-        look = self.body.look(past.motion.u - past.motion.d / 2)
+        look = self.body.look(past.motion["u"] - past.motion["d"] / 2)
         seen = self._seen(past, look)
         pushed = self._pushed(past.motion)
         excess = seen["energy.strain"] + seen["energy.kinetic"] + past.taken - past.work - pushed
@@ -214,12 +214,12 @@ class CentralStepper:
 
     def _pushed(self, motion: Motion) -> float:
         """Energy J that half an increment of the prescribed motion holds, and not yet its work."""
-        change = motion.r - self.body.force(motion.u - motion.d)
-        return float(motion.d[self.held] @ change[self.held]) / 8
+        change = motion["r"] - self.body.force(motion["u"] - motion["d"])
+        return float(motion["d"][self.held] @ change[self.held]) / 8
 
     def limited(self, past: Past) -> Past:
         """The critical step of the body as it is deformed now, if that has changed much."""
-        u, size = past.motion.u, float(np.ptp(self.scene.mesh.nodes, axis=0).max())
+        u, size = past.motion["u"], float(np.ptp(self.scene.mesh.nodes, axis=0).max())
         if np.isfinite(past.limit) and np.abs(u - past.limit_u).max() < _DEFORMED * size:
             return past
         full, free = np.zeros(len(u)), self.system.free
@@ -233,7 +233,7 @@ class CentralStepper:
         return replace(past, limit=limit, limit_u=u)
 
     def _seen(self, past: Past, look: Look) -> dict[str, float]:
-        d = past.motion.d[self.system.free]
+        d = past.motion["d"][self.system.free]
         kinetic = float(self.masses @ (d * d)) / (2 * self.rule.dt**2)
         return {
             "energy.strain": look.energy,

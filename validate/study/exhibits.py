@@ -9,7 +9,7 @@ from validate.estimate.consistency import Consistency, nis_consistency
 from validate.study.filters import Study
 from validate.study.outcome import CellResult
 from validate.study.plan import METHODS, Cell
-from validate.study.ranking import Ranked, Ranking
+from validate.study.ranking import SAME_TIME, Ranked, Ranking
 from validate.study.score import NIS
 from validate.study.sweep import Axis
 
@@ -171,20 +171,21 @@ def _dominated(ranking: Ranking) -> Iterator[str]:
     beaten = [m for m in methods if m not in front]
     if beaten:
         yield (
-            f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times of "
-            "one step differ by some percent from run to run: look at the chart before dropping "
-            "one that lies near."
+            f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times that "
+            f"differ by less than {SAME_TIME:g} times count as equal: that is noise of the clock."
         )
 
 
 def _pareto_chart(study: Study, ranking: Ranking, i: int) -> Chart:
-    rows = [r for r in ranking.rows if r.result.step_s]
+    rows = [r for r in ranking.rows if r.result.step_s and r.score.mean > 0]
+    exact = len(ranking.rows) - len(rows)
+    none = f" Not drawn: {exact} without any error." if exact else ""
     series = []
     for method in dict.fromkeys(r.cell.method for r in rows):
         mine = [r for r in rows if r.cell.method == method]
         x, y = _points(mine)
         series.append(Series(method, x, y, "points"))
-    x, y = _points([r for r in ranking.front if r.result.step_s])
+    x, y = _points([r for r in ranking.front if r in rows])
     series.append(Series("Pareto front", x, y))
     return Chart(
         f"pareto_{i}",
@@ -193,7 +194,7 @@ def _pareto_chart(study: Study, ranking: Ranking, i: int) -> Chart:
         f"{study.by} / mm",
         tuple(series),
         log="xy",
-        caption="Each point is one cell: one method with one set of values, mean over the seeds.",
+        caption=f"A point is one cell: a method with one set of values, mean over the seeds.{none}",
     )
 
 
@@ -289,7 +290,7 @@ def _curves(study: Study, method: str, axis: Axis, cells: Sequence[Cell]) -> Ite
             for c in cells
             if (value := _value(study, c, what)) is not None
         )
-        if len(pairs) < 2:
+        if len({y for _, y in pairs}) < 2:
             continue
         x, y = (np.array(column) for column in zip(*pairs, strict=True))
         scale = "xy" if log else "y"

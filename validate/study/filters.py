@@ -17,7 +17,7 @@ from validate.replay.find import find, root_of
 from validate.replay.options import AnyExperiment, Options
 from validate.study.outcome import CellResult, read_cells, write_cell
 from validate.study.plan import METHODS, Cell, Plan, plan
-from validate.study.ranking import Ranked, Ranking, rankings
+from validate.study.ranking import Ranked, Ranking, rankings, tied
 from validate.study.score import POOLED
 from validate.study.sweep import axes
 
@@ -30,7 +30,8 @@ Report = Callable[[int, int, str], None]
 
 @dataclass(frozen=True)
 class Best:
-    """The winner of one condition, and the command that runs it."""
+    """The best filter of one condition, the command that runs it, and how many filters' cells
+    cannot be told from it."""
 
     ranked: Ranked
     line: str
@@ -142,9 +143,11 @@ def _require_score(planned: Plan, results: Mapping[str, CellResult], by: str) ->
 
 
 def _best(planned: Plan, ranking: Ranking) -> Best:
-    first = ranking.rows[0]
-    ties = sum(r.tied for r in ranking.rows[1:])
-    return Best(first, run_line(planned, first.cell), ties)
+    """The first filter (what has innovations); the first of all where there is none."""
+    filters = [r for r in ranking.rows if r.result.nis is not None]
+    rows = filters or list(ranking.rows)
+    ties = sum(tied(r.scores, rows[0].scores)[1] for r in rows[1:])
+    return Best(rows[0], run_line(planned, rows[0].cell), ties)
 
 
 def run_line(planned: Plan, cell: Cell) -> str:

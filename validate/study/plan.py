@@ -72,7 +72,7 @@ def plan(
             f"'{experiment.name}' has no time: filters are studied on experiments over time"
         )
     parameters, _ = configure(experiment, Options(options.values, (), options.quick))
-    methods = _methods(experiment, options.methods)
+    methods = _methods(experiment, options.methods, axes)
     seed_path = _seed_path(parameters)
     _require(axes, parameters, experiment.methods, methods, seed_path)
     job = Job(
@@ -147,8 +147,10 @@ def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
     return [(p.path, repr(p.default)) for p in both]
 
 
-def _methods(experiment: Tracking, chosen: tuple[str, ...]) -> tuple[str, ...]:
-    """Those named, else all that step through the whole time."""
+def _methods(
+    experiment: Tracking, chosen: tuple[str, ...], axes: Sequence[Axis]
+) -> tuple[str, ...]:
+    """Those named, else those whose settings are swept, else all that run the whole time."""
     known = experiment.methods
     for name in chosen:
         if name not in known:
@@ -160,7 +162,8 @@ def _methods(experiment: Tracking, chosen: tuple[str, ...]) -> tuple[str, ...]:
             f"method '{short[0]}' runs {known[short[0]].steps} steps only, to be timed: it has no "
             "error; leave it out"
         )
-    return chosen or whole
+    swept = [a.path.split(".")[1] for a in axes if a.path.startswith(METHODS)]
+    return chosen or tuple(n for n in whole if n in swept) or whole
 
 
 def _seed_path(parameters: Any) -> str:

@@ -7,6 +7,9 @@ from validate.study.interval import Interval, interval, paired
 from validate.study.outcome import CellResult
 from validate.study.plan import Cell
 
+# Medians of one step on a machine that does other things too: closer than this is the same time.
+SAME_TIME = 1.25
+
 Condition = tuple[tuple[str, str], ...]
 
 
@@ -16,7 +19,7 @@ class Ranked:
 
     `from_best` is its score less the best one's over common seeds; `tied` when that interval holds
     zero, or there are too few seeds to say. `dominated_by` is the place of a cell with less error
-    and less time a step; None on the Pareto front.
+    and less time a step (see `SAME_TIME`); None on the Pareto front.
     """
 
     place: int
@@ -27,6 +30,7 @@ class Ranked:
     from_best: Interval
     tied: bool
     dominated_by: int | None
+    scores: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,9 @@ def _ranking(
             results[cell.key],
             scores[cell.key],
             _overlaps(i, [scores[c.key] for c in order]),
-            *_from_best(results[cell.key].scores[by], results[order[0].key].scores[by]),
+            *tied(results[cell.key].scores[by], results[order[0].key].scores[by]),
             _dominated(i, [results[c.key] for c in order], [scores[c.key] for c in order]),
+            results[cell.key].scores[by],
         )
         for i, cell in enumerate(order)
     ]
@@ -82,16 +87,21 @@ def _overlaps(i: int, scores: Sequence[Interval]) -> tuple[int, ...]:
     return tuple(j + 1 for j, s in enumerate(scores) if j != i and mine.overlaps(s))
 
 
-def _from_best(mine: Sequence[float], best: Sequence[float]) -> tuple[Interval, bool]:
+def tied(mine: Sequence[float], best: Sequence[float]) -> tuple[Interval, bool]:
+    """`mine` less `best` over common seeds, and whether that interval holds zero (or there is none:
+    one seed tells nothing)."""
     apart = paired(mine, best)
     return apart, apart.half is None or abs(apart.mean) <= apart.half
 
 
 def _dominated(i: int, results: Sequence[CellResult], scores: Sequence[Interval]) -> int | None:
-    """The best-placed cell with at most this error and at most this time, one of them less."""
-    mine = (scores[i].mean, results[i].step_s or 0.0)
+    """The best-placed cell with less error in at most this time, or this error in less time; times
+    within `SAME_TIME` are equal."""
+    error, time = scores[i].mean, results[i].step_s or 0.0
     for j, result in enumerate(results):
-        other = (scores[j].mean, result.step_s or 0.0)
-        if j != i and other[0] <= mine[0] and other[1] <= mine[1] and other != mine:
+        other, other_time = scores[j].mean, result.step_s or 0.0
+        better = other < error and other_time <= SAME_TIME * time
+        faster = other <= error and SAME_TIME * other_time < time
+        if j != i and (better or faster):
             return j + 1
     return None

@@ -1,12 +1,14 @@
 """A linear filter turned so that all seeds can share one walk: modal coordinates, gains beforehand.
 
-The estimates stay what they are to rounding; only the order of the work changes.
+The estimates stay what they are, to rounding and to the filter's own `settled`; only the order of
+the work changes.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.covariance import Dense, Modal
 from validate.estimate.displacement_filter import DisplacementStepper, InModes, Nodal
@@ -25,7 +27,7 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
         covariance = _turned(covariance, modes)
     gains, starts, nodal = stepper.gains, stepper.starts, isinstance(stepper.coordinates, Nodal)
     if gains is None:
-        gains = shared_gains(covariance, stepper.sensor.table)
+        gains = shared_gains(covariance, stepper.sensor.table, stepper.settled)
     elif nodal:
         gains = gains.mapped(modes.amplitudes)
     return replace(
@@ -41,6 +43,16 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
 
 def _turned(nodal: Dense, modes: InModes) -> Modal:
     """The recursion of nodal displacements in amplitudes, its transition diagonal."""
-    Q, P0 = (modes.amplitudes(modes.amplitudes(X).T) for X in (nodal.Q, nodal.P0))
+    Q = modes.amplitudes(modes.amplitudes(nodal.Q).T)
+    P0 = _scaled(nodal.P0, nodal.Q, Q)
+    if P0 is None:
+        P0 = modes.amplitudes(modes.amplitudes(nodal.P0).T)
     H = np.ascontiguousarray(nodal.H @ modes.shapes)
     return Modal(modes.factors[0], Q, H, nodal.R, P0)
+
+
+def _scaled(one: Floats, other: Floats, turned: Floats) -> Floats | None:
+    """`one` turned, where it is a multiple of `other`; spares two products of whole matrices."""
+    largest = float(np.abs(other).max())
+    factor = float(np.abs(one).max()) / largest if largest else 0.0
+    return factor * turned if np.array_equal(one, factor * other) else None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import dask
-from distributed import Client, LocalCluster, as_completed
+import distributed
 from distributed.scheduler import KilledWorker
 
 from validate.errors import UsageError
@@ -21,6 +21,7 @@ _AHEAD = 2  # tasks a worker: one that runs and one that waits
 # One thread each: two workers with two BLAS threads would only stand in each other's way.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
+_dask: Any = distributed  # its calls carry no annotations
 Done = Callable[[Cell, CellResult], None]
 
 
@@ -52,7 +53,7 @@ def cores() -> int:
 def _client(where: Where, cells: int) -> Iterator[Any]:
     if where.scheduler:
         try:
-            client = Client(where.scheduler, timeout="10s")
+            client = _dask.Client(where.scheduler, timeout="10s")
         except (OSError, ValueError) as error:
             raise UsageError(f"no scheduler at {where.scheduler}: {error}") from error
         with client:
@@ -67,7 +68,7 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
     }
     with (
         dask.config.set(settings),
-        LocalCluster(
+        _dask.LocalCluster(
             n_workers=count,
             threads_per_worker=1,
             processes=True,
@@ -75,14 +76,14 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
         ) as cluster,
-        Client(cluster) as client,
+        _dask.Client(cluster) as client,
     ):
         yield client
 
 
 def _drain(client: Any, job: Job, cells: list[Cell], done: Done) -> None:
     """Keeps every worker busy with tasks of about `TASK_S`, single cells at first."""
-    waiting, sent, pool = list(reversed(cells)), dict[str, tuple[Cell, ...]](), as_completed()
+    waiting, sent, pool = list(reversed(cells)), dict[str, tuple[Cell, ...]](), _dask.as_completed()
     spent, finished = 0.0, 0
 
     def send(batch: tuple[Cell, ...]) -> None:

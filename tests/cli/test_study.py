@@ -1,0 +1,73 @@
+"""`validate study filters` on a cluster: folder, terminal, exit codes."""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from validate.cli.main import BAD_INPUT, run
+from validate.report.store import schema
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
+from study_samples import experiment_file
+
+SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11", "--sweep", "twin.noise=1e-11,1e-10")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the experiment and its finished study."""
+    folder = tmp_path_factory.mktemp("study")
+    arguments = ["study", "filters", str(experiment_file(folder)), *SWEEPS, "--seeds", "3"]
+    assert run([*arguments, "--workers", "1"]) == 0
+    return folder
+
+
+def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
+    folder = made / "reports" / "pulled" / "study-filters"
+    content = json.loads((folder / "results.json").read_text("utf-8"))
+    jsonschema.validate(content, schema())
+    assert len(list((folder / "cells").glob("*.json"))) == 4
+    with (folder / "tables" / "cells.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(r["all.rmse_m"]) > 0 for r in rows] == [True] * 4
+    assert {p.name for p in (folder / "figures").iterdir()} >= {
+        "heat_nis_kf.png", "heat_error_kf.png", "chart_pareto_1.png",
+    }  # fmt: skip
+    page = (folder / "report.html").read_text("utf-8")
+    assert "cannot tell" in page or "worse" in page
+    for best in content["study"]["best"]:
+        assert best["command"].startswith("validate run pulled --set twin.noise=1e-1")
+        assert best["command"] in page.replace("​", "")
+
+
+def test_the_best_line_runs(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import shlex
+
+    folder = made / "reports" / "pulled" / "study-filters"
+    content = json.loads((folder / "results.json").read_text("utf-8"))
+    words = shlex.split(content["study"]["best"][0]["command"])[1:]
+    words[1] = str(made / "experiments" / "pulled.py")
+    run([*words, "--out", str(made / "reports"), "--json"])
+    values = {
+        s["name"]: s["value"] for s in json.loads(capsys.readouterr().out)["methods"][0]["scores"]
+    }
+    cell = next(c for c in content["study"]["cells"] if c["values"]["twin.noise"] == "1e-11")
+    assert values["top.rmse"] == pytest.approx(cell["scores"]["top.rmse"]["mean"], rel=2)
+    assert folder.is_dir()  # a new report leaves the studies below it
+
+
+def test_bad_input_is_one_line(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(made / "experiments" / "pulled.py")
+    for arguments, said in (
+        (["--sweep", "methods.kf.QQ=1,2"], "nearest: kf.Q"),
+        (["--seeds", "many"], "--seeds many"),
+        (["--scheduler", "tcp://127.0.0.1:9"], "no scheduler"),
+    ):
+        assert run(["study", "filters", file, *arguments]) == BAD_INPUT
+        error = capsys.readouterr().err
+        assert said in error
+        assert error.count("\n") == 1

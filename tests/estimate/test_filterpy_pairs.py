@@ -1,0 +1,86 @@
+"""filterpy as oracle and as guest: exact pairs, shape checks in front."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from cubes import case
+
+from validate.errors import ComparisonError
+from validate.estimate.filterpy_guest import GUESTS, Guest, kalman
+from validate.estimate.filterpy_oracle import OracleRow, oracle_table
+from validate.estimate.linear_model import LinearModel
+from validate.estimate.steady import ReducedKf
+
+
+@pytest.mark.parametrize("row", oracle_table(), ids=lambda r: r.pair)
+def test_our_filters_are_filterpys_to_rounding(row: OracleRow) -> None:
+    assert row.steps == 60
+    assert row.difference < 1e-12
+
+
+def test_a_guest_is_our_own_filter_to_rounding() -> None:
+    pulled = case()
+    seen = pulled.measured(1, every=2)
+    ours = pulled.march(ReducedKf(modes=5, settled=0.0).prepare(pulled.system, seen))
+    # The unscented one subtracts G S G^T from P and has no form that keeps its digits.
+    for name, rounding in (("KalmanFilter", 1e-9), ("UnscentedKalmanFilter", 1e-3)):
+        run = pulled.march(Guest(name).prepare(pulled.system, seen))
+        assert np.abs(run.u - ours.u).max() < rounding * np.abs(ours.u).max()
+        assert run.sd is not None
+        assert ours.sd is not None
+        assert np.abs(run.sd - ours.sd).max() < rounding * ours.sd.max()
+
+
+def test_a_guest_that_draws_repeats_itself_and_leaves_the_generator_alone() -> None:
+    pulled = case()
+    guest = Guest("EnsembleKalmanFilter")
+    before = np.random.get_state()[1].copy()  # type: ignore[union-attr,index]  # noqa: NPY002
+    runs = [pulled.march(guest.prepare(pulled.system, pulled.measured(1))) for _ in range(2)]
+    assert np.array_equal(runs[0].u, runs[1].u)
+    assert np.array_equal(before, np.random.get_state()[1])  # type: ignore[index]  # noqa: NPY002
+    assert pulled.nrmse(runs[0]) < 0.1
+
+
+def broken(name: str, value: Any) -> Callable[[LinearModel], Any]:
+    def make(model: LinearModel) -> Any:
+        guest = kalman(model)
+        setattr(guest, name, value(model.size))
+        return guest
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("x", lambda n: np.zeros((n, 1)), r"x: shape \(\d+, 1\), expected"),
+        ("P", lambda n: np.eye(n - 1), r"P: shape .* expected"),
+        ("P", lambda n: np.triu(np.ones((n, n))), "guest P: differs from its transpose"),
+        ("F", lambda n: np.eye(n + 1), r"F: shape .* expected"),
+        ("R", lambda _: np.eye(2), r"R: shape \(2, 2\), expected \(3, 3\)"),
+        ("H", lambda n: np.zeros((2, n)), r"H: shape .* expected"),
+        ("Q", lambda n: np.full((n, n), np.nan), "Q: not finite"),
+    ],
+)
+def test_a_guest_of_wrong_shape_is_refused(name: str, value: Any, says: str) -> None:
+    pulled = case()
+    with pytest.raises(ComparisonError, match=says):
+        Guest(broken(name, value)).prepare(pulled.system, pulled.measured(1))
+
+
+def test_unknown_guests_and_what_is_no_filter() -> None:
+    pulled = case()
+    with pytest.raises(ComparisonError, match=f"by name: {', '.join(GUESTS)}"):
+        Guest("Kalman").prepare(pulled.system, pulled.measured(1))
+    with pytest.raises(ComparisonError, match=r"dict.x: shape None"):
+        Guest(lambda _: {}).prepare(pulled.system, pulled.measured(1))
+
+
+def test_models_are_checked_at_the_door() -> None:
+    one = np.eye(2)
+    with pytest.raises(ComparisonError, match=r"model Q: shape \(3, 3\), expected \(2, 2\)"):
+        LinearModel(one, one, one, np.eye(3), one, np.zeros(2), one)
+    with pytest.raises(ComparisonError, match="model P0: differs from its transpose"):
+        LinearModel(one, one, one, one, one, np.zeros(2), np.array([[1.0, 1], [0, 1]]))

@@ -1,0 +1,76 @@
+"""Measurements: shapes at the door, and the steps on which they land."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cubes import DT, case
+
+from validate.errors import ComparisonError
+from validate.estimate.innovation import innovation
+from validate.estimate.measured import timetable
+
+
+def test_measurements_land_on_the_nearest_step() -> None:
+    seen = case().measured(1, every=5)
+    jittered = replace(seen, t=seen.t + 0.009 * DT * np.array([1, -1] * 6))
+    table = timetable(jittered, DT)
+    assert sorted(table.z) == list(range(5, 61, 5))
+    assert table.at(6) is None
+    assert np.array_equal(table.z[10], seen.z[1])
+
+
+def test_rows_without_a_value_and_rest_are_left_out() -> None:
+    seen = case().measured(1, every=5)
+    z = seen.z.copy()
+    z[2], z[3, 1] = np.nan, np.nan
+    table = timetable(replace(seen, z=z, t=seen.t - seen.t[0]), DT)
+    assert table.at_rest == 1
+    assert 10 not in table.z
+    assert np.isnan(table.z[15]).tolist() == [False, True, False]
+
+
+def test_a_step_that_does_not_meet_the_times_is_refused_with_one_that_does() -> None:
+    seen = case().measured(1, every=5)
+    with pytest.raises(
+        ComparisonError, match=r"0\.33 steps of 0\.003 s off .* take dt = 0\.0025 s"
+    ):
+        timetable(seen, 0.003)
+    assert len(timetable(seen, 0.0025).z) == 12
+    irregular = replace(seen, t=np.sort(np.random.default_rng(0).uniform(0.01, 1, 12)))
+    with pytest.raises(ComparisonError, match="resample the recording"):
+        timetable(irregular, DT)
+
+
+def test_two_measurements_in_a_step_are_refused() -> None:
+    seen = case().measured(1)
+    with pytest.raises(
+        ComparisonError,
+        match=r"60 measurements land on 1 steps of 0.01 s; take a step of at most 1e-06 s",
+    ):
+        timetable(replace(seen, t=0.01 + 1e-6 * np.arange(60)), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"sd": np.zeros(3)}, "sd 0 m: it must be positive"),
+        ({"names": ("a",)}, "1 names for 3 measured"),
+        ({"t": np.ones(60)}, "times must rise"),
+        ({"z": np.zeros((3, 60))}, r"z \[m\]: shape \(3, 60\), expected \(60, 3\)"),
+        ({"z": np.full((60, 3), np.inf)}, "not finite"),
+    ],
+)
+def test_wrong_measurements_are_refused(change: dict, says: str) -> None:  # type: ignore[type-arg]
+    with pytest.raises(ComparisonError, match=says):
+        replace(case().measured(1), **change)
+
+
+def test_an_innovation_by_hand() -> None:
+    """y = (2, -, 3), S of the seen pair [[2, 1], [1, 2]]: y S^-1 y = (8 - 12 + 18) / 3."""
+    S = np.array([[2.0, 9, 1], [9, 50, 9], [1, 9, 2]])
+    found = innovation(np.array([3.0, np.nan, 4.0]), np.ones(3), S)
+    assert found.y.tolist() == [2, 0, 3]
+    assert found.nis == pytest.approx(14 / 3)
+    assert found.dof == 2
+    assert found.sd == pytest.approx([np.sqrt(2), 0, np.sqrt(2)])

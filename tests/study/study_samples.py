@@ -1,0 +1,122 @@
+"""A small experiment over time, as a file: a block pulled upward, one filter, one solver."""
+
+from pathlib import Path
+
+TEXT = '''
+"""A block of 27 nodes that is pulled; its top is measured."""
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from validate.estimate.kf_fem import KfFem
+from validate.estimate.measured import measurements
+from validate.fem.system import build as build_system
+from validate.parameters import quantity
+from validate.recording.types import Signal
+from validate.register.observe import Hold, Registered
+from validate.register.placed import placed
+from validate.replay.tracking import Tracking, Truth
+from validate.scene.box import box
+from validate.scene.scene import Load, Material, Probe, Scene, Support
+from validate.solve.march import march
+from validate.solve.newmark import Newmark
+from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+
+STEPS, DT = 40, 0.01
+FIXED = {n: np.array(x) for n, x in
+         {"a": (0.0, 0.0, 0.0), "b": (0.02, 0.0, 0.0), "c": (0.0, 0.02, 0.0)}.items()}
+
+
+@dataclass(frozen=True)
+class Twin:
+    seed: int = quantity(5, "1", "seed of the noise")
+    noise: float = quantity(1e-10, "m2", "variance")
+    stiffness: float = quantity(1.0, "1", "its modulus over the models'")
+    missing: float = quantity(0.0, "1", "share of looks that miss a marker")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    twin: Twin = Twin()
+
+
+@dataclass(frozen=True)
+class Filter:
+    label: str = "filter"
+    Q: float = quantity(1e-11, "m2", "process noise")
+    R: float | None = quantity(None, "m2", "measurement noise")
+    gains: str = quantity("shared", "1", "shared or every_step")
+    trap: str = quantity("", "1", "raise, or wait for a file")
+
+
+@dataclass(frozen=True)
+class Solver:
+    label: str = "solver"
+
+
+def scene(E):
+    return Scene(box((0.02, 0.02, 0.02), (2, 2, 2)),
+                 Material(E, 0.4, "linear", 1000.0, 0.0, 0.02), (Support("z0", (0, 1, 2)),),
+                 loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+                 probes=(Probe("top", (0.01, 0.01, 0.02)), Probe("side", (0.0, 0.01, 0.01))))
+
+
+def run(p):
+    t = DT * np.arange(1, STEPS + 1)
+    force = 0.2 * np.sin(9 * t)[:, None]
+    made = scene(1e4 * p.twin.stiffness)
+    stepper = Newmark(DT).prepare(build_system(made))
+    return made, march("twin", stepper, t, force, np.array([0]), 0.0)
+
+
+def record(p, progress):
+    made, done = run(p)
+    camera = Camera(float(np.sqrt(p.twin.noise)), missing=p.twin.missing, still=10_000)
+    return record_tracked(Origin("pulled", p.twin.seed, True), points_of(done, made), FIXED,
+                          camera, {"pull": Reading(done.traces["pull.force"].y, "N")})
+
+
+def truth(p, seen):
+    made, done = run(p)
+    return Truth({q.name: np.stack([done.traces[f"{q.name}.{c}"].y for c in "xyz"], axis=1)
+                  for q in made.probes})
+
+
+def place(recording, p, made):
+    pull = recording.signal("pull", "N")
+    stage = Signal(pull.t[1:], pull.y[1:], "N", pull.sd, pull.frame)
+    return Registered(stage, (Hold("start", 0.0, DT),), placed(recording, made.mesh), None, ())
+
+
+def stepper(method, p, system, seen):
+    if isinstance(method, Solver):
+        return Newmark(DT).prepare(system)
+    if method.trap == "raise":
+        raise ZeroDivisionError("a trap")
+    if method.trap.startswith("count:"):
+        with (Path(method.trap[6:]) / "runs").open("a") as out:
+            out.write(f"{method.Q}\\n")
+        time.sleep(float(os.environ.get("TRAP_SECONDS", "0")))
+    given = measurements(seen, system.scene.mesh).of("top")
+    return KfFem(DT, method.Q, method.R, 1e-11, gains=method.gains).prepare(system, given)
+
+
+EXPERIMENT = Tracking(
+    name="pulled", title="A pulled block", source="made for tests", parameters=Parameters(),
+    methods={"kf": Filter(), "plain": Solver()}, accepted=("kf",), accept=(), same_model=True,
+    load=lambda p, folder: (record(p, lambda _: None),), record=record, truth=truth,
+    build=lambda recording, p, method: scene(1e4), place=place, stepper=stepper, axis="z",
+    reference="plain", seed=5,
+)
+'''
+
+
+def experiment_file(folder: Path) -> Path:
+    """Writes experiments/pulled.py below `folder`."""
+    path = folder / "experiments" / "pulled.py"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(TEXT, encoding="utf-8")
+    return path

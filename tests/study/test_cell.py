@@ -1,0 +1,108 @@
+"""One cell: sharing gains changes nothing, scores are the road's own, failures are rows."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from study_samples import experiment_file
+
+from validate.compare.track import rmse, track_error
+from validate.replay.find import load_file
+from validate.replay.options import Options
+from validate.replay.run import compare
+from validate.replay.tracking import Tracking
+from validate.study.cell import Bench, run_cell, run_cells
+from validate.study.outcome import CellResult, read_cells, write_cell
+from validate.study.plan import Plan, plan
+from validate.study.sweep import axes
+
+
+@pytest.fixture(scope="module")
+def pulled(tmp_path_factory: pytest.TempPathFactory) -> Tracking:
+    found = load_file(experiment_file(tmp_path_factory.mktemp("cell")))
+    assert isinstance(found, Tracking)
+    return found
+
+
+def planned(pulled: Tracking, *sweeps: str, **values: str) -> Plan:
+    texts = {k.replace("__", "."): v for k, v in values.items()}
+    return plan(pulled, Options(texts, ("kf",)), axes(sweeps), 3)
+
+
+def first(pulled: Tracking, *sweeps: str, **values: str) -> CellResult:
+    made = planned(pulled, *sweeps, **values)
+    return run_cell(Bench(pulled, made.job), made.cells[0])
+
+
+def test_shared_gains_give_the_scores_of_single_runs(
+    pulled: Tracking, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = first(pulled)
+    assert together.shared
+    dense = first(pulled, methods__kf__gains="every_step")
+    assert dense.shared
+    monkeypatch.setattr("validate.study.cell.sharing", lambda stepper: None)
+    alone = first(pulled)
+    assert not alone.shared
+    assert alone.scores.keys() == together.scores.keys()
+    for name, values in alone.scores.items():
+        assert together.scores[name] == pytest.approx(values, rel=1e-6), name
+        assert dense.scores[name] == pytest.approx(values, rel=1e-6), name
+    assert together.nis_dof == alone.nis_dof == 3 * 3 * 40
+    assert len(set(together.scores["top.rmse"])) == 3  # every seed has its own noise
+
+
+def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Tracking) -> None:
+    scores = {s.name: s.value for s in compare(pulled, Options({}, ("kf",))).methods[0].scores}
+    found = first(pulled).scores
+    for name in ("top.rmse", "side.rmse", "nis.per_dof"):
+        assert found[name][0] == pytest.approx(scores[name], rel=1e-6), name
+
+
+def test_the_pooled_error_is_that_of_all_probes() -> None:
+    from validate.study.score import error_scores
+
+    rng = np.random.default_rng(1)
+    truth = {n: rng.standard_normal((9, 3)) for n in "ab"}
+    estimates = {n: rng.standard_normal(9) for n in "ab"}
+    found = error_scores(estimates, truth, "y")
+    both = np.concatenate([estimates[n] - truth[n][:, 1] for n in "ab"])
+    assert found["all.rmse"] == pytest.approx(float(np.sqrt((both**2).mean())))
+    one = track_error("a", "y", estimates["a"], truth["a"][:, 1])
+    assert found["a.rmse"] == rmse(one)
+
+
+def test_seeds_that_miss_different_samples_run_one_by_one(pulled: Tracking) -> None:
+    found = first(pulled, twin__missing="0.3")
+    assert not found.shared
+    assert not found.failed
+    assert found.nis_dof < 3 * 3 * 40
+
+
+def test_a_failure_is_a_row_with_one_line(pulled: Tracking) -> None:
+    refused = first(pulled, "methods.kf.Q=-1,1e-11")
+    assert "variance Q = -1 m2" in refused.failed
+    crashed = first(pulled, methods__kf__trap="raise")
+    assert crashed.failed == "ZeroDivisionError: a trap"
+    assert crashed.scores == {}
+
+
+def test_a_changed_file_stops_the_study(pulled: Tracking) -> None:
+    from dataclasses import replace
+
+    from validate.errors import UsageError
+
+    made = planned(pulled)
+    with pytest.raises(UsageError, match="not the file that the study began with"):
+        run_cells(replace(made.job, sha256="0"), made.cells)
+
+
+def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
+    pulled: Tracking, tmp_path: Path
+) -> None:
+    cell, result = planned(pulled).cells[0], first(pulled)
+    write_cell(tmp_path, cell, result)
+    assert read_cells(tmp_path, [cell]) == {cell.key: result}
+    file = tmp_path / f"{cell.key}.json"
+    file.write_text(file.read_text("utf-8")[:-20], encoding="utf-8")
+    assert read_cells(tmp_path, [cell]) == {}

@@ -1,0 +1,82 @@
+"""What a study will run: checked before anything runs, keyed by all that makes a cell."""
+
+from pathlib import Path
+
+import pytest
+from study_samples import experiment_file
+
+from validate.errors import UsageError
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.options import Options
+from validate.replay.tracking import Tracking
+from validate.study.plan import Plan, plan
+from validate.study.sweep import axes
+
+
+@pytest.fixture(scope="module")
+def pulled(tmp_path_factory: pytest.TempPathFactory) -> Tracking:
+    found = load_file(experiment_file(tmp_path_factory.mktemp("plan")))
+    assert isinstance(found, Tracking)
+    return found
+
+
+def planned(pulled: Tracking, *sweeps: str, **options: object) -> Plan:
+    seeds = options.pop("seeds", 3)
+    return plan(pulled, Options(**{"values": {}, **options}), axes(sweeps), seeds)  # type: ignore[arg-type]
+
+
+def test_an_axis_of_one_method_multiplies_its_cells_only(pulled: Tracking) -> None:
+    sweeps = ("methods.kf.Q=1e-12,1e-11,1e-10", "twin.noise=1e-11,1e-10")
+    found = planned(pulled, *sweeps, methods=("kf", "plain"))
+    assert [c.method for c in found.cells].count("kf") == 6
+    assert [c.method for c in found.cells].count("plain") == 2
+    assert found.job.seeds == (5, 6, 7)
+
+
+def test_swept_methods_are_the_methods(pulled: Tracking) -> None:
+    assert planned(pulled, "methods.kf.Q=1e-12,1e-11").methods == ("kf",)
+    assert planned(pulled, "twin.noise=1e-11,1e-10").methods == ("kf", "plain")
+
+
+def test_keys_know_values_seeds_methods_and_the_file(pulled: Tracking) -> None:
+    def key(*sweeps: str, **options: object) -> str:
+        return planned(pulled, *sweeps, **{"methods": ("kf",), **options}).cells[0].key
+
+    base = key("methods.kf.Q=1e-11,1e-10")
+    assert base == key("methods.kf.Q=1e-11,1e-10")
+    others = [
+        key("methods.kf.Q=2e-11,1e-10"),
+        key("methods.kf.Q=1e-11,1e-10", seeds=4),
+        key("methods.kf.Q=1e-11,1e-10", values={"twin.noise": "2e-10"}),
+        key("methods.kf.Q=1e-11,1e-10", values={"methods.kf.R": "2e-10"}),
+    ]
+    assert len({base, *others}) == 5
+    assert pulled.path is not None
+    pulled.path.write_text(pulled.path.read_text("utf-8") + "\n", encoding="utf-8")
+    assert key("methods.kf.Q=1e-11,1e-10") != base
+
+
+@pytest.mark.parametrize(
+    ("sweeps", "options", "said"),
+    [
+        (["methods.kf.q=1,2"], {}, "unknown parameter 'kf.q'; nearest: .*kf.Q"),
+        (["twin.nois=1,2"], {}, "nearest: twin.noise"),
+        (["methods.kf.Q=1,high"], {}, "not a number"),
+        (["twin.seed=1,2"], {}, "--seeds"),
+        (["methods.kf.Q=1,2"], {"methods": ("plain",)}, "not among plain"),
+        ([], {"methods": ("kff",)}, "nearest: kf"),
+        ([], {"seeds": 0}, "at least 1"),
+        ([], {"seeds": (3, 3)}, "twice"),
+    ],
+)
+def test_what_cannot_run_is_refused_at_once(
+    pulled: Tracking, sweeps: list[str], options: dict[str, object], said: str
+) -> None:
+    with pytest.raises(UsageError, match=said):
+        planned(pulled, *sweeps, **options)
+
+
+def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
+    with pytest.raises(UsageError, match="experiments over time"):
+        plan(phantom, Options({}), (), 2)

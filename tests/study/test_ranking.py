@@ -1,0 +1,60 @@
+"""Places, ties, dominance and failures on results made by hand."""
+
+from collections.abc import Sequence
+
+from validate.study.outcome import CellResult
+from validate.study.plan import Cell
+from validate.study.ranking import Ranking, rankings
+
+
+def ranked(**cells: tuple[Sequence[float], float]) -> Ranking:
+    made = [Cell(name, (), (), name) for name in cells]
+    results = {
+        name: CellResult(name, {"e": tuple(scores)}, {"e": "m"}, step_s=step)
+        for name, (scores, step) in cells.items()
+    }
+    return rankings(made, results, "e")[0]
+
+
+def test_the_least_mean_error_is_first_and_overlaps_are_named() -> None:
+    found = ranked(
+        far=((9.0, 9.1, 9.2), 1.0), best=((1.0, 2.0, 3.0), 1.0), near=((1.4, 2.1, 3.3), 1.0)
+    )
+    assert [r.cell.method for r in found.rows] == ["best", "near", "far"]
+    assert found.rows[0].overlaps == (2,)
+    assert found.rows[2].overlaps == ()
+
+
+def test_paired_differences_can_tell_what_intervals_cannot() -> None:
+    found = ranked(best=((1.0, 2.0, 3.0), 1.0), worse=((1.1, 2.1, 3.11), 1.0))
+    assert found.rows[1].overlaps == (1,)
+    assert not found.rows[1].tied
+    tie = ranked(best=((1.0, 2.0, 3.0), 1.0), other=((2.2, 1.1, 3.3), 1.0))
+    assert tie.rows[1].tied
+
+
+def test_one_seed_tells_nothing_apart() -> None:
+    assert ranked(best=((1.0,), 1.0), far=((90.0,), 1.0)).rows[1].tied
+
+
+def test_a_cell_with_more_error_and_more_time_is_dominated() -> None:
+    found = ranked(
+        exact=((1.0, 1.0), 10.0), quick=((5.0, 5.0), 1.0), poor=((6.0, 6.0), 20.0),
+        jitter=((5.5, 5.5), 0.9),
+    )  # fmt: skip
+    by_name = {r.cell.method: r.dominated_by for r in found.rows}
+    assert by_name == {"exact": None, "quick": None, "poor": 1, "jitter": 2}
+    assert [r.cell.method for r in found.front] == ["quick", "exact"]
+
+
+def test_conditions_are_ranked_apart_and_failures_are_rows() -> None:
+    quiet, loud = (("twin.noise", "1"),), (("twin.noise", "2"),)
+    cells = [Cell("a", (), quiet, "1"), Cell("a", (), loud, "2"), Cell("b", (), loud, "3")]
+    results = {
+        "1": CellResult("1", {"e": (1.0,)}, {"e": "m"}),
+        "2": CellResult("2", {"e": (2.0,)}, {"e": "m"}),
+        "3": CellResult("3", failed="diverged at step 3"),
+    }
+    one, two = rankings(cells, results, "e")
+    assert (len(one.rows), len(two.rows)) == (1, 1)
+    assert two.failed == ((cells[2], "diverged at step 3"),)

@@ -1,0 +1,68 @@
+"""A study on a real cluster: killed in the middle it goes on, and nothing finished runs again."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from study_samples import experiment_file
+
+from validate.study.filters import study, study_folder
+from validate.study.stored_study import write_study
+
+VALUES = 12
+SWEEP = "methods.kf.Q=log:1e-14:1e-9:12"
+
+
+@pytest.mark.slow
+def test_a_killed_study_goes_on_without_repeating_cells(tmp_path: Path) -> None:
+    file, out = experiment_file(tmp_path), tmp_path / "reports"
+    arguments = ["study", "filters", str(file), "--sweep", SWEEP, "--seeds", "2"]
+    arguments += ["--set", f"methods.kf.trap=count:{tmp_path}", "--out", str(out), "--json"]
+    command = [sys.executable, "-m", "validate", *arguments]
+    cells = out / "pulled" / "study-filters" / "cells"
+    killed = subprocess.Popen(
+        command, env={**os.environ, "TRAP_SECONDS": "0.5"}, stdout=subprocess.DEVNULL
+    )
+    _wait(lambda: len(list(cells.glob("*.json"))) >= 3)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    kept = {float(json.loads(f.read_text("utf-8"))["values"]["methods.kf.Q"])
+            for f in cells.glob("*.json")}  # fmt: skip
+    assert 3 <= len(kept) < VALUES
+    (tmp_path / "runs").rename(tmp_path / "runs-before")
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    again = [float(line) for line in (tmp_path / "runs").read_text("utf-8").splitlines()]
+    assert not kept & set(again)
+    assert len(again) == len(set(again)) == VALUES - len(kept)
+    told = json.loads(done.stdout)["study"]
+    assert told["reused"] == len(kept)
+    assert all(c["failed"] is None for c in told["cells"])
+    assert len(told["cells"]) == VALUES
+
+
+def test_a_finished_study_is_read_back_and_more_values_are_added(tmp_path: Path) -> None:
+    file, out = experiment_file(tmp_path), tmp_path / "reports"
+
+    def run(values: str) -> tuple[int, int]:
+        sweep = [f"methods.kf.Q={values}"]
+        found = study(str(file), sweep, seeds=2, out=out, workers=1)
+        page = write_study(found, study_folder(found.plan.experiment, out))
+        assert page.is_file()
+        return found.reused, len(found.results)
+
+    assert run("1e-12,-1") == (0, 2)
+    assert run("1e-12,-1") == (2, 2)  # a failed cell is a finished one, and no cluster is started
+    assert run("1e-12,-1,1e-11") == (2, 3)
+
+
+def _wait(holds: object, limit: float = 100.0) -> None:
+    """Until a condition on the file system holds."""
+    end = time.monotonic() + limit
+    while not holds():  # type: ignore[operator]
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.02)

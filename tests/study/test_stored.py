@@ -1,0 +1,116 @@
+"""Stored runs side by side: what is shared is compared, nothing shared is refused."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from validate.cli.main import BAD_INPUT, run
+from validate.errors import ComparisonError, UsageError
+from validate.study.stored import read_run, side_by_side
+
+
+def stored(folder: Path, **changes: Any) -> Path:
+    """A report folder with a results.json as runs write it."""
+    scores = [_score("node_A.rmse", 2e-3), _score("nis.per_dof", 1.5, "1")]
+    content: dict[str, Any] = {
+        "experiment": "kf_cube",
+        "created": "2026-01-02T03:04:05+00:00",
+        "quick": False,
+        "inputs": [{"path": "kf.mcap", "sha256": "a" * 64, "bytes": 3}],
+        "parameters": {"material.E": {"value": 1e4, "unit": "Pa"}},
+        "methods": [{"name": "kf", "scores": scores}],
+    }
+    folder.mkdir(parents=True)
+    (folder / "results.json").write_text(json.dumps({**content, **changes}), encoding="utf-8")
+    return folder
+
+
+def _score(name: str, value: float | None, unit: str = "m") -> dict[str, Any]:
+    return {"name": name, "value": value, "unit": unit, "count": 9}
+
+
+def method(name: str, *scores: dict[str, Any]) -> list[dict[str, Any]]:
+    return [{"name": name, "scores": list(scores)}]
+
+
+def test_shared_scores_with_differences_and_changed_parameters(tmp_path: Path) -> None:
+    one = stored(tmp_path / "one")
+    other = stored(
+        tmp_path / "other",
+        methods=method("kf", _score("node_A.rmse", 3e-3), _score("node_B.rmse", 1.0)),
+        parameters={"material.E": {"value": 12e3, "unit": "Pa"}},
+    )
+    found = side_by_side([read_run(one), read_run(other / "results.json")])
+    assert [(r.method, r.score, r.values) for r in found.rows] == [
+        ("kf", "node_A.rmse", (2e-3, 3e-3))
+    ]
+    assert found.rows[0].differences == pytest.approx((0.0, 1e-3))
+    assert found.rows[0].changes == pytest.approx((0.0, 0.5))
+    assert found.parameters == {"material.E": ("10000 Pa", "12000 Pa")}
+    assert found.warnings == ()
+
+
+def test_other_recordings_units_and_experiments_are_said(tmp_path: Path) -> None:
+    one = stored(tmp_path / "one")
+    other = stored(
+        tmp_path / "other",
+        experiment="ekf_cube",
+        inputs=[{"path": "x", "sha256": "b" * 64, "bytes": 1}],
+        methods=method("kf", _score("node_A.rmse", 3.0, "mm"), _score("nis.per_dof", 1.0, "1")),
+    )
+    found = side_by_side([read_run(one), read_run(other)])
+    assert [r.score for r in found.rows] == ["nis.per_dof"]
+    said = " | ".join(found.warnings)
+    for words in ("different experiments", "aaaaaaaaaaaa", "bbbbbbbbbbbb", "m and in mm"):
+        assert words in said
+
+
+def test_scores_are_matched_where_no_method_is(tmp_path: Path) -> None:
+    one = stored(tmp_path / "one")
+    other = stored(tmp_path / "other", methods=method("ekf", _score("node_A.rmse", 1e-3)))
+    found = side_by_side([read_run(one), read_run(other)])
+    assert found.columns == ("one: kf", "other: ekf")
+    assert [(r.score, r.values) for r in found.rows] == [("node_A.rmse", (2e-3, 1e-3))]
+
+
+def test_nothing_shared_is_no_comparison(tmp_path: Path) -> None:
+    one = stored(tmp_path / "one")
+    for i, other in enumerate((method("kf", _score("force", 1.0, "N")), [],
+                               method("kf", _score("node_A.rmse", None)),
+                               method("kf", _score("node_A.rmse", 1.0, "Pa")))):  # fmt: skip
+        folder = stored(tmp_path / str(i), methods=other)
+        with pytest.raises(ComparisonError, match="nothing compared"):
+            side_by_side([read_run(one), read_run(folder)])
+    with pytest.raises(UsageError, match="two or more"):
+        side_by_side([read_run(one)])
+
+
+def test_what_is_no_stored_run_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = stored(tmp_path / "one")
+    bad = tmp_path / "bad.json"
+    bad.write_text("[1, 2", encoding="utf-8")
+    for path in (tmp_path / "absent", bad, tmp_path):
+        assert run(["compare", str(one), str(path)]) == BAD_INPUT
+        assert capsys.readouterr().err.count("\n") == 1
+    empty = stored(tmp_path / "empty", methods=[])
+    assert run(["compare", str(one), str(empty)]) == BAD_INPUT
+    assert "0 scores shared" in capsys.readouterr().err
+
+
+def test_the_command_prints_a_table_or_one_document(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [str(stored(tmp_path / name)) for name in ("one", "two")]
+    assert run(["compare", *runs]) == 0
+    text = capsys.readouterr().out
+    assert "node_A.rmse" in text
+    assert "2.000 mm" in text
+    assert "No parameter differs" in text
+    assert run(["compare", *runs, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["columns"] == ["one", "two"]
+    assert told["scores"][0]["differences"] == [0.0, 0.0]
