@@ -93,7 +93,7 @@ def filters(dt: float) -> dict[str, tuple[Filter, bool]]:
         "node EKF, 3 x 3 block": (replace(node, block="node"), True),
         "node EKF, companion": (replace(node, block="companion"), True),
         "reduced EKF, 20 modes + bias": (reduced, False),
-        "reduced EKF, 20 modes, steady gain": (replace(reduced, gain="steady"), False),
+        "reduced EKF, 20 modes, steady gain": (replace(reduced, gains="steady"), False),
         "reduced EKF, 5 POD + bias": (replace(reduced, basis="pod", shapes=5), False),
     }
 

@@ -16,7 +16,7 @@ from validate.estimate.displacement_filter import DisplacementStepper, Inner
 from validate.estimate.gains import Claims, gain_sequence, schedule
 from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
 from validate.estimate.load_scale import LoadScale
-from validate.estimate.measured import timetable
+from validate.estimate.measured import Measurements, timetable
 from validate.estimate.modal_kernel import advance, advance_reference, mirrored
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.observed import Observed, observed
@@ -24,9 +24,11 @@ from validate.estimate.reduced_linear import LoadDoubt, reduced_model
 from validate.estimate.small import Gaussian, kf_predict, kf_update
 from validate.estimate.steady import ReducedKf, dense_covariance, steady_claim
 from validate.fem.system import build
-from validate.scene.scene import Region
+from validate.scene.scene import Drive, Region
+from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import propagation, rule_of
+from validate.solve.types import Run, Stepper
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +87,36 @@ def test_the_printed_filter_is_filterpys(pulled: Case, recursion: str) -> None:
     assert run.sd[-1].ravel()[free] == pytest.approx(np.sqrt(np.diag(guest.P)), rel=1e-9)
 
 
+def test_drives_are_inputs_of_the_filter_too() -> None:
+    """A top driven in z: without measurements Newmark with its forces; with them, one filter."""
+    scene = cube().scene
+    drive = Drive("stage", "z1", (0.0, 0.0, -1.0))
+    system = build(replace(scene, loads=(), drives=(drive,)))
+    t = DT * np.arange(1, 41)
+    inputs, at = 1e-4 * np.sin(40 * t)[:, None], np.array([39])
+    H = case().rows(CORNER)  # a node that is driven in z and free in x and y
+    z = 1e-5 * np.random.default_rng(0).normal(size=(40, 3)) - [0, 0, 1] * inputs
+    seen = Measurements(t, H, z, np.full(3, SD), ("x", "y", "z"))
+    missing = replace(seen, z=np.full((40, 3), np.nan))
+
+    def run(stepper: Stepper) -> Run:
+        return march("m", stepper, t, inputs, at, 0.0)
+
+    plain = run(Newmark(DT, a0="zero").prepare(system))
+    for settings in (KfFem(a0="zero"), ModalKf(a0="zero")):
+        found = run(settings.prepare(system, missing))
+        assert found.u == pytest.approx(plain.u, rel=1e-9, abs=1e-15)
+        force, known = (r.traces["stage.force"].y for r in (found, plain))
+        assert force == pytest.approx(known, rel=1e-7, abs=1e-9 * np.abs(known).max())
+    dense, modal = (
+        run(f.prepare(system, seen)) for f in (KfFem(gains="every_step"), ModalKf(settled=0.0))
+    )
+    assert modal.u == pytest.approx(dense.u, rel=1e-8, abs=1e-14)
+    assert np.abs(dense.u - plain.u).max() > 1e-6
+    z_innovation = dense.traces["innovation.z"].y  # the drive is known: noise alone is left
+    assert z_innovation == pytest.approx(z[:, 2] + inputs[:, 0], abs=1e-15)
+
+
 def test_the_kernel_is_its_reference() -> None:
     rng = np.random.default_rng(0)
     X, G, B, H = (rng.normal(size=s) for s in ((9, 9), (9, 2), (9, 2), (3, 9)))
@@ -110,6 +142,15 @@ def test_gains_of_what_is_observed_are_those_of_the_whole() -> None:
         found, known = gains.gains[step], exact.gains[step]
         assert np.abs(found.G - known.G).max() < 1e-9 * np.abs(known.G).max()
         assert np.abs(found.S_yy - known.S_yy).max() < 1e-9 * np.abs(known.S_yy).max()
+
+
+def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: Case) -> None:
+    scene = pulled.system.scene
+    system = build(replace(scene, material=replace(scene.material, stiffness_damping=1e-4)))
+    modes = in_modes(system, rule_of("average", DT))
+    whole = modal_covariance(KfFem(), system, pulled.measured(1), modes)
+    assert isinstance(whole, Modal)
+    assert observed(whole, 60) is whole
 
 
 def test_gains_freeze_once_settled_and_thaw_where_something_is_missing(pulled: Case) -> None:
@@ -267,6 +308,19 @@ def test_the_steady_claim_is_where_the_sequence_settles(pulled: Case) -> None:
                 before, g = g, kf_update(g, np.zeros(3), m.H, m.R).posterior
         steady = steady_claim(m, every)
         assert pytest.approx(m.H @ before.P @ m.H.T, rel=1e-5) == m.H @ steady.P @ m.H.T
+
+
+def test_a_steady_filter_knows_how_often_it_measures(pulled: Case) -> None:
+    """At the end its claims are those that the exact sequence of gains has come to."""
+    seen = pulled.measured(1, every=4)
+    exact, steady = (
+        pulled.march(ReducedKf(load_walk=5.0, gains=g).prepare(pulled.system, seen))  # type: ignore[arg-type]
+        for g in ("sequence", "steady")
+    )
+    name = "innovation.top.z.sd"
+    assert steady.traces[name].y[59] == pytest.approx(exact.traces[name].y[59], rel=1e-4)
+    assert exact.sd is not None
+    assert steady.sd == pytest.approx(exact.sd, rel=1e-3, abs=1e-12)
 
 
 def test_what_a_filter_cannot_do_is_refused(pulled: Case) -> None:

@@ -1,14 +1,18 @@
 """Measurements: shapes at the door, and the steps on which they land."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from cubes import DT, case
+from cubes import DT, PAPER, case, cube
 
 from validate.errors import ComparisonError
 from validate.estimate.innovation import innovation
-from validate.estimate.measured import timetable
+from validate.estimate.measured import measurements, timetable
+from validate.fem.locate import barycentric_rows
+from validate.recording.types import Signal
+from validate.register.observe import MarkerObservation, Registered
 
 
 def test_measurements_land_on_the_nearest_step() -> None:
@@ -26,6 +30,7 @@ def test_rows_without_a_value_and_rest_are_left_out() -> None:
     z[2], z[3, 1] = np.nan, np.nan
     table = timetable(replace(seen, z=z, t=seen.t - seen.t[0]), DT)
     assert table.at_rest == 1
+    assert 0 not in table.z
     assert 10 not in table.z
     assert np.isnan(table.z[15]).tolist() == [False, True, False]
 
@@ -49,6 +54,35 @@ def test_two_measurements_in_a_step_are_refused() -> None:
         match=r"60 measurements land on 1 steps of 0.01 s; take a step of at most 1e-06 s",
     ):
         timetable(replace(seen, t=0.01 + 1e-6 * np.arange(60)), 0.01)
+
+
+def observed(names: tuple[str, ...], points: np.ndarray, x: np.ndarray) -> Registered:  # type: ignore[type-arg]
+    """Markers at `points` of the small cube, seen at `x` (nt, k, 3), without a registration."""
+    mesh = case().system.scene.mesh
+    t = 0.1 * np.arange(len(x))
+    rows = barycentric_rows(mesh, points)
+    fit: Any = None
+    markers = MarkerObservation(t, names, x, points, rows, 2e-5, np.zeros(len(names)), fit)
+    stage = Signal(t, np.zeros((len(t), 1)), "m", 1e-6, "scene")
+    return Registered(stage, (), markers, None, ())
+
+
+def test_markers_become_measurements_of_displacements() -> None:
+    """A linear field is read exactly; a marker that is not seen is missing in all components."""
+    mesh = case().system.scene.mesh
+    points = np.array([[0.001, 0.002, 0.003], [0.0035, 0.0005, 0.002]])
+    A = np.array([[0.1, 0.2, 0.0], [0.0, 0.1, 0.3], [0.2, 0.0, 0.1]])
+    x = np.array([points, points + points @ A, points + points @ A])
+    x[2, 0] = np.nan
+    found = measurements(observed(("a", "b"), points, x), mesh)
+    assert found.names == ("a.x", "a.y", "a.z", "b.x", "b.y", "b.z")
+    assert found.sd.tolist() == [2e-5] * 6
+    assert found.z[1] == pytest.approx(found.H @ (mesh.nodes @ A).ravel(), abs=1e-15)
+    assert np.isnan(found.z[2]).tolist() == [True] * 3 + [False] * 3
+    with pytest.raises(ComparisonError, match="rows of 27 nodes on a mesh of 200"):
+        measurements(observed(("a", "b"), points, x), cube(shape=PAPER).scene.mesh)
+    with pytest.raises(ComparisonError, match="no markers"):
+        measurements(replace(observed(("a", "b"), points, x), markers=None), mesh)
 
 
 @pytest.mark.parametrize(

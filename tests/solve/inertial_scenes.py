@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.fem.system import System, build
 from validate.scene.box import box
 from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
-from validate.solve.newmark_rule import MassName, mass_of
+from validate.solve.newmark_rule import MassName, damping_of, mass_of
 
 TOTAL = 3000 * 16e-6  # N, of 3 kPa on the block's top (paper 001, Table 1)
 
@@ -70,7 +70,7 @@ def exact(
 
     M a + C v + K u = forces (m, s) @ y with y' = generator (s, s) @ y from y = signal (s,).
     """
-    matrices = (mass_of(system, mass), system.C, system.K)
+    matrices = (mass_of(system, mass), damping_of(system, mass, "full"), system.K)
     M, C, K = (X[system.free][:, system.free].toarray() for X in matrices)
     m, s = len(M), len(signal)
     A = np.zeros((2 * m + s, 2 * m + s))

@@ -1,5 +1,7 @@
 """Explicit dynamics: order, energy, the critical step, and how runs end that should end."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from explicit_scenes import pressed, pulled, ran, rise
@@ -120,6 +122,19 @@ def test_divergence_is_seen_before_numbers_are_lost() -> None:
     late = ran(blind, system, np.full(50, 0.1), dt)
     assert late.outcome.state == "diverged"
     assert run.outcome.step < late.outcome.step
+
+
+@pytest.mark.parametrize("kind", ["shock", "release", "noise"])
+@pytest.mark.parametrize("make", [pulled, pressed])
+def test_no_alarm_where_all_is_well(kind: str, make: Callable[[], System]) -> None:
+    """Shocks close below the limit put much of the energy into the fastest modes."""
+    system = make()
+    dt = 0.9 * limit(system)
+    noise = np.random.default_rng(0).standard_normal(200)
+    inputs = {"shock": np.eye(200)[3], "release": np.repeat([1.0, 0.0], 100), "noise": noise}
+    size = 1e-4 if system.scene.drives else 1.0
+    run = ran(CentralDifference(dt, watch=1), system, size * inputs[kind], dt)
+    assert run.finished, run.outcome
 
 
 def test_inverted_elements_are_counted() -> None:

@@ -9,10 +9,10 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from validate.errors import SceneError
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import Drive, Load, Material, Scene, Support
+from validate.scene.scene import Drive, LawName, Load, Material, Scene, Support
 from validate.solve.fluid import LINEAR
 from validate.solve.newton import StaticNewton
-from validate.solve.schemes import INERTIAL, SCHEMES
+from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, SCHEMES
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
@@ -48,7 +48,9 @@ def settings(scheme: type[Scheme]) -> Scheme:
 
 
 @pytest.mark.parametrize(
-    "scheme", [s for s in SCHEMES if s not in INERTIAL], ids=lambda s: s.__name__
+    "scheme",
+    [s for s in SCHEMES if s not in (*INERTIAL, *LARGE_INERTIAL)],
+    ids=lambda s: s.__name__,
 )
 def test_a_scheme_steps_and_says_what_its_states_mean(
     scheme: type[Scheme], system: System, large: System
@@ -115,3 +117,40 @@ def test_a_scheme_of_drives_and_loads_refuses_fluid(scheme: type[Scheme], system
 def test_a_linear_scheme_refuses_a_law_at_large_strain(scheme: type[Scheme], large: System) -> None:
     with pytest.raises(SceneError, match="cannot solve the law 'neo_hooke'"):
         scheme().prepare(large)
+
+
+@pytest.mark.parametrize("scheme", LARGE_INERTIAL, ids=lambda s: s.__name__)
+@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+def test_dynamics_at_large_strain_step_drives_and_loads(
+    scheme: type[Scheme], law: LawName, pressed: System
+) -> None:
+    scene = pressed.scene
+    material = replace(scene.material, law=law, stiffness_damping=0.0)
+    stepper = scheme().prepare(build(replace(scene, material=material)))
+    rest = stepper.rest()
+    first = stepper.step(rest, np.array([1e-5, 0.01]))
+    state = stepper.step(first, np.array([2e-5, 0.02]))
+    assert state.failure is None
+    assert (state.k, state.drives.tolist()) == (2, [2e-5, 0.02])
+    assert np.abs(stepper.field(rest)).max() == 0.0
+    plate = scene.mesh.facet_nodes("z1")
+    assert stepper.field(state)[plate, 2] == pytest.approx(np.full(len(plate), -2e-5))
+    traces = stepper.traces([rest, first, state])
+    assert traces["press.force"].y[0] == 0.0
+    assert traces["press.force"].y[1] > 0
+    assert (traces["press.force"].unit, traces["pull.force"].y[2]) == ("N", 0.02)
+    assert (traces["energy.strain"].unit, traces["energy.strain"].y[0]) == ("J", 0.0)
+    assert all(len(t.y) == 3 for t in traces.values())
+    assert len(stepper.traces([])) == len(traces)
+    with pytest.raises(FrozenInstanceError):
+        state.updates = 7  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("scheme", LARGE_INERTIAL, ids=lambda s: s.__name__)
+def test_dynamics_at_large_strain_refuse_cavities_and_the_linear_law(
+    scheme: type[Scheme], pressed: System, large: System
+) -> None:
+    with pytest.raises(SceneError, match="no fluid in cavities"):
+        scheme().prepare(large)
+    with pytest.raises(SceneError, match="law 'linear' has no form at large strain"):
+        scheme().prepare(build(replace(pressed.scene, material=Material(1e4, 0.4, rho=1000.0))))

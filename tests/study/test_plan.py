@@ -1,7 +1,5 @@
 """What a study will run: checked before anything runs, keyed by all that makes a cell."""
 
-from pathlib import Path
-
 import pytest
 from study_samples import experiment_file
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from study_samples import experiment_file
 
-from validate.study.filters import study, study_folder
+from validate.study.filters import Study, study, study_folder
 from validate.study.stored_study import write_study
 
 VALUES = 12
@@ -45,19 +45,20 @@ def test_a_killed_study_goes_on_without_repeating_cells(tmp_path: Path) -> None:
     assert len(told["cells"]) == VALUES
 
 
-def test_a_finished_study_is_read_back_and_more_values_are_added(tmp_path: Path) -> None:
+def test_a_finished_study_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, out = experiment_file(tmp_path), tmp_path / "reports"
 
-    def run(values: str) -> tuple[int, int]:
-        sweep = [f"methods.kf.Q={values}"]
-        found = study(str(file), sweep, seeds=2, out=out, workers=1)
-        page = write_study(found, study_folder(found.plan.experiment, out))
-        assert page.is_file()
-        return found.reused, len(found.results)
+    def run() -> Study:
+        return study(str(file), ["methods.kf.Q=1e-12,-1"], seeds=2, out=out, workers=1)
 
-    assert run("1e-12,-1") == (0, 2)
-    assert run("1e-12,-1") == (2, 2)  # a failed cell is a finished one, and no cluster is started
-    assert run("1e-12,-1,1e-11") == (2, 3)
+    first = run()
+    page = write_study(first, study_folder(first.plan.experiment, out))
+    assert page.is_file()
+    assert (first.reused, first.failed, len(first.results)) == (0, 1, 2)
+    monkeypatch.setattr("validate.study.workers._client", None)  # no cluster is started
+    again = run()
+    assert (again.reused, again.failed) == (2, 1)  # a failed cell is a finished one
+    assert again.results == first.results
 
 
 def _wait(holds: object, limit: float = 100.0) -> None:

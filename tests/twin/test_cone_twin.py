@@ -120,7 +120,7 @@ def test_the_ramp_is_linear_and_signs_are_positive(quiet: Recording) -> None:
 def test_compliance_and_toe_are_what_the_crosshead_adds(quiet: Recording) -> None:
     """Crosshead less plate, by least squares: the machine's compliance and the seated toe."""
     force, stage = (quiet.signals[k].y[:, 0] for k in ("load_cell", "stage"))
-    extra = stage + displacement(quiet, "A")[:, 2]
+    extra = stage + displacement(quiet, "node_A")[:, 2]
     slope, toe = np.polyfit(force[50:], extra[50:], 1)
     assert 1 / slope == pytest.approx(COARSE.machine, rel=1e-3)
     assert toe == pytest.approx(COARSE.toe, rel=1e-3)
@@ -167,7 +167,7 @@ def test_it_survives_a_file_and_is_placed_on_the_shipped_mesh(
 
 def test_markers_turned_by_a_quarter_are_found(twin: Recording) -> None:
     markers = twin.markers["markers"]
-    turned = {"B": "C", "C": "D", "D": "E", "E": "B", "base1": "base2", "base2": "base3"}
+    turned = {"node_B": "node_C", "node_C": "node_D", "node_D": "node_E", "node_E": "node_B", "base1": "base2", "base2": "base3"}
     names = tuple({**turned, "base3": "base1"}.get(n, n) for n in markers.names)
     spoilt = replace(twin, markers={"markers": replace(markers, names=names)})
     with pytest.raises(RegistrationError, match="permuted"):
@@ -197,7 +197,7 @@ def test_the_papers_load_is_within_the_noise(project_root: Path) -> None:
     """At 0.15 N the plate moves 12.5 um, less than a look's noise; at 15 N, 1.19 mm."""
     for name, plate in (("ekf_cone", 1.19e-3), ("ekf_cone_small", 12.5e-6)):
         recording = read_recording(project_root / "recordings" / f"{name}.mcap")
-        moved = -displacement(recording, "A")[:, 2]
+        moved = -displacement(recording, "node_A")[:, 2]
         ramp = recording.markers["markers"].t / 15
         seen = np.isfinite(moved)
         fit = np.polyfit(ramp[seen], moved[seen], 2)
@@ -205,6 +205,7 @@ def test_the_papers_load_is_within_the_noise(project_root: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_the_shipped_recording_is_made_again(project_root: Path) -> None:
     read = read_recording(project_root / "recordings" / "ekf_cone.mcap")
     again = made(TwinSettings())

@@ -14,7 +14,8 @@ from validate.study.stored_study import sentence, write_study
 
 _PLACES = 10  # of every ranking on the terminal
 _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
-            "against #1", "NIS per dof / 1", "filter is", "step / ms")  # fmt: skip
+            "against #1", "NIS per dof / 1", "filter is", "step / ms",
+            "gains repeat from step")  # fmt: skip
 
 
 def filters(

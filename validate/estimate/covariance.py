@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dposv
 
 from validate.arrays import Floats
 from validate.estimate.modal_kernel import advance, mirrored
@@ -75,10 +75,20 @@ def best_gain(PHt: Floats, H: Floats, R: Floats, seen: tuple[bool, ...]) -> Gain
     S_yy = H @ PHt + np.diag(R)
     S_yy = (S_yy + S_yy.T) / 2
     if all(seen):
-        return Gain(np.ascontiguousarray(cho_solve(cho_factor(S_yy), PHt.T).T), S_yy, seen)
+        return Gain(_divided(PHt, S_yy), S_yy, seen)
     i = np.array(seen)
-    factor = cho_factor(S_yy[np.ix_(i, i)])
-    return Gain(np.ascontiguousarray(cho_solve(factor, PHt[:, i].T).T), S_yy, seen)
+    return Gain(_divided(PHt[:, i], S_yy[np.ix_(i, i)]), S_yy, seen)
+
+
+def _divided(PHt: Floats, S: Floats) -> Floats:
+    """P H^T S^-1 by Cholesky; LAPACK itself, as scipy's checks take ten times the work of small S.
+
+    Raises `LinAlgError` for an S that is not positive definite.
+    """
+    _, G, info = dposv(S, PHt.T)
+    if info:
+        raise np.linalg.LinAlgError(f"S_yy {S.shape} is not positive definite (pivot {info})")
+    return np.ascontiguousarray(G.T)
 
 
 @dataclass(frozen=True)

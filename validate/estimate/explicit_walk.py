@@ -18,8 +18,10 @@ from validate.estimate import node_ekf_kernel as kernel
 from validate.fem.critical import critical_step
 from validate.fem.explicit import ExplicitBody
 from validate.fem.system import System
+from validate.solve.central import lumped_damping
 
 FAR = 10  # body lengths
+MARGIN = 0.05  # of the critical step, which falls as a body deforms: as in `CentralDifference`
 
 
 class ExplicitModel(Protocol):
@@ -70,16 +72,21 @@ class Walk:
             "s: take smaller steps, or correct U_{t-dt} together with U_t"
         )
 
-    def inputs(self, old: Floats, new: Floats, part: float) -> Floats:
-        """Inputs at a fraction of the way from one march step to the next."""
-        return old + (part / self.parts) * (new - old)
-
-    def following(self, u: Floats, before: Floats, R: Floats, start: Floats, end: Floats) -> Floats:
-        """U_{t+h} (N,) m from inputs at t and t + h; R (N,) N are the internal forces at t."""
+    def inputs(self, old: Floats, new: Floats, part: int) -> tuple[Floats, Floats]:
+        """Loads N at the start and drives m at the end of a part of the way between two inputs."""
         k = self.system.moves.shape[1]
+        if self.parts == 1:
+            return old[k:], new[:k]
+        start, end = part / self.parts, (part + 1) / self.parts
+        return old[k:] + start * (new - old)[k:], old[:k] + end * (new - old)[:k]
+
+    def following(
+        self, u: Floats, before: Floats, R: Floats, loads: Floats, drives: Floats
+    ) -> Floats:
+        """U_{t+h} (N,) m; R (N,) N are the internal forces at t, with the loads then."""
         return kernel.follow(
             u, before, R, self.c2, self.c1, self.w,
-            self.loaded, self.columns, start[k:], self.driven, self.moves, end[:k],
+            self.loaded, self.columns, loads, self.driven, self.moves, drives,
         )  # fmt: skip
 
 
@@ -90,15 +97,15 @@ def explicit_model(system: System) -> ExplicitModel:
 
 def walk(system: System, model: ExplicitModel, dt: float, parts: int) -> Walk:
     """The step of h = dt/parts; raises `SceneError` for damping that is not diagonal."""
-    material, h = system.scene.material, dt / parts
-    if material.stiffness_damping:
+    h, lags = dt / parts, system.scene.per_cell(lambda m: m.stiffness_damping)
+    if lags.any():
         raise SceneError(
-            f"stiffness damping {material.stiffness_damping:g} s couples the nodes: the explicit "
-            "filters know mass damping only; set it to 0"
+            f"stiffness damping {lags.max():g} s couples the nodes: the explicit filters know mass "
+            "damping only; set it to 0"
         )
-    half = material.mass_damping * h / 2
+    half = h / 2 * lumped_damping(system) / system.masses
     free = np.zeros(len(system.moves))
-    free[system.free] = 1 / (1 + half)
+    free[system.free] = 1 / (1 + half[system.free])
     loaded, driven = (np.flatnonzero(X.any(axis=1)) for X in (system.loads, system.moves))
     return Walk(
         system, model, h, parts, 2 * free, (1 - half) * free, free * h * h / system.masses,
@@ -108,9 +115,9 @@ def walk(system: System, model: ExplicitModel, dt: float, parts: int) -> Walk:
 
 
 def beyond(system: System, h: float) -> str:
-    """Why a step of h s is refused; empty where it is below the recommended one."""
+    """Why a step of h s is refused; empty where it keeps the margin below the critical one."""
     found = critical_step(system)
-    if h <= found.lanczos:
+    if h <= (1 - MARGIN) * found.lanczos:
         return ""
     return (
         f"dt {h:g} s is {h / found.lanczos:.3g} times the critical step {found.lanczos:.3g} s; "

@@ -37,7 +37,7 @@ class OracleRow:
     pair: str
     states: int
     steps: int
-    difference: float
+    largest: float
 
 
 def oracle_table(steps: int = 60, seed: int = 1) -> tuple[OracleRow, ...]:

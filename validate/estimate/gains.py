@@ -21,22 +21,28 @@ Seen = tuple[bool, ...]
 class GainSequence:
     """Gains by step; from step `frozen` on they repeat (None: they never settled).
 
-    `computed` counts the gains that were computed, `claim` is what the last of them left.
+    `computed` counts the gains that were computed, `before` are those that were `mapped` to these.
     """
 
     gains: Mapping[int, Gain]
     frozen: int | None
     computed: int
+    before: "GainSequence | None" = None
 
     def at(self, step: int) -> Gain | None:
         return self.gains.get(step)
 
     def mapped(self, turn: Callable[[Floats], Floats]) -> "GainSequence":
-        """The same gains in other coordinates; repeats stay one array."""
+        """The same gains in other coordinates by a linear `turn`; repeats stay one array."""
         distinct = {id(gain): gain for gain in self.gains.values()}
-        turned = {k: replace(gain, G=turn(gain.G)) for k, gain in distinct.items()}
+        if not distinct:
+            return self
+        columns = np.cumsum([gain.G.shape[1] for gain in distinct.values()])[:-1]
+        whole = turn(np.hstack([gain.G for gain in distinct.values()]))  # one product, not hundreds
+        parts = zip(distinct.items(), np.split(whole, columns, axis=1), strict=True)
+        turned = {k: replace(gain, G=np.ascontiguousarray(G)) for (k, gain), G in parts}
         gains = {step: turned[id(gain)] for step, gain in self.gains.items()}
-        return replace(self, gains=MappingProxyType(gains))
+        return replace(self, gains=MappingProxyType(gains), before=self)
 
 
 @dataclass(frozen=True)

@@ -121,9 +121,7 @@ class NodeStepper:
         u, memory, found = state.u, state.extra, nothing(len(self.names))
         memory = Memory(memory.before, memory.P.copy(), memory.held)
         for part in range(self.walk.parts):
-            start = self.walk.inputs(state.drives, drives, part)
-            end = self.walk.inputs(state.drives, drives, part + 1)
-            u, memory = self._predicted(u, memory, start, end)
+            u, memory = self._predicted(u, memory, self.walk.inputs(state.drives, drives, part))
             if failure := self._failure(u, memory):
                 return replace(state, failure=failure)
             z = self.times.at(state.k * self.walk.parts + part + 1)
@@ -152,7 +150,7 @@ class NodeStepper:
         return innovation_traces(self.names, states) | {"covariance.held": Trace(held, "1")}
 
     def _predicted(
-        self, u: Floats, memory: Memory, start: Floats, end: Floats
+        self, u: Floats, memory: Memory, inputs: tuple[Floats, Floats]
     ) -> tuple[Floats, Memory]:
         """Eqs 35 and 36; P is changed in place, the caller owns it."""
         w, P, c = self.walk, memory.P, self.settings
@@ -166,7 +164,7 @@ class NodeStepper:
             R, K = w.model.force_and_diagonal(u)
             count = kernel.spread_components(P, w.c2, w.w, K, self.Q)
         held = kernel.clip(P) if count and c.overflow == "hold" else count
-        return w.following(u, memory.before, R, start, end), Memory(u, P, held)
+        return w.following(u, memory.before, R, *inputs), Memory(u, P, held)
 
     def _corrected(
         self, u: Floats, memory: Memory, z: Floats, found: Innovation
@@ -185,7 +183,7 @@ class NodeStepper:
         return u, Memory(before, P, memory.held), total
 
     def _failure(self, u: Floats, memory: Memory) -> tuple[Ending, str] | None:
-        largest = float(np.abs(u).max())
+        largest = kernel.farthest(u)
         if not largest < self.walk.far:
             return "diverged", self.walk.lost(largest)
         if not memory.held or self.settings.overflow == "hold":

@@ -39,6 +39,16 @@ def follow(
 
 
 @_compiled
+def farthest(u: Floats) -> float:
+    """The largest |u|; infinite where one is not a number."""
+    top, lost = 0.0, 0
+    for i in range(u.size):
+        top = max(top, abs(u[i]))
+        lost += not abs(u[i]) < np.inf
+    return np.inf if lost else top
+
+
+@_compiled
 def spread_components(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
     """P = A^2 P + Q of every component (eq 36), A = c2 - w K_ii; counts those beyond `HUGE`."""
     count = 0

@@ -77,13 +77,12 @@ def _snapshots(walk: Walk, load: int, force: float) -> Floats:
     lowest = float(np.sqrt(modes(walk.system, 1).squares[0]))
     steps = max(_SNAPSHOTS, int(_PERIODS * 2 * np.pi / lowest / walk.h))
     kept = frozenset(np.linspace(1, steps, _SNAPSHOTS).astype(int).tolist())
-    inputs = np.zeros(len(walk.system.scene.inputs))
-    at, still = len(walk.system.scene.drives) + load, np.zeros_like(inputs)
+    loads, drives = np.zeros(walk.columns.shape[1]), np.zeros(walk.moves.shape[1])
     u = before = np.zeros(len(walk.system.moves))
     shots = []
     for k in range(steps):
-        inputs[at] = force * min(_PERIODS * k / steps, 1.0)
-        u, before = walk.following(u, before, walk.model.force(u), inputs, still), u
+        loads[load] = force * min(_PERIODS * k / steps, 1.0)
+        u, before = walk.following(u, before, walk.model.force(u), loads, drives), u
         if k + 1 in kept:
             shots.append(u)
     return np.array(shots).T

@@ -17,18 +17,15 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy import sparse
-from scipy.linalg import solve
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import UsageError
+from validate.estimate import node_ekf_kernel as kernel
 from validate.estimate.explicit_walk import Walk, beyond, explicit_model, walk
-from validate.estimate.innovation import Innovation, innovation, innovation_traces, nothing
-from validate.estimate.linear_model import LinearModel
+from validate.estimate.innovation import Innovation, innovation_traces, nothing
 from validate.estimate.measured import Measurements, Timetable, timetable
 from validate.estimate.reduced_basis import Basis, modes, pod
-from validate.estimate.small import joseph
-from validate.estimate.steady import steady_claim
+from validate.estimate.reduced_gains import Jump, ReducedModel, Update, updates
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
@@ -39,7 +36,8 @@ from validate.solve.types import NO_SURFACE, NOTHING, State, Trace
 class ReducedEKF:
     """Settings. `process` is the random walk of the shapes' amplitudes, as the rms displacement of
     the body that one of them makes: "white" for every shape alike, or "load": in one direction, the
-    static response to each load (rank 1). `gain` "steady" solves the Riccati equation once.
+    static response to each load (rank 1). `gains`: the exact sequence, which needs no data and is
+    found before the run, or the steady gain from the start.
     """
 
     dt: float = quantity(2e-4, "s", "time step of the run")
@@ -51,7 +49,7 @@ class ReducedEKF:
     load_sd: float = quantity(0.0, "N", "standard deviation of the bias at rest")
     process: float = quantity(1e-6, "m/s^0.5", "random walk of the shapes, rms over the body")
     noise: Literal["white", "load"] = quantity("white", "1", "where the process noise acts")
-    gain: Literal["recursive", "steady"] = quantity("recursive", "1", "every update, or one")
+    gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or the steady one")
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
 
     def __post_init__(self) -> None:
@@ -66,74 +64,39 @@ class ReducedEKF:
         """
         steps = walk(system, explicit_model(system), self.dt, self.substeps)
         refusal = beyond(system, steps.h) if self.beyond_limit == "refuse" else ""
-        pods = self.basis == "pod" and not refusal
-        basis = pod(steps, self.shapes, self.snapshot_load) if pods else modes(system, self.shapes)
         times = timetable(measurements, steps.h)
+        basis = modes(system, 1) if refusal else self._basis(steps)
         model = reduced_model(self, steps, basis, measurements)
-        gaps = np.diff([0, *sorted(times.z)])
-        jumps = {int(gap): model.over(int(gap)) for gap in np.unique(gaps)}
-        fixed = None
-        if self.gain == "steady" and len(gaps):
-            fixed = steady(jumps[int(np.median(gaps))], model)
+        found = {} if refusal else updates(model, times, steady=self.gains == "steady")
+        sensed = np.unique(measurements.H.indices).astype(np.int64)
+        rows = np.ascontiguousarray(measurements.H[:, sensed].toarray())
         return ReducedStepper(
-            self, steps, measurements.names, measurements.H, times, model, jumps, fixed, refusal
+            self, steps, measurements.names, sensed, rows, times, model, found, refusal
         )
 
-
-@dataclass(frozen=True)
-class Jump:
-    """A transition A (s, s) over some steps and the process noise Q (s, s) gathered on the way."""
-
-    A: Floats
-    Q: Floats
-
-    def then(self, later: "Jump") -> "Jump":
-        return Jump(later.A @ self.A, later.A @ self.Q @ later.A.T + later.Q)
-
-
-@dataclass(frozen=True)
-class ReducedModel:
-    """The state (q, q_before, bias) of s = 2 r + l numbers: one explicit step, P at rest, H (m, s)
-    and R (m, m) m^2 of the measurements."""
-
-    Phi: Floats
-    one: Jump
-    P0: Floats
-    H: Floats
-    R: Floats
-
-    @property
-    def r(self) -> int:
-        return int(self.Phi.shape[1])
-
-    def over(self, steps: int) -> Jump:
-        """The transition over any number of explicit steps >= 0, by repeated squaring."""
-        s = len(self.P0)
-        whole, part = Jump(np.eye(s), np.zeros((s, s))), self.one
-        while steps:
-            whole = whole.then(part) if steps & 1 else whole
-            steps, part = steps >> 1, part.then(part)
-        return whole
-
-    def gain(self, P: Floats, seen: Floats | slice = slice(None)) -> Floats:
-        """G (s, seen) = P H^T (H P H^T + R)^-1."""
-        H = self.H[seen]
-        return np.asarray(solve(H @ P @ H.T + self.R[seen][:, seen], H @ P, assume_a="pos").T)
-
-    def updated(self, P: Floats, G: Floats, seen: Floats | slice = slice(None)) -> Floats:
-        """Joseph's form: positive for any G."""
-        return joseph(P, G, self.H[seen], self.R[seen][:, seen])
+    def _basis(self, steps: Walk) -> Basis:
+        if self.basis == "pod":
+            basis = pod(steps, self.shapes, self.snapshot_load)
+        else:
+            basis = modes(steps.system, self.shapes)
+        top = float(np.sqrt(basis.squares.max()))
+        if steps.h * top >= 2:
+            raise UsageError(
+                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {steps.h:g} s carry those "
+                f"below {2 / steps.h:.4g}; take fewer shapes or smaller steps"
+            )
+        return basis
 
 
 def reduced_model(
     settings: ReducedEKF, steps: Walk, basis: Basis, measurements: Measurements
 ) -> ReducedModel:
-    """Central difference in modal form; noises grow with the length of a step."""
+    """Central difference in modal form; noises grow with the square root of a step."""
     Phi, loads, h = basis.Phi, steps.system.loads, steps.h
     r, l = Phi.shape[1], loads.shape[1]
     now, old, bias = slice(0, r), slice(r, 2 * r), slice(2 * r, 2 * r + l)
-    first = steps.system.free[0]
-    c2, c1 = steps.c2[first], steps.c1[first]
+    masses = np.where(steps.c2 > 0, steps.system.masses, 0.0)  # regions' damping on the average
+    c2, c1 = (float(np.average(c, weights=masses)) for c in (steps.c2, steps.c1))
     push = (c2 / 2) * h * h * (Phi.T @ loads)
     A = np.eye(2 * r + l)
     A[now, now] = np.diag(c2 - (c2 / 2) * h * h * basis.squares)
@@ -162,44 +125,27 @@ def _directions(settings: ReducedEKF, system: System, basis: Basis) -> Floats:
 
 
 @dataclass(frozen=True)
-class Steady:
-    """The gain (s, m) that regular updates settle to, and P (s, s) after each."""
-
-    G: Floats
-    P: Floats
-
-
-def steady(jump: Jump, model: ReducedModel) -> Steady:
-    """That of updates a `jump` apart; raises `ComparisonError` where there is none."""
-    s = len(model.P0)
-    Q, none = (jump.Q + jump.Q.T) / 2, np.zeros((s, 0))
-    P = steady_claim(LinearModel(jump.A, none, model.H, Q, model.R, np.zeros(s), model.P0)).P
-    G = model.gain(P)
-    return Steady(G, model.updated(P, G))
-
-
-@dataclass(frozen=True)
 class Beside:
-    """U_{t-h} (N,) m, bias (l,) N, P (s, s) of the explicit step number `at` and that number."""
+    """U_{t-h} (N,) m, bias (l,) N, and the explicit step of the last update (0: none)."""
 
     before: Floats
     bias: Floats
-    P: Floats
     at: int
 
 
 @dataclass(frozen=True)
 class ReducedStepper:
-    """A prepared `ReducedEKF`; `jumps` are the transitions over the gaps between measurements."""
+    """A prepared `ReducedEKF`; `rows` (m, c) read measured components from the `sensed` (c,)
+    unknowns; `updates` are by explicit step."""
 
     settings: ReducedEKF
     walk: Walk
     names: tuple[str, ...]
-    H: sparse.csr_array
+    sensed: Ints
+    rows: Floats
     times: Timetable
     model: ReducedModel
-    jumps: Mapping[int, Jump]
-    fixed: Steady | None
+    updates: Mapping[int, Update]
     refusal: str
 
     @property
@@ -211,9 +157,7 @@ class ReducedStepper:
         zeros = np.zeros(len(self.walk.system.moves))
         bias = np.zeros(len(self.scene.loads))
         inputs = np.zeros(len(self.scene.inputs))
-        return State(
-            inputs, NOTHING, 0, NO_SURFACE, u=zeros, extra=Beside(zeros, bias, self.model.P0, 0)
-        )
+        return State(inputs, NOTHING, 0, NO_SURFACE, u=zeros, extra=Beside(zeros, bias, 0))
 
     def step(self, state: State, drives: Floats) -> State:
         """`substeps` plain explicit steps; an update where something was measured."""
@@ -222,17 +166,15 @@ class ReducedStepper:
         assert state.u is not None
         u, beside, found = state.u, state.extra, nothing(len(self.names))
         for part in range(self.walk.parts):
-            start = self.walk.inputs(state.drives, drives, part)
-            start[len(self.scene.drives) :] += beside.bias
-            end = self.walk.inputs(state.drives, drives, part + 1)
+            loads, ends = self.walk.inputs(state.drives, drives, part)
             R = self.walk.model.force(u)
-            u, before = self.walk.following(u, beside.before, R, start, end), u
-            beside = replace(beside, before=before)
+            following = self.walk.following(u, beside.before, R, loads + beside.bias, ends)
+            u, beside = following, Beside(u, beside.bias, beside.at)
             number = state.k * self.walk.parts + part + 1
             z = self.times.at(number)
             if z is not None:
                 u, beside, found = self._corrected(u, beside, z, number, found)
-        largest = float(np.abs(u).max())
+        largest = kernel.farthest(u)
         if not largest < self.walk.far:
             return replace(state, failure=("diverged", self.walk.lost(largest)))
         return State(
@@ -249,7 +191,8 @@ class ReducedStepper:
         """Standard deviations (n, 3) m: what the shapes span, diag(Phi P Phi^T)."""
         beside, model = state.extra, self.model
         jump = model.over(state.k * self.walk.parts - beside.at)
-        P = (jump.A @ beside.P @ jump.A.T + jump.Q)[: model.r, : model.r]
+        P = self.updates[beside.at].P if beside.at else model.P0
+        P = (jump.A @ P @ jump.A.T + jump.Q)[: model.r, : model.r]
         variances = np.maximum(((model.Phi @ P) * model.Phi).sum(axis=1), 0)
         return np.asarray(np.sqrt(variances).reshape(-1, 3))
 
@@ -269,16 +212,10 @@ class ReducedStepper:
         self, u: Floats, beside: Beside, z: Floats, number: int, found: Innovation
     ) -> tuple[Floats, Beside, Innovation]:
         """The update; `found` gains this one's NIS."""
-        model, r, seen = self.model, self.model.r, np.isfinite(z)
-        jump = self.jumps[number - beside.at]
-        P = jump.A @ beside.P @ jump.A.T + jump.Q
-        this = innovation(z, self.H @ u, model.H @ P @ model.H.T + model.R)
-        if self.fixed is None:
-            G = model.gain(P, seen)
-            P, dx = model.updated(P, G, seen), G @ this.y[seen]
-        else:
-            P, dx = self.fixed.P, self.fixed.G @ this.y
-        before = beside.before + model.Phi @ dx[r : 2 * r]
-        after = Beside(before, beside.bias + dx[2 * r :], P, number)
-        total = replace(this, nis=found.nis + this.nis, dof=found.dof + this.dof)
-        return u + model.Phi @ dx[:r], after, total
+        update, r = self.updates[number], self.model.r
+        y = np.where(np.isfinite(z), z - self.rows @ u[self.sensed], 0.0)
+        dx = update.G @ y
+        moved = self.model.Phi @ dx[: 2 * r].reshape(2, r).T
+        after = Beside(beside.before + moved[:, 1], beside.bias + dx[2 * r :], number)
+        nis = found.nis + float(y @ update.inverse @ y)
+        return u + moved[:, 0], after, Innovation(y, update.sd, nis, found.dof + update.dof)

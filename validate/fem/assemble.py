@@ -10,11 +10,15 @@ from scipy import sparse
 from skfem import (
     Basis,
     BilinearForm,
+    ElementHex1,
+    ElementQuad1,
     ElementTetP1,
     ElementTetP2,
     ElementTriP1,
     ElementTriP2,
     ElementVector,
+    MeshHex,
+    MeshQuad,
     MeshTet,
     MeshTri,
     asm,
@@ -27,18 +31,23 @@ from validate.fem.surface import surface_stiffness
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
 
+# The library's mesh and element, the degrees that stiffness and mass are integrated to.
 _ELEMENTS = {
-    "tri3": (MeshTri, ElementTriP1, 1),
-    "tri6": (MeshTri, ElementTriP2, 2),
-    "tet4": (MeshTet, ElementTetP1, 1),
-    "tet10": (MeshTet, ElementTetP2, 2),
+    "tri3": (MeshTri, ElementTriP1, 1, 2),
+    "tri6": (MeshTri, ElementTriP2, 2, 4),
+    "tet4": (MeshTet, ElementTetP1, 1, 2),
+    "tet10": (MeshTet, ElementTetP2, 2, 4),
+    "quad4": (MeshQuad, ElementQuad1, 3, 3),  # 2 x 2 Gauss points
+    "hex8": (MeshHex, ElementHex1, 3, 3),
 }
+# Our corners in the order in which the library lists a hexahedron's.
+_HEXAHEDRON = (0, 4, 3, 1, 7, 5, 2, 6)
 
 
 def stiffness(scene: Scene) -> sparse.csr_array:
     """K (N, N) N/m of the scene's mesh and material, N = n d, node-major.
 
-    In 2-D plane strain, N/m per metre of thickness.
+    In 2-D of the scene's plane state and thickness (1 m: N/m per metre).
 
     Raises `SceneError` for an inverted element, named, or an element kind that is not assembled.
     """
@@ -46,8 +55,7 @@ def stiffness(scene: Scene) -> sparse.csr_array:
     if scene.dilatation == "nodal_mean":
         K = _nodal_mean_stiffness(scene.mesh, scene.material)
     else:
-        lame = scene.per_cell(_lambda), scene.per_cell(_mu)
-        K = _assembled(scene.mesh, *lame)
+        K = _assembled(scene.mesh, *(scene.thickness * c for c in lame_constants(scene)))
     for part in surface_stiffness(scene):
         K = K + part
     return sparse.csr_array(K)
@@ -57,12 +65,12 @@ def stiffness_damping(scene: Scene) -> sparse.csr_array:
     """The share of C (N, N) N s/m that is proportional to K: sum over cells of beta_e K_e."""
     if scene.dilatation == "nodal_mean":
         return sparse.csr_array(scene.material.stiffness_damping * stiffness(scene))
-    beta = scene.per_cell(lambda m: m.stiffness_damping)
-    return _assembled(scene.mesh, beta * scene.per_cell(_lambda), beta * scene.per_cell(_mu))
+    beta = scene.thickness * scene.per_cell(lambda m: m.stiffness_damping)
+    return _assembled(scene.mesh, *(beta * c for c in lame_constants(scene)))
 
 
 def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
-    """Consistent M (N, N) kg (2-D: kg per metre); with `damping`, its share of C in N s/m.
+    """Consistent M (N, N) kg, in 2-D of the thickness; with `damping`, its share of C in N s/m.
 
     Raises `SceneError` where a material has no density.
     """
@@ -72,6 +80,7 @@ def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
     weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
     basis = _basis(scene.mesh, vector=False)
     _require_node_major(basis.doflocs, scene.mesh.nodes, 1)
+    weight = scene.thickness * weight
     scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
     return sparse.csr_array(sparse.kron(scalar, np.eye(scene.mesh.dimension)))
 
@@ -92,22 +101,37 @@ def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
     return np.asarray(diagonal * (M.sum() / diagonal.sum()))
 
 
+def lame_constants(scene: Scene) -> tuple[Floats, Floats]:
+    """lambda and mu (e,) Pa of every cell; in plane stress lambda' = E nu/(1 - nu^2)."""
+    stress = scene.plane == "stress"
+    return scene.per_cell(_plane_stress if stress else _lambda), scene.per_cell(_mu)
+
+
 def _lambda(m: Material) -> float:
     return float(lame_parameters(m.E, m.nu)[0])
+
+
+def _plane_stress(m: Material) -> float:
+    return m.E * m.nu / (1 - m.nu**2)
 
 
 def _mu(m: Material) -> float:
     return float(lame_parameters(m.E, m.nu)[1])
 
 
-def _basis(mesh: Mesh, *, vector: bool) -> Basis:
-    library_mesh, element, degree = _ELEMENTS[mesh.kind]
-    corners = np.ascontiguousarray(mesh.corners.T)
+def library_mesh(mesh: Mesh) -> Any:
+    """The vertices and cells as scikit-fem has them, its order of corners included."""
+    order = _HEXAHEDRON if mesh.kind == "hex8" else slice(None)
+    corners = np.ascontiguousarray(mesh.corners[:, order].T)
     vertices = int(mesh.corners.max()) + 1
-    domain = library_mesh(np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
+    return _ELEMENTS[mesh.kind][0](np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
+
+
+def _basis(mesh: Mesh, *, vector: bool) -> Basis:
+    _, element, stiffness_degree, mass_degree = _ELEMENTS[mesh.kind]
     if vector:
-        return Basis(domain, ElementVector(element()), intorder=degree)
-    return Basis(domain, element(), intorder=2 * degree)
+        return Basis(library_mesh(mesh), ElementVector(element()), intorder=stiffness_degree)
+    return Basis(library_mesh(mesh), element(), intorder=mass_degree)
 
 
 def _assembled(mesh: Mesh, lam: Floats, mu: Floats) -> sparse.csr_array:
@@ -154,7 +178,12 @@ def divergence(mesh: Mesh) -> tuple[sparse.csr_array, Floats]:
 
 
 def shape_gradients(mesh: Mesh) -> Floats:
-    """dN_a/dx (e, d + 1, d) 1/m of the linear shape functions of every cell."""
+    """dN_a/dx (e, d + 1, d) 1/m of the linear shape functions of every simplex.
+
+    Raises `SceneError` for bricks, whose gradients vary within the cell.
+    """
+    if mesh.bricks:
+        raise SceneError(f"elements of kind {mesh.kind} have no constant strain; use simplices")
     x = mesh.nodes[mesh.corners]
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1])
     rest = np.swapaxes(inverse, 1, 2)

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import shape_gradients
+from validate.fem.assemble import lame_constants, shape_gradients
 from validate.fem.system import System
 from validate.scene.scene import Material, Scene
 
@@ -163,8 +163,7 @@ def element_frequencies(scene: Scene) -> Floats:
     """
     mesh, d = scene.mesh, scene.mesh.dimension
     gradients = shape_gradients(mesh)
-    lam = scene.per_cell(lambda m: m.bulk_modulus - 2 * m.shear_modulus / 3)
-    mu, rho = scene.per_cell(lambda m: m.shear_modulus), scene.per_cell(_density)
+    (lam, mu), rho = lame_constants(scene), scene.per_cell(_density)
     squares = np.empty(len(gradients))
     for start in range(0, len(gradients), _BLOCK):
         part = slice(start, start + _BLOCK)
@@ -188,7 +187,7 @@ def _strain_rows(gradients: Floats) -> Floats:
 
 
 def _elasticity(lam: Floats, mu: Floats, d: int) -> Floats:
-    """D (e, s, s) Pa of Hooke's law; in 2-D plane strain."""
+    """D (e, s, s) Pa of Hooke's law; in 2-D of the plane state that lambda is for."""
     s = d + d * (d - 1) // 2
     normal = np.zeros(s)
     normal[:d] = 1

@@ -8,9 +8,12 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
+from validate.scene.bricks import shapes, slopes
 from validate.scene.mesh import EDGES, Mesh
 
 _CANDIDATES = 24  # nearest cell centres tried per point
+_INVERSIONS = 12  # Newton steps to a brick's local coordinates; a parallelepiped takes one
+_STRAY = 4.0  # how far outside its unit cell such a step may go: a brick's map folds further out
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,8 @@ class Rows:
 
 def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
     """Rows of the cell that holds each point (k, d), or of the nearest cell, clipped to it."""
+    if mesh.bricks:
+        return _brick_rows(mesh, points)
     L, cell = _barycentric(mesh, points)
     clipped = np.clip(L, 0, None)
     clipped /= clipped.sum(axis=1, keepdims=True)
@@ -64,16 +69,43 @@ def facet_samples(mesh: Mesh, facets: Ints, parts: int) -> tuple[Rows, Ints]:
 
 
 def _barycentric(mesh: Mesh, points: Floats) -> tuple[Floats, Ints]:
-    x = mesh.nodes[mesh.corners]
-    near = min(_CANDIDATES, len(x))
-    _, cells = cKDTree(x.mean(axis=1)).query(points, k=near)
-    cells = np.asarray(cells).reshape(len(points), near)
+    x, cells = mesh.nodes[mesh.corners], _near_cells(mesh, points)
     edges = np.swapaxes(x[cells, 1:] - x[cells, :1], -1, -2)
     rest = np.linalg.solve(edges, (points[:, None] - x[cells, 0])[..., None])[..., 0]
     L = np.concatenate([1 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)
     best = np.argmax(L.min(axis=-1), axis=1)
     pick = np.arange(len(points))
     return L[pick, best], cells[pick, best]
+
+
+def _near_cells(mesh: Mesh, points: Floats) -> Ints:
+    """The cells (k, c) whose centres are nearest to each point."""
+    near = min(_CANDIDATES, len(mesh.cells))
+    _, cells = cKDTree(mesh.nodes[mesh.corners].mean(axis=1)).query(points, k=near)
+    return np.asarray(cells).reshape(len(points), near)
+
+
+def _brick_rows(mesh: Mesh, points: Floats) -> Rows:
+    cells = _near_cells(mesh, points)
+    x = mesh.nodes[mesh.corners[cells]]
+    flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
+    weights = shapes(np.clip(_local(flat, each), 0.0, 1.0))
+    feet = np.einsum("ka,kad->kd", weights, flat)
+    away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
+    # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
+    best, pick = np.argmin(away, axis=1), np.arange(len(points))
+    weights = weights.reshape(*cells.shape, -1)[pick, best]
+    return Rows(_csr(mesh.cells[cells[pick, best]], weights, mesh), away[pick, best])
+
+
+def _local(x: Floats, points: Floats) -> Floats:
+    """Local coordinates (k, d) of points (k, d) in the bricks of corners x (k, 2^d, d)."""
+    xi = np.full(points.shape, 0.5)
+    for _ in range(_INVERSIONS):
+        missed = points - np.einsum("ka,kad->kd", shapes(xi), x)
+        J = np.einsum("kad,kaj->kdj", x, slopes(xi))
+        xi = np.clip(xi + np.linalg.solve(J, missed[..., None])[..., 0], -_STRAY, 1 + _STRAY)
+    return xi
 
 
 def _shape_values(L: Floats, order: int) -> Floats:

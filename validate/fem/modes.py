@@ -8,6 +8,7 @@ from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.once import once
 from validate.fem.system import System
 
 _CLUSTER = 1e-3  # relative distance of frequencies that are taken as one cluster
@@ -27,8 +28,13 @@ class Modes:
 def modes_of(system: System, count: int | None = None) -> Modes:
     """The lowest modes, with the whole of the last cluster of equal frequencies.
 
-    Raises `SceneError` for more modes than unknowns or a C that they do not make diagonal.
+    They are kept with the system. Raises `SceneError` for more modes than unknowns or a C that they
+    do not make diagonal.
     """
+    return once(system, ("modes", count), lambda: _modes(system, count))
+
+
+def _modes(system: System, count: int | None) -> Modes:
     free = system.free
     m = len(free)
     wanted = m if count is None else count

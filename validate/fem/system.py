@@ -26,7 +26,7 @@ class System:
 
     Matrices are assembled when first asked for: what a scheme does not use costs nothing. K, M and
     C are (N, N) in N/m, kg and N s/m; `masses` (N,) are the lumped ones; `loads` (N, l) are the
-    nodal forces of one newton of each load.
+    nodal forces of one newton of each load, or one m/s^2 of a weight.
     """
 
     scene: Scene
@@ -159,7 +159,12 @@ def _driven(scene: Scene, drive: Drive) -> Ints:
     axes = np.flatnonzero(drive.direction)
     if len(axes) != 1:
         raise SceneError(f"drive '{drive.name}' must move along one axis, got {drive.direction}")
-    return _unknowns(scene, drive.facets, (int(axes[0]),))
+    driven = _unknowns(scene, drive.facets, (int(axes[0]),))
+    if drive.point is None:
+        return driven
+    mesh = scene.mesh
+    away = np.linalg.norm(mesh.nodes[driven // mesh.dimension] - np.array(drive.point), axis=1)
+    return driven[[int(np.argmin(away))]]
 
 
 def _unknowns(scene: Scene, facets: str, components: tuple[int, ...]) -> Ints:

@@ -2,7 +2,7 @@
 
 Conventions: cells are positively oriented; facets are oriented outward from the solid; quadratic
 meshes list the vertices first, then one node per edge at its midpoint (straight edges), in the
-local order of `EDGES`.
+local order of `EDGES`. Corners of quad4 and hex8 run as in `scene.bricks`.
 """
 
 from collections.abc import Mapping
@@ -15,18 +15,38 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, checked, checked_indices
 from validate.errors import SceneError
+from validate.scene.bricks import CORNERS, gauss_points, jacobians
 
-Kind = Literal["tri3", "tri6", "tet4", "tet10"]
-DIMENSION: Mapping[str, int] = {"tri3": 2, "tri6": 2, "tet4": 3, "tet10": 3}
-ORDER: Mapping[str, int] = {"tri3": 1, "tri6": 2, "tet4": 1, "tet10": 2}
+Kind = Literal["tri3", "tri6", "tet4", "tet10", "quad4", "hex8"]
+DIMENSION: Mapping[str, int] = {
+    "tri3": 2, "tri6": 2, "tet4": 3, "tet10": 3, "quad4": 2, "hex8": 3,
+}  # fmt: skip
+ORDER: Mapping[str, int] = {"tri3": 1, "tri6": 2, "tet4": 1, "tet10": 2, "quad4": 1, "hex8": 1}
+# Nodes of a cell and of a facet.
+_NODES: Mapping[str, tuple[int, int]] = {
+    "tri3": (3, 2), "tri6": (6, 3), "tet4": (4, 3), "tet10": (10, 6), "quad4": (4, 2),
+    "hex8": (8, 4),
+}  # fmt: skip
 EDGES: Mapping[int, tuple[tuple[int, int], ...]] = {
     2: ((0, 1), (1, 2), (0, 2)),
     3: ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
 }
-_FACETS: Mapping[int, tuple[tuple[int, ...], ...]] = {
-    2: ((0, 1), (1, 2), (2, 0)),
-    3: ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
-}
+# Outward facets by dimension and corners of a cell.
+_FACETS: Mapping[tuple[int, int], tuple[tuple[int, ...], ...]] = {
+    (2, 3): ((0, 1), (1, 2), (2, 0)),
+    (2, 4): ((0, 1), (1, 2), (2, 3), (3, 0)),
+    (3, 4): ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
+    (3, 8): (
+        (0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)
+    ),
+}  # fmt: skip
+# Kuhn's split of a brick along its diagonal, positively oriented.
+_SIMPLICES: Mapping[str, tuple[tuple[int, ...], ...]] = {
+    "quad4": ((0, 1, 2), (0, 2, 3)),
+    "hex8": (
+        (0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,9 +59,7 @@ class Mesh:
     facets: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        d, order = DIMENSION[self.kind], ORDER[self.kind]
-        per_cell = {1: d + 1, 2: d + 1 + len(EDGES[d])}[order]
-        per_facet = {1: d, 2: d + len(EDGES[d - 1]) if d == 3 else 3}[order]
+        d, (per_cell, per_facet) = DIMENSION[self.kind], _NODES[self.kind]
         nodes = checked(self.nodes, "mesh nodes [m]", (None, d), error=SceneError)
         n = len(nodes)
         cells = checked_indices(self.cells, "cells", (None, per_cell), n, error=SceneError)
@@ -62,9 +80,25 @@ class Mesh:
         return ORDER[self.kind]
 
     @property
+    def bricks(self) -> bool:
+        """Whether the cells are quadrilaterals or hexahedra rather than simplices."""
+        return self.kind in _SIMPLICES
+
+    @property
     def corners(self) -> Ints:
-        """The vertices of every cell (e, d + 1)."""
-        return self.cells[:, : self.dimension + 1]
+        """The vertices of every cell (e, d + 1), of bricks (e, 2^d)."""
+        return self.cells if self.bricks else self.cells[:, : self.dimension + 1]
+
+    @property
+    def simplices(self) -> Ints:
+        """The vertices of simplices (s, d + 1) that fill the mesh: bricks split, for drawing.
+
+        Neighbouring hexahedra meet along the same diagonals only in meshes of one orientation, as
+        `scene.box.grid` makes them.
+        """
+        if not self.bricks:
+            return self.corners
+        return self.cells[:, np.array(_SIMPLICES[self.kind])].reshape(-1, self.dimension + 1)
 
     def facet_nodes(self, name: str) -> Ints:
         """Sorted node numbers of a facet set; raises `SceneError` when it is absent or empty."""
@@ -78,15 +112,18 @@ class Mesh:
 
 
 def cell_volumes(mesh: Mesh) -> Floats:
-    """Signed volume (area in 2-D) of every cell (e,), from its vertices."""
+    """Signed volume (area in 2-D) of every cell (e,), from its vertices; bricks by quadrature."""
     x = mesh.nodes[mesh.corners]
+    if mesh.bricks:
+        points, weight = gauss_points(mesh.dimension)
+        return np.asarray(weight * np.linalg.det(jacobians(x, points)).sum(axis=1))
     size = {2: 2.0, 3: 6.0}[mesh.dimension]
     return np.asarray(np.linalg.det(x[:, 1:] - x[:, :1]) / size)
 
 
 def require_positive_cells(mesh: Mesh) -> None:
     """Raises `SceneError` naming the worst cell when any volume is not clearly positive."""
-    volumes = cell_volumes(mesh)
+    volumes = _least_volumes(mesh)
     bad = volumes <= 1e-9 * np.abs(volumes).mean()
     if bad.any():
         worst = int(np.argmin(volumes))
@@ -97,6 +134,14 @@ def require_positive_cells(mesh: Mesh) -> None:
             f"with {1e9 * volumes[worst]:.4g} mm3 at ({at}) mm; refine the mesh or move the "
             "inclusion"
         )
+
+
+def _least_volumes(mesh: Mesh) -> Floats:
+    """Signed volume (e,) of every cell as its worst corner has it: bricks may fold over there."""
+    if not mesh.bricks:
+        return cell_volumes(mesh)
+    x = mesh.nodes[mesh.corners]
+    return np.asarray(np.linalg.det(jacobians(x, CORNERS[mesh.dimension])).min(axis=1))
 
 
 def kuhn_cells(shape: tuple[int, ...]) -> Ints:
@@ -116,8 +161,9 @@ def kuhn_cells(shape: tuple[int, ...]) -> Ints:
 
 
 def boundary_facets(corners: Ints, dimension: int) -> Ints:
-    """Facets (f, d) that belong to one cell only, oriented outward."""
-    facets = np.vstack([corners[:, list(local)] for local in _FACETS[dimension]])
+    """Facets (f, d), of hexahedra (f, 4), that belong to one cell only, oriented outward."""
+    known = _FACETS[dimension, corners.shape[1]]
+    facets = np.vstack([corners[:, list(local)] for local in known])
     _, first, count = np.unique(
         np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True
     )
@@ -129,6 +175,8 @@ def quadratic(mesh: Mesh) -> Mesh:
     """The mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10)."""
     if mesh.order == 2:
         return mesh
+    if mesh.bricks:
+        raise SceneError(f"elements of kind {mesh.kind} have no quadratic form; use simplices")
     d, n = mesh.dimension, len(mesh.nodes)
     ends = np.sort(mesh.cells[:, list(EDGES[d])].reshape(-1, 2), axis=1)
     edges, number = np.unique(ends, axis=0, return_inverse=True)

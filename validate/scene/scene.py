@@ -12,6 +12,7 @@ from validate.scene.mesh import Mesh
 
 Dilatation = Literal["pointwise", "nodal_mean"]
 LawName = Literal["linear", "svk", "neo_hooke"]
+PlaneState = Literal["strain", "stress"]
 
 
 @dataclass(frozen=True)
@@ -84,12 +85,22 @@ class Pin:
 class Drive:
     """A facet set moved along `direction` (d,), a unit vector along an axis, by a named input in m.
 
-    The reported force is that on the plate against the motion: compression positive.
+    The reported force is that on the plate against the motion: compression positive. With `point`
+    m only the set's node nearest to it moves, as under a needle. `speeds`: the true velocity of a
+    motion that is planned piecewise linear, (from t s, m/s) in rising order, each valid from its
+    instant on; what dynamic schemes read whose drive rates are "given".
     """
 
     name: str
     facets: str
     direction: tuple[float, ...]
+    point: tuple[float, ...] | None = None
+    speeds: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        starts = [t for t, _ in self.speeds]
+        if not all(np.isfinite(v) for _, v in self.speeds) or starts != sorted(starts):
+            raise SceneError(f"drive '{self.name}': speeds must be finite, their times rising")
 
 
 @dataclass(frozen=True)
@@ -110,6 +121,23 @@ class Load:
         length = float(np.linalg.norm(self.direction))
         if abs(length - 1) > 1e-9:
             raise SceneError(f"load '{self.name}': direction of length {length:g}, needs 1")
+
+
+@dataclass(frozen=True)
+class Weight:
+    """Gravity along `direction` (d,), a unit vector, by a named input in m/s^2.
+
+    A load among loads: every cell's mass times the input, consistently, on its nodes. Gravity that
+    is switched on at t = 0 is a constant input.
+    """
+
+    name: str
+    direction: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.direction))
+        if abs(length - 1) > 1e-9:
+            raise SceneError(f"weight '{self.name}': direction of length {length:g}, needs 1")
 
 
 @dataclass(frozen=True)
@@ -162,7 +190,8 @@ class Scene:
     """What is simulated. Parts that are absent cost nothing.
 
     `copies`: planes of symmetry leave this many equal parts, of which the mesh is one; the force
-    of a drive is that on the whole body.
+    of a drive is that on the whole body. `plane` and `thickness` m are those of a 2-D mesh; at 1 m
+    all forces are per metre.
     """
 
     mesh: Mesh
@@ -176,8 +205,10 @@ class Scene:
     foundations: tuple[Foundation, ...] = ()
     membranes: tuple[Membrane, ...] = ()
     regions: tuple[Region, ...] = ()
-    loads: tuple[Load, ...] = ()
+    loads: tuple[Load | Weight, ...] = ()
     probes: tuple[Probe, ...] = ()
+    plane: PlaneState = "strain"
+    thickness: float = 1.0
 
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
@@ -186,6 +217,7 @@ class Scene:
             self.dilatation == "nodal_mean" or self.foundations or self.membranes
         ):
             raise SceneError("mean dilatation, foundations and membranes are for 3-D meshes")
+        self._check_cells()
         if self.dilatation == "nodal_mean" and self.regions:
             raise SceneError("nodal mean dilatation is for one material; drop the regions")
         for region in self.regions:
@@ -199,13 +231,27 @@ class Scene:
         named = [s.facets for s in self.supports]
         named += [f.facets for f in self.foundations] + [m.facets for m in self.membranes]
         named += [d.facets for d in self.drives] + [c.facets for c in self.cavities]
-        named += [load.facets for load in self.loads]
+        named += [load.facets for load in self.loads if isinstance(load, Load)]
         for facets in named:
             self.mesh.facet_nodes(facets)
 
+    def _check_cells(self) -> None:
+        """What bricks cannot have, and plane state and thickness, which are for 2-D meshes."""
+        flat, kind = self.mesh.dimension == 2, self.mesh.kind
+        if self.mesh.bricks and self.dilatation == "nodal_mean":
+            raise SceneError(f"nodal mean dilatation is for simplices, not {kind}; use box()")
+        if kind == "hex8" and (self.foundations or self.membranes or self.cavities):
+            raise SceneError("foundations, membranes and cavities need triangular facets; use box()")
+        if not (np.isfinite(self.thickness) and self.thickness > 0):
+            raise SceneError(f"thickness {self.thickness:g} m: a number above 0")
+        if not flat and (self.plane != "strain" or self.thickness != 1):
+            raise SceneError(f"plane {self.plane} of {self.thickness:g} m: for 2-D meshes only")
+        if self.cavities and self.thickness != 1:
+            raise SceneError(f"thickness {self.thickness:g} m: cavities in 2-D are per metre")
+
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of what a step is given: drives in m first, then loads in N."""
+        """Names of what a step is given: drives in m, then loads in N and weights in m/s^2."""
         return tuple(d.name for d in self.drives) + tuple(load.name for load in self.loads)
 
     def per_cell(self, value: Callable[[Material], float]) -> Floats:

@@ -8,9 +8,10 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.factor import factorise
 from validate.fem.system import System
-from validate.scene.scene import Scene
-from validate.solve.newmark_rule import MassName, mass_of
+from validate.scene.scene import Scene, Weight
+from validate.solve.newmark_rule import DampingTerms, MassName, damping_of, mass_of
 from validate.solve.types import NO_SURFACE, NOTHING, State, Trace
 
 StartName = Literal["equilibrium", "zero"]
@@ -41,11 +42,13 @@ class Reactions:
         }
 
 
-def reactions(system: System, mass: MassName | None = "consistent") -> Reactions:
+def reactions(
+    system: System, mass: MassName | None = "consistent", terms: DampingTerms = "full"
+) -> Reactions:
     """Rows of the drives' forces; `mass` None for a scheme without rates: no M, no C is made."""
     rows, names = system.moves.T, tuple(d.name for d in system.scene.drives)
     still = np.zeros_like(rows)
-    C = still if mass is None else rows @ system.C
+    C = still if mass is None else rows @ damping_of(system, mass, terms)
     M = still if mass is None else rows @ mass_of(system, mass)
     return Reactions(names, system.scene.copies, rows @ system.K, C, M, rows @ system.loads)
 
@@ -77,8 +80,8 @@ class InertialStepper:
     def _drives(self) -> int:
         return len(self.scene.drives)
 
-    def _state(self, inputs: Floats, k: int, **fields: object) -> State:
-        return State(inputs, NOTHING, 0, NO_SURFACE, k=k, **fields)  # type: ignore[arg-type]
+    def _state(self, inputs: Floats, k: int, updates: int = 0, **fields: object) -> State:
+        return State(inputs, NOTHING, updates, NO_SURFACE, k=k, **fields)  # type: ignore[arg-type]
 
     def rest(self) -> State:
         zeros = np.zeros(self.system.moves.shape[0])
@@ -94,19 +97,42 @@ class InertialStepper:
     def traces(self, states: Sequence[State]) -> dict[str, Trace]:
         """`<drive>.displacement` m, `<drive>.force` N (compression positive), `<load>.force` N.
 
-        A load's force is its input: with `per_node` that at each node, else the total.
+        A load's force is its input: with `per_node` that at each node, else the total. A weight's
+        trace is `<weight>.acceleration` m/s^2.
         """
         names = self.scene.inputs
         inputs = np.array([s.drives for s in states]).reshape(len(states), len(names))
         traces = {}
         for j, name in enumerate(names):
             moved = j < self._drives
-            kind, unit = ("displacement", "m") if moved else ("force", "N")
+            kind, unit = input_kind(self.scene, j)
             traces[f"{name}.{kind}"] = Trace(inputs[:, j], unit)
             if moved:
                 force = np.array([s.numbers[f"{name}.force"] for s in states])
                 traces[f"{name}.force"] = Trace(force, "N")
         return traces
+
+
+def input_kind(scene: Scene, j: int) -> tuple[str, str]:
+    """What the scene's input j is, and its unit."""
+    drives = len(scene.drives)
+    if j < drives:
+        return "displacement", "m"
+    return ("acceleration", "m/s^2") if isinstance(scene.loads[j - drives], Weight) else ("force", "N")
+
+
+def starting_accelerations(
+    system: System, mass: MassName = "consistent", a0: StartName = "equilibrium"
+) -> Floats | None:
+    """M^-1 f (m, l) m/s^2 that one unit of each load gives the body at rest; None for a0 = 0."""
+    if a0 == "zero":
+        return None
+    loads = system.loads[system.free]
+    if mass == "lumped":
+        return np.asarray(loads / system.masses[system.free][:, None])
+    mesh = system.scene.mesh
+    M = system.M[system.free][:, system.free]
+    return factorise(M, system.free // mesh.dimension, mesh.nodes).solve(loads)
 
 
 def spread(system: System, free: Floats, driven: Floats) -> Floats:

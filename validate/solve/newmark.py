@@ -3,6 +3,9 @@
 u' = J^-1 (A u + L v + M a + f'), then v' and a' by the rule (paper 001, eqs 8-14); J is factorised
 once. The paper solves anew at every step by Gaussian elimination: that is a named solver here.
 
+Paper 002 prints the same rule with u' = u + h v' + h^2/4 (a + a'), v' for v: a misprint, which is
+an update here to show that it is unstable from w h = 1.155 (undamped; 1.29 at xi .1, 1.55 at .3).
+
 Departures: average acceleration is not L-stable: with a0 = M^-1 f velocities and accelerations
 ring for ever. Show none of them; take backward Euler or generalised alpha, or ramp the load.
 """
@@ -13,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.factor import factorise
+from validate.errors import SceneError
 from validate.fem.system import System
 from validate.solve.dynamic import (
     InertialStepper,
@@ -21,9 +24,12 @@ from validate.solve.dynamic import (
     reactions,
     require_linear,
     spread,
+    starting_accelerations,
 )
-from validate.solve.linear_solvers import SolverName
+from validate.solve.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
 from validate.solve.newmark_rule import (
+    DampingTerms,
+    DriveRates,
     Excitation,
     MassName,
     Motion,
@@ -36,7 +42,7 @@ from validate.solve.newmark_rule import (
 )
 from validate.solve.types import State, Stepper
 
-DriveRates = Literal["difference", "rule"]
+UpdateName = Literal["newmark", "misprinted"]
 
 
 @dataclass(frozen=True)
@@ -57,35 +63,32 @@ class Newmark:
     mass: MassName = "consistent"
     rho_inf: float = 0.8
     drive_rates: DriveRates = "difference"
+    damping_terms: DampingTerms = "full"
+    update: UpdateName = "newmark"
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt, self.rho_inf)
+        if self.update == "misprinted" and self.rule != "average":
+            raise SceneError(f"the misprinted update is paper 002's average rule, not {self.rule}")
+        if not 0 < self.tolerance < 1:
+            raise SceneError(f"tolerance {self.tolerance:g} of the residual: a number in 0..1")
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
         require_linear(system)
         rule = rule_of(self.rule, self.dt, self.rho_inf)
-        by_rule = self.drive_rates == "rule"
+        terms = self.damping_terms
         if self.a0 == "equilibrium" and system.scene.loads:
             require_start(system, rule, self.mass)
         return NewmarkStepper(
             system,
-            reactions(system, self.mass),
-            propagation(system, rule, self.mass, self.solver),
-            excitation(system, rule, self.mass, by_rule=by_rule),
-            self._starts(system),
+            reactions(system, self.mass, terms),
+            propagation(system, rule, self.mass, self.solver, terms, self.tolerance),
+            excitation(system, rule, self.mass, self.drive_rates, terms),
+            starting_accelerations(system, self.mass, self.a0),
+            self.update == "misprinted",
         )
-
-    def _starts(self, system: System) -> Floats | None:
-        """Accelerations (m, l) m/s^2 that one newton of each load gives the body at rest."""
-        if self.a0 == "zero":
-            return None
-        loads = system.loads[system.free]
-        if self.mass == "lumped":
-            return np.asarray(loads / system.masses[system.free][:, None])
-        mesh = system.scene.mesh
-        M = system.M[system.free][:, system.free]
-        return factorise(M, system.free // mesh.dimension, mesh.nodes).solve(loads)
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class NewmarkStepper(InertialStepper):
     propagation: Propagation
     excitation: Excitation
     starts: Floats | None
+    misprinted: bool = False
 
     def step(self, state: State, drives: Floats) -> State:
         """The state at the end of a step; `drives` are the inputs there, loads included."""
@@ -109,13 +113,28 @@ class NewmarkStepper(InertialStepper):
         motion = state.extra if isinstance(state.extra, Motion) else self.excitation.rest()
         moved = self.excitation.moved(motion, drives[:k])
         f = self.excitation.force(new, old, moved, motion)
-        u_new = self.propagation.predict(u, v, a, f)
-        rates = self.propagation.rates(u_new, u, v, a)
-        return self._done(state, drives, moved, u_new, *rates)
+        solved = self._solved(u, self.propagation.history(u, v, a) + f)
+        u_new = solved.x
+        v_new, a_new = self.propagation.rates(u_new, u, v, a)
+        if self.misprinted:
+            u_new = u_new + self.propagation.rule.h * (v_new - v)
+        return self._done(state, drives, moved, solved, (u_new, v_new, a_new))
+
+    def _solved(self, u: Floats, b: Floats) -> Solved:
+        solver = self.propagation.solver
+        if isinstance(solver, Iterative):
+            return solver.solve_from(b, u)
+        return Solved(solver.solve(b), 0, True)
 
     def _done(
-        self, state: State, inputs: Floats, moved: Motion, u: Floats, v: Floats, a: Floats
+        self,
+        state: State,
+        inputs: Floats,
+        moved: Motion,
+        solved: Solved,
+        free: tuple[Floats, Floats, Floats],
     ) -> State:
+        u, v, a = free
         full_u = spread(self.system, u, moved.q)
         full_v = spread(self.system, v, moved.rate)
         full_a = spread(self.system, a, moved.acceleration)
@@ -123,6 +142,9 @@ class NewmarkStepper(InertialStepper):
         failure = None
         if not np.isfinite(full_a.sum()):
             failure = ("diverged", f"accelerations are not finite at step {state.k + 1}")
+        elif not solved.converged:
+            why = f"{solved.iterations} iterations leave the residual above the tolerance"
+            failure = ("not_converged", f"step {state.k + 1}: {why}")
         return self._state(
             inputs,
             state.k + 1,
@@ -132,4 +154,5 @@ class NewmarkStepper(InertialStepper):
             numbers=numbers,
             extra=moved,
             failure=failure,
+            updates=solved.iterations,
         )

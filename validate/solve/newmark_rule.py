@@ -20,11 +20,15 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.assemble import lumped, mass, stiffness_damping
 from validate.fem.system import System
-from validate.solve.linear_solvers import Solver, SolverName, solver_of
+from validate.scene.scene import Drive
+from validate.solve.linear_solvers import TOLERANCE, Solver, SolverName, solver_of
 
 RuleName = Literal["average", "backward_euler", "generalised_alpha"]
 MassName = Literal["consistent", "lumped"]
+DampingTerms = Literal["full", "mass"]
+DriveRates = Literal["difference", "rule", "given"]
 
 
 @dataclass(frozen=True)
@@ -133,17 +137,18 @@ def propagation(
     rule: Rule,
     mass: MassName = "consistent",
     solver: SolverName = "prefactored",
+    terms: DampingTerms = "full",
+    tolerance: float = TOLERANCE,
 ) -> Propagation:
     """The step's matrices over the free unknowns, with J factorised or as the solver takes it.
 
     Raises `SceneError` for missing densities, or a J that is not positive definite.
     """
     free = system.free
-    M, C, K = (
-        sparse.csr_array(X[free][:, free]) for X in (mass_of(system, mass), system.C, system.K)
-    )
+    matrices = mass_of(system, mass), damping_of(system, mass, terms), system.K
+    M, C, K = (sparse.csr_array(X[free][:, free]) for X in matrices)
     J, mesh = _system_matrix(rule, M, C, K), system.scene.mesh
-    ready = solver_of(solver, J, free // mesh.dimension, mesh.nodes)
+    ready = solver_of(solver, J, free // mesh.dimension, mesh.nodes, tolerance)
     return Propagation(rule, free, M, C, K, ready)
 
 
@@ -191,20 +196,22 @@ def _weights(r: Rule) -> tuple[tuple[float, float, float], tuple[float, float, f
 
 @dataclass(frozen=True)
 class Motion:
-    """Drives q (k,) m with their rates m/s and accelerations m/s^2."""
+    """Drives q (k,) m with their rates m/s and accelerations m/s^2 after `steps` steps."""
 
     q: Floats
     rate: Floats
     acceleration: Floats
+    steps: int = 0
 
 
 @dataclass(frozen=True)
 class Excitation:
     """What inputs do to the free unknowns: columns of loads (m, l) and of drives (m, k).
 
-    Prescribed unknowns are coupled by K, C and M; `by_rule` gives their rates the rule's formulas
-    (which average acceleration makes ring, growing, on a ramp), else backward differences: the
-    rate of second order, the acceleration one step late.
+    Prescribed unknowns are coupled by K, C and M. Their `rates`: "rule" by the rule's formulas
+    (which average acceleration makes ring, growing, on a ramp), "difference" by backward
+    differences: the rate of second order, the acceleration one step late; "given" are the drives'
+    own `speeds`, whose jumps have no acceleration.
     """
 
     rule: Rule
@@ -212,7 +219,8 @@ class Excitation:
     stiffness: Floats
     damping: Floats
     mass: Floats
-    by_rule: bool = False
+    rates: DriveRates = "difference"
+    given: tuple[Drive, ...] = ()
 
     @property
     def drives(self) -> int:
@@ -224,13 +232,16 @@ class Excitation:
 
     def moved(self, motion: Motion, q: Floats) -> Motion:
         """The drives at the end of a step that takes them to q (k,) m."""
-        h = self.rule.h
-        if self.by_rule:
+        h, steps = self.rule.h, motion.steps + 1
+        if self.rates == "given":
+            speeds = np.array([_speed(d, steps * h, h) for d in self.given])
+            return Motion(q, speeds, np.zeros_like(speeds), steps)
+        if self.rates == "rule":
             rates = self.rule.rates(q, motion.q, motion.rate, motion.acceleration)
-            return Motion(q, *rates)
+            return Motion(q, *rates, steps)
         mean, last = (q - motion.q) / h, motion.rate - h / 2 * motion.acceleration
         acceleration = (mean - last) / h
-        return Motion(q, mean + h / 2 * acceleration, acceleration)
+        return Motion(q, mean + h / 2 * acceleration, acceleration, steps)
 
     def force(self, new: Floats, old: Floats, moved: Motion, motion: Motion) -> Floats:
         """Forces (m,) N at the balance of a step from the loads `old` to `new` (l,) N."""
@@ -243,16 +254,31 @@ class Excitation:
         return np.asarray(f)
 
 
+def _speed(drive: Drive, t: float, h: float) -> float:
+    """The planned velocity m/s at t, at a jump that behind it; instants as near as 1e-6 h count."""
+    passed = [v for start, v in drive.speeds if start <= t + 1e-6 * h]
+    return passed[-1] if passed else 0.0
+
+
 def excitation(
-    system: System, rule: Rule, mass: MassName = "consistent", *, by_rule: bool = False
+    system: System,
+    rule: Rule,
+    mass: MassName = "consistent",
+    rates: DriveRates = "difference",
+    terms: DampingTerms = "full",
 ) -> Excitation:
-    """Columns of the system's loads and drives over its free unknowns."""
-    M = mass_of(system, mass)
-    K, C, M_d = (
-        np.ascontiguousarray((X @ system.moves)[system.free]) for X in (system.K, system.C, M)
-    )
+    """Columns of the system's loads and drives over its free unknowns.
+
+    Raises `SceneError` for rates "given" of a drive without `speeds`.
+    """
+    given = system.scene.drives if rates == "given" else ()
+    for drive in given:
+        if not drive.speeds:
+            raise SceneError(f"drive '{drive.name}' has no speeds; use drive_rates = difference")
+    matrices = system.K, damping_of(system, mass, terms), mass_of(system, mass)
+    K, C, M = (np.ascontiguousarray((X @ system.moves)[system.free]) for X in matrices)
     loads = np.ascontiguousarray(system.loads[system.free])
-    return Excitation(rule, loads, K, C, M_d, by_rule)
+    return Excitation(rule, loads, K, C, M, rates, given)
 
 
 def mass_of(system: System, mass: MassName) -> sparse.csr_array:
@@ -260,3 +286,16 @@ def mass_of(system: System, mass: MassName) -> sparse.csr_array:
     if mass == "consistent":
         return system.M
     return sparse.csr_array(sparse.diags_array(system.masses))
+
+
+def damping_of(system: System, mass_name: MassName, terms: DampingTerms) -> sparse.csr_array:
+    """C (N, N) N s/m: alpha M of the mass in use, with `terms` "full" plus beta K.
+
+    Without beta K lumped masses leave C diagonal: paper 002's price of explicit steps.
+    """
+    if (mass_name, terms) == ("consistent", "full"):
+        return system.C
+    C = mass(system.scene, damping=True)
+    if mass_name == "lumped":
+        C = sparse.csr_array(sparse.diags_array(lumped(system.scene, C)))
+    return C if terms == "mass" else sparse.csr_array(C + stiffness_damping(system.scene))

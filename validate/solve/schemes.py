@@ -1,6 +1,8 @@
 """Every scheme there is. A new one is one file beside this and its name here."""
 
+from validate.solve.central import CentralDifference
 from validate.solve.fluid import LINEAR
+from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
@@ -11,4 +13,13 @@ from validate.solve.types import Scheme
 # Linear schemes of drives and loads, without cavities.
 INERTIAL: tuple[type[Scheme], ...] = (QuasiStatic, Newmark, Modal)
 
-SCHEMES: tuple[type[Scheme], ...] = (*LINEAR, StaticNewton, Tabulated, *INERTIAL)
+# Dynamics at large strain of drives and loads, without cavities.
+LARGE_INERTIAL: tuple[type[Scheme], ...] = (CentralDifference, NewtonDynamics)
+
+SCHEMES: tuple[type[Scheme], ...] = (
+    *LINEAR,
+    StaticNewton,
+    Tabulated,
+    *INERTIAL,
+    *LARGE_INERTIAL,
+)

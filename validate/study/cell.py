@@ -36,7 +36,7 @@ from validate.study.score import NIS, error_scores
 from validate.study.shared import sharing
 
 _TIMED = 25  # steps that are timed where the seeds run together
-_TIMED_S = 0.05  # s after which no more of them are
+_TIMED_S = 0.01  # s after which no more of them are
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,8 @@ def _under(ranking: Ranking) -> str:
 
 def _short(path: str) -> str:
     """`Q` of `methods.kf.Q`, `twin.noise` as it is."""
-    return path.split(".", 2)[2] if path.startswith(METHODS) else path
+    inner = path.split(".", 2)[2] if path.startswith(METHODS) else path
+    return inner.removeprefix("settings.")
 
 
 # --- error against time --------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.covariance import Dense, Modal
 from validate.estimate.displacement_filter import DisplacementStepper, InModes, Nodal
-from validate.estimate.kf_fem import in_modes, shared_gains
+from validate.estimate.kf_fem import excitation_in, in_modes, shared_gains
 
 
 def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
@@ -29,9 +29,11 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
     if gains is None:
         gains = shared_gains(covariance, stepper.sensor.table, stepper.settled)
     elif nodal:
-        gains = gains.mapped(modes.amplitudes)
+        known = gains.before if stepper.claimed is modes else None
+        gains = known or gains.mapped(modes.amplitudes)
     return replace(
         stepper,
+        excitation=excitation_in(modes, stepper.excitation) if nodal else stepper.excitation,
         coordinates=modes,
         claimed=modes,
         covariance=covariance,
@@ -43,7 +45,9 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
 
 def _turned(nodal: Dense, modes: InModes) -> Modal:
     """The recursion of nodal displacements in amplitudes, its transition diagonal."""
-    Q = modes.amplitudes(modes.amplitudes(nodal.Q).T)
+    Q = _white(nodal.Q, modes)
+    if Q is None:
+        Q = modes.amplitudes(modes.amplitudes(nodal.Q).T)
     P0 = _scaled(nodal.P0, nodal.Q, Q)
     if P0 is None:
         P0 = modes.amplitudes(modes.amplitudes(nodal.P0).T)
@@ -56,3 +60,9 @@ def _scaled(one: Floats, other: Floats, turned: Floats) -> Floats | None:
     largest = float(np.abs(other).max())
     factor = float(np.abs(one).max()) / largest if largest else 0.0
     return factor * turned if np.array_equal(one, factor * other) else None
+
+
+def _white(Q: Floats, modes: InModes) -> Floats | None:
+    """`Q` turned, where every unknown has the same variance and no other a share in it."""
+    q = float(Q[0, 0])
+    return q * modes.white if np.array_equal(Q, q * np.eye(len(Q))) else None

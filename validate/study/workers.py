@@ -2,6 +2,8 @@
 
 import logging
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ from validate.study.outcome import CellResult
 from validate.study.plan import Cell, Job
 
 TASK_S = 0.5  # s of work in one task: a kill loses so much, and Dask's 2 ms a task vanish in it
+CONNECT_S = 10.0  # s until a scheduler counts as absent
 _AHEAD = 2  # tasks a worker: one that runs and one that waits
 # One thread each: two workers with two BLAS threads would only stand in each other's way.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -53,7 +56,7 @@ def cores() -> int:
 def _client(where: Where, cells: int) -> Iterator[Any]:
     if where.scheduler:
         try:
-            client = _dask.Client(where.scheduler, timeout="10s")
+            client = _dask.Client(where.scheduler, timeout=CONNECT_S)
         except (OSError, ValueError) as error:
             raise UsageError(f"no scheduler at {where.scheduler}: {error}") from error
         with client:
@@ -66,19 +69,31 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(_THREADS, "1"),
         "distributed.admin.system-monitor.gil.enabled": False,
     }
-    with (
-        dask.config.set(settings),
-        _dask.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        _dask.Client(cluster) as client,
-    ):
-        yield client
+    with dask.config.set(settings):
+        with _deaf_to_interrupts():
+            cluster = _dask.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # None would take a fixed port
+                silence_logs=logging.CRITICAL,
+            )
+        with cluster, _dask.Client(cluster) as client:
+            yield client
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Processes started here leave Ctrl-C to their parent, which ends them in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _drain(client: Any, job: Job, cells: list[Cell], done: Done) -> None:

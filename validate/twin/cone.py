@@ -3,7 +3,7 @@
 A quarter of the cone in quadratic elements, neo-Hookean, both faces bonded to their plates, loaded
 so slowly that every instant is static. The machine raises the force linearly; its crosshead shows
 the compression plus its own compliance and the seating of the plate, while a camera follows the
-plate ("A") and the side ("B" to "E").
+plate (node_A) and the side (node_B to node_E).
 
 Departures from the paper: nu 0.4995 for its 0.5, which no displacement element has; a neo-Hookean
 law for its St. Venant-Kirchhoff; a tracked plate, where the paper does not say what it measured.
@@ -30,7 +30,8 @@ from validate.solve.types import Stepper
 from validate.twin.tracked import Camera, Origin, Points, Reading, record_tracked
 
 _FIRST = 1e-4  # of the height: the compression that tells the stiffness at rest
-_SIDES = {"B": (1, 0), "C": (0, 1), "D": (-1, 0), "E": (0, -1)}  # x, y of the markers on the side
+# x, y of the markers on the side
+_SIDES = {"node_B": (1, 0), "node_C": (0, 1), "node_D": (-1, 0), "node_E": (0, -1)}
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class TwinSettings:
     force: float = quantity(15.0, "N", "force at the end of the ramp")
     duration: float = quantity(15.0, "s", "of the ramp")
     rate: float = quantity(10.0, "Hz", "samples of machine and camera")
-    loads: int = quantity(8, "1", "static solutions between which the ramp is interpolated")
+    loads: int = quantity(5, "1", "static solutions between which the ramp is interpolated")
     machine: float = quantity(2e5, "N/m", "stiffness of the machine's frame")
     toe: float = quantity(0.15e-3, "m", "crosshead travel while the plate seats")
     toe_force: float = quantity(0.5, "N", "force at which 63 % of the toe is gone")
@@ -129,10 +130,10 @@ def cone_scene(settings: TwinSettings) -> Scene:
 
 
 def marker_places(settings: TwinSettings) -> dict[str, Floats]:
-    """ "A" at the top's centre, on the plate; "B" to "E" around the side at half height (3,) m."""
+    """node_A at the top's centre, on the plate; node_B to node_E around the side at half height (3,) m."""
     r, z = (settings.bottom + settings.top) / 4, settings.height / 2
     sides = {name: np.array([r * x, r * y, z]) for name, (x, y) in _SIDES.items()}
-    return {"A": np.array([0.0, 0.0, settings.height]), **sides}
+    return {"node_A": np.array([0.0, 0.0, settings.height]), **sides}
 
 
 def fiducial_places(settings: TwinSettings) -> dict[str, Floats]:

@@ -1,0 +1,131 @@
+"""The filters' contract for those on the explicit step, at large strain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from explicit_scenes import CENTRE, at_nodes, cube, plain, ramp, run
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError
+from validate.estimate.filters import EXPLICIT_FILTERS, Filter
+from validate.estimate.measured import Measurements
+from validate.estimate.node_ekf import NodeEKF
+from validate.estimate.reduced_ekf import ReducedEKF
+from validate.fem.system import System
+from validate.solve.types import Uncertain
+
+H = 4e-4
+STEPS = 60
+SETTINGS: tuple[Filter, ...] = (
+    NodeEKF(H, correct_previous=True),
+    NodeEKF(H, block="node", covariance="joseph", correct_previous=True),
+    NodeEKF(H, block="companion"),
+    ReducedEKF(H, shapes=6),
+    ReducedEKF(H, shapes=6, gains="steady"),
+    ReducedEKF(H, basis="pod", shapes=4, snapshot_load=3.0),
+)
+Case = tuple[System, Measurements, Floats, Floats]
+
+
+@pytest.fixture(scope="module")
+def pushed() -> Case:
+    """The body, node A at every second step (a fifth too far), inputs, the plain run."""
+    system, inputs = cube(), ramp(H, STEPS, 3.0, 0.01)
+    truth = plain(system, H, inputs)
+    node = system.scene.mesh.nearest_node(np.array(CENTRE))
+    t = H * np.arange(2, STEPS + 1, 2)
+    z = 1.2 * truth[1::2, 3 * node : 3 * node + 3]
+    return system, at_nodes(system, [node], t, z, 3e-5), inputs, truth
+
+
+def test_all_of_them_are_tested() -> None:
+    assert {type(s) for s in SETTINGS} == set(EXPLICIT_FILTERS)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_an_explicit_filter_steps_and_says_what_its_states_mean(
+    settings: Filter, pushed: Case
+) -> None:
+    """A step leaves its state as it was: the same step again is the same."""
+    system, measured, inputs, _ = pushed
+    stepper, mesh = settings.prepare(system, measured), system.scene.mesh
+    assert isinstance(stepper, Uncertain)
+    rest = stepper.rest()
+    assert np.abs(stepper.field(rest)).max() == 0.0
+    first = stepper.step(rest, inputs[0])
+    state, again = stepper.step(first, inputs[1]), stepper.step(first, inputs[1])
+    assert state.failure is None
+    assert (state.k, state.drives.tolist()) == (2, inputs[1].tolist())
+    assert np.array_equal(stepper.field(state), stepper.field(again))
+    assert np.array_equal(stepper.sd(state), stepper.sd(again))
+    sd = stepper.sd(state)
+    assert stepper.field(state).shape == sd.shape == mesh.nodes.shape
+    assert (sd >= 0).all()
+    assert np.abs(sd[mesh.facet_nodes("z0")]).max() == 0.0
+    assert sd.max() > 0
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_traces_of_explicit_filters_hold_nis_and_innovations(
+    settings: Filter, pushed: Case
+) -> None:
+    system, measured, inputs, _ = pushed
+    z = measured.z.copy()
+    z[4] = np.nan
+    found = run(settings.prepare(system, replace(measured, z=z)), H, inputs, 10)
+    assert found.finished
+    dof = found.traces["nis.dof"].y
+    assert set(np.flatnonzero(dof)) == {k for k in range(1, STEPS, 2) if k != 9}
+    assert set(dof) == {0.0, 3.0}
+    assert ((found.traces["nis"].y > 0) == (dof > 0)).all()
+    for name in measured.names:
+        assert found.traces[f"innovation.{name}"].unit == "m"
+        assert ((found.traces[f"innovation.{name}.sd"].y > 0) == (dof > 0)).all()
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_seeing_nothing_an_explicit_filter_is_the_plain_run(settings: Filter, pushed: Case) -> None:
+    system, measured, inputs, truth = pushed
+    blind = replace(measured, z=np.full_like(measured.z, np.nan))
+    found = run(settings.prepare(system, blind), H, inputs)
+    assert found.u.reshape(STEPS, -1) == pytest.approx(truth, rel=1e-9, abs=1e-14)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_an_explicit_filter_sees_no_future(settings: Filter, pushed: Case) -> None:
+    """Another future leaves the past as it is; another present moves the estimate."""
+    system, measured, inputs, _ = pushed
+    z = measured.z.copy()
+    z[15:] += 0.001
+    one, two = (
+        run(settings.prepare(system, m), H, inputs).u for m in (measured, replace(measured, z=z))
+    )
+    assert np.array_equal(one[:31], two[:31])
+    assert np.abs(one[31] - two[31]).max() > 1e-5
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+@pytest.mark.parametrize("sd", [1e-9, 1.0])
+def test_extreme_noise_leaves_an_explicit_filter_finite(
+    settings: Filter, sd: float, pushed: Case
+) -> None:
+    """A steady gain of readings that say nothing is refused instead, in words."""
+    system, measured, inputs, _ = pushed
+    rough = replace(measured, sd=np.full(3, sd))
+    if sd == 1.0 and isinstance(settings, ReducedEKF) and settings.gains == "steady":
+        with pytest.raises(ComparisonError, match="use the sequence of gains"):
+            settings.prepare(system, rough)
+        return
+    stepper = settings.prepare(system, rough)
+    found = run(stepper, H, inputs, 10)
+    assert found.finished
+    assert found.sd is not None
+    assert np.isfinite(found.sd).all()
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_explicit_filters_refuse_times_between_their_steps(settings: Filter, pushed: Case) -> None:
+    system, measured, _, _ = pushed
+    with pytest.raises(ComparisonError, match="off its nearest step; take dt"):
+        settings.prepare(system, replace(measured, t=measured.t + H / 4))

@@ -1,0 +1,89 @@
+"""Shape functions and quadrature of every cell kind against exact integrals and scikit-fem."""
+
+from math import factorial, prod
+
+import numpy as np
+import pytest
+
+from validate.fem.assemble import mass
+from validate.fem.cells import (
+    jacobians,
+    nodal_rule,
+    nodal_volumes,
+    rule,
+    shapes,
+    values_at,
+    volumes_at,
+)
+from validate.scene.box import box, grid
+from validate.scene.mesh import Mesh, cell_volumes, quadratic
+from validate.scene.scene import Material, Scene
+
+PLANE, SOLID = ((1.0, 0.8), (3, 2)), ((1.0, 0.8, 0.6), (2, 2, 1))
+MESHES = {
+    "tri3": box(*PLANE),
+    "tri6": quadratic(box(*PLANE)),
+    "quad4": grid(*PLANE),
+    "tet4": box(*SOLID),
+    "tet10": quadratic(box(*SOLID)),
+    "hex8": grid(*SOLID),
+}
+
+
+@pytest.fixture(params=MESHES, name="mesh")
+def _mesh(request: pytest.FixtureRequest) -> Mesh:
+    return MESHES[request.param]
+
+
+def test_shapes_are_one_at_their_own_node(mesh: Mesh) -> None:
+    assert np.allclose(nodal_rule(mesh).N, np.eye(mesh.cells.shape[1]), atol=1e-15)
+
+
+def test_slopes_are_the_shapes_differences(mesh: Mesh) -> None:
+    xi = np.full((1, mesh.dimension), 0.21)
+    _, slopes = shapes(mesh, xi)
+    for axis in range(mesh.dimension):
+        step = 1e-6 * np.eye(mesh.dimension)[axis]
+        difference = (shapes(mesh, xi + step)[0] - shapes(mesh, xi - step)[0]) / 2e-6
+        assert slopes[..., axis] == pytest.approx(difference, abs=1e-9)
+
+
+@pytest.mark.parametrize("points", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", ["tri3", "tet4"])
+def test_rules_on_simplices_are_exact_to_their_degree(kind: str, points: int) -> None:
+    """Integral of x^i y^j (z^k) over the unit simplex is i! j! k! / (i + j + k + d)!."""
+    d = MESHES[kind].dimension
+    unit = Mesh(np.vstack([np.zeros(d), np.eye(d)]), np.arange(d + 1)[None], kind)
+    found = rule(unit, points)
+    x = values_at(unit, found, unit.nodes)[0]
+    for power in np.ndindex(*[2 * points] * d):
+        if sum(power) < 2 * points:
+            exact = prod(map(factorial, power)) / factorial(sum(power) + d)
+            assert found.weights @ (x**power).prod(axis=1) == pytest.approx(exact, rel=1e-13)
+
+
+def test_volumes_and_nodal_shares_sum_to_the_body(mesh: Mesh) -> None:
+    per_cell = volumes_at(mesh, rule(mesh, 2)).sum(axis=1)
+    assert per_cell == pytest.approx(cell_volumes(mesh), rel=1e-13)
+    assert nodal_volumes(mesh).sum() == pytest.approx(cell_volumes(mesh).sum(), rel=1e-13)
+
+
+def test_vertices_of_quadratic_tetrahedra_have_negative_shares() -> None:
+    mesh = MESHES["tet10"]
+    assert (nodal_volumes(mesh)[np.unique(mesh.corners)] < 0).all()
+
+
+def test_the_integral_of_a_square_is_that_of_the_library_mass(mesh: Mesh) -> None:
+    """u^T M u by scikit-fem against our quadrature, of an arbitrary field."""
+    u = np.random.default_rng(3).normal(size=mesh.nodes.shape)
+    points = rule(mesh, 3)
+    ours = 1070.0 * (volumes_at(mesh, points) * (values_at(mesh, points, u) ** 2).sum(2)).sum()
+    M = mass(Scene(mesh, Material(1e4, 0.3, rho=1070.0)))
+    assert ours == pytest.approx(float(u.ravel() @ (M @ u.ravel())), rel=1e-12)
+
+
+def test_a_jacobian_turns_negative_with_its_cell(mesh: Mesh) -> None:
+    mirrored = np.zeros(mesh.nodes.shape)
+    mirrored[:, 0] = -2 * mesh.nodes[:, 0]
+    found = rule(mesh, 2)
+    assert jacobians(mesh, found, mirrored) == pytest.approx(-jacobians(mesh, found), rel=1e-12)

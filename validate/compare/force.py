@@ -1,0 +1,142 @@
+"""Errors of a force over time: of its peak, on the whole, and in phase."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.score import Score
+from validate.compare.track import TRACK_METRICS, TrackError, rmse
+from validate.errors import ComparisonError, RecordingError
+from validate.recording.correlate import coarse_lag, met, refined_lag, step_of
+from validate.recording.types import Signal
+
+MIN_MATCHED = 10  # samples of the reference met by the run
+_COVERAGE = 0.5  # share of the run that must overlap the reference at every tried lag
+
+
+@dataclass(frozen=True)
+class ForcePair:
+    """A run's force and the reference force at the reference's times t (nt,) s, both (nt,) N.
+
+    `run` and `reference` are the whole signals; `lag_within` s bounds the search for the phase.
+    """
+
+    name: str
+    t: Floats
+    y: Floats
+    y_reference: Floats
+    run: Signal
+    reference: Signal
+    lag_within: float
+
+    @property
+    def track(self) -> TrackError:
+        error = self.y - self.y_reference
+        return TrackError(self.name, "force", error, float(np.ptp(self.y_reference)))
+
+
+def force_pair(name: str, run: Signal, reference: Signal, lag_within: float) -> ForcePair:
+    """The run interpolated at the reference's times that it meets, gaps excluded.
+
+    Raises `ComparisonError` for different units, several columns, or fewer than 10 met samples.
+    """
+    if run.unit != reference.unit or run.y.shape[1] != 1 or reference.y.shape[1] != 1:
+        raise ComparisonError(
+            f"{name}: {run.y.shape[1]} columns in {run.unit} against {reference.y.shape[1]} in "
+            f"{reference.unit}; choose one column each in one unit"
+        )
+    if lag_within <= 0:
+        raise ComparisonError(f"{name}: lags within {lag_within:g} s; give a positive time")
+    seen = met(run.t, reference.t) if len(run.t) > 1 else np.zeros(len(reference.t), dtype=bool)
+    if seen.sum() < MIN_MATCHED:
+        raise ComparisonError(
+            f"{name}: {int(seen.sum())} of {len(reference.t)} reference samples meet the run, "
+            f"{MIN_MATCHED} are needed; check the clocks"
+        )
+    t = reference.t[seen]
+    y = np.interp(t, run.t, run.y[:, 0])
+    return ForcePair(name, t, y, reference.y[seen, 0], run, reference, lag_within)
+
+
+def peak_error(force: ForcePair) -> float:
+    """Largest |force| of the run less that of the reference; negative = the run stays below."""
+    return float(np.abs(force.y).max() - np.abs(force.y_reference).max())
+
+
+def relative_peak_error(force: ForcePair) -> float:
+    """Peak error over the largest |force| of the reference; refuses a reference of zeros."""
+    return peak_error(force) / _positive(float(np.abs(force.y_reference).max()), force)
+
+
+def rms_error(force: ForcePair) -> float:
+    return rmse(force.track)
+
+
+def relative_rms_error(force: ForcePair) -> float:
+    """Root mean square error over the root mean square of the reference."""
+    scale = float(np.sqrt((force.y_reference**2).mean()))
+    return rms_error(force) / _positive(scale, force)
+
+
+def phase_error(force: ForcePair) -> float:
+    """How much later (s) the run comes than the reference: the lag of best correlation.
+
+    Refined between the samples; independent of scale and offset. Raises `ComparisonError` where
+    the two are not alike or one lag does not stand out; of a periodic force, search within less
+    than half a period.
+    """
+    run, reference = force.run, force.reference
+    if np.array_equal(run.t, reference.t) and np.array_equal(run.y, reference.y):
+        return 0.0  # the refined lag would stop within a thousandth of a sample
+    step = min(step_of(run.t), step_of(reference.t))
+    try:
+        start = coarse_lag(reference, run, step, force.lag_within, _COVERAGE)
+        lag, _ = refined_lag(reference, run, start)
+    except RecordingError as error:
+        raise ComparisonError(f"{force.name}: no phase error: {error}") from error
+    return -lag
+
+
+def _positive(scale: float, force: ForcePair) -> float:
+    if scale == 0:
+        raise ComparisonError(f"{force.name}: the reference force is 0 throughout; no scale")
+    return scale
+
+
+FORCE_METRICS: tuple[tuple[str, Callable[[ForcePair], float], str | None, str], ...] = (
+    ("peak", peak_error, None, "largest |force| of the run less that of the reference"),
+    ("peak.relative", relative_peak_error, "1", "peak error over the reference's largest |force|"),
+    ("rms", rms_error, None, "root mean square of run less reference"),
+    ("rms.relative", relative_rms_error, "1", "rms error over the reference's root mean square"),
+    (
+        "phase",
+        phase_error,
+        "s",
+        "how much later the run comes than the reference: lag of best correlation",
+    ),
+)
+
+
+def force_scores(force: ForcePair, against: str) -> tuple[Score, ...]:
+    """Scores `<name>.<metric>` of the force, and MAE, RMSE, SD, NRMSE as for displacements."""
+    n, unit = len(force.t), force.run.unit
+    words = f"{force.name} at the reference's times the run meets"
+    scores = [
+        Score(f"{force.name}.{name}", value(force), own or unit, n, against, f"{words}; {text}")
+        for name, value, own, text in FORCE_METRICS
+    ]
+    error = force.track
+    scores += [
+        Score(
+            f"{force.name}.{name}",
+            value(error),
+            unit if own == "m" else own,
+            n,
+            against,
+            f"{words}; {text}",
+        )
+        for name, value, own, text in TRACK_METRICS
+    ]
+    return tuple(scores)

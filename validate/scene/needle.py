@@ -1,0 +1,43 @@
+"""Paper 002's block that a needle pokes (section IV.A): a unit square held on three sides.
+
+The needle pushes the middle of the free side inward at 0.08 m/s for 2 s and stops; the node is
+free along the side. A displacement prescribed at a point has no limit under refinement: the force
+falls with 1/ln of the mesh size.
+"""
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.scene.box import grid
+from validate.scene.scene import Drive, Material, PlaneState, Probe, Scene, Support
+
+MP1 = Material(200.0, 0.47, rho=2000.0, mass_damping=1.0, stiffness_damping=0.1)
+MP2 = Material(60e3, 0.495, rho=1140.0, mass_damping=1.0, stiffness_damping=0.1)
+STEP = 1 / 30  # s
+SPEED = 0.08  # m/s
+STOP = 2.0  # s
+
+
+def needle_block(n: int, material: Material = MP1, plane: PlaneState = "strain") -> Scene:
+    """n x n quadrilaterals, the drive "needle" at (1, 0.5) m; forces are N per metre.
+
+    The drive's input is the depth, 0.08 min(t, 2) m; its `speeds` are that motion's. Probes "side"
+    and "inside" lie at (1, 0.25) and (0.75, 0.5) m. Raises `SceneError` for an odd n, whose side
+    has no middle node.
+    """
+    if n < 2 or n % 2:
+        raise SceneError(f"needle block of {n} cells a side: an even number, so that a node is hit")
+    return Scene(
+        grid((1.0, 1.0), (n, n)),
+        material,
+        tuple(Support(side, (0, 1)) for side in ("x0", "y0", "y1")),
+        drives=(Drive("needle", "x1", (-1.0, 0.0), (1.0, 0.5), ((0.0, SPEED), (STOP, 0.0))),),
+        probes=(Probe("side", (1.0, 0.25)), Probe("inside", (0.75, 0.5))),
+        plane=plane,
+    )
+
+
+def needle_depth(t: Floats) -> Floats:
+    """Inputs (nt, 1) m of the block at times t (nt,) s."""
+    return np.asarray(SPEED * np.minimum(t, STOP))[:, None]

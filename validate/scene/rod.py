@@ -1,0 +1,33 @@
+"""Paper 002's bending rod (section IV.B): held at one end, gravity switched on at t = 0."""
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.scene.box import grid
+from validate.scene.scene import Material, Probe, Scene, Support, Weight
+
+MP3 = Material(7000.0, 0.2, rho=10_000.0, mass_damping=1.0, stiffness_damping=0.1)
+SIZE = (0.5, 0.25, 0.25)  # m
+GRAVITY = 0.05  # m/s^2
+
+
+def bending_rod(n: int, material: Material = MP3) -> Scene:
+    """2n x n x n hexahedra, x = 0 held, the weight "gravity" along -z with its input in m/s^2.
+
+    Probe "tip": the middle of the free end. Raises `SceneError` for n < 1.
+    """
+    if n < 1:
+        raise SceneError(f"rod of {n} cells across: at least 1")
+    return Scene(
+        grid(SIZE, (2 * n, n, n)),
+        material,
+        (Support("x0", (0, 1, 2)),),
+        loads=(Weight("gravity", (0.0, 0.0, -1.0)),),
+        probes=(Probe("tip", (SIZE[0], SIZE[1] / 2, SIZE[2] / 2)),),
+    )
+
+
+def gravity_inputs(t: Floats) -> Floats:
+    """Inputs (nt, 1) m/s^2 of the rod at times t (nt,) s: constant from the first step on."""
+    return np.full((len(t), 1), GRAVITY)

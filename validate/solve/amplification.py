@@ -1,0 +1,122 @@
+"""How errors grow per step: the spectral radius of a linear scheme's map of (u, v, a) at rest.
+
+With C = alpha M + beta K the modes of K and M decouple and the map is 3 x 3 for each of them: exact
+and cheap. `step_matrix` drives a stepper itself, column by column, for whatever couples the modes.
+Radius 1 is the border: an undamped mode of average acceleration lies on it; above it, however
+little, a run grows without end (heavily damped explicit ones by as little as 1.0002 a step).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigh
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.system import System
+from validate.solve.explicit_linear import ExplicitLinear
+from validate.solve.explicit_linear import UpdateName as ExplicitUpdate
+from validate.solve.newmark import Newmark
+from validate.solve.newmark_rule import Rule, damping_of, mass_of, per_mode, rule_of
+from validate.solve.types import Stepper
+
+DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
+STEPPED_LIMIT = 400  # free unknowns of a stepper's own map: a dense matrix of 1200
+_COUPLED = 1e-8  # of the damping, as in `fem.modes`
+
+
+@dataclass(frozen=True)
+class Amplification:
+    """Spectral `radius` of the step, the frequency `omega` 1/s of the mode that has it; radii (r,)
+    of all modes by rising `omegas` (r,) 1/s."""
+
+    radius: float
+    omega: float
+    radii: Floats
+    omegas: Floats
+
+
+def amplification(system: System, scheme: Newmark | ExplicitLinear) -> Amplification:
+    """The scheme's amplification by modes.
+
+    Raises `SceneError` above 2000 free unknowns or where the damping couples the modes.
+    """
+    omegas, c = modes_with(system, scheme)
+    if isinstance(scheme, ExplicitLinear):
+        maps = explicit_maps(scheme.dt, c, omegas**2, scheme.update)
+    else:
+        rule = rule_of(scheme.rule, scheme.dt, scheme.rho_inf)
+        maps = newmark_maps(rule, c, omegas**2, misprinted=scheme.update == "misprinted")
+    radii = spectral_radii(maps)
+    worst = int(np.argmax(radii))
+    return Amplification(float(radii[worst]), float(omegas[worst]), radii, omegas)
+
+
+def modes_with(system: System, scheme: Newmark | ExplicitLinear) -> tuple[Floats, Floats]:
+    """Frequencies and dampings c (r,) 1/s of all modes with the scheme's masses and damping."""
+    free = system.free
+    if len(free) > DENSE_LIMIT:
+        raise SceneError(f"{len(free)} unknowns: all modes of at most {DENSE_LIMIT}; coarsen it")
+    matrices = (
+        system.K,
+        mass_of(system, scheme.mass),
+        damping_of(system, scheme.mass, scheme.damping_terms),
+    )
+    K, M, C = (X[free][:, free].toarray() for X in matrices)
+    squares, shapes = eigh(K, M)
+    modal = shapes.T @ C @ shapes
+    c = np.diag(modal).copy()
+    if np.abs(modal - np.diag(c)).max() > _COUPLED * max(float(np.abs(c).max()), 1e-300):
+        raise SceneError("the damping couples the modes; use step_matrix of the stepper")
+    return np.sqrt(np.maximum(squares, 0.0)), c
+
+
+def newmark_maps(rule: Rule, c: Floats, k: Floats, *, misprinted: bool = False) -> Floats:
+    """Maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2 (r,)."""
+    h, one, zero = rule.h, np.ones_like(c), np.zeros_like(c)
+    q = np.stack(per_mode(rule, c, k)[:3], axis=-1)
+    v_old = np.stack([zero, one, zero], axis=-1)
+    a_old = np.stack([zero, zero, one], axis=-1)
+    q_old = np.stack([one, zero, zero], axis=-1)
+    v, a = rule.rates(q, q_old, v_old, a_old)
+    if misprinted:
+        q = q + h * (v - v_old)
+    return np.stack([q, v, a], axis=1)
+
+
+def explicit_maps(h: float, c: Floats, k: Floats, update: ExplicitUpdate) -> Floats:
+    """As `newmark_maps`, for the explicit schemes."""
+    one, zero = np.ones_like(c), np.zeros_like(c)
+    half = np.stack([zero, one, h / 2 * one], axis=-1)
+    q = np.stack([one, zero, zero], axis=-1) + h * half
+    J = one if update == "lagged" else 1 + h / 2 * c
+    a = -(k[:, None] * q + c[:, None] * half) / J[:, None]
+    return np.stack([q, half + h / 2 * a, a], axis=1)
+
+
+def spectral_radii(maps: Floats) -> Floats:
+    """Largest magnitude of the eigenvalues of every map (r, m, m)."""
+    return np.asarray(np.abs(np.linalg.eigvals(maps)).max(axis=-1))
+
+
+def step_matrix(stepper: Stepper, system: System) -> Floats:
+    """The map (3 m, 3 m) of (u, v, a) of the free unknowns, by steps from unit states at inputs 0.
+
+    Raises `SceneError` above 400 free unknowns.
+    """
+    free, m = system.free, len(system.free)
+    if m > STEPPED_LIMIT:
+        raise SceneError(f"{m} unknowns: a step's dense map has at most {STEPPED_LIMIT}")
+    # A state that has been under way: the first step treats loads in its own way.
+    rest = replace(stepper.rest(), k=1)
+    still = np.zeros(len(system.scene.inputs))
+    columns = np.empty((3 * m, 3 * m))
+    for j in range(3 * m):
+        fields = np.zeros((3, len(system.moves)))
+        fields[j // m, free[j % m]] = 1.0
+        after = stepper.step(replace(rest, u=fields[0], v=fields[1], a=fields[2]), still)
+        assert after.u is not None
+        assert after.v is not None
+        assert after.a is not None
+        columns[:, j] = np.concatenate([after.u[free], after.v[free], after.a[free]])
+    return columns

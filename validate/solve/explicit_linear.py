@@ -1,0 +1,197 @@
+"""Explicit linear dynamics of paper 002, section V.B: Newmark's family with beta = 0, gamma = 1/2.
+
+u' = u + h v + h^2/2 a, (M + h/2 C) a' = f' - K u' - C (v + h/2 a), v' = v + h/2 (a + a'). Lumped
+masses and C = alpha M make that a division; all else is one solve with a matrix factorised once.
+With `update` "lagged" C acts at the last half step alone, M a' = f' - K u' - C (v + h/2 a): masses
+may then be lumped under any C without a solve, but the stable step is shorter.
+
+Departures: lumping and the restriction of C to alpha M, one thing in the paper, are two switches:
+of its "mass lumping" error most is the second. Prescribed unknowns keep all their coupling terms.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import eigsh
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.factor import factorise
+from validate.fem.system import System
+from validate.solve.dynamic import (
+    InertialStepper,
+    StartName,
+    reactions,
+    require_linear,
+    spread,
+    starting_accelerations,
+)
+from validate.solve.linear_solvers import Diagonal, Solver
+from validate.solve.newmark_rule import (
+    DampingTerms,
+    DriveRates,
+    Excitation,
+    MassName,
+    Motion,
+    damping_of,
+    excitation,
+    mass_of,
+    rule_of,
+)
+from validate.solve.types import Ending, State, Stepper
+
+UpdateName = Literal["printed", "lagged"]
+# Displacements of so many times the body's size say that a linear run has left all bounds.
+_RUNAWAY = 100.0
+_ROUNDING = 1e-12  # of the critical step
+
+
+@dataclass(frozen=True)
+class ExplicitLinear:
+    """Steps of dt s. `mass` and `damping_terms` ("mass" drops beta K) are separate switches.
+
+    `a0`, `drive_rates` as in `Newmark`. A dt above the critical step is refused at the first step,
+    or with `beyond_limit` "run" goes on until displacements are 100 times the body's size.
+    """
+
+    dt: float = 1e-4
+    mass: MassName = "lumped"
+    damping_terms: DampingTerms = "mass"
+    update: UpdateName = "printed"
+    a0: StartName = "equilibrium"
+    drive_rates: DriveRates = "difference"
+    beyond_limit: Literal["refuse", "run"] = "refuse"
+
+    def __post_init__(self) -> None:
+        rule_of("average", self.dt)
+        if self.drive_rates == "rule":
+            raise SceneError("an explicit step has no rule for drives; use drive_rates=difference")
+
+    @property
+    def treatment(self) -> str:
+        """Masses and damping in words, for messages about the limit."""
+        C = "alpha M + beta K" if self.damping_terms == "full" else "alpha M"
+        return f"{self.mass} mass, {self.update} C = {C}"
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
+        require_linear(system)
+        free, terms = system.free, self.damping_terms
+        matrices = mass_of(system, self.mass), damping_of(system, self.mass, terms), system.K
+        M, C, K = (sparse.csr_array(X[free][:, free]) for X in matrices)
+        J = M if self.update == "lagged" else sparse.csr_array(M + self.dt / 2 * C)
+        mesh = system.scene.mesh
+        rule = rule_of("average", self.dt)
+        return ExplicitStepper(
+            system,
+            reactions(system, self.mass, terms),
+            self,
+            excitation(system, rule, self.mass, self.drive_rates, terms),
+            starting_accelerations(system, self.mass, self.a0),
+            C,
+            K,
+            _solver(J, free // mesh.dimension, mesh.nodes),
+            stable_step(system, self),
+            float(np.ptp(mesh.nodes, axis=0).max()),
+        )
+
+
+def _solver(J: sparse.csr_array, node: Ints, places: Floats) -> Solver:
+    """A division where J is diagonal, else its factorisation."""
+    apart = J - sparse.diags_array(J.diagonal())
+    if apart.count_nonzero() == 0:
+        return Diagonal(1 / J.diagonal())
+    return factorise(J, node, places)
+
+
+def stable_step(system: System, settings: ExplicitLinear) -> float:
+    """The critical step s, exact: 2/w for C in the matrix; (sqrt(c^2 + 4 w^2) - c)/w^2 for lagged C
+    with c = alpha + beta w^2; w is the highest frequency with the mass in use.
+
+    Regions that are damped differently get their largest alpha and beta: a safe bound.
+    """
+    w = highest_frequency(system, settings.mass)
+    if settings.update == "printed":
+        return 2 / w
+    c = float(system.scene.per_cell(lambda m: m.mass_damping).max())
+    if settings.damping_terms == "full":
+        c += float(system.scene.per_cell(lambda m: m.stiffness_damping).max()) * w**2
+    # The same as the formula above, without its cancellation under heavy damping.
+    return float(4 / (np.sqrt(c**2 + 4 * w**2) + c))
+
+
+def highest_frequency(system: System, mass: MassName) -> float:
+    """Largest angular frequency 1/s of the free unknowns (Lanczos)."""
+    free = system.free
+    K = system.K[free][:, free].tocsc()
+    start = np.random.default_rng(0).standard_normal(len(free))
+    if mass == "lumped":
+        root = sparse.diags_array(1 / np.sqrt(system.masses[free]))
+        square = eigsh(root @ K @ root, k=1, which="LA", v0=start, return_eigenvectors=False)
+    else:
+        M = system.M[free][:, free].tocsc()
+        square = eigsh(K, k=1, M=M, which="LA", v0=start, return_eigenvectors=False)
+    return float(np.sqrt(square[0]))
+
+
+@dataclass(frozen=True)
+class ExplicitStepper(InertialStepper):
+    """`C`, `K` (m, m) over the free unknowns, `solver` of the accelerations' matrix, `limit` s.
+
+    `starts` as in `NewmarkStepper`; `size` m is the body's.
+    """
+
+    settings: ExplicitLinear
+    excitation: Excitation
+    starts: Floats | None
+    C: sparse.csr_array
+    K: sparse.csr_array
+    solver: Solver
+    limit: float
+    size: float
+
+    def step(self, state: State, drives: Floats) -> State:
+        """The state at the end of a step; `drives` are the inputs there, loads included."""
+        assert state.u is not None
+        assert state.v is not None
+        assert state.a is not None
+        k, free, h = self._drives, self.system.free, self.settings.dt
+        new, old = drives[k:], state.drives[k:]
+        v, a = state.v[free], state.a[free]
+        if state.k == 0 and self.starts is not None:
+            a = self.starts @ new
+        motion = state.extra if isinstance(state.extra, Motion) else self.excitation.rest()
+        moved = self.excitation.moved(motion, drives[:k])
+        f = self.excitation.force(new, old, moved, motion)
+        half = v + h / 2 * a
+        u = state.u[free] + h * half
+        a = self.solver.solve(f - self.K @ u - self.C @ half)
+        return self._done(state, drives, moved, (u, half + h / 2 * a, a))
+
+    def _done(
+        self, state: State, inputs: Floats, moved: Motion, free: tuple[Floats, Floats, Floats]
+    ) -> State:
+        driven = moved.q, moved.rate, moved.acceleration
+        u, v, a = (spread(self.system, x, q) for x, q in zip(free, driven, strict=True))
+        return self._state(
+            inputs,
+            state.k + 1,
+            u=u,
+            v=v,
+            a=a,
+            numbers=self.reactions.numbers(u, v, a, inputs[self._drives :]),
+            extra=moved,
+            failure=self._failure(state.k, u),
+        )
+
+    def _failure(self, k: int, u: Floats) -> tuple[Ending, str] | None:
+        times = self.settings.dt / self.limit
+        over = f"dt {self.settings.dt:.3g} s is {times:.4g} times the critical step {self.limit:.4g} s"
+        over = f"{over} ({self.settings.treatment})"
+        if k == 0 and times > 1 + _ROUNDING and self.settings.beyond_limit == "refuse":
+            return "refused", f"{over}; take a smaller dt, or beyond_limit=run to see it diverge"
+        if not float(np.abs(u).max()) <= _RUNAWAY * self.size:
+            return "diverged", f"step {k + 1}: displacements over {_RUNAWAY:g} body sizes; {over}"
+        return None
