@@ -6,6 +6,7 @@ paper's, pushed by the measured force, with and without filters that see the pla
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,11 +32,19 @@ from validate.solve.central import CentralDifference
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Stepper
-from validate.twin.cone import TwinSettings, cone_scene, load_table, marker_places, record_cone
+from validate.twin.cone import (
+    LoadTable,
+    TwinSettings,
+    cone_scene,
+    load_table,
+    marker_places,
+    record_cone,
+)
 
 HERE = Path(__file__).parent
 RECORDING = HERE.parent / "recordings" / "ekf_cone.mcap"
 SMALL = HERE.parent / "recordings" / "ekf_cone_small.mcap"
+REACH = TwinSettings().force
 SHEAR = {"paper": 22_081.0, "cylinders_slip": 31_200.0, "cylinders_bonded": 18_500.0}  # Pa
 
 
@@ -170,11 +179,16 @@ def record(parameters: Parameters, progress: Progress) -> Recording:
 def truth(parameters: Parameters, seen: Registered) -> Truth:
     """The twin's own displacements at the samples after rest."""
     s = parameters.twin
-    places = marker_places(s)
-    table = load_table(cone_scene(s), np.array(list(places.values())), s.force, s.loads)
     n = round(s.duration * s.rate)
-    _, u = table.at(s.force * np.arange(1, n + 1) / n)
-    return Truth({name: u[:, j] for j, name in enumerate(places)})
+    _, u = _table(replace(s, force=max(s.force, REACH))).at(s.force * np.arange(1, n + 1) / n)
+    return Truth({name: u[:, j] for j, name in enumerate(marker_places(s))})
+
+
+@cache
+def _table(s: TwinSettings) -> LoadTable:
+    """One table for both recordings: it is by far the dearest part of a run."""
+    places = np.array(list(marker_places(s).values()))
+    return load_table(cone_scene(s), places, s.force, s.loads)
 
 
 # --- the road ------------------------------------------------------------------------------------
@@ -183,7 +197,7 @@ def truth(parameters: Parameters, seen: Registered) -> Truth:
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
     """The plate's path, or the load cell's ramp, each fitted by least squares; explicit runs in
     scaled time."""
-    markers = placed(recording, scene.mesh)
+    markers = placed(recording, read_mesh(Path(parameters.mesh.file))).within(scene.mesh)
     cell = recording.signal("load_cell", "N")
     if scene.drives:
         return _plate(markers, cell)

@@ -15,7 +15,7 @@ from validate.replay.options import Options
 from validate.replay.run import compare
 from validate.report.store import schema
 
-SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11", "--sweep", "twin.noise=1e-11,1e-10")
+SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11,-1", "--sweep", "twin.noise=1e-11,1e-10")
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +31,11 @@ def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
     folder = made / "reports" / "pulled" / "study-filters"
     content = json.loads((folder / "results.json").read_text("utf-8"))
     jsonschema.validate(content, schema())
-    assert len(list((folder / "cells").glob("*.json"))) == 4
+    assert len(list((folder / "cells").glob("*.json"))) == 6
     with (folder / "tables" / "cells.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [float(r["all.rmse_m"]) > 0 for r in rows] == [True] * 4
+    assert [bool(r["all.rmse_m"]) for r in rows] == [not r["failed"] for r in rows]
+    assert sum("variance Q = -1 m2" in r["failed"] for r in rows) == 2
     assert {p.name for p in (folder / "figures").iterdir()} >= {
         "heat_nis_kf.png", "heat_error_kf.png", "chart_pareto_1.png",
     }  # fmt: skip
@@ -51,7 +52,9 @@ def test_the_best_line_is_the_best_cell(made: Path) -> None:
     best = told["best"][0]
     words = shlex.split(best["command"])
     values = dict(w.split("=", 1) for w in words if "=" in w)
-    cells = [c for c in told["cells"] if c["values"]["twin.noise"] == values["twin.noise"]]
+    noise = values["twin.noise"]
+    scored = [c for c in told["cells"] if not c["failed"]]
+    cells = [c for c in scored if c["values"]["twin.noise"] == noise]
     first = min(cells, key=lambda c: c["scores"]["all.rmse"]["mean"])
     assert first["values"] == values
     assert words[-2:] == ["--methods", "kf"]
@@ -59,6 +62,16 @@ def test_the_best_line_is_the_best_cell(made: Path) -> None:
     rmse = {s.name: s.value for s in scores.methods[0].scores}["top.rmse"]
     found = first["scores"]["top.rmse"]
     assert abs(rmse - found["mean"]) < 3 * found["half_95"]  # one seed of three
+
+
+def test_a_finished_study_is_not_run_again(
+    made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("validate.study.workers._client", None)  # no cluster is started
+    file = str(made / "experiments" / "pulled.py")
+    assert run(["study", "filters", file, *SWEEPS, "--seeds", "3", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["study"]
+    assert told["reused"] == len(told["cells"]) == 6  # failed cells are finished ones
 
 
 def test_bad_input_is_one_line(

@@ -105,6 +105,17 @@ def test_the_weighted_nodal_sum_bounds_the_mean_distance(kind: str) -> None:
     assert 1.001 < weighted_nodal_sum(between) / mean_distance(between) < 1.1
 
 
+def test_the_nodal_sum_weighs_uneven_cells() -> None:
+    """A difference of one sign and direction, linear: the sum is the integral, 0.5 m of x."""
+    uniform = grid((1.0, 1.0), (6, 4))
+    mesh = Mesh(uniform.nodes**2, uniform.cells, "quad4")
+    u = np.zeros(mesh.nodes.shape)
+    moved = np.stack([mesh.nodes[:, 0], u[:, 1]], axis=1)
+    between = pair(Field(mesh, moved, "run"), Field(mesh, u, "ref"))
+    assert weighted_nodal_sum(between) == pytest.approx(0.5, rel=1e-13)
+    assert mean_distance(between) == pytest.approx(0.5, rel=1e-13)
+
+
 def test_quadratic_meshes_have_no_nodal_sum() -> None:
     mesh = quadratic(box((1.0, 1.0, 1.0), (1, 1, 1)))
     still = Field(mesh, np.zeros(mesh.nodes.shape), "run")

@@ -68,6 +68,14 @@ def test_volumes_and_nodal_shares_sum_to_the_body(mesh: Mesh) -> None:
     assert nodal_volumes(mesh).sum() == pytest.approx(cell_volumes(mesh).sum(), rel=1e-13)
 
 
+def test_nodal_shares_are_the_row_sums_of_the_library_mass(mesh: Mesh) -> None:
+    """On cells of different sizes, as w_a = sum over b of the integral of N_a N_b."""
+    uneven = Mesh(mesh.nodes**2 + mesh.nodes, mesh.cells, mesh.kind) if mesh.order == 1 else mesh
+    M = mass(Scene(uneven, Material(1e4, 0.3, rho=1.0)))
+    rows = np.asarray(M.sum(axis=1)).ravel()[:: mesh.dimension]
+    assert nodal_volumes(uneven) == pytest.approx(rows, rel=1e-12, abs=1e-15)
+
+
 def test_vertices_of_quadratic_tetrahedra_have_negative_shares() -> None:
     mesh = MESHES["tet10"]
     assert (nodal_volumes(mesh)[np.unique(mesh.corners)] < 0).all()

@@ -13,6 +13,8 @@ def test_the_centre_is_in_the_middle_of_the_colours() -> None:
     norm = _norm(HEAT)
     assert float(norm(1.0)) == 0.5
     assert float(norm(100.0)) == 1.0
+    low = Heat("low", "NIS", "Q", "R", ("1", "2"), ("a",), np.array([[1e-3, 2.0]]), "1", 1.0)
+    assert float(_norm(low)(1e-3)) == 0.0
     assert abs(float(norm(0.1)) - 0.25) < 1e-12
 
 

@@ -51,7 +51,7 @@ def _written(path: Path, **changes: NDArray[Any] | None) -> Path:
     ("changes", "words"),
     [
         ({"nodes": None}, r"no \['nodes'\] among its arrays"),
-        ({"kind": np.array("hex8")}, "kind 'hex8': one of tri3, tri6, tet4, tet10"),
+        ({"kind": np.array("hex20")}, "kind 'hex20': one of tri3, tri6, tet4, tet10, quad4"),
         ({"kind": np.array("tet10")}, r"cells: shape \(36, 4\), expected \(any, 10\)"),
         ({"kind": np.array(3)}, "kind '3'"),
         ({"nodes": np.full(BOX.nodes.shape, np.nan)}, "72 of 72 values not finite"),

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.linalg import expm
 
 from validate.arrays import Floats
+from validate.fem.matrices import MassName, damping_of, mass_of
 from validate.fem.system import System, build
 from validate.scene.box import box
 from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
-from validate.solve.newmark_rule import MassName, damping_of, mass_of
 
 TOTAL = 3000 * 16e-6  # N, of 3 kPa on the block's top (paper 001, Table 1)
 

@@ -232,7 +232,9 @@ def test_generalised_alpha_is_not_started_where_it_would_leave_an_offset() -> No
 @pytest.mark.parametrize("solver", get_args(SolverName))
 def test_every_solver_makes_the_same_steps(solver: SolverName) -> None:
     inputs = np.array([[0.001, 2.0], [0.003, 1.0], [0.002, 0.0]])
-    expected, got = (last(Newmark(solver=s), driven(), inputs) for s in ("prefactored", solver))
+    exactly = {"tolerance": 1e-14} if solver in ("gauss_seidel", "cg") else {}
+    expected = last(Newmark(), driven(), inputs)
+    got = last(Newmark(solver=solver, **exactly), driven(), inputs)
     assert expected.u is not None
     assert got.u == pytest.approx(expected.u, abs=1e-12 * np.abs(expected.u).max())
 
@@ -242,7 +244,7 @@ def test_solvers_take_several_right_hand_sides(solver: SolverName) -> None:
     p = propagation(driven(), rule_of("average", 0.002))
     b = np.random.default_rng(2).standard_normal((len(p.free), 2))
     nodes = driven().scene.mesh.nodes
-    x = solver_of(solver, p.J, p.free // 3, nodes).solve(b)
+    x = solver_of(solver, p.J, p.free // 3, nodes, 1e-12).solve(b)
     assert p.J @ x == pytest.approx(b, abs=1e-10)
 
 

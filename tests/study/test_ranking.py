@@ -40,11 +40,13 @@ def test_one_seed_tells_nothing_apart() -> None:
 def test_a_cell_with_more_error_and_more_time_is_dominated() -> None:
     found = ranked(
         exact=((1.0, 1.0), 10.0), quick=((5.0, 5.0), 1.0), poor=((6.0, 6.0), 20.0),
-        jitter=((5.5, 5.5), 0.9),
+        jitter=((5.5, 5.5), 0.9), same=((1.0, 1.0), 9.0),
     )  # fmt: skip
     by_name = {r.cell.method: r.dominated_by for r in found.rows}
-    assert by_name == {"exact": None, "quick": None, "poor": 1, "jitter": 2}
-    assert [r.cell.method for r in found.front] == ["quick", "exact"]
+    assert by_name == {
+        "exact": None, "same": None, "quick": None, "poor": 1, "jitter": 3,
+    }  # fmt: skip
+    assert [r.cell.method for r in found.front] == ["quick", "same", "exact"]
 
 
 def test_conditions_are_ranked_apart_and_failures_are_rows() -> None:

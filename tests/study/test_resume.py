@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from study_samples import experiment_file
 
-from validate.study.filters import Study, study, study_folder
-from validate.study.stored_study import write_study
+from validate.study.filters import study
 
 VALUES = 12
 SWEEP = "methods.kf.Q=log:1e-14:1e-9:12"
@@ -45,20 +44,17 @@ def test_a_killed_study_goes_on_without_repeating_cells(tmp_path: Path) -> None:
     assert len(told["cells"]) == VALUES
 
 
-def test_a_finished_study_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+def test_a_cell_that_kills_its_worker_is_a_row_and_the_others_finish(tmp_path: Path) -> None:
     file, out = experiment_file(tmp_path), tmp_path / "reports"
-
-    def run() -> Study:
-        return study(str(file), ["methods.kf.Q=1e-12,-1"], seeds=2, out=out, workers=1)
-
-    first = run()
-    page = write_study(first, study_folder(first.plan.experiment, out))
-    assert page.is_file()
-    assert (first.reused, first.failed, len(first.results)) == (0, 1, 2)
-    monkeypatch.setattr("validate.study.workers._client", None)  # no cluster is started
-    again = run()
-    assert (again.reused, again.failed) == (2, 1)  # a failed cell is a finished one
-    assert again.results == first.results
+    sweep = ["methods.kf.Q=log:1e-13:1e-9:5"]
+    found = study(str(file), sweep, values={"methods.kf.trap": "die"}, seeds=2, out=out)
+    [(cell, why)] = found.rankings[0].failed
+    assert cell.values == {"methods.kf.Q": "1e-09"}
+    assert "its worker died" in why
+    assert len(found.rankings[0].rows) == 4
+    kept = list((out / "pulled" / "study-filters" / "cells").glob("*.json"))
+    assert len(kept) == 4  # another try may have more memory
 
 
 def _wait(holds: object, limit: float = 100.0) -> None:

@@ -84,7 +84,7 @@ def _rows(ranking: Ranking) -> list[list[str]]:
     pick = [RANKING.index(c) for c in _COLUMNS]
     shown = []
     for r in ranking.rows[:_PLACES]:
-        row = ranking_row(r, ranking)
+        row = ranking_row(r)
         shown.append([_text(row[i]) for i in pick])
     return shown
 

@@ -48,11 +48,13 @@ def _nodal(mesh: Mesh, load: Load) -> Floats:
 def _parts(mesh: Mesh, facets: Ints) -> Floats:
     """Integral of every node's shape function (f, m) over its facet, m^(d - 1)."""
     if mesh.kind != "hex8":
-        return facet_sizes(mesh, facets)[:, None] * np.array(_SHARES[mesh.kind])
+        shares: Floats = np.array(_SHARES[mesh.kind], dtype=np.float64)
+        return facet_sizes(mesh, facets)[:, None] * shares
     points, weight = gauss_points(2)
     J = jacobians(mesh.nodes[facets], points)
     areas = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=-1)
-    return np.asarray(weight * areas @ shapes(points))
+    parts: Floats = weight * areas @ shapes(points)
+    return parts
 
 
 def facet_sizes(mesh: Mesh, facets: Ints) -> Floats:

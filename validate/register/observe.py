@@ -5,7 +5,7 @@ differently, so each is its own small type; `Registered` holds them together.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -21,6 +21,7 @@ from validate.register.quality import Registration, register_points
 from validate.scene.mesh import Mesh
 
 Sampling = Literal["barycentric", "nearest_node"]
+_INSIDE = 1e-4  # m: a marker further out belongs to another body or frame
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,20 @@ class MarkerObservation:
     def simulated(self, u: Floats) -> Floats:
         """Marker positions (k, 3) m under nodal displacements u (n, 3) m."""
         return self.rest + self.rows.apply(u)
+
+    def within(self, mesh: Mesh) -> "MarkerObservation":
+        """The markers that lie in a mesh of part of the body (within 0.1 mm); the registration
+        stays that of all of them."""
+        rows = barycentric_rows(mesh, self.rest)
+        kept = np.flatnonzero(rows.outside <= _INSIDE)
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in kept),
+            x=self.x[:, kept],
+            rest=self.rest[kept],
+            rows=Rows(rows.weights[kept], rows.outside[kept]),
+            tre=self.tre[kept],
+        )
 
 
 @dataclass(frozen=True)
@@ -174,7 +189,7 @@ def observe_markers(
     )
     rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, rest)
     if sampling == "barycentric":
-        require_inside(rows, markers.names, 1e-4)
+        require_inside(rows, markers.names, _INSIDE)
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
     require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
     tre = registration.tre_at(rest)

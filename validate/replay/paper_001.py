@@ -60,7 +60,7 @@ def _nrmse(
     batch = shared_gain_run(stepper, followed.seen.stage.y, _noisy(followed), row)
     reference = followed.truth.probes["node_A"][:, 2]
     off = batch.values[..., 0] - reference
-    return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference), dtype=np.float64)
+    return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))
 
 
 def _noisy(followed: Followed) -> Floats:
@@ -82,7 +82,7 @@ def _raw(parameters: Any, followed: Followed) -> Floats:
     """NRMSE (seeds,) of the measurement itself."""
     reference = followed.truth.probes["node_A"][:, 2]
     off = _noisy(followed)[..., 2] - reference
-    return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference), dtype=np.float64)
+    return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))
 
 
 def _interval(values: Floats) -> tuple[float, float]:
@@ -124,7 +124,7 @@ def _ensemble(found: Mapping[tuple[float, str], Floats], raw: Floats) -> Exhibit
 
 
 def _oracle() -> Exhibit:
-    rows = tuple((r.pair, r.states, r.steps, r.difference) for r in oracle_table())
+    rows = tuple((r.pair, r.states, r.steps, r.largest) for r in oracle_table())
     table = NumberTable(
         "oracle",
         "Own filters against filterpy on small systems: largest difference in any entry of state "

@@ -19,7 +19,7 @@ from validate.fem.system import build as build_system
 from validate.replay.experiment import Progress
 from validate.replay.rates import Integrator, cells_at, measured_rates, rates_exhibit
 from validate.replay.tracking import Cases, Told
-from validate.scene.scene import Scene
+from validate.scene.scene import Load, Scene
 from validate.solve.central import CentralDifference
 from validate.solve.haptic import HAPTIC_HZ, VISUAL_HZ
 from validate.solve.implicit import NewtonDynamics
@@ -77,7 +77,9 @@ def readings_table(scene: Scene, force: float, axis: str) -> NumberTable:
     c = "xyz".index(axis)
     rows: list[tuple[Entry, ...]] = []
     for spread in ("consistent", "nodal", "per_node"):
-        loads = tuple(replace(load, spread=spread) for load in scene.loads)
+        loads = tuple(
+            replace(load, spread=spread) for load in scene.loads if isinstance(load, Load)
+        )
         system = build_system(replace(scene, loads=loads))
         total = float(np.abs(system.loads.sum())) * force
         stepper = NewtonDynamics(rule="static").prepare(system)

@@ -55,8 +55,10 @@ def curves(result: Result) -> Section | None:
 
 def _observations(result: Result, quantity: str) -> list[tuple[int, Registered, SignalObservation]]:
     """The recordings' signals, from the method that was compared over the longest way."""
-    widest = max(finished(result), key=lambda m: float(m.registered[0].stage.y.max()))
-    return _signals(widest, quantity)
+    seen = [m for m in finished(result) if _signals(m, quantity)]
+    if not seen:
+        return []
+    return _signals(max(seen, key=lambda m: float(m.registered[0].stage.y.max())), quantity)
 
 
 def _signals(
@@ -72,7 +74,7 @@ def _signals(
 
 def _signal(result: Result, quantity: str) -> Picture | None:
     seen = _observations(result, quantity)
-    lines, hidden = _lines(result, quantity, seen)
+    lines, hidden = _lines(result, quantity, seen) if seen else ([], [])
     left_out = f" Not drawn, lying on another line: {'; '.join(hidden)}." if hidden else ""
     if not lines:
         return None

@@ -241,7 +241,9 @@ class Scene:
         if self.mesh.bricks and self.dilatation == "nodal_mean":
             raise SceneError(f"nodal mean dilatation is for simplices, not {kind}; use box()")
         if kind == "hex8" and (self.foundations or self.membranes or self.cavities):
-            raise SceneError("foundations, membranes and cavities need triangular facets; use box()")
+            raise SceneError(
+                "foundations, membranes and cavities need triangular facets; use box()"
+            )
         if not (np.isfinite(self.thickness) and self.thickness > 0):
             raise SceneError(f"thickness {self.thickness:g} m: a number above 0")
         if not flat and (self.plane != "strain" or self.thickness != 1):

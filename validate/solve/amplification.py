@@ -13,11 +13,12 @@ from scipy.linalg import eigh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.matrices import damping_of, mass_of
 from validate.fem.system import System
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.explicit_linear import UpdateName as ExplicitUpdate
 from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import Rule, damping_of, mass_of, per_mode, rule_of
+from validate.solve.newmark_rule import Rule, per_mode, rule_of
 from validate.solve.types import Stepper
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s

@@ -21,6 +21,7 @@ from validate.fem.critical import lanczos_step
 from validate.fem.explicit import ExplicitBody, Look, Motion, Rule
 from validate.fem.system import System
 from validate.scene.scene import Scene
+from validate.solve.dynamic import input_kind
 from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -296,8 +297,8 @@ def numbered(scene: Scene, names: Iterable[str], states: Sequence[State]) -> dic
     """Traces of the inputs and of the states' numbers, with units by the last word of the name."""
     traces = {}
     for j, name in enumerate(scene.inputs):
-        kind = "displacement" if j < len(scene.drives) else "force"
-        traces[f"{name}.{kind}"] = Trace(np.array([s.drives[j] for s in states]), _UNITS[kind])
+        kind, unit = input_kind(scene, j)
+        traces[f"{name}.{kind}"] = Trace(np.array([s.drives[j] for s in states]), unit)
     for name in names:
         unit = _UNITS.get(name.rpartition(".")[2], "1")
         traces[name] = Trace(np.array([s.numbers[name] for s in states]), unit)

@@ -9,9 +9,9 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.factor import factorise
+from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.scene.scene import Scene, Weight
-from validate.solve.newmark_rule import DampingTerms, MassName, damping_of, mass_of
 from validate.solve.types import NO_SURFACE, NOTHING, State, Trace
 
 StartName = Literal["equilibrium", "zero"]
@@ -118,7 +118,8 @@ def input_kind(scene: Scene, j: int) -> tuple[str, str]:
     drives = len(scene.drives)
     if j < drives:
         return "displacement", "m"
-    return ("acceleration", "m/s^2") if isinstance(scene.loads[j - drives], Weight) else ("force", "N")
+    weighs = isinstance(scene.loads[j - drives], Weight)
+    return ("acceleration", "m/s^2") if weighs else ("force", "N")
 
 
 def starting_accelerations(
@@ -133,6 +134,15 @@ def starting_accelerations(
     mesh = system.scene.mesh
     M = system.M[system.free][:, system.free]
     return factorise(M, system.free // mesh.dimension, mesh.nodes).solve(loads)
+
+
+def elastic_forces(system: System, u: Floats) -> Floats:
+    """Share K u of the drives' forces (nt, k) N in fields u (nt, n, d) m, compression positive.
+
+    Where a drive's velocity jumps, damping makes its whole force jump; this share does not.
+    """
+    forces: Floats = u.reshape(len(u), -1) @ (system.K @ system.moves)
+    return system.scene.copies * forces
 
 
 def spread(system: System, free: Floats, driven: Floats) -> Floats:

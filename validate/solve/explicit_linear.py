@@ -19,6 +19,7 @@ from scipy.sparse.linalg import eigsh
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.factor import factorise
+from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.solve.dynamic import (
     InertialStepper,
@@ -30,14 +31,10 @@ from validate.solve.dynamic import (
 )
 from validate.solve.linear_solvers import Diagonal, Solver
 from validate.solve.newmark_rule import (
-    DampingTerms,
     DriveRates,
     Excitation,
-    MassName,
     Motion,
-    damping_of,
     excitation,
-    mass_of,
     rule_of,
 )
 from validate.solve.types import Ending, State, Stepper
@@ -188,8 +185,8 @@ class ExplicitStepper(InertialStepper):
 
     def _failure(self, k: int, u: Floats) -> tuple[Ending, str] | None:
         times = self.settings.dt / self.limit
-        over = f"dt {self.settings.dt:.3g} s is {times:.4g} times the critical step {self.limit:.4g} s"
-        over = f"{over} ({self.settings.treatment})"
+        over = f"dt {self.settings.dt:.3g} s is {times:.4g} times the critical step "
+        over += f"{self.limit:.4g} s ({self.settings.treatment})"
         if k == 0 and times > 1 + _ROUNDING and self.settings.beyond_limit == "refuse":
             return "refused", f"{over}; take a smaller dt, or beyond_limit=run to see it diverge"
         if not float(np.abs(u).max()) <= _RUNAWAY * self.size:

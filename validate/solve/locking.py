@@ -9,7 +9,7 @@ from validate.errors import SceneError
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import build
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Scene
+from validate.scene.scene import Load, Scene
 
 
 def locking_factor(scene: Scene, probe: str) -> float:
@@ -33,7 +33,10 @@ def locking_factor(scene: Scene, probe: str) -> float:
         regions=tuple(
             replace(r, material=replace(r.material, law="linear")) for r in scene.regions
         ),
-        loads=(replace(scene.loads[0], spread="consistent"),),
+        loads=tuple(
+            replace(load, spread="consistent") if isinstance(load, Load) else load
+            for load in scene.loads
+        ),
     )
     finer = replace(small, mesh=quadratic(scene.mesh), dilatation="pointwise")
     ours, reference = (_moved(s, np.array(points)) for s in (small, finer))
@@ -44,9 +47,9 @@ def locking_factor(scene: Scene, probe: str) -> float:
 
 
 def _moved(scene: Scene, points: Floats) -> Floats:
-    """Displacement (3,) m of the one point under a unit of the one load."""
+    """Displacement (d,) m of the one point under a unit of the one load."""
     system = build(scene)
     u = np.zeros(scene.mesh.nodes.size)
     u[system.free] = system.factor().solve(system.loads[system.free, 0])
-    moved: Floats = barycentric_rows(scene.mesh, points).apply(u.reshape(-1, 3))[0]
+    moved: Floats = barycentric_rows(scene.mesh, points).apply(u.reshape(scene.mesh.nodes.shape))[0]
     return moved

@@ -17,6 +17,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.matrices import DampingTerms, MassName
 from validate.fem.system import System
 from validate.solve.dynamic import (
     InertialStepper,
@@ -28,10 +29,8 @@ from validate.solve.dynamic import (
 )
 from validate.solve.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
 from validate.solve.newmark_rule import (
-    DampingTerms,
     DriveRates,
     Excitation,
-    MassName,
     Motion,
     Propagation,
     RuleName,
@@ -80,7 +79,7 @@ class Newmark:
         rule = rule_of(self.rule, self.dt, self.rho_inf)
         terms = self.damping_terms
         if self.a0 == "equilibrium" and system.scene.loads:
-            require_start(system, rule, self.mass)
+            require_start(system, rule, self.mass, terms)
         return NewmarkStepper(
             system,
             reactions(system, self.mass, terms),

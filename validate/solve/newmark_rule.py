@@ -20,14 +20,12 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assemble import lumped, mass, stiffness_damping
+from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.scene.scene import Drive
 from validate.solve.linear_solvers import TOLERANCE, Solver, SolverName, solver_of
 
 RuleName = Literal["average", "backward_euler", "generalised_alpha"]
-MassName = Literal["consistent", "lumped"]
-DampingTerms = Literal["full", "mass"]
 DriveRates = Literal["difference", "rule", "given"]
 
 
@@ -160,7 +158,7 @@ def _system_matrix(
     return sparse.csr_array(m * M + c * C + (1 - rule.af) * K)
 
 
-def require_start(system: System, rule: Rule, mass: MassName) -> None:
+def require_start(system: System, rule: Rule, mass: MassName, terms: DampingTerms = "full") -> None:
     """Refuses a0 = M^-1 f with generalised alpha where damping acts within the step.
 
     The rule then carries the vanished a0 on for 1/(1 - rho_inf) steps, which leaves an offset in u:
@@ -168,7 +166,8 @@ def require_start(system: System, rule: Rule, mass: MassName) -> None:
     Raises `SceneError` with the ratio, from below, of the step to the fastest decay.
     """
     free = system.free
-    fastest = (system.C.diagonal()[free] / mass_of(system, mass).diagonal()[free]).max()
+    C = damping_of(system, mass, terms)
+    fastest = (C.diagonal()[free] / mass_of(system, mass).diagonal()[free]).max()
     if rule.am != rule.af and fastest * rule.h > 1:
         raise SceneError(
             f"generalised alpha from a0 = equilibrium: damping is over in 1/{fastest * rule.h:.3g} "
@@ -279,23 +278,3 @@ def excitation(
     K, C, M = (np.ascontiguousarray((X @ system.moves)[system.free]) for X in matrices)
     loads = np.ascontiguousarray(system.loads[system.free])
     return Excitation(rule, loads, K, C, M, rates, given)
-
-
-def mass_of(system: System, mass: MassName) -> sparse.csr_array:
-    """M (N, N) kg as the setting names it."""
-    if mass == "consistent":
-        return system.M
-    return sparse.csr_array(sparse.diags_array(system.masses))
-
-
-def damping_of(system: System, mass_name: MassName, terms: DampingTerms) -> sparse.csr_array:
-    """C (N, N) N s/m: alpha M of the mass in use, with `terms` "full" plus beta K.
-
-    Without beta K lumped masses leave C diagonal: paper 002's price of explicit steps.
-    """
-    if (mass_name, terms) == ("consistent", "full"):
-        return system.C
-    C = mass(system.scene, damping=True)
-    if mass_name == "lumped":
-        C = sparse.csr_array(sparse.diags_array(lumped(system.scene, C)))
-    return C if terms == "mass" else sparse.csr_array(C + stiffness_damping(system.scene))

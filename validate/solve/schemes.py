@@ -1,6 +1,7 @@
 """Every scheme there is. A new one is one file beside this and its name here."""
 
 from validate.solve.central import CentralDifference
+from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import LINEAR
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
@@ -11,7 +12,7 @@ from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
 # Linear schemes of drives and loads, without cavities.
-INERTIAL: tuple[type[Scheme], ...] = (QuasiStatic, Newmark, Modal)
+INERTIAL: tuple[type[Scheme], ...] = (QuasiStatic, Newmark, Modal, ExplicitLinear)
 
 # Dynamics at large strain of drives and loads, without cavities.
 LARGE_INERTIAL: tuple[type[Scheme], ...] = (CentralDifference, NewtonDynamics)

@@ -17,6 +17,16 @@ _MM = 1e3
 _SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
 _SHOWN_OF_MANY = 8  # places of each where there are many conditions
 _FULL = 12  # conditions whose rankings and charts are shown
+_SAME_MODEL = (
+    "The twin is the models' own model, so trusting the model most wins: that says nothing about a "
+    "body that differs. Change the twin with --set or sweep it, and look for settings that hold."
+)
+_PAIRS = (
+    "All cells of a condition see the same seeds, so differences from the first place are taken "
+    "seed by seed (paired): 'cannot tell' means that their 95 % interval holds zero. Intervals "
+    "that overlap may still differ in pairs. Nothing is corrected for the number of cells: the "
+    "winner of many is a little better here than it is."
+)
 _NAMED = 3  # overlapping places that are named
 
 
@@ -41,7 +51,7 @@ def named(values: Mapping[str, str] | Sequence[tuple[str, str]]) -> str:
     return ", ".join(f"{_short(k)}={v}" for k, v in pairs) or "as declared"
 
 
-def ranking_row(r: Ranked, ranking: Ranking) -> tuple[Entry, ...]:
+def ranking_row(r: Ranked) -> tuple[Entry, ...]:
     """One place: what it is, its score with interval, ties, honesty and cost."""
     seen = consistency(r.result)
     half, apart = r.score.half, r.from_best
@@ -59,14 +69,14 @@ def ranking_row(r: Ranked, ranking: Ranking) -> tuple[Entry, ...]:
         seen.verdict if seen else None,
         None if r.result.step_s is None else _MM * r.result.step_s,
         r.result.frozen,
-        "on the front" if r.dominated_by is None else f"dominated by #{r.dominated_by}",
+        "front" if r.dominated_by is None else f"#{r.dominated_by} beats",
     )
 
 
 RANKING = (
     "place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
     "less #1's, paired / mm", "± 95 % / mm (paired)", "against #1", "NIS per dof / 1", "filter is",
-    "step / ms", "gains repeat from step", "error against time",
+    "step / ms", "gains repeat from step", "Pareto",
 )  # fmt: skip
 
 
@@ -77,10 +87,11 @@ def best_exhibit(study: Study) -> Exhibit:
         r = best.ranked
         half = f" ± {_MM * r.score.half:.3g}" if r.score.half is not None else ""
         when = f" with {named(r.cell.condition)}" if r.cell.condition else ""
-        ties = f"; {best.ties} others cannot be told from it" if best.ties else ""
+        doubts = f"; {best.doubts}" if best.doubts else ""
         words.append(
             f"Best{when}: {r.cell.method} ({named(r.cell.settings)}), "
-            f"{study.by} {_MM * r.score.mean:.4g}{half} mm over {r.score.count} seeds{ties}."
+            f"{study.by} {_MM * r.score.mean:.4g}{half} mm over "
+            f"{seeds_text(r.score.count)}{doubts}."
         )
         rows.append((named(r.cell.condition), best.line))
     head = ("condition of the twin", "command")
@@ -89,29 +100,33 @@ def best_exhibit(study: Study) -> Exhibit:
 
 
 def _ranking_exhibit(study: Study) -> Exhibit:
-    seeds = len(study.plan.job.seeds)
-    words = (
-        f"Ranked by the mean of {study.by} over {seeds} seeds of the noise; ± is half of Student's "
-        "95 % interval of that mean, taken over the seeds.",
-        "All cells of a condition see the same seeds, so differences from the first place are "
-        "taken seed by seed (paired): 'cannot tell' means that their 95 % interval holds zero. "
-        "Intervals that overlap may still differ in pairs. Nothing is corrected for the number of "
-        "cells: the winner of many is a little better here than it is."
-        if seeds > 1
-        else "One seed: no interval, so no two places can be told apart.",
-        "Time is the median of one step in this study's workers, one thread each, side by side.",
-    )
     most = _SHOWN if len(study.rankings) == 1 else _SHOWN_OF_MANY
     tables = tuple(
         NumberTable(
             f"ranking_{i}",
             f"Ranking{_under(r)}: the first {min(most, len(r.rows))} of {len(r.rows)} places",
             RANKING,
-            tuple(ranking_row(row, r) for row in r.rows[:most]),
+            tuple(ranking_row(row) for row in r.rows[:most]),
         )
         for i, r in enumerate(study.rankings[:_FULL], start=1)
     )
-    return Exhibit("ranking", "Ranking", words, tables=tables)
+    return Exhibit("ranking", "Ranking", tuple(_ranking_words(study)), tables=tables)
+
+
+def _ranking_words(study: Study) -> Iterator[str]:
+    seeds = len(study.plan.job.seeds)
+    yield (
+        f"Ranked by the mean of {study.by} over {seeds_text(seeds)} of the noise; ± is half of "
+        "Student's 95 % interval of that mean, taken over the seeds."
+    )
+    yield _PAIRS if seeds > 1 else "One seed: no interval, so no two places can be told apart."
+    yield "Time is the median of one step in this study's workers, one thread each, side by side."
+    if study.plan.experiment.same_model:
+        yield _SAME_MODEL
+
+
+def seeds_text(count: int) -> str:
+    return "1 seed" if count == 1 else f"{count} seeds"
 
 
 def _overlapping(r: Ranked) -> str:
@@ -280,7 +295,7 @@ def _nan(value: float | None) -> float:
 
 def _curves(study: Study, method: str, axis: Axis, cells: Sequence[Cell]) -> Iterator[Chart]:
     """Over an axis of numbers; other values have the ranking alone."""
-    numbers = _numbers(axis)
+    numbers = axis.numbers
     if numbers is None:
         return
     at = dict(zip(axis.values, numbers, strict=True))
@@ -302,13 +317,6 @@ def _curves(study: Study, method: str, axis: Axis, cells: Sequence[Cell]) -> Ite
             (("consistent", 1.0),) if what == NIS else (),
             scale if y.min() > 0 else log,  # type: ignore[arg-type]
         )  # fmt: skip
-
-
-def _numbers(axis: Axis) -> list[float] | None:
-    try:
-        return [float(v) for v in axis.values]
-    except ValueError:
-        return None
 
 
 # --- failures ------------------------------------------------------------------------------------

@@ -31,11 +31,24 @@ Report = Callable[[int, int, str], None]
 @dataclass(frozen=True)
 class Best:
     """The best filter of one condition, the command that runs it, and how many filters' cells
-    cannot be told from it."""
+    cannot be told from it; `edges` are the swept paths whose first or last value it has."""
 
     ranked: Ranked
     line: str
     ties: int
+    edges: tuple[str, ...]
+
+    @property
+    def doubts(self) -> str:
+        """What speaks against taking it as it is; "" for nothing."""
+        found = []
+        if self.ranked.score.half is None:
+            found.append("one seed tells no two cells apart")
+        elif self.ties:
+            found.append(f"{self.ties} others cannot be told from it")
+        if self.edges:
+            found.append(f"at the end of the sweep of {', '.join(self.edges)}: widen it")
+        return "; ".join(found)
 
 
 @dataclass(frozen=True)
@@ -147,7 +160,20 @@ def _best(planned: Plan, ranking: Ranking) -> Best:
     filters = [r for r in ranking.rows if r.result.nis is not None]
     rows = filters or list(ranking.rows)
     ties = sum(tied(r.scores, rows[0].scores)[1] for r in rows[1:])
-    return Best(rows[0], run_line(planned, rows[0].cell), ties)
+    cell = rows[0].cell
+    return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell))
+
+
+def _edges(planned: Plan, cell: Cell) -> tuple[str, ...]:
+    """Swept settings of three and more numbers of which the cell has the least or the largest."""
+    found = []
+    for axis in planned.axes:
+        numbers = axis.numbers
+        if axis.path in dict(cell.settings) and numbers is not None and len(numbers) > 2:
+            own = numbers[axis.values.index(cell.values[axis.path])]
+            if own in (min(numbers), max(numbers)):
+                found.append(axis.path)
+    return tuple(found)
 
 
 def run_line(planned: Plan, cell: Cell) -> str:

@@ -8,7 +8,7 @@ from validate.compare.result import Result
 from validate.parameters import describe
 from validate.replay.options import Options, configure
 from validate.report.study_page import Row, StudyPage, write_study_page
-from validate.study.exhibits import consistency, study_exhibits
+from validate.study.exhibits import consistency, seeds_text, study_exhibits
 from validate.study.filters import CELLS, Study
 from validate.study.interval import interval
 from validate.study.outcome import CellResult
@@ -50,14 +50,15 @@ def _result(study: Study) -> Result:
 def sentence(study: Study) -> str:
     """What ran and what won, in one sentence."""
     cells, best = len(study.plan.cells), study.best[0]
-    ties = f", {best.ties} others cannot be told from it" if best.ties else ""
+    doubts = f" ({best.doubts})" if best.doubts else ""
     more = f" (first of {len(study.rankings)} conditions)" if len(study.rankings) > 1 else ""
     failed = f", {study.failed} failed" if study.failed else ""
     half = best.ranked.score.half
     spread = "" if half is None else f" ± {1e3 * half:.2g}"
+    seeds = seeds_text(len(study.plan.job.seeds))
     return (
-        f"{cells} cells over {len(study.plan.job.seeds)} seeds{failed}; best by {study.by}{more}: "
-        f"{best.ranked.cell.method}, {1e3 * best.ranked.score.mean:.4g}{spread} mm{ties}."
+        f"{cells} cells over {seeds}{failed}; best by {study.by}{more}: "
+        f"{best.ranked.cell.method}, {1e3 * best.ranked.score.mean:.4g}{spread} mm{doubts}."
     )
 
 
@@ -73,7 +74,12 @@ def document(study: Study) -> dict[str, Any]:
         "seconds": study.seconds,
         "workers": study.workers,
         "best": [
-            {"condition": dict(b.ranked.cell.condition), "command": b.line, "ties": b.ties}
+            {
+                "condition": dict(b.ranked.cell.condition),
+                "command": b.line,
+                "ties": b.ties,
+                "at_end_of_sweep": list(b.edges),
+            }
             for b in study.best
         ],
         "cells": [_cell(c, study.results[c.key]) for c in study.plan.cells],

@@ -18,6 +18,14 @@ class Axis:
     path: str
     values: tuple[str, ...]
 
+    @property
+    def numbers(self) -> tuple[float, ...] | None:
+        """The values as numbers; None where one is none."""
+        try:
+            return tuple(float(v) for v in self.values)
+        except ValueError:
+            return None
+
 
 def axis(text: str) -> Axis:
     """Raises `UsageError` for a text that is no sweep, holds no value, or one of them twice."""

@@ -1,0 +1,124 @@
+"""Quadrilaterals and hexahedra: numbering, volumes, sides, and what scenes of them refuse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from validate.errors import SceneError
+from validate.scene.box import box, grid
+from validate.scene.bricks import CORNERS, gauss_points, shapes, slopes
+from validate.scene.mesh import (
+    Mesh,
+    boundary_facets,
+    cell_volumes,
+    quadratic,
+    require_positive_cells,
+)
+from validate.scene.needle import needle_block
+from validate.scene.rod import bending_rod
+from validate.scene.scene import Cavity, Drive, Foundation, Material, Scene, Weight
+
+BLOCKS = [((3.0, 2.0, 1.0), (2, 3, 4)), ((3.0, 2.0), (2, 3)), ((1.0, 1.0), (1, 1))]
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_shape_functions_are_one_at_their_corner_and_their_slopes_are_differences(d: int) -> None:
+    assert np.array_equal(shapes(CORNERS[d]), np.eye(2**d))
+    xi = np.random.default_rng(0).random((5, d))
+    assert shapes(xi).sum(axis=-1) == pytest.approx(np.ones(5))
+    for c in range(d):
+        step = np.zeros(d)
+        step[c] = 1e-6
+        difference = (shapes(xi + step) - shapes(xi - step)) / 2e-6
+        assert slopes(xi)[..., c] == pytest.approx(difference, abs=1e-9)
+
+
+def test_gauss_points_integrate_cubes_along_every_axis() -> None:
+    points, weight = gauss_points(2)
+    assert weight * (points[:, 0] ** 3 * points[:, 1] ** 3).sum() == pytest.approx(1 / 16)
+
+
+@pytest.mark.parametrize(("size", "cells"), BLOCKS)
+def test_bricks_fill_the_block_and_number_as_the_simplices_do(
+    size: tuple[float, ...], cells: tuple[int, ...]
+) -> None:
+    mesh, split = grid(size, cells), box(size, cells)
+    assert np.array_equal(mesh.nodes, split.nodes)
+    assert len(mesh.cells) == np.prod(cells)
+    assert cell_volumes(mesh) == pytest.approx(
+        np.full(len(mesh.cells), np.prod(size / np.array(cells)))
+    )
+    first = mesh.nodes[mesh.cells[0]] * np.array(cells) / np.array(size)
+    assert first == pytest.approx(CORNERS[len(size)])
+    for name, facets in split.facets.items():
+        assert np.array_equal(mesh.facet_nodes(name), np.unique(facets))
+    require_positive_cells(mesh)
+
+
+def test_facets_point_outward() -> None:
+    """Their vector areas times the place sum to d times the volume (divergence theorem)."""
+    mesh = grid((3.0, 2.0, 1.0), (2, 3, 4))
+    x = mesh.nodes[boundary_facets(mesh.corners, 3)]
+    areas = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]) / 2
+    assert (areas * x.mean(axis=1)).sum() == pytest.approx(3 * 6.0)
+    flat = grid((3.0, 2.0), (2, 3))
+    ends = flat.nodes[boundary_facets(flat.corners, 2)]
+    along = ends[:, 1] - ends[:, 0]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    assert (outward * ends.mean(axis=1)).sum() == pytest.approx(2 * 6.0)
+
+
+@pytest.mark.parametrize(("size", "cells"), BLOCKS)
+def test_split_bricks_fill_the_mesh_and_meet(
+    size: tuple[float, ...], cells: tuple[int, ...]
+) -> None:
+    mesh, d = grid(size, cells), len(size)
+    x = mesh.nodes[mesh.simplices]
+    volumes = np.linalg.det(x[:, 1:] - x[:, :1])
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(np.prod(size) * {2: 2, 3: 6}[d])
+    sides = sum(len(f) for f in mesh.facets.values())
+    assert len(boundary_facets(mesh.simplices, d)) == sides * (d - 1)
+
+
+def test_a_folded_quadrilateral_is_refused_though_its_area_is_positive() -> None:
+    dart = Mesh(np.array([[0, 0], [1, 0], [0.2, 0.2], [0, 1.0]]), np.array([[0, 1, 2, 3]]), "quad4")
+    assert cell_volumes(dart)[0] == pytest.approx(0.2)
+    with pytest.raises(SceneError, match="1 of 1 elements inverted or flat"):
+        require_positive_cells(dart)
+
+
+def test_what_bricks_do_not_have_is_refused() -> None:
+    rod = bending_rod(1)
+    with pytest.raises(SceneError, match="hex8 have no quadratic form"):
+        quadratic(rod.mesh)
+    with pytest.raises(SceneError, match="nodal mean dilatation is for simplices, not hex8"):
+        replace(rod, dilatation="nodal_mean")
+    with pytest.raises(SceneError, match="need triangular facets"):
+        replace(rod, foundations=(Foundation("z0", (0,), 1.0),))
+    with pytest.raises(SceneError, match="need triangular facets"):
+        replace(rod, cavities=(Cavity("c", "z0"),))
+
+
+def test_plane_states_and_thicknesses_are_those_of_two_dimensions() -> None:
+    block = needle_block(4)
+    with pytest.raises(SceneError, match="thickness 0 m"):
+        replace(block, thickness=0.0)
+    with pytest.raises(SceneError, match=r"plane stress of 1 m: for 2-D meshes only"):
+        replace(bending_rod(1), plane="stress")
+    with pytest.raises(SceneError, match="cavities in 2-D are per metre"):
+        replace(block, thickness=0.1, cavities=(Cavity("c", "x1"),))
+
+
+def test_drives_and_weights_are_checked() -> None:
+    with pytest.raises(SceneError, match="speeds must be finite, their times rising"):
+        Drive("d", "x1", (1.0, 0.0), speeds=((1.0, 0.1), (0.0, 0.2)))
+    with pytest.raises(SceneError, match="direction of length 2"):
+        Weight("w", (0.0, 2.0))
+    with pytest.raises(SceneError, match="needle block of 5 cells a side: an even number"):
+        needle_block(5)
+    with pytest.raises(SceneError, match="at least 1"):
+        bending_rod(0)
+    scene = Scene(grid((1.0, 1.0), (1, 1)), Material(1.0, 0.3), loads=(Weight("w", (0.0, -1.0)),))
+    assert scene.inputs == ("w",)

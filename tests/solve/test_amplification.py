@@ -1,0 +1,111 @@
+"""Spectral radii: modes against steppers, the limits of explicit steps, the misprint."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from inertial_scenes import driven, small
+
+from validate.errors import SceneError
+from validate.fem.system import System, build
+from validate.scene.needle import needle_block
+from validate.scene.rod import bending_rod
+from validate.scene.scene import Region
+from validate.solve.amplification import (
+    amplification,
+    explicit_maps,
+    newmark_maps,
+    spectral_radii,
+    step_matrix,
+)
+from validate.solve.explicit_linear import ExplicitLinear, stable_step
+from validate.solve.newmark import Newmark
+from validate.solve.newmark_rule import rule_of
+
+SCHEMES = [
+    Newmark(0.004),
+    Newmark(0.004, "backward_euler", mass="lumped"),
+    Newmark(0.004, "generalised_alpha", rho_inf=0.5, damping_terms="mass"),
+    Newmark(0.004, update="misprinted"),
+    ExplicitLinear(0.002, "consistent", "full"),
+    ExplicitLinear(0.002, "lumped", "mass"),
+    ExplicitLinear(0.002, "lumped", "full", "lagged"),
+    ExplicitLinear(0.02, "consistent", "mass", "lagged", beyond_limit="run"),
+]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: f"{type(s).__name__}")
+@pytest.mark.parametrize("system", [small(), driven()], ids=["loaded", "driven"])
+def test_modes_have_the_radius_of_the_steppers_own_map(
+    scheme: Newmark | ExplicitLinear, system: System
+) -> None:
+    whole = np.abs(np.linalg.eigvals(step_matrix(scheme.prepare(system), system))).max()
+    assert amplification(system, scheme).radius == pytest.approx(whole, rel=1e-7)
+
+
+@pytest.mark.parametrize("mass", ["consistent", "lumped"])
+@pytest.mark.parametrize("terms", ["full", "mass"])
+@pytest.mark.parametrize("update", ["printed", "lagged"])
+@pytest.mark.parametrize("scene", [needle_block(8), bending_rod(2)], ids=["needle", "rod"])
+def test_the_critical_step_parts_radii_below_one_from_those_above(
+    mass: str, terms: str, update: str, scene: object
+) -> None:
+    system = build(scene)  # type: ignore[arg-type]
+    scheme = ExplicitLinear(0.01, mass, terms, update)  # type: ignore[arg-type]
+    limit = stable_step(system, scheme)
+    below, above = (amplification(system, replace(scheme, dt=r * limit)) for r in (0.999, 1.001))
+    assert below.radius < 1 < above.radius
+    assert above.omega == pytest.approx(above.omegas[-1], rel=1e-3)
+
+
+def test_heavy_damping_grows_slowly_beyond_its_limit() -> None:
+    """MP1 as printed, 2 % above 2/w: a run would look stable for hundreds of steps."""
+    system = build(needle_block(20))
+    scheme = ExplicitLinear(0.01, "consistent", "full")
+    grown = amplification(system, replace(scheme, dt=1.02 * stable_step(system, scheme)))
+    assert 1.0001 < grown.radius < 1.05
+
+
+@pytest.mark.parametrize(("xi", "limit"), [(0.0, 1.155), (0.1, 1.29), (0.3, 1.55)])
+def test_the_misprinted_update_is_unstable_from(xi: float, limit: float) -> None:
+    """w h of paper 002's u' = u + h v' + ...: 2/sqrt(3) undamped."""
+
+    def radius(x: float) -> float:
+        c, k = np.array([2 * xi * x]), np.array([x * x])
+        return float(
+            spectral_radii(newmark_maps(rule_of("average", 1.0), c, k, misprinted=True))[0]
+        )
+
+    assert radius(limit - 0.006) < 1 + 1e-9
+    assert radius(limit + 0.006) > 1 + 1e-6
+    assert xi > 0 or radius(2 / np.sqrt(3) + 1e-4) > 1 + 1e-6
+
+
+def test_average_acceleration_neither_grows_nor_decays_undamped() -> None:
+    x = np.array([0.01, 1.0, 100.0])
+    radii = spectral_radii(newmark_maps(rule_of("average", 1.0), np.zeros(3), x**2))
+    assert radii == pytest.approx(np.ones(3), abs=1e-7)
+
+
+def test_an_explicit_modes_radius_is_the_quadratics() -> None:
+    """Undamped, w h = 2 cosh(s)... above 2: the roots of z^2 - (2 - x^2) z + 1."""
+    x = np.array([0.5, 1.9, 2.1, 3.0])
+    radii = spectral_radii(explicit_maps(1.0, np.zeros(4), x**2, "printed"))
+    roots = [np.abs(np.roots([1.0, y * y - 2.0, 1.0])).max() for y in x]
+    assert radii == pytest.approx(roots, abs=1e-7)
+
+
+def test_what_it_cannot_do_is_refused() -> None:
+    system = driven()
+    cells = np.arange(len(system.scene.mesh.cells) // 2)
+    other = replace(system.scene.material, stiffness_damping=0.1)
+    mixed = build(replace(system.scene, regions=(Region("half", cells, other),)))
+    with pytest.raises(SceneError, match="damping couples the modes; use step_matrix"):
+        amplification(mixed, Newmark())
+    stepper = Newmark().prepare(mixed)
+    assert np.abs(np.linalg.eigvals(step_matrix(stepper, mixed))).max() < 1
+    large = build(needle_block(34))
+    with pytest.raises(SceneError, match="unknowns: all modes of at most 2000"):
+        amplification(large, Newmark())
+    with pytest.raises(SceneError, match="dense map has at most 400"):
+        step_matrix(stepper, large)
