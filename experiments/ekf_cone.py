@@ -121,7 +121,7 @@ METHODS = {
         "plate moved, P1 mean dilatation, neo-Hooke", QUASI_STATIC, (), True, "p1_mean", "neo_hooke"
     ),
     "plate_p1": Method("plate moved, P1 (locks)", QUASI_STATIC, (), True, "p1", "neo_hooke"),
-    "nfem": Method("NFEM, force, explicit", CentralDifference()),
+    "nfem": Method("NFEM, force, explicit", CentralDifference(watch=1)),
     "ekf_held": Method("node-level EKF as printed, held", NodeEKF(overflow="hold"), A),
     "ekf_companion": Method("node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), A),
     "reduced_modes": Method("reduced EKF, 20 modes and load bias", ReducedEKF(), A),

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
+from validate.fem.locking import locking_warning
 from validate.fem.mixed import mixed_static
 from validate.fem.system import build
 from validate.scene.box import box, grid
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.needle import needle_block
+from validate.scene.needle import MP2, needle_block
 from validate.scene.rod import GRAVITY, bending_rod
 from validate.scene.scene import Load, Material, Pin, Scene, Support
 
@@ -82,6 +83,15 @@ def test_the_rods_weight_bends_it_to_the_converged_tip() -> None:
     end = scene.mesh.facet_nodes("x1")
     tip = GRAVITY * mixed_static(scene).u[0, end, 2].mean()
     assert -tip == pytest.approx(0.13037, rel=5e-3)
+
+
+def test_the_warning_names_the_cells_and_leaves_plane_stress_alone() -> None:
+    block = needle_block(4, MP2)
+    warning = locking_warning(block)
+    assert warning is not None
+    assert "nu = 0.495: linear quadrilaterals lock" in warning
+    assert "compare with a mixed reference" in warning
+    assert locking_warning(replace(block, plane="stress")) is None
 
 
 def test_pins_and_drives_are_held() -> None:

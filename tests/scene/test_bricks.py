@@ -57,16 +57,19 @@ def test_bricks_fill_the_block_and_number_as_the_simplices_do(
 
 
 def test_facets_point_outward() -> None:
-    """Their vector areas times the place sum to d times the volume (divergence theorem)."""
+    """Their vector areas times the place sum to d times the volume (divergence theorem), and each
+    looks away from the middle."""
     mesh = grid((3.0, 2.0, 1.0), (2, 3, 4))
     x = mesh.nodes[boundary_facets(mesh.corners, 3)]
     areas = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]) / 2
     assert (areas * x.mean(axis=1)).sum() == pytest.approx(3 * 6.0)
+    assert (areas * (x.mean(axis=1) - [1.5, 1.0, 0.5])).sum(axis=1).min() > 0
     flat = grid((3.0, 2.0), (2, 3))
     ends = flat.nodes[boundary_facets(flat.corners, 2)]
     along = ends[:, 1] - ends[:, 0]
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
     assert (outward * ends.mean(axis=1)).sum() == pytest.approx(2 * 6.0)
+    assert (outward * (ends.mean(axis=1) - [1.5, 1.0])).sum(axis=1).min() > 0
 
 
 @pytest.mark.parametrize(("size", "cells"), BLOCKS)

@@ -19,7 +19,7 @@ def standard_exhibits(
     scored = {n: f for n, f in main.items() if f.scored}
     found = [_displacements(experiment, scored)] if scored else []
     if others:
-        found.append(_wrong_models(experiment, scored, others, docs))
+        found.append(_other_cases(experiment, scored, others, docs))
     found.append(_speeds(experiment, main))
     maps = _maps(scored)
     return (*found, *((maps,) if maps else ()))
@@ -110,7 +110,7 @@ def _statistics(error: TrackError) -> tuple[Entry, ...]:
     return (*lengths, values["nrmse"], len(error.values))
 
 
-def _wrong_models(
+def _other_cases(
     experiment: Tracking, scored: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
 ) -> Exhibit:
     axis, probes = experiment.axis, tuple(next(iter(scored.values())).truth.probes)
@@ -124,14 +124,14 @@ def _wrong_models(
             ended = followed.run.outcome.state
             rows.append((name, followed.label, *shown, _nis(followed), ended))
     table = NumberTable(
-        "wrong_models",
-        "Truths that the models do not know: RMSE over the range of the reference, per node, and "
+        "cases",
+        "Every other case: RMSE over the range of the reference, per node, and "
         "NIS per degree of freedom (1: consistent; far above: the model class is wrong).",
         ("truth", "method", *(f"{p} NRMSE / %" for p in probes), "NIS per dof / 1", "ended"),
         tuple(rows),
     )
     words = tuple(f"{name}: {docs[name]}" for name in others)
-    return Exhibit("wrong-models", "When the model is wrong", words, tables=(table,))
+    return Exhibit("cases", "Other truths than the recorded one", words, tables=(table,))
 
 
 def rmse_share(error: TrackError) -> float:

@@ -14,6 +14,7 @@ from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.compare.verdict import Check, Sensitivity, judge
 from validate.errors import ComparisonError
+from validate.fem.locate import barycentric_rows
 from validate.fem.system import build as build_system
 from validate.parameters import describe
 from validate.recording.types import Recording
@@ -239,6 +240,7 @@ def _checks(
     residuals: Mapping[str, Residual],
 ) -> tuple[Check, ...]:
     finer, inputs, refinement = _uncertain(experiment, road, parameters, residuals)
+    own = _own_doubt(mine, residuals)
     found = []
     for accept in experiment.accept:
         key = f"{accept.quantity}@all"
@@ -246,9 +248,30 @@ def _checks(
             found.append(_nothing(accept.quantity, accept.limit, mine.run))
             continue
         found.append(
-            judge(residuals[key], accept.limit, finer.get(key), refinement, inputs.get(key, []))
+            judge(
+                residuals[key],
+                accept.limit,
+                finer.get(key),
+                refinement,
+                inputs.get(key, []) + own.get(key, []),
+            )
         )
     return tuple(found)
+
+
+def _own_doubt(mine: Followed, residuals: Mapping[str, Residual]) -> dict[str, list[Sensitivity]]:
+    """What a filter itself claims of its error at every probe, as one more input of u_val."""
+    if mine.run.sd is None or not mine.whole:
+        return {}
+    found = {}
+    for probe in mine.scene.probes:
+        key = f"{probe.name}@all"
+        if key in residuals:
+            rows = barycentric_rows(mine.scene.mesh, np.array([probe.point]))
+            sd = np.array([rows.apply(s)[0] for s in mine.run.sd])
+            claimed = replace(residuals[key], values=sd, sd=0.0)
+            found[key] = [Sensitivity("the filter's own covariance", claimed, 1.0)]
+    return found
 
 
 def _uncertain(

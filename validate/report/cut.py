@@ -61,7 +61,7 @@ def _cut_polygons(body: Body, normal: Floats) -> tuple[list[Floats], Floats]:
     nodes, u = _MM * body.mesh.nodes, body.u
     height = (nodes - body.origin) @ normal
     height = np.where(np.abs(height) < 1e-9, 1e-9, height)
-    corners = body.mesh.corners
+    corners = body.mesh.simplices
     sides = height[corners] > 0
     crossed = corners[sides.any(axis=1) & ~sides.all(axis=1)]
     right, upward = _screen(body)

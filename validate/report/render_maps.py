@@ -25,7 +25,7 @@ def _shot(shown: NodeMap, span: Range) -> Pixels:
     plotter: Any = pv.Plotter(off_screen=True, window_size=_SIZE, lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    facets = boundary_facets(shown.mesh.corners, 3)
+    facets = boundary_facets(shown.mesh.simplices, 3)
     faces = np.hstack([np.full((len(facets), 1), 3), facets]).ravel()
     surface = pv.PolyData(1e3 * shown.mesh.nodes, faces)
     surface.point_data["value"] = values(shown)

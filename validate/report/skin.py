@@ -36,7 +36,7 @@ def skins(scene: Scene, most: int) -> tuple[Skin, ...]:
     if mesh.dimension != 3:
         return ()
     walls = {c.name: mesh.facets[c.facets][:, :3] for c in scene.cavities}
-    parts = {OUTSIDE: _without(boundary_facets(mesh.corners, 3), list(walls.values())), **walls}
+    parts = {OUTSIDE: _without(boundary_facets(mesh.simplices, 3), list(walls.values())), **walls}
     total = sum(len(t) for t in parts.values())
     share = min(1.0, most / total)
     return tuple(_skin(mesh, name, t, share) for name, t in parts.items() if len(t))

@@ -1,0 +1,32 @@
+"""Bodies of hexahedra are drawn by the tetrahedra they split into."""
+
+import numpy as np
+import pytest
+
+from validate.report.body import Body
+from validate.report.cut import _cut_polygons
+from validate.report.skin import skins
+from validate.scene.rod import bending_rod
+
+ROD = bending_rod(3)
+
+
+def test_the_skin_has_two_triangles_a_side() -> None:
+    (outside,) = skins(ROD, 5000)
+    assert len(outside.triangles) == 2 * (2 * 9 + 4 * 18)
+    x = ROD.mesh.nodes[outside.nodes][outside.triangles]
+    normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    assert (normals * (x.mean(axis=1) - [0.25, 0.125, 0.125])).sum(axis=1).min() > 0
+
+
+def test_a_cut_shows_the_whole_section() -> None:
+    still, up, along = np.zeros((len(ROD.mesh.nodes), 3)), np.eye(3)[2], np.eye(3)[0]
+    middle = np.array([250.0, 125.0, 125.0])
+    body = Body(
+        "rod", "", "", ROD.mesh, still, (), None, None, (0.0, 0.0), middle, np.eye(3)[1], up, along
+    )
+    polygons, _ = _cut_polygons(body, np.eye(3)[1])
+    area = 0.0
+    for x, y in (p.T for p in polygons):
+        area += abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+    assert area == pytest.approx(500.0 * 250.0)
