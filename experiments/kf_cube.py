@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from validate.arrays import Ints
+from validate.arrays import Floats, Ints
 from validate.compare.verdict import Accept
 from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
@@ -91,6 +91,7 @@ class TwinCard:
         "nothing", "1", "stiff layer at mid-height, or stiff inclusion"
     )
     contrast: float = quantity(5.0, "1", "modulus of layer or inclusion over the rest")
+    finer: int = quantity(1, "1", "its steps in one of the models'")
     every: int = quantity(1, "1", "steps between two looks of the tracker")
     missing: float = quantity(0.0, "1", "share of the looks at which a marker is not seen")
 
@@ -160,18 +161,22 @@ def _stiff_cells(p: Parameters, mesh: Mesh) -> Ints:
     return np.flatnonzero(layer & middle)
 
 
-def _inputs(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
-    """Times (nt,) s of the steps' ends and the traction's total force (nt,) N there."""
-    t = p.clock.dt * np.arange(1, p.clock.steps + 1)
+def _inputs(p: Parameters) -> tuple[Floats, Floats]:
+    """Times (nt,) s of the twin's steps' ends and the traction's total force (nt,) N there."""
+    n, dt = p.clock.steps * p.twin.finer, p.clock.dt / p.twin.finer
+    t: Floats = dt * np.arange(1, n + 1, dtype=np.float64)
     side = p.body.across * p.body.cell
-    on = np.where((p.loading.off > 0) & (t > p.loading.off), 0.0, 1.0)
+    on = np.where((p.loading.off > 0) & (t > p.loading.off + dt / 2), 0.0, 1.0)
     return t, p.loading.traction * side**2 * on
 
 
 def _true_run(p: Parameters, at: Ints) -> tuple[Scene, Run]:
-    scene, (t, force) = _true_scene(p), _inputs(p)
-    stepper = Newmark(p.clock.dt, a0=p.loading.a0).prepare(build_system(scene))
-    return scene, march("twin", stepper, t, force[:, None], at, 0.0)
+    """The twin's run, at the ends of the models' steps."""
+    scene, (t, force), f = _true_scene(p), _inputs(p), p.twin.finer
+    stepper = Newmark(p.clock.dt / f, a0=p.loading.a0).prepare(build_system(scene))
+    run = march("twin", stepper, t, force[:, None], (at + 1) * f - 1, 0.0)
+    traces = {name: replace(trace, y=trace.y[f - 1 :: f]) for name, trace in run.traces.items()}
+    return scene, replace(run, t=run.t[f - 1 :: f], at=at, traces=traces)
 
 
 def record(parameters: Parameters, progress: Progress) -> Recording:

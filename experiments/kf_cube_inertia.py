@@ -1,0 +1,74 @@
+"""The block of paper 001 made ten times as large and lightly damped, so that inertia matters.
+
+The paper's own block creeps: every mode has the same time constant of 0.1 s, and no integrator can
+be told from another. Here the traction is switched on and released, the block swings at 4 Hz, and
+the twin takes ten steps in one of the models'.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+from validate.compare.verdict import Accept
+from validate.estimate.kf_fem import KfFem
+from validate.estimate.steady import ReducedKf
+from validate.replay.find import load_file
+from validate.replay.tracking import Case, Follower, Tracking
+from validate.solve.modal import Modal
+from validate.solve.newmark import Newmark
+from validate.solve.quasi_static import QuasiStatic
+
+CREEPING = cast(Tracking, load_file(Path(__file__).with_name("kf_cube.py")))
+_p = CREEPING.parameters
+PARAMETERS = replace(
+    _p,
+    material=replace(_p.material, stiffness_damping=1e-3),
+    body=replace(_p.body, cell=0.01),
+    loading=replace(_p.loading, traction=300.0, a0="zero", off=0.4),
+    twin=replace(_p.twin, finer=10, seed=2),
+    recording=str(Path(__file__).parents[1] / "recordings" / "kf_cube_inertia.mcap"),
+)
+A = ("node_A",)
+PRINTED = 1e-9  # m2
+METHODS = {
+    "average": Follower("FEM, average acceleration", Newmark()),
+    "generalised_alpha": Follower("FEM, generalised alpha", Newmark(rule="generalised_alpha")),
+    "backward_euler": Follower("FEM, backward Euler", Newmark(rule="backward_euler")),
+    "modal": Follower("FEM, 20 modes, exact in time", Modal(modes=20)),
+    "quasi_static": Follower("FEM, quasi-static", QuasiStatic()),
+    "kf_printed": Follower("KF-FEM as printed", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED), A),
+    "kf_load": Follower(
+        "KF-FEM, Q along the load", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, structure="load"), A
+    ),
+    "kf_reduced": Follower("20 modes and load bias", ReducedKf(), A),
+}
+RIVALS = ("average", "kf_printed", "kf_load", "kf_reduced")
+
+
+def _named(name: str) -> Case:
+    case = next(c for c in CREEPING.cases if c.name == name)
+    return replace(case, methods=RIVALS)
+
+
+EXPERIMENT = replace(
+    CREEPING,
+    name="kf_cube_inertia",
+    title="Kalman filter finite elements where inertia matters",
+    source="beside paper 001 (KF-FEM), whose scene is trivial in time",
+    parameters=PARAMETERS,
+    methods=METHODS,
+    accepted=("average", "kf_reduced"),
+    accept=(
+        Accept("node_B", 0.2e-3, "a tenth of the largest displacement there (ours)"),
+        Accept("corner", 0.3e-3, "a tenth of the largest displacement there (ours)"),
+    ),
+    reference="average",
+    cases=tuple(_named(name) for name in ("stiff_model", "layer", "sparse")),
+    tell=None,
+    published=None,
+    seed=PARAMETERS.twin.seed,
+    twin_notice=(
+        "The recording is a twin: the same mesh and law as the models, ten of its steps in one of "
+        "theirs, plus white noise. What is left of the models' error is their time step."
+    ),
+)
