@@ -1,7 +1,7 @@
-"""The README's table: models of the fluid phantom side by side, from today's run.
+"""The README's tables, from today's runs: models of the fluid phantom, and filters.
 
-python benchmarks/readme_table.py            prints it
-python benchmarks/readme_table.py --write    puts it into README.md, with the picture
+python benchmarks/readme_table.py            prints them (about three minutes)
+python benchmarks/readme_table.py --write    puts them into README.md
 """
 
 import sys
@@ -12,6 +12,8 @@ from validate.replay import compare, load
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
+FILTERS_BEGIN, FILTERS_END = "<!-- filters: begin -->", "<!-- filters: end -->"
+PRINTED_BEGIN, PRINTED_END = "<!-- printed: begin -->", "<!-- printed: end -->"
 HEAD = (
     "at 9 mm", "contour rms / max, mm", "markers in plane / vertical rms, mm",
     "plate force error, N", "pressure error, Pa", "volume error, %", "most updates a step",
@@ -21,6 +23,22 @@ PAPER = (
     "paper 000 (its own phantom)", "- / 0.41", "within about 1", "-", "not measured", "within 1",
     "1", "3 (2004)",
 )  # fmt: skip
+FILTERS_HEAD = (
+    "block of paper 001", "perfect model: measured node, %", "20 % too stiff: measured node, %",
+    "2 mm below, %", "corner, %", "NIS per degree of freedom", "step over FEM step",
+)  # fmt: skip
+FILTERS = ("fem", "kf_printed", "kf_load", "load_scale", "kf_reduced")
+PRINTED_HEAD = ("printed", "ours", "theirs", "verdict")
+# The figures a reader asks for first; `validate check` has them all.
+PRINTED = {
+    "kf_cube": (
+        "NRMSE at the observation point",
+        "share of the measurement noise that is left",
+        "error left 2 mm below the measured node, model 20 % too stiff",
+    ),
+    "ekf_cube": ("time step", "ekf_held: node_A.rmse", "ekf_held: node_B.rmse"),
+    "ekf_cone": ("ekf_held: node_A.rmse", "ekf_held: node_B.rmse"),
+}
 
 
 def rows(result: Result) -> list[list[str]]:
@@ -44,20 +62,69 @@ def _row(method: MethodResult) -> list[str]:
     ]
 
 
-def markdown(table: list[list[str]]) -> str:
-    lines = [list(HEAD), ["---"] * len(HEAD), *table, list(PAPER)]
+def filter_rows(result: Result) -> list[list[str]]:
+    """One row a filter of `kf_cube`; the last column is a timing."""
+    methods = {m.name: m for m in result.methods}
+    base = _scores(methods["fem"])["step.p50"]
+    return [_filter_row(methods[name], base) for name in FILTERS]
+
+
+def _filter_row(method: MethodResult, base: float) -> list[str]:
+    s = _scores(method)
+    names = [f"{n}.nrmse@stiff_model" for n in ("node_A", "node_B", "corner")]
+    nis = s.get("nis.per_dof@stiff_model")
+    return [
+        method.label,
+        f"{100 * s['node_A.nrmse']:.2f}",
+        *(f"{100 * s[name]:.2f}" for name in names),
+        "-" if nis is None else f"{nis:.2f}",
+        f"{s['step.p50'] / base:.1f}",
+    ]
+
+
+def _scores(method: MethodResult) -> dict[str, float]:
+    return {score.name: score.value for score in method.scores}
+
+
+def printed_rows(results: dict[str, Result]) -> list[list[str]]:
+    """Printed figures beside ours, by experiment."""
+    found = []
+    for name, wanted in PRINTED.items():
+        figures = {p.name: p for p in results[name].published}
+        for figure in (figures[w] for w in wanted):
+            factor, unit = {"m": (1e3, " mm"), "s": (1e3, " ms")}.get(figure.unit, (1.0, ""))
+            ours, theirs = (
+                "-" if v is None else f"{factor * v:.3g}{unit}"
+                for v in (figure.ours, figure.theirs)
+            )
+            found.append([f"`{name}`: {figure.name}", ours, theirs, figure.verdict])
+    return found
+
+
+def markdown(head: tuple[str, ...], table: list[list[str]]) -> str:
+    lines = [list(head), ["---"] * len(head), *table]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
+def _result(name: str) -> Result:
+    return compare(load(str(ROOT / "experiments" / f"{name}.py")))
+
+
 def main() -> None:
-    result = compare(load(str(ROOT / "experiments" / "fluid_phantom.py")))
-    text = markdown(rows(result))
-    print(text)
+    phantom, printed = _result("fluid_phantom"), {name: _result(name) for name in PRINTED}
+    parts = {
+        (BEGIN, END): markdown(HEAD, [*rows(phantom), list(PAPER)]),
+        (FILTERS_BEGIN, FILTERS_END): markdown(FILTERS_HEAD, filter_rows(printed["kf_cube"])),
+        (PRINTED_BEGIN, PRINTED_END): markdown(PRINTED_HEAD, printed_rows(printed)),
+    }
+    print("\n\n".join(parts.values()))
     if "--write" in sys.argv[1:]:
         readme = ROOT / "README.md"
-        before, rest = readme.read_text("utf-8").split(BEGIN)
-        after = rest.split(END)[1]
-        readme.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", "utf-8")
+        text = readme.read_text("utf-8")
+        for (begin, end), part in parts.items():
+            before, rest = text.split(begin)
+            text = f"{before}{begin}\n{part}\n{end}{rest.split(end)[1]}"
+        readme.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ EXPERIMENT = replace(
     source="beside paper 001 (KF-FEM), whose scene is trivial in time",
     parameters=PARAMETERS,
     methods=METHODS,
-    accepted=("average", "kf_reduced"),
+    accepted=("kf_reduced",),
     accept=(
         Accept("node_B", 0.2e-3, "a tenth of the largest displacement there (ours)"),
         Accept("corner", 0.3e-3, "a tenth of the largest displacement there (ours)"),
@@ -69,6 +69,7 @@ EXPERIMENT = replace(
     seed=PARAMETERS.twin.seed,
     twin_notice=(
         "The recording is a twin: the same mesh and law as the models, ten of its steps in one of "
-        "theirs, plus white noise. What is left of the models' error is their time step."
+        "theirs, plus white noise. Models know the load at the ends of their steps only, so a load "
+        "that is switched acts up to half a step late: that is most of the plain models' error."
     ),
 )

@@ -48,6 +48,22 @@ def test_its_table_is_todays_run_but_for_the_rates(
     assert all(float(row[-1]) > 0 for row in printed)
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_its_tables_of_filters_are_todays_runs(readme: str, script: ModuleType) -> None:
+    """All but the last column of the filters' table, which is a timing."""
+    results = {name: script._result(name) for name in script.PRINTED}
+    ours = [row[:-1] for row in script.filter_rows(results["kf_cube"])]
+    assert [row[:-1] for row in _cells(readme, "filters")] == ours
+    assert _cells(readme, "printed") == script.printed_rows(results)
+
+
+def _cells(readme: str, name: str) -> list[list[str]]:
+    text = readme.split(f"<!-- {name}: begin -->")[1].split(f"<!-- {name}: end -->")[0]
+    lines = text.strip().splitlines()[2:]
+    return [[c.strip() for c in line.strip("|").split("|")] for line in lines]
+
+
 def test_every_command_is_documented_and_every_documented_one_exists(readme: str) -> None:
     documented = set(re.findall(r"^\| `validate (\w+)", readme, flags=re.MULTILINE))
     assert documented == set(cli.commands)
@@ -56,7 +72,7 @@ def test_every_command_is_documented_and_every_documented_one_exists(readme: str
 def test_its_parameters_exist(readme: str) -> None:
     listed = "".join(
         CliRunner().invoke(cli, ["list", name, "--json"]).output
-        for name in ("fluid_phantom", "ecoflex_cylinder")
+        for name in ("fluid_phantom", "ecoflex_cylinder", "kf_cube")
     )
     for path in re.findall(r"`--set ([\w.]+)=", readme):
         if path != "path":

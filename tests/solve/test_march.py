@@ -118,8 +118,7 @@ def test_run_that_breaks_at_once_is_empty_but_whole(coarse: Responses) -> None:
     assert run.t.shape == (0,)
     assert run.u.shape == (0, len(coarse.scene.mesh.nodes), 3)
     assert all(len(trace.y) == 0 for trace in run.traces.values())
-    assert run.step_s is not None
-    assert run.step_s.n == 1
+    assert run.step_s is None  # the time of a step that failed is no step time
 
 
 @pytest.mark.parametrize(

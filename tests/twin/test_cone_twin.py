@@ -110,7 +110,7 @@ def test_the_ramp_is_linear_and_signs_are_positive(quiet: Recording) -> None:
     assert force.y[:, 0] == pytest.approx(force.t)  # 15 N in 15 s
     assert (force.unit, stage.unit) == ("N", "m")
     assert (np.diff(stage.y[:, 0]) > 0).all()
-    a, b, d = (displacement(quiet, name) for name in "ABD")
+    a, b, d = (displacement(quiet, f"node_{name}") for name in "ABD")
     assert a[-1] == pytest.approx([0, 0, -1.14e-3], abs=4e-5)  # the plate comes down by 4 %
     assert b[-1, 0] > 5e-4  # the side bulges
     assert d[-1] == pytest.approx(b[-1] * [-1, 1, 1], abs=1e-12)
@@ -167,7 +167,14 @@ def test_it_survives_a_file_and_is_placed_on_the_shipped_mesh(
 
 def test_markers_turned_by_a_quarter_are_found(twin: Recording) -> None:
     markers = twin.markers["markers"]
-    turned = {"node_B": "node_C", "node_C": "node_D", "node_D": "node_E", "node_E": "node_B", "base1": "base2", "base2": "base3"}
+    turned = {
+        "node_B": "node_C",
+        "node_C": "node_D",
+        "node_D": "node_E",
+        "node_E": "node_B",
+        "base1": "base2",
+        "base2": "base3",
+    }
     names = tuple({**turned, "base3": "base1"}.get(n, n) for n in markers.names)
     spoilt = replace(twin, markers={"markers": replace(markers, names=names)})
     with pytest.raises(RegistrationError, match="permuted"):
@@ -177,7 +184,7 @@ def test_markers_turned_by_a_quarter_are_found(twin: Recording) -> None:
 def test_what_cannot_be_reached_is_refused() -> None:
     with pytest.raises(SceneError, match=r"above 0 N, at least 3 loads"):
         table(replace(COARSE, force=0.0))
-    with pytest.raises(SceneError, match="cone beyond 0 N of 10000 N: no static solution"):
+    with pytest.raises(SceneError, match="cone beyond 0 N of 10000 N: .*last good load"):
         table(replace(COARSE, radial=1, axial=2, force=1e4))
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
@@ -42,6 +42,11 @@ _CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 
 
 def _compiled(function: _Function) -> _Function:
     made = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")(function)
+    return cast(_Function, made)
+
+
+def _threaded(function: _Function) -> _Function:
+    made = njit(cache=True, nogil=True, parallel=True, error_model="numpy")(function)
     return cast(_Function, made)
 
 
@@ -272,6 +277,26 @@ def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w
         else:
             _forces_neo_hooke(w)
         _scatter(w, cells, block, f)
+
+
+@_threaded
+def add_forces_in_parts(
+    law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, parts: Floats
+) -> None:
+    """The same by as many threads as `parts` (threads, WORK + N) has rows, each for itself.
+
+    A thread adds up its share of the blocks in its own row; the rows are added in their order, so
+    results do not depend on which thread was first.
+    """
+    threads, blocks = parts.shape[0], cells.shape[0]
+    for t in prange(threads):
+        first, end = t * blocks // threads, (t + 1) * blocks // threads
+        parts[t, WORK:] = 0.0
+        own = parts[t, WORK:]
+        add_forces(law, geometry[first:end], cells[first:end], u, own, parts[t, :WORK])
+    for t in range(threads):
+        for i in range(f.size):
+            f[i] += parts[t, WORK + i]
 
 
 @_inlined
@@ -621,7 +646,8 @@ def advance(
     unknowns move by `moves` (held, k) times the first inputs, `loaded` ones take `loads`
     (loaded, l) times the others; inputs go linearly from `begin` to `end` (k + l,). Returns the
     work J of loads and prescribed motion and what damping took, up to half a step before the last
-    time, and the sum of d^2, not finite where any unknown is not.
+    time, and the sum of d^2, not finite where any unknown is not. `w` is a workspace (WORK,) or the
+    parts of `add_forces_in_parts`.
     """
     u, d, r, old, v, a = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
     k = moves.shape[1]
@@ -647,7 +673,10 @@ def advance(
             u[i] += d[i]
             work += r[i] * d[i] / 2
         _pull(springs, u, r)
-        add_forces(law, geometry, cells, u, r, w)
+        if w.ndim == 2:  # known to the compiler: one thread has no part in the threads' code
+            add_forces_in_parts(law, geometry, cells, u, r, w)
+        else:
+            add_forces(law, geometry, cells, u, r, w)
     size = _rates(rows, keep, gain, lag, dt)
     for j in range(loaded.size):
         i, more = loaded[j], gain[loaded[j]] * _input(loads, j, begin, end, 1.0, k)

@@ -173,7 +173,8 @@ def observe_markers(
     """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
 
     `up` is one direction in the markers' frame and in the scene's: without it a planar set that
-    was mirrored within its plane could not be told from the true one.
+    was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the plane
+    z = 0 of the layout: what markers do across it is dropped.
     Raises `RegistrationError` for names that the layout lacks, for markers outside the mesh, and
     for whatever `register_points` finds.
     """
@@ -187,13 +188,17 @@ def observe_markers(
     registration = register_points(
         markers.names, markers.x[0], rest, method=method, expected_sd=markers.sd, up=up
     )
-    rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, rest)
+    d = mesh.dimension
+    places = rest[:, :d]
+    rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, places)
     if sampling == "barycentric":
         require_inside(rows, markers.names, _INSIDE)
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
     require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
     tre = registration.tre_at(rest)
-    return MarkerObservation(markers.t, markers.names, x, rest, rows, markers.sd, tre, registration)
+    return MarkerObservation(
+        markers.t, markers.names, x[..., :d], places, rows, markers.sd, tre, registration
+    )
 
 
 def _require_scale(x: Floats, rest: Floats) -> None:

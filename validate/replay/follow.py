@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.compare.track import TRACK_METRICS, TrackError, track_error
+from validate.compare.track import TRACK_METRICS, TrackError, nrmse, track_error
 from validate.replay.tracking import Cases, Followed, Tracking
 
 _MM = 1e3
@@ -19,7 +19,7 @@ def standard_exhibits(
     scored = {n: f for n, f in main.items() if f.scored}
     found = [_displacements(experiment, scored)] if scored else []
     if others:
-        found.append(_other_cases(experiment, scored, others, docs))
+        found.append(_other_cases(experiment, main, others, docs))
     found.append(_speeds(experiment, main))
     maps = _maps(scored)
     return (*found, *((maps,) if maps else ()))
@@ -111,14 +111,14 @@ def _statistics(error: TrackError) -> tuple[Entry, ...]:
 
 
 def _other_cases(
-    experiment: Tracking, scored: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
+    experiment: Tracking, main: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
 ) -> Exhibit:
-    axis, probes = experiment.axis, tuple(next(iter(scored.values())).truth.probes)
+    axis, probes = experiment.axis, tuple(next(iter(main.values())).truth.probes)
     rows: list[tuple[Entry, ...]] = []
     for name, case in others.items():
         for followed in case.values():
             shown: list[Entry] = [
-                rmse_share(error_at(followed, p, axis)) if p in followed.scored else None
+                100 * nrmse(error_at(followed, p, axis)) if p in followed.scored else None
                 for p in probes
             ]
             ended = followed.run.outcome.state
@@ -132,11 +132,6 @@ def _other_cases(
     )
     words = tuple(f"{name}: {docs[name]}" for name in others)
     return Exhibit("cases", "Other truths than the recorded one", words, tables=(table,))
-
-
-def rmse_share(error: TrackError) -> float:
-    """NRMSE in %."""
-    return 100 * float(np.sqrt((error.values**2).mean())) / error.spread
 
 
 def _nis(followed: Followed) -> float | None:
@@ -181,7 +176,8 @@ def _maps(scored: Mapping[str, Followed]) -> Exhibit | None:
     for f in scored.values():
         u, mesh = f.truth.u, f.scene.mesh
         same = f.truth.mesh is not None and np.array_equal(f.truth.mesh.nodes, mesh.nodes)
-        if u is None or not same or u.shape != f.run.u.shape:
+        every = len(f.run.t) == len(f.seen.stage.t)  # long steps keep other times than the truth
+        if u is None or not (same and every) or u.shape != f.run.u.shape:
             continue
         error = np.sqrt(((f.run.u - u) ** 2).sum(axis=2).mean(axis=0))
         if error.any():

@@ -34,7 +34,7 @@ MAIN = ""  # the case that was recorded
 def track(experiment: Tracking, options: Options, report: Report | None = None) -> Result:
     """Runs the road and judges it. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
-    cases = () if options.quick else experiment.cases
+    cases = () if options.quick else _cases(experiment, methods)
     road = _Road(experiment, methods, report, _total(experiment, methods, cases))
     recordings = experiment.load(parameters, folder_of(experiment))
     main = road.case(MAIN, recordings[0], parameters, parameters, tuple(methods))
@@ -80,6 +80,11 @@ def _exhibits(
 def _total(experiment: Tracking, methods: Mapping[str, Any], cases: tuple[Case, ...]) -> int:
     per_case = [len(_of_case(experiment, methods, case)) for case in cases]
     return len(methods) + sum(per_case) + 1
+
+
+def _cases(experiment: Tracking, methods: Mapping[str, Any]) -> tuple[Case, ...]:
+    """The cases that any of the chosen methods is run on."""
+    return tuple(case for case in experiment.cases if _of_case(experiment, methods, case))
 
 
 def _of_case(experiment: Tracking, methods: Mapping[str, Any], case: Case) -> tuple[str, ...]:
@@ -226,7 +231,8 @@ def _residual(followed: Followed, markers: MarkerObservation, name: str) -> Resi
     if not seen.any():
         return None
     t = markers.t[seen]
-    estimate = np.stack([np.interp(t, run.t, run.traces[f"{name}.{c}"].y) for c in "xyz"], axis=1)
+    axes = "xyz"[: moved.shape[1]]
+    estimate = np.stack([np.interp(t, run.t, run.traces[f"{name}.{c}"].y) for c in axes], axis=1)
     words = "estimate less measured displacement of the marker, at the times it was seen"
     tre = float(markers.tre[j])
     return Residual(name, "all", estimate - moved[seen], markers.sd, tre, "m", words)

@@ -48,8 +48,9 @@ Cases = Mapping[str, Mapping[str, "Followed"]]
 
 def truth_of(run: Run, scene: Scene) -> Truth:
     """What a twin's run says of its own probes and nodes."""
+    axes = "xyz"[: scene.mesh.dimension]
     probes = {
-        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in "xyz"], axis=1)
+        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in axes], axis=1)
         for p in scene.probes
     }
     return Truth(probes, run.u, scene.mesh)

@@ -102,7 +102,7 @@ class Origin:
 
 
 def points_of(run: Run, scene: Scene) -> Points:
-    """All probes of a finished run.
+    """All probes of a finished run; those of a 2-D scene lie in the plane z = 0.
 
     Raises `RecordingError` for a run that did not finish and for a scene without probes.
     """
@@ -111,9 +111,17 @@ def points_of(run: Run, scene: Scene) -> Points:
             f"run '{run.method}' is {run.outcome.state} after {len(run.t)} steps with "
             f"{len(scene.probes)} probes: only a finished run with probes can be recorded"
         )
-    u = [[run.traces[f"{p.name}.{axis}"].y for axis in "xyz"] for p in scene.probes]
+    axes = "xyz"[: scene.mesh.dimension]
+    u = [[run.traces[f"{p.name}.{axis}"].y for axis in axes] for p in scene.probes]
     rest = np.array([p.point for p in scene.probes])
-    return Points(run.t, tuple(p.name for p in scene.probes), rest, np.transpose(u, (2, 0, 1)))
+    moved = np.transpose(u, (2, 0, 1))
+    flat = 3 - len(axes)
+    return Points(
+        run.t,
+        tuple(p.name for p in scene.probes),
+        np.pad(rest, ((0, 0), (0, flat))),
+        np.pad(moved, ((0, 0), (0, 0), (0, flat))),
+    )
 
 
 def record_tracked(

@@ -1,0 +1,100 @@
+"""Paper 002's block and needle: what explicit steps, lumping and quasi-statics cost in accuracy.
+
+A unit square held on three sides, poked at 0.08 m/s for 2 s. As in the paper the truth is the
+implicit run with consistent mass on the same mesh; beside it stand truths that the models do not
+know: the prostate's material, a finer mesh, smaller steps, plane stress.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+from validate.arrays import Floats
+from validate.compare.verdict import Accept
+from validate.replay.paper_002_needle import published, tell
+from validate.replay.solver_benchmark import (
+    FIVE,
+    FRAMES,
+    STEP,
+    SWITCHES,
+    Benchmark,
+    Body,
+    Clock,
+    Parameters,
+    TwinCard,
+    card,
+    changed,
+    solvers,
+)
+from validate.replay.tracking import Case, Follower, Tracking
+from validate.scene.needle import MP1, MP2, needle_block, needle_depth
+from validate.scene.scene import Material, Scene
+from validate.solve.modal import Modal
+
+RECORDING = Path(__file__).parents[1] / "recordings" / "needle_block.mcap"
+PARAMETERS = Parameters(card(MP1), Body(20), Clock(), TwinCard(), str(RECORDING))
+
+
+def scene(material: Material, body: Body) -> Scene:
+    return needle_block(body.cells, material, body.plane)
+
+
+def depth(t: Floats) -> Floats:
+    return needle_depth(t)[:, 0]
+
+
+BENCHMARK = Benchmark(
+    "needle_block",
+    scene,
+    "needle",
+    "m",
+    depth,
+    {"f1": (0.0, 0.0), "f2": (0.0, 1.0), "f3": (0.3, 0.0), "f4": (0.6, 1.0)},
+)
+METHODS = {
+    **FIVE,
+    **SWITCHES,
+    **solvers(30),
+    "modal": Follower("all modes, by the implicit rule", Modal(STEP, propagate="average")),
+    "modal_40": Follower("40 modes, exact in time", Modal(STEP, 40)),
+}
+CASES = (
+    Case("prostate", "the truth is MP2, the models are MP1",
+         lambda p: replace(p, material=card(MP2)), methods=tuple(FIVE)),
+    Case("finer_mesh", "the truth has twice as many cells a side",
+         changed("twin", refined=2), methods=tuple(FIVE)),
+    Case("small_steps", "the truth takes 20 steps in one of the models'",
+         changed("twin", finer=20), methods=tuple(FIVE)),
+    Case("plane_stress", "the truth is in plane stress, the models in plane strain",
+         changed("body", plane="stress"), methods=tuple(FIVE)),
+)  # fmt: skip
+
+EXPERIMENT = Tracking(
+    name="needle_block",
+    title="Solvers against the implicit run on a block poked by a needle",
+    source="paper 002 (accuracy metrics and benchmarks), sections IV.A and VI",
+    parameters=PARAMETERS,
+    methods=METHODS,
+    accepted=("explicit",),
+    accept=(
+        Accept("side", 1e-3, "some percent of the largest displacement there (ours)"),
+        Accept("inside", 1e-3, "some percent of the largest displacement there (ours)"),
+    ),
+    load=BENCHMARK.load,
+    record=BENCHMARK.record,
+    truth=BENCHMARK.truth,
+    build=BENCHMARK.build,
+    place=BENCHMARK.place,
+    stepper=BENCHMARK.stepper,
+    axis="x",
+    reference="implicit",
+    cases=CASES,
+    tell=tell,
+    published=published,
+    frames=FRAMES,
+    same_model=True,
+    seed=TwinCard().seed,
+    twin_notice=(
+        "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
+        "markers. Errors are between solvers; no tissue was measured."
+    ),
+)

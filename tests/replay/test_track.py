@@ -1,0 +1,468 @@
+"""The road of experiments over time, on a cube of 27 boxes that is pulled for 30 steps."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats
+from validate.compare.result import MethodResult, Result
+from validate.compare.score import rms
+from validate.compare.verdict import Accept, Published
+from validate.errors import ComparisonError, UsageError
+from validate.estimate.steady import ReducedKf
+from validate.fem.system import System, build
+from validate.parameters import quantity
+from validate.recording.types import Recording
+from validate.register.observe import Registered
+from validate.replay.experiment import Input, Uncertainty
+from validate.replay.options import Options
+from validate.replay.run import compare
+from validate.replay.tracking import (
+    Case,
+    Cases,
+    Follower,
+    Told,
+    Tracking,
+    Truth,
+    followed_load,
+    truth_of,
+)
+from validate.scene.box import box
+from validate.scene.scene import Load, Material, Probe, Scene, Support
+from validate.solve.march import march, output_frames
+from validate.solve.newmark import Newmark
+from validate.solve.types import Ending, State, Stepper, Trace
+from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+
+DT, STEPS, SIDE = 0.002, 30, 0.01
+PROBES = {"node_A": (SIDE, SIDE, SIDE), "node_B": (0.0, SIDE, 2 * SIDE / 3)}
+FIDUCIALS = {"f1": (0.0, 0.0, 0.0), "f2": (SIDE, 0.0, 0.0), "f3": (0.0, SIDE, 0.0)}
+METRICS = ("mae", "rmse", "sd", "max", "nrmse")
+
+
+@dataclass(frozen=True)
+class TwinCard:
+    stiffness: float = quantity(1.0, "1", "its modulus over the models'")
+    missing: float = quantity(0.0, "1", "share of looks without a marker")
+
+
+@dataclass(frozen=True)
+class Card:
+    E: float = quantity(10e3, "Pa", "modulus of the models")
+    cells: int = quantity(3, "1", "boxes along an edge")
+    sd: float = quantity(1e-5, "m", "noise")
+    twin: TwinCard = field(default_factory=TwinCard)
+
+
+def scene(E: float, cells: int = 3) -> Scene:
+    return Scene(
+        box((SIDE, SIDE, SIDE), (cells,) * 3),
+        Material(E, 0.3, "linear", 1000.0, 0.0, 0.05),
+        (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+        probes=tuple(Probe(name, at) for name, at in PROBES.items()),
+    )
+
+
+def true_run(card: Card) -> tuple[Scene, Any]:
+    true = scene(card.twin.stiffness * card.E)
+    t = DT * np.arange(1, STEPS + 1)
+    force = 0.05 * np.minimum(t / 0.02, 1.0)[:, None]
+    stepper = Newmark(DT).prepare(build(true))
+    return true, march("twin", stepper, t, force, output_frames(STEPS, 200), 0.0)
+
+
+def record(card: Card, progress: Callable[[str], None]) -> Recording:
+    true, run = true_run(card)
+    return record_tracked(
+        Origin("tiny", 3, True),
+        points_of(run, true),
+        {k: np.array(v) for k, v in FIDUCIALS.items()},
+        Camera(card.sd, 1, card.twin.missing, still=10_000),
+        {"pull": Reading(run.traces["pull.force"].y, "N")},
+    )
+
+
+def truth(card: Card, seen: Registered) -> Truth:
+    true, run = true_run(card)
+    return truth_of(run, true)
+
+
+@dataclass(frozen=True)
+class Breaking:
+    """Steps as another stepper until one fails."""
+
+    inner: Stepper
+    at: int
+    failure: tuple[Ending, str]
+
+    @property
+    def scene(self) -> Scene:
+        return self.inner.scene
+
+    def rest(self) -> State:
+        return self.inner.rest()
+
+    def step(self, state: State, drives: Floats) -> State:
+        stepped = self.inner.step(state, drives)
+        return replace(stepped, failure=self.failure) if stepped.k == self.at else stepped
+
+    def field(self, state: State) -> Floats:
+        return self.inner.field(state)
+
+    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
+        return self.inner.traces(states)
+
+
+@dataclass(frozen=True)
+class Breaks:
+    """A scheme whose step `at` fails."""
+
+    dt: float = quantity(DT, "s", "time step")
+    at: int = quantity(1, "1", "step that fails")
+    ending: str = quantity("refused", "1", "its ending")
+
+    def prepare(self, system: System) -> Stepper:
+        ending: Any = self.ending
+        return Breaking(Newmark(self.dt).prepare(system), self.at, (ending, "told so"))
+
+
+def stepper(method: Follower, card: Card, system: System, seen: Registered) -> Stepper:
+    return method.prepare(system, seen, dt=DT * method.stride)
+
+
+A = ("node_A",)
+METHODS = {
+    "fem": Follower("FEM", Newmark()),
+    "timed": Follower("FEM, timed", Newmark(), steps=5),
+    "slow": Follower("FEM, long steps", Newmark(), stride=3),
+    "kf": Follower("filter", ReducedKf(modes=5, load_start=0.02, load_walk=0.05), A),
+    "refused": Follower("refused", Breaks()),
+    "diverged": Follower("diverged", Breaks(at=8, ending="diverged")),
+}
+
+
+def stiffer(card: Card) -> Card:
+    return replace(card, twin=replace(card.twin, stiffness=1.25))
+
+
+def missed(card: Card) -> Card:
+    return replace(card, twin=replace(card.twin, missing=0.4))
+
+
+TINY = Tracking(
+    name="test_track",
+    title="tiny",
+    source="this test",
+    parameters=Card(),
+    methods=METHODS,
+    accepted=("fem",),
+    accept=(Accept("node_B", 1e-4, "ours"),),
+    load=lambda card, folder: (record(card, print),),
+    record=record,
+    truth=truth,
+    build=lambda recording, card, method: scene(card.E, card.cells),
+    place=lambda recording, card, its: followed_load(recording, its, "pull", "N"),
+    stepper=stepper,
+    axis="z",
+    reference="fem",
+    cases=(
+        Case("stiff", "25 % stiffer", stiffer),
+        Case("missing", "looks are missing", missed, methods=("kf", "diverged")),
+    ),
+    same_model=True,
+    path=Path(__file__),
+)
+
+
+def run(experiment: Tracking, *methods: str, quick: bool = False, **values: str) -> Result:
+    return compare(experiment, Options(values, methods, quick))
+
+
+def of(result: Result, name: str) -> MethodResult:
+    return next(m for m in result.methods if m.name == name)
+
+
+def scores(result: Result, name: str) -> dict[str, float]:
+    return {s.name: s.value for s in of(result, name).scores}
+
+
+def table(result: Result, name: str) -> list[tuple[Any, ...]]:
+    found = [t for e in result.exhibits for t in e.tables if t.name == name]
+    assert len(found) == 1
+    return list(found[0].rows)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Result:
+    return compare(TINY, Options({}))
+
+
+def test_every_probe_is_scored_on_every_case(whole: Result) -> None:
+    """The model that made the recording has no error; `@all` are residuals of what was measured."""
+    names = {f"{p}.{m}" for p in PROBES for m in METRICS}
+    mine = {n for n in scores(whole, "fem") if n.split("@")[0] in names and "@all" not in n}
+    assert mine == names | {f"{n}@stiff" for n in names}
+    assert all(scores(whole, "fem")[n] == 0.0 for n in names)
+    assert all(scores(whole, "fem")[f"{p}.rmse@stiff"] > 1e-5 for p in PROBES)
+    filtered = scores(whole, "kf")
+    assert {f"{n}@{case}" for n in names for case in ("stiff", "missing")} <= set(filtered)
+    assert {"nis.per_dof", "nis.per_dof@stiff", "node_B.nees.per_dof@missing"} <= set(filtered)
+    assert filtered["node_B.rmse@stiff"] < scores(whole, "fem")["node_B.rmse@stiff"]
+
+
+def test_scores_are_those_of_the_runs_traces_against_the_truth(whole: Result) -> None:
+    true = true_run(Card())[1]
+    found = of(whole, "kf")
+    off = found.run.traces["node_B.z"].y - true.traces["node_B.z"].y
+    by_hand = {
+        "mae": np.abs(off).mean(),
+        "rmse": np.sqrt((off**2).mean()),
+        "sd": np.abs(off).std(ddof=1),
+        "max": np.abs(off).max(),
+        "nrmse": np.sqrt((off**2).mean()) / np.ptp(true.traces["node_B.z"].y),
+    }
+    for name, value in by_hand.items():
+        assert scores(whole, "kf")[f"node_B.{name}"] == pytest.approx(value, rel=1e-12)
+
+
+def test_no_method_sees_the_truth(whole: Result) -> None:
+    """Another truth moves every score and not one number of a run."""
+
+    def shifted(card: Card, seen: Registered) -> Truth:
+        return Truth({name: u + 1.0 for name, u in truth(card, seen).probes.items()})
+
+    other = run(replace(TINY, truth=shifted, cases=()))
+    for name in ("fem", "kf", "slow"):
+        one, two = of(whole, name).run, of(other, name).run
+        assert np.array_equal(one.u, two.u)
+        assert all(np.array_equal(t.y, two.traces[n].y) for n, t in one.traces.items())
+        assert scores(other, name)["node_B.rmse"] > 0.9
+
+
+def test_a_stepper_gets_the_models_parameters_and_what_was_registered() -> None:
+    given: list[tuple[Any, ...]] = []
+
+    def spy(*arguments: Any) -> Stepper:
+        given.append(arguments)
+        return stepper(*arguments)
+
+    run(replace(TINY, stepper=spy), "fem", "kf")
+    assert len(given) == 5  # two recorded, two on 'stiff', one on 'missing'
+    for settings, card, system, seen in given:
+        assert isinstance(settings, Follower)
+        assert card == Card()  # never the truth's own
+        assert system.scene.material.E == Card().E
+        assert type(seen) is Registered
+        assert {f.name for f in fields(seen)} == {
+            "stage", "holds", "markers", "outline", "signals", "windows", "outside", "findings",
+        }  # fmt: skip
+
+
+def test_a_method_that_fails_is_a_row_and_the_others_go_on(whole: Result) -> None:
+    assert [m.name for m in whole.methods] == list(METHODS)
+    assert of(whole, "refused").run.outcome.state == "refused"
+    assert len(of(whole, "refused").run.t) == 0
+    ended = of(whole, "diverged").run
+    assert (ended.outcome.state, ended.outcome.step, len(ended.t)) == ("diverged", 7, 7)
+    for name in ("refused", "diverged"):
+        assert not {n for n in scores(whole, name) if n.startswith("node_")}
+        assert not of(whole, name).residuals
+    rows = {row[0]: row for row in table(whole, "speeds")}
+    assert rows["refused"][-2:] == (0, "refused at step 0: told so")
+    assert rows["diverged"][-2:] == (7, "diverged at step 7: told so")
+    cases = [row for row in table(whole, "cases") if row[1] == "diverged"]
+    assert [row[0] for row in cases] == ["stiff", "missing"]
+    assert all(row[2:] == (None, None, None, "diverged") for row in cases)
+    assert of(whole, "kf").run.finished
+
+
+def test_a_run_that_ends_early_is_compared_with_nothing_and_fails() -> None:
+    result = run(replace(TINY, accepted=("diverged",), cases=()), "diverged")
+    (check,) = result.checks
+    assert (check.verdict, check.count) == ("cannot decide", 0)
+    assert check.why == "compared nothing: diverged: told so"
+    assert not result.passed
+
+
+def test_a_marker_that_is_not_there_is_compared_with_nothing_and_fails() -> None:
+    accept = (Accept("node_B", 1e-4, "ours"), Accept("nowhere", 1e-4, "ours"))
+    result = run(replace(TINY, accept=accept, cases=()), "fem")
+    one, two = result.checks
+    assert one.holds
+    assert one.count == STEPS
+    assert two.why == "compared nothing: no such marker in the recording"
+    assert not two.holds
+    assert not result.passed
+
+
+def test_only_looks_that_saw_the_marker_are_compared() -> None:
+    card = missed(Card())
+    markers = record(card, print).marker("markers")
+    j = markers.names.index("node_B")
+    looks = int(np.isfinite(markers.x[1:, j, 0]).sum())
+    assert 10 < looks < 25
+    result = run(replace(TINY, parameters=card, cases=()), "fem", "slow")
+    assert of(result, "fem").residuals["node_B@all"].count == looks
+    assert of(result, "fem").checks[0].count == looks
+    # Nothing is compared before the first long step's end, and no marker outside the scene is.
+    later = int(np.isfinite(markers.x[3:, j, 0]).sum())
+    assert of(result, "slow").residuals["node_B@all"].count == later
+    assert set(of(result, "fem").residuals) == {"node_A@all", "node_B@all"}
+
+
+def test_a_residual_is_estimate_less_measured() -> None:
+    """Without noise only the modulus is left: the static part is 1/1.25 of the model's."""
+    result = run(TINY, "fem", quick=True, sd="1e-12", **{"twin.stiffness": "1.25"})
+    model = np.stack([of(result, "fem").run.traces[f"node_B.{c}"].y for c in "xyz"], axis=1)
+    true = true_run(stiffer(Card()))[1]
+    measured = np.stack([true.traces[f"node_B.{c}"].y for c in "xyz"], axis=1)
+    values = of(result, "fem").residuals["node_B@all"].values
+    assert values == pytest.approx(model - measured, abs=1e-9)
+    assert values[-1, 2] / model[-1, 2] == pytest.approx(1 - 1 / 1.25, abs=0.03)
+
+
+def test_long_steps_are_scored_at_their_own_times(whole: Result) -> None:
+    found = of(whole, "slow").run
+    assert found.t == pytest.approx(DT * np.arange(3, STEPS + 1, 3))
+    assert found.finished
+    true = true_run(Card())[1].traces["node_A.z"].y[2::3]
+    off = found.traces["node_A.z"].y - true
+    value = scores(whole, "slow")["node_A.max"]
+    assert value == pytest.approx(float(np.abs(off).max()), rel=1e-12)
+    assert value > 0
+    speed = next(row for row in table(whole, "speeds") if row[0] == "FEM, long steps")
+    assert speed[6] == pytest.approx(3 * DT * speed[5], rel=1e-12)  # real-time factor, rate
+
+
+def test_a_baseline_is_timed_and_neither_scored_nor_run_on_other_cases(whole: Result) -> None:
+    timed = of(whole, "timed")
+    assert len(timed.run.t) == 5
+    assert "step.p50" in scores(whole, "timed")
+    assert not {n for n in scores(whole, "timed") if n.startswith("node_")}
+    assert "FEM, timed" not in {row[1] for row in table(whole, "cases")}
+    assert {row[1] for row in table(whole, "cases") if row[0] == "missing"} == {
+        "filter", "diverged",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["timed", "refused", "diverged"])
+def test_methods_without_a_score_alone_are_a_result_too(method: str) -> None:
+    result = run(TINY, method)
+    assert [row[0] for row in table(result, "speeds")] == [METHODS[method].label]
+    assert not result.passed
+
+
+def test_a_case_is_loaded_where_it_ships_and_made_anew_where_not() -> None:
+    loaded: list[Card] = []
+    made: list[Card] = []
+
+    def loads(card: Card, folder: Path) -> tuple[Recording, ...]:
+        loaded.append(card)
+        assert folder == Path(__file__).parent
+        return (record(card, print),)
+
+    def records(card: Card, progress: Callable[[str], None]) -> Recording:
+        made.append(card)
+        return record(card, progress)
+
+    cases = (Case("a", "", stiffer, shipped=True), Case("b", "", stiffer))
+    result = run(replace(TINY, load=loads, record=records, cases=cases), "fem")
+    assert loaded == [Card(), stiffer(Card())]
+    assert made == [stiffer(Card())]
+    found = scores(result, "fem")
+    assert found["node_B.rmse@a"] == found["node_B.rmse@b"] > 0
+
+
+def test_a_filters_own_covariance_is_part_of_u_val() -> None:
+    result = run(replace(TINY, accepted=("fem", "kf"), cases=()), "fem", "kf")
+    plain, filtered = (of(result, name).checks[0] for name in ("fem", "kf"))
+    assert plain.u_input == 0.0
+    found = of(result, "kf")
+    assert found.run.sd is not None
+    node = found.scene.mesh.nearest_node(np.array(PROBES["node_B"]))
+    assert filtered.u_input == pytest.approx(rms(found.run.sd[:, node]), rel=1e-9)
+    assert filtered.u_input > 0
+    assert filtered.u_val == pytest.approx(np.hypot(filtered.u_D, filtered.u_input))
+
+
+def test_mesh_and_inputs_enter_u_val_by_the_surrogate() -> None:
+    """By hand: residuals of three runs, their differences times the declared scales."""
+    declared = Uncertainty(
+        finer=lambda card: replace(card, cells=4),
+        refinement=lambda card: 0.75,
+        inputs=(Input("modulus", lambda c: replace(c, E=1.01 * c.E), lambda c: 2.0, "modulus"),),
+        surrogate="fem",
+    )
+    experiment = replace(TINY, uncertainty=declared, cases=())
+    check = of(run(experiment, "fem"), "fem").checks[0]
+
+    def residual(**values: str) -> Floats:
+        return of(run(TINY, "fem", quick=True, **values), "fem").residuals["node_B@all"].values
+
+    # The recording is made with the card, so its E stays and the twin's is moved against it.
+    moved = residual(E="10100", **{"twin.stiffness": repr(1 / 1.01)})
+    assert check.u_input == pytest.approx(2 * rms(moved - residual()), rel=1e-6)
+    finer = residual(cells="4")
+    assert check.u_num == pytest.approx(1.5 * rms(finer - residual()) / 0.75, rel=1e-9)
+    assert min(check.u_input, check.u_num) > 0
+
+
+def test_another_model_without_declared_uncertainty_is_refused() -> None:
+    with pytest.raises(ComparisonError, match="no uncertainty is declared; u_val unknown"):
+        run(replace(TINY, same_model=False, cases=()), "fem")
+
+
+def told(card: Card, cases: Cases, progress: Callable[[str], None]) -> Told:
+    return Told((), {"cases": float(len(cases))})
+
+
+def published(values: Any) -> tuple[Published, ...]:
+    ours = values["told"].get("cases")
+    return (Published("cases", ours, 3.0, 0.0, "1", "reproduced", "", "here"),)
+
+
+def test_quick_skips_cases_own_exhibits_and_printed_figures() -> None:
+    experiment = replace(TINY, tell=told, published=published)
+    result = run(experiment, quick=True)
+    assert result.quick
+    assert not result.published
+    assert not any("@stiff" in n for n in scores(result, "fem"))
+    assert "quick run" in result.sentence
+
+
+def test_what_an_experiment_tells_reaches_its_printed_figures_when_all_was_run() -> None:
+    experiment = replace(TINY, tell=told, published=published)
+    (figure,) = run(experiment).published
+    assert figure.ours == 3.0  # the recorded case and two others
+    assert not figure.fault
+    (alone,) = run(experiment, "fem").published
+    assert alone.ours is None
+    assert alone.fault == "marked reproduced, and compared nothing"
+
+
+def test_unknown_methods_name_the_nearest() -> None:
+    with pytest.raises(UsageError, match="unknown method 'femm'; nearest: fem"):
+        run(TINY, "femm")
+
+
+def test_progress_counts_every_run_once() -> None:
+    calls: list[tuple[int, int]] = []
+    compare(TINY, Options({}, ("fem", "kf", "timed")), lambda d, n, _: calls.append((d, n)))
+    assert {n for _, n in calls} == {3 + 2 + 1 + 1}
+    done = [d for d, _ in calls]
+    assert done == sorted(done)
+    assert done[-1] <= 7
+
+
+def test_maps_compare_equal_times_only(whole: Result) -> None:
+    """A long step's frames are other times than the truth's: no map, or it would show a lag."""
+    maps = {m.name: m for e in whole.exhibits for m in e.maps}
+    assert set(maps) == {"error_kf"}  # the exact model has no error to show
+    true = true_run(Card())[1]
+    error = np.sqrt(((of(whole, "kf").run.u - true.u) ** 2).sum(axis=2).mean(axis=0))
+    assert maps["error_kf"].values == pytest.approx(1e3 * error, rel=1e-12)

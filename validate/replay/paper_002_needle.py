@@ -1,0 +1,2 @@
+tell = None
+published = None
