@@ -56,6 +56,20 @@ def test_every_scheme_is_in_the_tuple(project_root: Path) -> None:
     assert written == {scheme.__name__ for scheme in SCHEMES}
 
 
+def test_every_filter_is_in_the_tuple(project_root: Path) -> None:
+    """A class of the filters' floor with `prepare` is a filter."""
+    from validate.estimate.filters import FILTERS
+
+    written = {
+        node.name
+        for path in (project_root / "validate" / "estimate").glob("*.py")
+        for node in classes(path)
+        if any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
+        and "Protocol" not in [ast.unparse(b) for b in node.bases]
+    }
+    assert written == {filter_.__name__ for filter_ in FILTERS}
+
+
 def test_arrays_of_meshes_are_read_only() -> None:
     mesh = phantom_mesh(COARSE_GRID, 2)
     for array in (mesh.nodes, mesh.cells, *mesh.facets.values()):

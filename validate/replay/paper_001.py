@@ -68,7 +68,7 @@ def _noisy(followed: Followed) -> Floats:
     clean = followed.truth.probes["node_A"]
     rng = np.random.default_rng(_SEED)
     noise = rng.standard_normal((SEEDS, *clean.shape))
-    return clean + np.sqrt(PRINTED * _MM2) * noise
+    return clean + float(np.sqrt(PRINTED * _MM2)) * noise
 
 
 def _z_row(system: System, followed: Followed) -> Floats:
