@@ -31,6 +31,12 @@ def dataclass_settings(node: ast.ClassDef) -> dict[str, object] | None:
     return None
 
 
+def test_names_of_test_modules_are_unique(project_root: Path) -> None:
+    """pytest imports them by bare name: two of one name are one module."""
+    names = [p.name for p in (project_root / "tests").rglob("*.py") if p.name != "conftest.py"]
+    assert sorted(names) == sorted(set(names))
+
+
 def test_every_dataclass_is_frozen(project_root: Path) -> None:
     found = {
         f"{path.name}:{node.name}": settings

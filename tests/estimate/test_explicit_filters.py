@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from explicit_scenes import CENTRE, at_nodes, cube, plain, ramp, run
+from filter_scenes import CENTRE, at_nodes, cube, plain, ramp, run
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError

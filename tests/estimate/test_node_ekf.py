@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from explicit_scenes import CENTRE, at_nodes, cube, plain, ramp, run, unmeasured
+from filter_scenes import CENTRE, at_nodes, cube, plain, ramp, run, unmeasured
 from filterpy.kalman import ExtendedKalmanFilter
 
 from validate.arrays import Floats

@@ -70,7 +70,8 @@ class Chart:
 class NodeMap:
     """A number at every node (n,) in `unit`, drawn on the mesh's surface.
 
-    Maps of one `scale` share their colour range.
+    Maps of one `scale` share their colour range. `surface` says what the mesh is: a deformed shape
+    is a map on the moved mesh.
     """
 
     name: str
@@ -79,6 +80,7 @@ class NodeMap:
     values: Floats
     unit: str
     scale: str = ""
+    surface: str = "the undeformed surface"
 
     def __post_init__(self) -> None:
         n = len(self.mesh.nodes)

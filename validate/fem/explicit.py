@@ -25,7 +25,7 @@ RowName = Literal["u", "d", "r", "old", "v", "a"]
 _ROWS: tuple[RowName, ...] = get_args(RowName)
 # Turns that a thread waits awake for the next step, read as GNU OpenMP is loaded. By its own default
 # (a millisecond and more) steps take a hundred times as long where another process has the core.
-_PATIENCE = "10000"
+_PATIENCE = "3000"
 _LAWS = {"svk": SVK, "neo_hooke": NEO_HOOKE}
 
 

@@ -333,48 +333,45 @@ def _put_block(w: Floats, o: int, rows: int, block: Six) -> None:
 
 @_inlined
 def _node_svk(
-    w: Floats, o: int, rows: int, g: Three, q: Three, s: float, ab: float, b: float, B: Six
+    w: Floats, o: int, rows: int, g: Three, q: Three, ab: float, b: float, T: Nine
 ) -> None:
-    """V (g.S g I + (lambda + mu) q q^T + mu |g|^2 F F^T) of one node, q = F g, s = V g.S g."""
-    m = b * _dot(g, g)
-    x, y, z = ab * q[0], ab * q[1], ab * q[2]
+    """V (|g|^2 T + mu |q|^2 I + (lambda + mu) q q^T) of one node, q = F g.
+
+    With F S g = T q this is g.S g I + (lambda + mu) q q^T + mu |g|^2 F F^T in fewer products.
+    """
+    m, x, y, z = _dot(g, g), q[0] * q[0], q[1] * q[1], q[2] * q[2]
+    s = b * (x + y + z)
     block = (
-        s + x * q[0] + m * B[0],
-        s + y * q[1] + m * B[1],
-        s + z * q[2] + m * B[2],
-        x * q[1] + m * B[3],
-        x * q[2] + m * B[4],
-        y * q[2] + m * B[5],
+        s + ab * x + m * T[0],
+        s + ab * y + m * T[4],
+        s + ab * z + m * T[8],
+        ab * q[0] * q[1] + m * T[1],
+        ab * q[0] * q[2] + m * T[2],
+        ab * q[1] * q[2] + m * T[5],
     )
     _put_block(w, o, rows, block)
 
 
 @_inlined
-def _left(F: Nine) -> Six:
-    """F F^T as xx, yy, zz, xy, xz, yz."""
-    x, y, z = _row(F, 0), _row(F, 1), _row(F, 2)
-    return _dot(x, x), _dot(y, y), _dot(z, z), _dot(x, y), _dot(x, z), _dot(y, z)
-
-
-@_inlined
 def _tangents_svk(w: Floats, rows: int) -> None:
-    """The nodes' own blocks of the tangent, and the forces V F S g."""
+    """The nodes' own blocks of the tangent, and the forces V F S g = V T F g.
+
+    T = F S F^-1 = lambda tr(E) I + mu (F F^T - I) is S with H^T for H.
+    """
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
         H = _product(_matrix(w, _U + l), G)
-        F, S = _deformation(H), _second(H, a, b)
-        B, o = _left(F), _TANGENTS + l
+        F, T, o = _deformation(H), _second(_transposed(H), a, b), _TANGENTS + l
         g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
         q1, q2, q3 = _times(F, g1), _times(F, g2), _times(F, g3)
-        t1, t2, t3 = _times(S, g1), _times(S, g2), _times(S, g3)
-        _put_force(w, l, 0, _times(F, t1))
-        _put_force(w, l, 1, _times(F, t2))
-        _put_force(w, l, 2, _times(F, t3))
-        g0, q0, t0 = _rest(g1, g2, g3), _rest(q1, q2, q3), _rest(t1, t2, t3)
-        _node_svk(w, o, rows, g0, q0, _dot(g0, t0), a + b, b, B)
-        _node_svk(w, o + 6 * LANES, rows, g1, q1, _dot(g1, t1), a + b, b, B)
-        _node_svk(w, o + 12 * LANES, rows, g2, q2, _dot(g2, t2), a + b, b, B)
-        _node_svk(w, o + 18 * LANES, rows, g3, q3, _dot(g3, t3), a + b, b, B)
+        _put_force(w, l, 0, _times(T, q1))
+        _put_force(w, l, 1, _times(T, q2))
+        _put_force(w, l, 2, _times(T, q3))
+        g0, q0 = _rest(g1, g2, g3), _rest(q1, q2, q3)
+        _node_svk(w, o, rows, g0, q0, a + b, b, T)
+        _node_svk(w, o + 6 * LANES, rows, g1, q1, a + b, b, T)
+        _node_svk(w, o + 12 * LANES, rows, g2, q2, a + b, b, T)
+        _node_svk(w, o + 18 * LANES, rows, g3, q3, a + b, b, T)
 
 
 @_inlined

@@ -177,11 +177,15 @@ FIVE: Mapping[str, Follower] = {
 }
 #: Lumping and the restriction of C one at a time.
 SWITCHES: Mapping[str, Follower] = {
-    "implicit_lumped_full": Follower("implicit, lumped M, full C", replace(IMPLICIT, mass="lumped")),
+    "implicit_lumped_full": Follower(
+        "implicit, lumped M, full C", replace(IMPLICIT, mass="lumped")
+    ),
     "implicit_restricted": Follower(
         "implicit, consistent M, C = αM", replace(IMPLICIT, damping_terms="mass")
     ),
-    "explicit_lumped_full": Follower("explicit, lumped M, full C", replace(EXPLICIT, mass="lumped")),
+    "explicit_lumped_full": Follower(
+        "explicit, lumped M, full C", replace(EXPLICIT, mass="lumped")
+    ),
     "explicit_restricted": Follower(
         "explicit, consistent M, C = αM", replace(EXPLICIT, damping_terms="mass")
     ),
@@ -203,7 +207,9 @@ def changed(part: str, **values: Any) -> Change:
 def solvers(steps: int) -> dict[str, Follower]:
     """The linear solvers of the implicit step, and the misprinted update for a few `steps`."""
     return {
-        "gauss_seidel": Follower("implicit by Gauss-Seidel", replace(IMPLICIT, solver="gauss_seidel")),
+        "gauss_seidel": Follower(
+            "implicit by Gauss-Seidel", replace(IMPLICIT, solver="gauss_seidel")
+        ),
         "cg": Follower("implicit by conjugate gradients", replace(IMPLICIT, solver="cg")),
         "dense_inverse": Follower(
             "implicit by a dense inverse", replace(IMPLICIT, solver="dense_inverse")

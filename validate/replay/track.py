@@ -15,6 +15,7 @@ from validate.compare.track import track_scores
 from validate.compare.verdict import Check, Sensitivity, judge
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows
+from validate.fem.locking import locking_warning
 from validate.fem.system import build as build_system
 from validate.parameters import describe
 from validate.recording.types import Recording
@@ -56,13 +57,23 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
         rest=(),
         effects=(),
         published=printed,
-        notes=first.seen.findings,
+        notes=(*first.seen.findings, *_locking(main)),
         quick=options.quick,
         same_model=experiment.same_model,
         seed=experiment.seed,
         twin_notice=experiment.twin_notice,
         exhibits=_exhibits(experiment, main, others, told),
     )
+
+
+def _locking(main: Mapping[str, Followed]) -> tuple[str, ...]:
+    """Which methods' cells lock near incompressibility, by warning."""
+    found: dict[str, list[str]] = {}
+    for followed in main.values():
+        warning = locking_warning(followed.scene)
+        if warning:
+            found.setdefault(warning, []).append(followed.label)
+    return tuple(f"{warning} ({'; '.join(labels)})" for warning, labels in found.items())
 
 
 def _exhibits(

@@ -54,8 +54,8 @@ def words(shown: NodeMap, span: Range) -> str:
     common = f" Colours as in the other maps of {shown.scale}." if shown.scale else ""
     title = shown.title.removesuffix(".")
     return (
-        f"{title}, {unit}: {v.min():.3g} to {v.max():.3g} at {len(v)} nodes, on the undeformed "
-        f"surface; colours from {span[0]:.3g} to {span[1]:.3g}.{common}"
+        f"{title}, {unit}: {v.min():.3g} to {v.max():.3g} at {len(v)} nodes, on "
+        f"{shown.surface}; colours from {span[0]:.3g} to {span[1]:.3g}.{common}"
     ).replace(" -", " −")
 
 

@@ -74,7 +74,7 @@ def _ranking(
             scores[cell.key],
             _overlaps(i, [scores[c.key] for c in order]),
             *tied(results[cell.key].scores[by], results[order[0].key].scores[by]),
-            _dominated(i, [results[c.key] for c in order], [scores[c.key] for c in order]),
+            _place_of_better(i, [results[c.key] for c in order], [scores[c.key] for c in order]),
             results[cell.key].scores[by],
         )
         for i, cell in enumerate(order)
@@ -94,14 +94,20 @@ def tied(mine: Sequence[float], best: Sequence[float]) -> tuple[Interval, bool]:
     return apart, apart.half is None or abs(apart.mean) <= apart.half
 
 
-def _dominated(i: int, results: Sequence[CellResult], scores: Sequence[Interval]) -> int | None:
-    """The best-placed cell with less error in at most this time, or this error in less time; times
-    within `SAME_TIME` are equal."""
-    error, time = scores[i].mean, results[i].step_s or 0.0
-    for j, result in enumerate(results):
-        other, other_time = scores[j].mean, result.step_s or 0.0
-        better = other < error and other_time <= SAME_TIME * time
-        faster = other <= error and SAME_TIME * other_time < time
+def dominator(i: int, errors: Sequence[float], times: Sequence[float]) -> int | None:
+    """The first that has less error than i in at most its time, or no more error in less time;
+    times within `SAME_TIME` are equal. None on the Pareto front."""
+    for j, (error, time) in enumerate(zip(errors, times, strict=True)):
+        better = error < errors[i] and time <= SAME_TIME * times[i]
+        faster = error <= errors[i] and SAME_TIME * time < times[i]
         if j != i and (better or faster):
-            return j + 1
+            return j
     return None
+
+
+def _place_of_better(
+    i: int, results: Sequence[CellResult], scores: Sequence[Interval]
+) -> int | None:
+    """The best-placed cell that dominates."""
+    found = dominator(i, [s.mean for s in scores], [r.step_s or 0.0 for r in results])
+    return None if found is None else found + 1

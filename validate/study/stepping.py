@@ -6,7 +6,6 @@ entries of order 1 whatever the step. Linear solvers (direct, CG, Gauss-Seidel) 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from validate.solve.explicit_linear import (
 )
 from validate.solve.newmark_rule import RuleName, rule_of
 
-ENERGIES = ("whole", "shadow")
 Radii = Callable[["Rates"], Floats]
 
 
@@ -47,7 +45,8 @@ class Stepping:
     """A scheme: its `maps` (r, m, m) per mode with the masses `mass`, and its predicted `limit` s.
 
     Without `limit` it is predicted to be stable at every step. `kinds`: the meshes it is for (none:
-    all). `rounding`: how far above 1 a radius may lie by rounding alone; defective double
+    all). `conserves`: undamped it keeps an energy exactly, that of half steps where it is explicit.
+    `rounding`: how far above 1 a radius may lie by rounding alone; defective double
     eigenvalues, as undamped implicit rules have at large steps, cost half of the digits.
     """
 
@@ -58,11 +57,8 @@ class Stepping:
     limit: Callable[[System], float] | None = None
     kinds: tuple[Kind, ...] = ()
     rounding: float = 1e-9
-    energy: Literal["whole", "shadow"] = "whole"
-
-    @property
-    def explicit(self) -> bool:
-        return self.energy == "shadow"
+    explicit: bool = False
+    conserves: bool = False
 
     def radius(self, h: float, omegas: Floats, alpha: float, beta: float) -> float:
         """Spectral radius of a step of h s over all modes (r,) 1/s."""
@@ -146,7 +142,8 @@ def _linear_explicit(
 ) -> Stepping:
     settings = ExplicitLinear(1.0, mass, terms, update)
     maps = _explicit(terms, update)
-    return Stepping(name, settings.treatment, mass, maps, _explicit_step(settings), energy="shadow")
+    return Stepping(name, settings.treatment, mass, maps, _explicit_step(settings),
+                    explicit=True, conserves=True)
 
 
 _LOOSE = 1e-6  # rounding of double eigenvalues, squared and some more
@@ -155,11 +152,11 @@ _TETS: tuple[Kind, ...] = ("tet4",)
 STEPPINGS: tuple[Stepping, ...] = (
     Stepping(
         "newmark_average", "average acceleration, consistent mass", "consistent",
-        _implicit("average"), rounding=_LOOSE,
+        _implicit("average"), conserves=True, rounding=_LOOSE,
     ),
     Stepping(
         "newmark_lumped", "average acceleration, lumped mass", "lumped",
-        _implicit("average"), rounding=_LOOSE,
+        _implicit("average"), conserves=True, rounding=_LOOSE,
     ),
     Stepping(
         "backward_euler", "backward Euler", "consistent", _implicit("backward_euler"),
@@ -179,15 +176,15 @@ STEPPINGS: tuple[Stepping, ...] = (
     _linear_explicit("explicit_lumped_lagged", "lumped", "full", "lagged"),
     Stepping(
         "central", "central difference at rest, C = alpha M", "lumped", _central(lagged=False),
-        _central_step(lagged=False), _TETS, energy="shadow",
+        _central_step(lagged=False), _TETS, explicit=True, conserves=True,
     ),
     Stepping(
         "central_lagged", "central difference at rest, lagged C", "lumped", _central(lagged=True),
-        _central_step(lagged=True), _TETS, energy="shadow",
+        _central_step(lagged=True), _TETS, explicit=True, conserves=True,
     ),
     Stepping(
         "newton_dynamics", "Newton's average acceleration at rest, lumped mass", "lumped",
-        _implicit("average"), None, _TETS, rounding=_LOOSE,
+        _implicit("average"), None, _TETS, conserves=True, rounding=_LOOSE,
     ),
     Stepping("modal", "all modes, each exactly", "consistent", _exact),
     Stepping("quasi_static", "statics: no memory of the last step", "consistent", _still),

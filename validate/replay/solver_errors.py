@@ -1,0 +1,301 @@
+"""How far solvers are from the implicit run, over time, in the metrics of paper 002, section III.
+
+Also what both of its benchmarks show besides: lumping and the restricted damping one at a time, the
+way to the static solution, critical steps, deformed shapes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
+from validate.compare.pair import Common, Field, pair
+from validate.compare.two_fields import METRICS_OF_FIELDS, compared
+from validate.fem.system import System
+from validate.replay.tracking import Follower, Followed
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
+from validate.solve.explicit_linear import ExplicitLinear, stable_step
+from validate.solve.march import march
+from validate.solve.types import Run
+
+INSTANTS = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)  # s
+RIVALS = ("explicit", "implicit_lumped", "explicit_lumped", "quasi_static")
+DRAWN = ("E_n", "E_s", "E_i")
+TABLED = ("E_n", "L2.relative", "energy.relative", "E_s", "E_i", "E_i.mean")
+_EVERY = 5  # steps between two compared frames: 1/6 s shows every swing of both benchmarks
+_METRICS = {m.name: m for m in METRICS_OF_FIELDS}
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Metrics of one method: times (k,) s, and by metric values (k,), NaN where `refused` says
+    why there is none."""
+
+    label: str
+    t: Floats
+    values: Mapping[str, Floats]
+    refused: tuple[tuple[float, str, str], ...]
+
+    def line(self, name: str, label: str = "") -> Series:
+        """A metric over time, without the times that have none and exact zeros."""
+        y = self.values[name]
+        there = np.isfinite(y) & (y > 0)
+        return Series(label or self.label, self.t[there], y[there])
+
+    def at(self, name: str, t: float) -> float | None:
+        """The metric at an instant; None where it was not compared or does not exist."""
+        k = int(np.argmin(np.abs(self.t - t)))
+        value = float(self.values[name][k])
+        return value if abs(self.t[k] - t) < 1e-6 and np.isfinite(value) else None
+
+
+def frames_of(t: Floats, at: Sequence[int]) -> list[int]:
+    """Kept frames to be compared: the first, and each fifth step."""
+    return [k for k, step in enumerate(at) if step == 0 or (step + 1) % _EVERY == 0]
+
+
+def errors_of(
+    one: Run,
+    mesh: Mesh,
+    truth: Floats,
+    on: Common,
+    names: Sequence[str] = TABLED,
+    frames: Sequence[int] | None = None,
+    label: str = "",
+) -> Errors:
+    """A run with fields on `mesh` against fields `truth` (no, n, d) m of the same frames on `on`."""
+    chosen = frames_of(one.t, one.at.tolist()) if frames is None else list(frames)
+    t = one.t[one.at[chosen]]
+    values = {name: np.full(len(chosen), np.nan) for name in names}
+    refused = []
+    for i, k in enumerate(chosen):
+        between = pair(
+            Field(mesh, one.u[k], label or one.method), Field(on.mesh, truth[k], "truth"), on
+        )
+        found = compared(between, tuple(_METRICS[name] for name in names))
+        for score in found.scores:
+            values[score.name][i] = score.value
+        refused += [(float(t[i]), name, why) for name, why in found.refused]
+    return Errors(label or one.method, t, values, tuple(refused))
+
+
+def errors_on(case: Mapping[str, Followed], names: Sequence[str], methods: Sequence[str],
+              frames: Sequence[int] | None = None) -> dict[str, Errors]:  # fmt: skip
+    """Metrics of a case's methods against its truth, on the truth's mesh."""
+    first = next(iter(case.values()))
+    truth, mesh = first.truth.u, first.truth.mesh
+    assert truth is not None
+    assert mesh is not None
+    on = Common(mesh, replace(first.scene, mesh=mesh))
+    return {
+        name: errors_of(
+            case[name].run, case[name].scene.mesh, truth, on, names, frames, case[name].label
+        )
+        for name in methods
+        if name in case and case[name].whole
+    }
+
+
+# --- exhibits -------------------------------------------------------------------------------------
+
+
+def instants_table(name: str, title: str, errors: Mapping[str, Errors],
+                   metrics: Sequence[str], units: Mapping[str, str]) -> NumberTable:  # fmt: skip
+    """Rows of method and metric, columns of instants."""
+    rows: list[tuple[Entry, ...]] = [
+        (e.label, f"{metric} / {units.get(metric, '1')}", *(e.at(metric, t) for t in INSTANTS))
+        for metric in metrics
+        for e in errors.values()
+        if metric in e.values
+    ]
+    heads = ("method", "metric", *(f"at {t:g} s" for t in INSTANTS))
+    return NumberTable(name, title, heads, tuple(rows), _gaps(errors))
+
+
+def _gaps(errors: Mapping[str, Errors]) -> str:
+    """What has no value, and why, in one sentence."""
+    reasons = {f"{metric}: {why}" for e in errors.values() for _, metric, why in e.refused}
+    return f"Without a value: {'; '.join(sorted(reasons))}." if reasons else ""
+
+
+def units_in(dimension: int) -> dict[str, str]:
+    return {name: m.units[dimension - 2] for name, m in _METRICS.items()}
+
+
+def errors_exhibit(errors: Mapping[str, Errors], dimension: int, figures: Mapping[str, str],
+                   words: tuple[str, ...]) -> Exhibit:  # fmt: skip
+    """E_n, E_s and E_i over time, and every norm at the instants; `figures` are the captions."""
+    units = units_in(dimension)
+    charts = tuple(
+        Chart(
+            f"{name}_over_time", f"{name} against the implicit run", "time / s",
+            f"{name} / {units[name]}", tuple(e.line(name) for e in errors.values()),
+            log="y", caption=figures[name],
+        )
+        for name in DRAWN
+    )  # fmt: skip
+    table = instants_table(
+        "solver_errors", "Errors against the implicit run, consistent mass, full damping.",
+        errors, TABLED, units,
+    )  # fmt: skip
+    near = [errors[n].line("E_i") for n in ("explicit_lumped", "quasi_static") if n in errors]
+    linear = Chart(
+        "E_i_linear", "E_i, linear axis", "time / s", f"E_i / {units['E_i']}", tuple(near),
+        caption=figures["E_i_linear"],
+    )  # fmt: skip
+    return Exhibit("solver-errors", "Errors of the solvers over time", words, (table,),
+                   (*charts, linear))  # fmt: skip
+
+
+def ordered_share(errors: Mapping[str, Errors], name: str = "E_i") -> float:
+    """Share of the compared times after the first step at which explicit < lumped < quasi-static.
+
+    "Lumped" is the worse of the two lumped methods, as the paper's "mass lumping methods".
+    """
+    best, worst = errors["explicit"].values[name], errors["quasi_static"].values[name]
+    lumped = np.stack([errors[n].values[name] for n in ("implicit_lumped", "explicit_lumped")])
+    holds = (best < lumped.min(axis=0)) & (lumped.max(axis=0) < worst)
+    return float(holds[1:].mean())
+
+
+def sum_ratio(errors: Mapping[str, Errors], name: str = "E_i") -> tuple[float, float]:
+    """Median of explicit-lumped over (lumped + explicit), and of explicit over lumped."""
+    explicit, lumped, both = (
+        errors[n].values[name][1:] for n in ("explicit", "implicit_lumped", "explicit_lumped")
+    )
+    return float(np.median(both / (explicit + lumped))), float(np.median(explicit / lumped))
+
+
+SWITCHED = (
+    "implicit_lumped_full",
+    "implicit_restricted",
+    "implicit_lumped",
+    "explicit",
+    "explicit_lumped_full",
+    "explicit_restricted",
+    "explicit_lumped",
+)
+
+
+def switches_exhibit(case: Mapping[str, Followed], dimension: int) -> tuple[Exhibit, float]:
+    """Lumping and restriction apart, and how many times the restriction's E_i is lumping's at
+    2 s."""
+    some = next(iter(case.values())).run
+    frames = [k for k, s in enumerate(some.at.tolist()) if _is_instant(float(some.t[s]))]
+    errors = errors_on(case, ("E_n", "E_i"), SWITCHED, frames)
+    table = instants_table(
+        "switches",
+        "Lumped masses and the restriction of C to alpha M, one at a time. The paper's 'mass "
+        "lumping' is both.", errors, ("E_n", "E_i"), units_in(dimension),
+    )  # fmt: skip
+    lumped = errors["implicit_lumped_full"].at("E_i", 2.0) or 0.0
+    restricted = errors["implicit_restricted"].at("E_i", 2.0) or 0.0
+    ratio = restricted / lumped if lumped else 0.0
+    words = (
+        f"At 2 s the restriction C = αM alone costs {ratio:.1f} times the E_i of lumped masses "
+        "alone: what the paper calls the error of mass lumping is mostly the damping it drops.",
+    )
+    return Exhibit("switches", "Lumping and the damping it drops", words, (table,)), ratio
+
+
+def _is_instant(t: float) -> bool:
+    return min(abs(t - instant) for instant in INSTANTS) < 1e-6
+
+
+# --- the static solution ---------------------------------------------------------------------------
+
+
+def static_exhibit(
+    system: System, methods: Mapping[str, Follower], dt: float, steps: int, inputs: Floats
+) -> tuple[Exhibit, float]:
+    """|u - u_static| / |u_static| far beyond the benchmark's end, and the largest of the ends."""
+    t: Floats = dt * np.arange(1, steps + 1, dtype=np.float64)
+    at = np.arange(0, steps, _EVERY) + _EVERY - 1
+    static = methods["quasi_static"].settings.prepare(system)
+    last = static.step(static.rest(), inputs[-1])
+    u_static = static.field(last)
+    size = float(np.linalg.norm(u_static))
+    lines = []
+    for name, method in methods.items():
+        if name == "quasi_static":
+            continue
+        run = march(name, replace(method.settings, dt=dt).prepare(system), t, inputs, at, 0.0)
+        if run.finished:
+            off = np.linalg.norm((run.u - u_static).reshape(len(run.u), -1), axis=1) / size
+            lines.append(Series(method.label, run.t[run.at], np.maximum(off, 1e-14)))
+    chart = Chart(
+        "static", "Distance to the static solution", "time / s",
+        "|u − u_static| / |u_static| / 1", tuple(lines), log="y",
+        caption="Nodal norm. All solvers reach the one static solution, on ways of their own.",
+    )  # fmt: skip
+    ends = [float(s.y[-1]) for s in lines]
+    words = (
+        f"At {t[-1]:g} s the {len(lines)} dynamic methods are within {max(ends):.1e} of the static "
+        "solution, which knows no mass and no damping.",
+    )
+    return Exhibit("static", "One static solution", words, (), (chart,)), max(ends)
+
+
+# --- limits ---------------------------------------------------------------------------------------
+
+
+def limit_row(label: str, system: System, dt: float) -> tuple[Entry, ...]:
+    """Critical steps ms: printed and lagged damping (full C), consistent and lumped mass."""
+    steps = [1e3 * stable_of(system, mass, update) for update, mass in _TREATMENTS]
+    return (label, *steps, "yes" if min(steps[:2]) > 1e3 * dt else "no")
+
+
+_TREATMENTS: tuple[
+    tuple[Literal["printed", "lagged"], Literal["consistent", "lumped"]], ...
+] = (
+    ("printed", "consistent"),
+    ("printed", "lumped"),
+    ("lagged", "consistent"),
+    ("lagged", "lumped"),
+)  # fmt: skip
+LIMIT_HEADS = (
+    "scene",
+    *(f"{update} C, {mass} M / ms" for update, mass in _TREATMENTS),
+    "33.3 ms stable as printed",
+)
+
+
+def stable_of(
+    system: System, mass: Literal["consistent", "lumped"], update: Literal["printed", "lagged"]
+) -> float:
+    """The exact critical step s with full C."""
+    return stable_step(system, ExplicitLinear(1.0, mass, "full", update))
+
+
+# --- shapes ---------------------------------------------------------------------------------------
+
+
+def shape_maps(case: Mapping[str, Followed], methods: Sequence[str], t: float) -> list[NodeMap]:
+    """The deformed body of methods at a time, coloured by the length of its displacement."""
+    found = []
+    for name in methods:
+        followed = case.get(name)
+        if followed is None or not followed.whole:
+            continue
+        run, mesh = followed.run, followed.scene.mesh
+        k = int(np.argmin(np.abs(run.t[run.at] - t)))
+        u = run.u[k]
+        moved = Mesh(mesh.nodes + u, mesh.cells, mesh.kind)
+        found.append(
+            NodeMap(
+                f"shape_{name}_{t:g}s".replace(".", "_"),
+                f"{followed.label} at {run.t[run.at[k]]:g} s: length of the displacement",
+                moved, 1e3 * np.linalg.norm(u, axis=1), "mm", f"the shapes at {t:g} s",
+                "the deformed body",
+            )
+        )  # fmt: skip
+    return found
+
+
+def shown_scene(scene: Scene) -> str:
+    """Kind and size of a mesh in words."""
+    return f"{len(scene.mesh.cells)} {scene.mesh.kind}, {len(scene.mesh.nodes)} nodes"
