@@ -181,6 +181,9 @@ def stepper(method: Follower, parameters: Parameters, system: System, seen: Regi
 
 
 A = ("node_A",)
+# m/s^0.5. The filter's default of 1e-6 lets undamped shapes drift for the whole ramp: it then
+# claims .046 mm at node B, seven times its error there and above the accepted limit.
+PROCESS = 2e-7
 METHODS = {
     "nfem": Follower("NFEM, central difference", CentralDifference()),
     "nfem_printed": Follower("NFEM at the printed 1 ms", CentralDifference(), stride=5),
@@ -198,8 +201,12 @@ METHODS = {
     ),
     "ekf_node": Follower("node-level EKF, 3 x 3 blocks", NodeEKF(block="node"), A),
     "ekf_companion": Follower("node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), A),
-    "reduced_modes": Follower("reduced EKF, 20 modes and load bias", ReducedEKF(), A),
-    "reduced_pod": Follower("reduced EKF, POD and load bias", ReducedEKF(basis="pod"), A),
+    "reduced_modes": Follower(
+        "reduced EKF, 20 modes and load bias", ReducedEKF(process=PROCESS), A
+    ),
+    "reduced_pod": Follower(
+        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", process=PROCESS), A
+    ),
 }
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.replay.paper_002_needle import published, tell
+from validate.replay.paper_002 import needle_published
+from validate.replay.paper_002_needle import tell
 from validate.replay.solver_benchmark import (
     FIVE,
     FRAMES,
-    STEP,
     SWITCHES,
     Benchmark,
     Body,
@@ -26,7 +26,7 @@ from validate.replay.solver_benchmark import (
     solvers,
 )
 from validate.replay.tracking import Case, Follower, Tracking
-from validate.scene.needle import MP1, MP2, needle_block, needle_depth
+from validate.scene.needle import MP1, MP2, STEP, needle_block, needle_depth
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 
@@ -53,7 +53,7 @@ BENCHMARK = Benchmark(
 METHODS = {
     **FIVE,
     **SWITCHES,
-    **solvers(30),
+    **solvers(),
     "modal": Follower("all modes, by the implicit rule", Modal(STEP, propagate="average")),
     "modal_40": Follower("40 modes, exact in time", Modal(STEP, 40)),
 }
@@ -89,7 +89,7 @@ EXPERIMENT = Tracking(
     reference="implicit",
     cases=CASES,
     tell=tell,
-    published=published,
+    published=needle_published,
     frames=FRAMES,
     same_model=True,
     seed=TwinCard().seed,

@@ -65,6 +65,28 @@ def test_tangents_are_those_of_the_numpy_body(law: LawName) -> None:
     assert apart(fast.tangent_product(u, v), K @ v) < 1e-13
 
 
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_share_the_cells(threads: int) -> None:
+    body, u = scene("svk"), deformed(jittered())
+    body = replace(body, foundations=(Foundation("x0", (0, 2), 1e6),))
+    shared = ExplicitBody(body, threads)
+    one = shared.force(u)
+    assert apart(one, ExplicitBody(body).force(u)) < 1e-14
+    assert np.array_equal(shared.force(u), one)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_blocks_do_not_remember(law: LawName) -> None:
+    """The workspace keeps what was there before: a state beyond all numbers must leave nothing."""
+    body, u = scene(law), deformed(jittered())
+    fast = ExplicitBody(body)
+    f, d = fast.force_and_diagonal(u)
+    fast.force_and_blocks(np.full_like(u, np.nan))
+    again = fast.force_and_diagonal(u)
+    assert np.array_equal(again[0], f)
+    assert np.array_equal(again[1], d)
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_the_look_knows_energy_and_det_f(law: LawName) -> None:
     body, u = scene(law), deformed(jittered())
@@ -156,6 +178,8 @@ def test_an_inverted_neo_hookean_cell_has_no_force() -> None:
 
 def test_what_has_no_explicit_form_is_refused() -> None:
     body = scene("svk")
+    with pytest.raises(SceneError, match="0 threads: take 1"):
+        ExplicitBody(body, threads=0)
     with pytest.raises(SceneError, match="tet10 have no explicit form"):
         ExplicitBody(replace(body, mesh=quadratic(body.mesh)))
     with pytest.raises(SceneError, match="law 'linear' has no form"):

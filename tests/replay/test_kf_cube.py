@@ -115,6 +115,7 @@ def test_noise_along_the_load_and_two_states_correct_every_node(some: Result) ->
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(cube: Tracking) -> None:
     result = compare_with(cube, Options({}))
     assert result.passed

@@ -45,6 +45,16 @@ def test_substeps_are_steps_with_inputs_linear_between() -> None:
     assert four.traces["updates"].y.tolist() == [4.0] * 20
 
 
+def test_threads_change_no_more_than_rounding() -> None:
+    system, dt = pressed(), 3e-4
+    one, two = (
+        ran(CentralDifference(dt, threads=n, watch=1), system, rise(200, 0.02), dt) for n in (1, 2)
+    )
+    assert np.abs(two.u - one.u).max() < 1e-12 * np.abs(one.u).max()
+    force, other = (run.traces["plate.force"].y for run in (one, two))
+    assert np.abs(other - force).max() < 1e-10 * np.abs(force).max()
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_energy_is_what_the_load_brought(law: LawName) -> None:
     system = pulled(law)

@@ -137,6 +137,47 @@ def filters(name: str, **options: Any) -> None:
     studying.filters(name, **options)
 
 
+@study.command("stability")
+@click.argument("name", metavar="NAME")
+@click.option("--quick", is_flag=True, help="Fewer variants and steps; a banner says so.")
+@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
+@click.option("--workers", type=int, help="Local processes (default: one a core).")
+@click.option("--scheduler", default="", metavar="ADDRESS", help="A Dask scheduler that runs.")
+@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+def stability_(name: str, **options: Any) -> int:
+    """Where every scheme is stable, over step, material, damping, cells and mesh."""
+    from validate.cli import stability
+
+    return stability.run(name, **options)
+
+
+@study.command()
+@click.argument("name")
+@click.option("--quick", is_flag=True, help="Coarser and fewer meshes; a banner says so.")
+@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
+@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+def tradeoff(name: str, **options: Any) -> None:
+    """Error against time per step: every solver, mesh, element and step; the Pareto front."""
+    from validate.cli import trading
+
+    trading.tradeoff(name, **options)
+
+
+@study.command()
+@click.argument("name")
+@click.option("--error", required=True, metavar="LENGTH", help="The largest error, as in 0.5mm.")
+@click.option("--rate", required=True, metavar="RATE", help="The least rate, as in 1000Hz.")
+@click.option("--declared-law", is_flag=True, help="Leave out what the linear law itself costs.")
+@click.option("--quick", is_flag=True, help="Coarser and fewer meshes; a banner says so.")
+@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
+@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+def choose(name: str, **options: Any) -> int:
+    """The cheapest method that meets an error and a rate, or what comes nearest (exit code 1)."""
+    from validate.cli import trading
+
+    return trading.choosing(name, **options)
+
+
 @cli.command()
 @click.argument("file", type=_FILE)
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
 from validate.scene.mesh import Mesh
 
@@ -114,8 +114,57 @@ class Heat:
 
 
 @dataclass(frozen=True)
+class Panel:
+    """One part of a regime map: codes (rows, columns) into its regimes, and a predicted border.
+
+    `border` (rows,) is the x at which every row is predicted to turn, NaN = nowhere.
+    """
+
+    title: str
+    codes: Ints
+    border: Floats
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A named place on a regime map: x, and the index of its row.
+
+    `on_map` is False where it only lies above: something else is not as on the map.
+    """
+
+    label: str
+    x: float
+    row: float
+    on_map: bool = True
+
+
+@dataclass(frozen=True)
+class RegimeMap:
+    """What happens over logarithmic x (columns,) and the texts of rows, one panel a method."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    x: Floats
+    rows: tuple[str, ...]
+    regimes: tuple[str, ...]
+    panels: tuple[Panel, ...]
+    marks: tuple[Mark, ...] = ()
+    caption: str = ""
+
+    def __post_init__(self) -> None:
+        shape = (len(self.rows), len(self.x))
+        for panel in self.panels:
+            if panel.codes.shape != shape or len(panel.border) != len(self.rows):
+                raise ComparisonError(
+                    f"map '{self.name}', {panel.title}: codes {panel.codes.shape}, needs {shape}"
+                )
+
+
+@dataclass(frozen=True)
 class Exhibit:
-    """A part of a report: its sentences, then tables, charts, heats and maps in order."""
+    """A part of a report: its sentences, then tables, charts, heats, maps, regimes in order."""
 
     anchor: str
     title: str
@@ -124,3 +173,4 @@ class Exhibit:
     charts: tuple[Chart, ...] = ()
     maps: tuple[NodeMap, ...] = ()
     heats: tuple[Heat, ...] = ()
+    regimes: tuple[RegimeMap, ...] = ()

@@ -3,12 +3,14 @@
 Blocks of 16 cells are gathered into one flat workspace, worked through lane by lane and scattered.
 One workspace for all that a loop reads and writes is what lets the compiler use vector registers:
 between separate arrays it cannot rule out overlap. Rows of 16 lanes in the workspace: 0-8 gradients
-dN/dX of nodes 1-3, 9-10 moduli times volume, 11-19 edges of u, 20-28 edges of v, from 29 results.
+dN/dX of nodes 1-3, 9-10 moduli times volume, 11-19 edges of u, 20-28 edges of v, from 29 results:
+9 rows of forces, or 12 a node of force and block.
 
 One thread takes 11.5 ns a tet for St. Venant-Kirchhoff and 15 ns for neo-Hooke where dgemm gives
 52 GFLOP/s: 5.4 and 8.5 ns of arithmetic, the rest gather and scatter; the order of the cells makes
-no difference there. With the tangent's diagonal 1.7 and 1.5 times that: the arithmetic of the nodes
-and a second scatter (`benchmarks/explicit.py`). All is in one file because compiled code is cached
+no difference there. The tangent's diagonal is 105 flop more on 228 (1.46), the nodes' own blocks
+153 (1.67); measured 1.32 and 1.73, since gathering is shared and forces and blocks are scattered
+together as vectors (`benchmarks/explicit.py`). All is in one file because compiled code is cached
 by its own file's date: an inlined function elsewhere could change without being compiled anew.
 
 Neither NaN nor infinity is assumed away (no `nnan`, `ninf`): a run that diverges must be seen to.
@@ -19,7 +21,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from llvmlite import ir
 from numba import njit, prange
+from numba.core import cgutils, types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
@@ -33,9 +38,10 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 LANES = 16
 ROWS = 11  # of geometry: 9 gradients, 2 moduli
-WORK = 64 * LANES  # length of the workspace
+WORK = 80 * LANES  # length of the workspace
+WIDE = 12  # numbers a node that `add_forces_and_blocks` needs behind the workspace
 SVK, NEO_HOOKE = 0, 1
-_U, _V, _OUT, _TANGENTS = ROWS * LANES, 20 * LANES, 29 * LANES, 38 * LANES
+_U, _V, _OUT, _NODES = ROWS * LANES, 20 * LANES, 29 * LANES, 29 * LANES
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
 _CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 3 % off
 
@@ -316,19 +322,25 @@ def _rest(x: Three, y: Three, z: Three) -> Three:
 
 
 @_inlined
-def _put_force(w: Floats, l: int, a: int, f: Three) -> None:
-    """V P g of node a + 1, in the rows of `_put_forces`."""
-    w[_OUT + a * LANES + l] = f[0]
-    w[_OUT + (a + 3) * LANES + l] = f[1]
-    w[_OUT + (a + 6) * LANES + l] = f[2]
+def _put_three(w: Floats, o: int, x: Three) -> None:
+    w[o], w[o + 16], w[o + 32] = x[0], x[1], x[2]
+
+
+@_inlined
+def _put_node_forces(w: Floats, o: int, f1: Three, f2: Three, f3: Three) -> None:
+    """V P g of all four nodes, in the first three of the 12 rows that each has."""
+    _put_three(w, o, _rest(f1, f2, f3))
+    _put_three(w, o + WIDE * LANES, f1)
+    _put_three(w, o + 2 * WIDE * LANES, f2)
+    _put_three(w, o + 3 * WIDE * LANES, f3)
 
 
 @_inlined
 def _put_block(w: Floats, o: int, rows: int, block: Six) -> None:
-    """Three or all six entries of a symmetric block: xx, yy, zz, xy, xz, yz."""
-    w[o], w[o + 16], w[o + 32] = block[0], block[1], block[2]
+    """Three or all six entries of a symmetric block, in the rows after the force."""
+    _put_three(w, o + 48, (block[0], block[1], block[2]))
     if rows == 6:
-        w[o + 48], w[o + 64], w[o + 80] = block[3], block[4], block[5]
+        _put_three(w, o + 96, (block[3], block[4], block[5]))
 
 
 @_inlined
@@ -361,17 +373,15 @@ def _tangents_svk(w: Floats, rows: int) -> None:
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
         H = _product(_matrix(w, _U + l), G)
-        F, T, o = _deformation(H), _second(_transposed(H), a, b), _TANGENTS + l
+        F, T, o = _deformation(H), _second(_transposed(H), a, b), _NODES + l
         g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
         q1, q2, q3 = _times(F, g1), _times(F, g2), _times(F, g3)
-        _put_force(w, l, 0, _times(T, q1))
-        _put_force(w, l, 1, _times(T, q2))
-        _put_force(w, l, 2, _times(T, q3))
+        _put_node_forces(w, o, _times(T, q1), _times(T, q2), _times(T, q3))
         g0, q0 = _rest(g1, g2, g3), _rest(q1, q2, q3)
         _node_svk(w, o, rows, g0, q0, a + b, b, T)
-        _node_svk(w, o + 6 * LANES, rows, g1, q1, a + b, b, T)
-        _node_svk(w, o + 12 * LANES, rows, g2, q2, a + b, b, T)
-        _node_svk(w, o + 18 * LANES, rows, g3, q3, a + b, b, T)
+        _node_svk(w, o + 1 * WIDE * LANES, rows, g1, q1, a + b, b, T)
+        _node_svk(w, o + 2 * WIDE * LANES, rows, g2, q2, a + b, b, T)
+        _node_svk(w, o + 3 * WIDE * LANES, rows, g3, q3, a + b, b, T)
 
 
 @_inlined
@@ -404,20 +414,19 @@ def _tangents_neo_hooke(w: Floats, rows: int) -> None:
         g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
         q1, q2, q3 = _times(H, g1), _times(H, g2), _times(H, g3)
         h1, h2, h3 = _times(K, g1), _times(K, g2), _times(K, g3)
-        _put_force(w, l, 0, _mixed(i, g1, h, q1, k, h1))
-        _put_force(w, l, 1, _mixed(i, g2, h, q2, k, h2))
-        _put_force(w, l, 2, _mixed(i, g3, h, q3, k, h3))
+        f1, f2 = _mixed(i, g1, h, q1, k, h1), _mixed(i, g2, h, q2, k, h2)
+        _put_node_forces(w, _NODES + l, f1, f2, _mixed(i, g3, h, q3, k, h3))
         q1, q2, q3 = _plus(g1, q1), _plus(g2, q2), _plus(g3, q3)
         h1, h2, h3 = _plus(g1, h1), _plus(g2, h2), _plus(g3, h3)
         g0, q0, h0 = _rest(g1, g2, g3), _rest(q1, q2, q3), _rest(h1, h2, h3)
         third = 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
-        m, inverse, o = b * y * y, y * y * y, _TANGENTS + l
+        m, inverse, o = b * y * y, y * y * y, _NODES + l
         c = (5 / 3 * m * third + 0.5 * a * (2 + dJ * (dJ + 2))) * inverse * inverse
         k = 4 / 3 * m * inverse
         _node_neo_hooke(w, o, rows, g0, q0, h0, m, c, k)
-        _node_neo_hooke(w, o + 6 * LANES, rows, g1, q1, h1, m, c, k)
-        _node_neo_hooke(w, o + 12 * LANES, rows, g2, q2, h2, m, c, k)
-        _node_neo_hooke(w, o + 18 * LANES, rows, g3, q3, h3, m, c, k)
+        _node_neo_hooke(w, o + 1 * WIDE * LANES, rows, g1, q1, h1, m, c, k)
+        _node_neo_hooke(w, o + 2 * WIDE * LANES, rows, g2, q2, h2, m, c, k)
+        _node_neo_hooke(w, o + 3 * WIDE * LANES, rows, g3, q3, h3, m, c, k)
 
 
 @_inlined
@@ -429,14 +438,58 @@ def _mixed(a: float, x: Three, b: float, y: Three, c: float, z: Three) -> Three:
     )
 
 
+def _add_four(typing: Any, to: Any, n: Any, w: Any, o: Any) -> Any:
+    """Adds w[o + 16 k + j] to to[n[j] + k], j and k 0-3: four rows of four lanes, turned.
+
+    As vectors, 16 sums are 4 loads, 8 shuffles and 4 sums; the compiler does not see to it.
+    """
+    four, picks = ir.VectorType(ir.DoubleType(), 4), ir.VectorType(ir.IntType(32), 4)
+    proxy = cast(Callable[..., Any], cgutils.create_struct_proxy)
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        def vector(i: int, index: Any) -> Any:
+            array = proxy(signature.args[i])(context, builder, args[i])
+            return builder.bitcast(builder.gep(array.data, [index]), four.as_pointer())
+
+        def row(k: int) -> Any:
+            index = builder.add(args[3], ir.Constant(args[3].type, k * LANES))
+            return builder.load(vector(2, index), align=8)
+
+        def turned(x: Any, y: Any, lanes: list[int]) -> Any:
+            return builder.shuffle_vector(x, y, ir.Constant(picks, lanes))
+
+        x, y, z, t = (row(k) for k in range(4))
+        even, odd = [0, 4, 2, 6], [1, 5, 3, 7]
+        pairs = [(turned(x, y, half), turned(z, t, half)) for half in (even, odd)]
+        for j in range(4):
+            lanes = [0, 1, 4, 5] if j < 2 else [2, 3, 6, 7]
+            place = vector(0, builder.extract_value(args[1], j))
+            old = builder.load(place, align=8)
+            builder.store(builder.fadd(old, turned(*pairs[j % 2], lanes)), place, align=8)
+        return context.get_dummy_value()
+
+    return types.none(to, n, w, o), code
+
+
+_add_lanes = cast(Callable[..., None], intrinsic(_add_four))
+
+
 @_inlined
-def _scatter_blocks(w: Floats, cells: Cells, block: int, rows: int, d: Floats) -> None:
-    """Adds the nodes' blocks to d, `rows` numbers a node: 3 or 6."""
-    for l in range(LANES):
-        for node in range(4):
-            n = np.uint64(cells[block, node, l] * (rows // 3))
-            for k in range(rows):
-                d[n + np.uint64(k)] += w[_TANGENTS + (node * 6 + k) * LANES + l]
+def _place(cells: Cells, block: int, a: int, l: int, wide: int) -> Any:
+    return np.uint64(cells[block, a, l]) // np.uint64(3) * np.uint64(wide)
+
+
+@_inlined
+def _scatter_nodes(w: Floats, cells: Cells, block: int, wide: int, to: Floats) -> None:
+    """Adds the first `wide` (8 or 12) rows of every node to `to`, as many numbers a node."""
+    for l in range(0, LANES, 4):
+        for a in range(4):
+            n0, n1 = _place(cells, block, a, l, wide), _place(cells, block, a, l + 1, wide)
+            n2, n3 = _place(cells, block, a, l + 2, wide), _place(cells, block, a, l + 3, wide)
+            o = _NODES + a * WIDE * LANES + l
+            for k in range(0, wide, 4):
+                c = np.uint64(k)
+                _add_lanes(to, (n0 + c, n1 + c, n2 + c, n3 + c), w, o + k * LANES)
 
 
 @_compiled
@@ -445,25 +498,34 @@ def add_forces_and_blocks(
 ) -> None:
     """Adds the internal forces to f (N,) and the nodes' own blocks of the tangent to d.
 
-    d (3 n,) takes the diagonal; d (6 n,) the blocks as xx, yy, zz, xy, xz, yz.
+    d (3 n,) takes the diagonal; d (6 n,) the blocks as xx, yy, zz, xy, xz, yz. They are added up
+    side by side behind the workspace, w (WORK + 12 n,): one place in memory a node.
     """
-    six = d.size == 2 * f.size
+    rows = 6 if d.size == 2 * f.size else 3
+    wide = 4 * (1 + rows // 3)
+    to = w[WORK : WORK + wide * (f.size // 3)]
+    to[:] = 0.0
     for block in range(cells.shape[0]):
         _load(w, geometry, block)
         _gather(w, _U, cells, block, u)
-        if law == SVK and six:
+        if law == SVK and rows == 6:
             _tangents_svk(w, 6)
         elif law == SVK:
             _tangents_svk(w, 3)
-        elif six:
+        elif rows == 6:
             _tangents_neo_hooke(w, 6)
         else:
             _tangents_neo_hooke(w, 3)
-        _scatter(w, cells, block, f)
-        if six:
-            _scatter_blocks(w, cells, block, 6, d)
+        if rows == 6:
+            _scatter_nodes(w, cells, block, 12, to)
         else:
-            _scatter_blocks(w, cells, block, 3, d)
+            _scatter_nodes(w, cells, block, 8, to)
+    for n in range(f.size // 3):
+        for i in range(3):
+            f[3 * n + i] += to[wide * n + i]
+            d[rows * n + i] += to[wide * n + 3 + i]
+            if rows == 6:
+                d[rows * n + 3 + i] += to[wide * n + 6 + i]
 
 
 @_inlined

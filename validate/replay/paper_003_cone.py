@@ -17,6 +17,7 @@ Values = Mapping[str, Mapping[str, float]]
 _MM = 1e3
 _PRINTED_FORCE, _PRINTED_STEP = 0.15, 1e-4  # N, s
 _SEEN = 2.0  # standard deviations that a motion must span to be seen
+_UNSEEN = "below noise; no method is ranked there."
 _KINETIC = 0.01  # of the strain energy, after the first tenth of the ramp
 _NU = (0.45, 0.49, 0.499, 0.4995)
 
@@ -34,30 +35,38 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
     numbers = {
         "nodes": float(len(explicit.scene.mesh.nodes)),
         "cells": float(len(explicit.scene.mesh.cells)),
-        "kinetic_share": share,
         "locking": float(locked.rows[-1][1] or 0.0),
     }
+    if share is not None:
+        numbers["kinetic_share"] = share
+    ranked = (_ranking(main, parameters.twin.force),) if _seen(explicit, "node_A") else ()
     signals = Exhibit(
-        "signal",
-        "Is there anything to see?",
-        _noise_words(cases),
-        (_noise_table(cases), _ranking(main)),
+        "signal", "Is there anything to see?", _noise_words(cases), (_noise_table(cases), *ranked)
     )
     elements = Exhibit(
         "elements",
         "Element, material and force",
-        (
-            f"Explicit runs take the ramp {parameters.clock.scale:g} times as fast as it was "
-            f"recorded; after its first tenth kinetic energy is at most {100 * share:.2f} % of "
-            f"strain energy (declared limit {100 * _KINETIC:g} %).",
-        ),
+        (_inertia_words(parameters.clock.scale, share),),
         (_forces(main), locked, readings, limits, _cards(parameters, main)),
     )
     return Told((signals, elements), numbers)
 
 
-def kinetic_share(followed: Followed) -> float:
-    """Largest kinetic over strain energy after the first tenth of the run."""
+def _inertia_words(scale: float, share: float | None) -> str:
+    taken = f"Explicit runs take the ramp {scale:g} times as fast as it was recorded; "
+    if share is None:
+        return f"{taken}this one did not reach its end, so its inertia is not judged."
+    verdict = "within" if share <= _KINETIC else "beyond"
+    return (
+        f"{taken}after its first tenth kinetic energy is at most {100 * share:.2f} % of strain "
+        f"energy: {verdict} the declared {100 * _KINETIC:g} %."
+    )
+
+
+def kinetic_share(followed: Followed) -> float | None:
+    """Largest kinetic over strain energy after the first tenth; None for a run that ended early."""
+    if not followed.whole:
+        return None
     traces, t = followed.run.traces, followed.run.t
     later = t > t[-1] / 10
     kinetic, strain = traces["energy.kinetic"].y[later], traces["energy.strain"].y[later]
@@ -69,14 +78,17 @@ def _noise_words(cases: Cases) -> tuple[str, ...]:
     for name, case in cases.items():
         followed = case["nfem"]
         moved, sd = _motion(followed, "node_A")
-        case_name = name or "recorded"
-        verdict = "above noise" if moved > _SEEN * sd else "below noise"
+        verdict = "above noise." if _seen(followed, "node_A") else _UNSEEN
         words.append(
-            f"{case_name}: the plate moves by {_MM * moved:.3f} mm, the tracker's noise is "
-            f"{_MM * sd:.3f} mm: {verdict}"
-            + ("." if verdict == "above noise" else "; no method is ranked there.")
+            f"{name or 'recorded'}: the plate moves by {_MM * moved:.3f} mm, the tracker's noise "
+            f"is {_MM * sd:.3f} mm: {verdict}"
         )
     return tuple(words)
+
+
+def _seen(followed: Followed, probe: str) -> bool:
+    moved, sd = _motion(followed, probe)
+    return moved > _SEEN * sd
 
 
 def _motion(followed: Followed, probe: str) -> tuple[float, float]:
@@ -91,7 +103,7 @@ def _noise_table(cases: Cases) -> NumberTable:
         followed = case["nfem"]
         for probe in followed.truth.probes:
             moved, sd = _motion(followed, probe)
-            seen = "above noise" if moved > _SEEN * sd else "below noise"
+            seen = "above noise" if _seen(followed, probe) else "below noise"
             rows.append((name or "recorded", probe, _MM * moved, _MM * sd, moved / sd, seen))
     return NumberTable(
         "signal",
@@ -101,7 +113,7 @@ def _noise_table(cases: Cases) -> NumberTable:
     )
 
 
-def _ranking(main: Mapping[str, Followed]) -> NumberTable:
+def _ranking(main: Mapping[str, Followed], force: float) -> NumberTable:
     """Methods by their error at B, which no filter is given."""
     errors = {
         f.label: (error_at(f, "node_B", "z"), error_at(f, "node_A", "z"))
@@ -115,7 +127,7 @@ def _ranking(main: Mapping[str, Followed]) -> NumberTable:
     )
     return NumberTable(
         "ranking",
-        "At 15 N, by the error of u_z at node B on the side, which no filter is given.",
+        f"At {force:g} N, by the error of u_z at node B on the side, which no filter is given.",
         ("rank", "method", "RMSE at B / mm", "RMSE at A / mm"),
         rows,
         "One recording: neighbours closer than the marker's noise are not told apart.",

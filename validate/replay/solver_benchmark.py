@@ -204,8 +204,8 @@ def changed(part: str, **values: Any) -> Change:
     return change
 
 
-def solvers(steps: int) -> dict[str, Follower]:
-    """The linear solvers of the implicit step, and the misprinted update for a few `steps`."""
+def solvers() -> dict[str, Follower]:
+    """The linear solvers of the implicit step, and the update as misprinted."""
     return {
         "gauss_seidel": Follower(
             "implicit by Gauss-Seidel", replace(IMPLICIT, solver="gauss_seidel")
@@ -215,6 +215,6 @@ def solvers(steps: int) -> dict[str, Follower]:
             "implicit by a dense inverse", replace(IMPLICIT, solver="dense_inverse")
         ),
         "misprinted": Follower(
-            "implicit, update as misprinted", replace(IMPLICIT, update="misprinted"), steps=steps
+            "implicit, update as misprinted", replace(IMPLICIT, update="misprinted")
         ),
     }

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from validate.compare.exhibit import Entry, Exhibit, NodeMap, NumberTable
 from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.report import charts, csv_tables, gl, heat
+from validate.report import charts, csv_tables, gl, heat, regime_map
 from validate.report.maps import Range, drawn, ranges
 from validate.report.numbers import MISSING, significant, text
 from validate.report.page import (
@@ -39,6 +39,7 @@ def require_distinct(found: tuple[Exhibit, ...]) -> None:
         "charts": [c.name for e in found for c in e.charts],
         "heats": [h.name for e in found for h in e.heats],
         "maps": [m.name for e in found for m in e.maps],
+        "regime maps": [m.name for e in found for m in e.regimes],
     }
     for kind, names in kinds.items():
         twice = [name for name, count in Counter(names).items() if count > 1]
@@ -59,6 +60,7 @@ def _section(result: Result, exhibit: Exhibit, scales: dict[str, Range]) -> Sect
             *map(_table, exhibit.tables),
             *(charts.picture(result, c) for c in exhibit.charts),
             *map(heat.picture, exhibit.heats),
+            *map(regime_map.picture, exhibit.regimes),
             *(_map(m, scales[m.scale or m.name]) for m in exhibit.maps),
         ),
     )

@@ -24,12 +24,15 @@ class StudyPage:
     """A result without methods whose exhibits are the study; `study` goes into results.json.
 
     `cells`: head and rows of tables/cells.csv, SI. `keep`: names of entries that stay as they are.
+    `passed`: whether the study's own checks hold (None: it has none); `band` as `html.page` takes.
     """
 
     result: Result
     study: dict[str, Any]
     cells: tuple[tuple[str, ...], tuple[Row, ...]]
     keep: tuple[str, ...]
+    passed: bool | None = None
+    band: tuple[str, str] = _BAND
 
 
 def write_study_page(shown: StudyPage, folder: Path, created: str) -> Path:
@@ -44,7 +47,10 @@ def write_study_page(shown: StudyPage, folder: Path, created: str) -> Path:
 def _fill(shown: StudyPage, folder: Path, created: str) -> None:
     for name in ("tables", "figures"):
         (folder / name).mkdir()
-    write_json({**document(shown.result, created), "study": shown.study}, folder / MARK)
+    content = {**document(shown.result, created), "study": shown.study}
+    if shown.passed is not None:
+        content["passed"] = shown.passed
+    write_json(content, folder / MARK)
     write_tables(shown.result, folder / "tables")
     head, rows = shown.cells
     with (folder / "tables" / "cells.csv").open("w", newline="", encoding="utf-8") as out:
@@ -53,5 +59,5 @@ def _fill(shown: StudyPage, folder: Path, created: str) -> None:
     for section in sections:
         for picture in section.pictures:
             (folder / "figures" / f"{picture.name}.png").write_bytes(png(picture))
-    text = page(shown.result, sections, created, _BAND)
+    text = page(shown.result, sections, created, shown.band)
     (folder / "report.html").write_text(text, encoding="utf-8")

@@ -5,6 +5,8 @@ free along the side. A displacement prescribed at a point has no limit under ref
 falls with 1/ln of the mesh size.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from validate.arrays import Floats
@@ -41,3 +43,14 @@ def needle_block(n: int, material: Material = MP1, plane: PlaneState = "strain")
 def needle_depth(t: Floats) -> Floats:
     """Inputs (nt, 1) m of the block at times t (nt,) s."""
     return np.asarray(SPEED * np.minimum(t, STOP))[:, None]
+
+
+def needle_from_above(n: int, material: Material = MP1, plane: PlaneState = "strain") -> Scene:
+    """The same block a quarter turn on, the needle along -y at (0.5, 1) m and no probes.
+
+    Node numbers run along y first: sweeps in their order (Gauss-Seidel) see another problem.
+    """
+    block = needle_block(n, material, plane)
+    needle = replace(block.drives[0], facets="y1", direction=(0.0, -1.0), point=(0.5, 1.0))
+    sides = tuple(Support(side, (0, 1)) for side in ("y0", "x0", "x1"))
+    return replace(block, supports=sides, drives=(needle,), probes=())

@@ -9,6 +9,7 @@ the differences of one number. Whether they converge monotonously is the sign of
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 
-SAFETY, UNSURE = 1.25, 3.0  # factors of the index: three meshes, two meshes or an odd order (Roache)
+SAFETY, UNSURE = (
+    1.25,
+    3.0,
+)  # factors of the index: three meshes, two meshes or an odd order (Roache)
 _WITHIN = 1.0  # an observed order further from the theoretical one is not trusted with SAFETY
 _LEAST, _MOST = 0.05, 10.0  # orders looked for
 _ITERATIONS = 200
@@ -50,7 +54,7 @@ def convergence(h: Sequence[float], answers: Sequence[Floats], theoretical: floa
     """
     if len(h) != len(answers) or len(h) < 2 or min(np.diff(h)) <= 0:
         raise ComparisonError(f"{len(answers)} answers at sizes {list(h)}: two and more, rising")
-    steps = [_rms(a - b) for a, b in zip(answers[:-1], answers[1:], strict=True)]
+    steps = [_rms(a - b) for a, b in pairwise(answers)]
     r21 = h[1] / h[0]
     if len(h) == 2:
         return _made("two only", None, theoretical, r21, steps, answers)

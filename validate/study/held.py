@@ -46,9 +46,15 @@ def _inside(one: Any) -> Iterable[Any]:
     if isinstance(one, (tuple, list)):
         return list(one)
     if sparse.issparse(one):
-        return [getattr(one, n) for n in ("data", "indices", "indptr", "offsets") if hasattr(one, n)]
+        return [
+            getattr(one, n) for n in ("data", "indices", "indptr", "offsets") if hasattr(one, n)
+        ]
     if is_dataclass(one) and not isinstance(one, type):
         own = [getattr(one, f.name) for f in fields(one)]
         return own + list(getattr(one, "__dict__", {}).values())  # cached properties too
     module = type(one).__module__ or ""
-    return list(vars(one).values()) if module.startswith("validate") and hasattr(one, "__dict__") else []
+    return (
+        list(vars(one).values())
+        if module.startswith("validate") and hasattr(one, "__dict__")
+        else []
+    )

@@ -31,6 +31,7 @@ from validate.study.variants import VariantCell
 _REACH = 8.0  # times the predicted limit, on both sides, that the measured one is sought in
 _HALVINGS = 30  # of that interval's logarithm: 4e-9 of the limit
 _DRIFT_SHARE = 0.5  # of the limit
+_LEAST_NU = 1e-6  # of mixed elements, whose pressure has no equation at lambda = 0
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,7 @@ def _conditions(system: System, dt: float) -> dict[str, float]:
 def _locking(scene: str, nu: float, mesh: int, quality: float) -> float:
     """Compliance under the static load over that of mixed elements on the mesh; E has no part."""
     base = base_scene(scene)
+    nu = max(nu, _LEAST_NU)
     pulled = base.pulled(replace(base.base, nu=nu, mesh=mesh, quality=quality))
     system = build(pulled)
     f = system.loads[system.free, 0]

@@ -142,8 +142,15 @@ def _linear_explicit(
 ) -> Stepping:
     settings = ExplicitLinear(1.0, mass, terms, update)
     maps = _explicit(terms, update)
-    return Stepping(name, settings.treatment, mass, maps, _explicit_step(settings),
-                    explicit=True, conserves=True)
+    return Stepping(
+        name,
+        settings.treatment,
+        mass,
+        maps,
+        _explicit_step(settings),
+        explicit=True,
+        conserves=True,
+    )
 
 
 _LOOSE = 1e-6  # rounding of double eigenvalues, squared and some more

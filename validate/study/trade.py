@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import ValidateError
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System, build
@@ -22,12 +22,12 @@ from validate.solve.types import Run, Scheme, Stepper, StepTimes
 from validate.study.convergence import Convergence, convergence
 from validate.study.held import held_bytes
 from validate.study.ranking import dominator
-from validate.study.trade_scene import Rung, Solver, TradeScene
+from validate.study.trade_scene import Solver, TradeScene
 
-_PROBED = 60  # steps that tell how long all would take
+_FIRST, _PROBED = 4, 60  # steps that tell how long all would take, the second where it is short
+_PROBE_S = 1.0
 _FIELDS = 15  # times a field is formed, for its median
-BUDGET_S = 5.0  # of one cell's steps: a longer one is timed, not scored
-_SECOND = 2.0  # order of all elements' strains and steps' rules here in smooth fields
+BUDGET_S = 3.0  # of one cell's steps: a longer one is timed, not scored
 ERROR = (
     "root mean square over the frames and points of the length of u - u_reference, the mesh's "
     "displacements read at the same points of the body on every mesh"
@@ -50,7 +50,8 @@ class Row:
 
     `error` is against the reference of its own law, `total` against the one at large strain;
     `mesh_error` is that of `TradeScene.best` on this mesh, `solver_error` the distance from it.
-    `field_s`: all displacements formed from a state. `assembled`: matrices that set-up made.
+    `setup_s` is that of the solver's first dt on this mesh. `field_s`: all displacements formed
+    from a state. `assembled`: matrices that set-up made.
     """
 
     cell: Cell
@@ -104,28 +105,47 @@ class Front:
 
 @dataclass(frozen=True)
 class Trade:
-    """All rows, convergences, sizes: `moved` m rms of the reference, `law_error` m of the law."""
+    """All rows and convergences; `reference`, `gap` (no, p, d) m: the answer, and its law's share.
+
+    `floor` m is the reference's own error (Richardson): smaller errors than it are all the same.
+    """
 
     scene: TradeScene
     rows: tuple[Row, ...]
     ladders: tuple[Ladder, ...]
-    moved: float
-    law_error: float
+    reference: Floats
+    gap: Floats
+    floor: float
     law_words: str
     seconds: float
     quick: bool = False
 
+    @property
+    def moved(self) -> float:
+        """Rms length m of the reference's displacements."""
+        return rms(self.reference)
+
+    @property
+    def law_error(self) -> float:
+        """Rms length m of what large strain changes."""
+        return rms(self.gap)
+
+    def again(self, cell: Cell) -> Row:
+        """Another cell, measured against the same reference."""
+        return Bench(self.scene, 4 * BUDGET_S).row(cell, self.reference, self.gap)
+
     def front(self, by: str = "error") -> Front:
         """The Pareto front of `by` ("error" or "total") against time per step."""
-        return front(self.rows, by)
+        return front(self.rows, by, self.floor)
 
 
-def front(rows: tuple[Row, ...], by: str) -> Front:
-    """See `Trade.front`; rows without this error or a time are left out."""
+def front(rows: tuple[Row, ...], by: str, floor: float = 0.0) -> Front:
+    """See `Trade.front`; rows without this error or a time are left out, errors below `floor` m
+    count as equal."""
     good = [r for r in rows if getattr(r, by) is not None and r.time_s is not None]
     if by == "error":  # one law, one reference
         good = [r for r in good if r.cell.solver.law == "linear"]
-    errors = [float(getattr(r, by)) for r in good]
+    errors = [max(float(getattr(r, by)), floor) for r in good]
     times = [float(r.time_s or 0.0) for r in good]
     by_whom = [dominator(i, errors, times) for i in range(len(good))]
     free = [r for r, j in zip(good, by_whom, strict=True) if j is None]
@@ -145,13 +165,17 @@ def cells(scene: TradeScene) -> tuple[Cell, ...]:
 
 
 def trade(
-    scene: TradeScene, *, quick: bool = False, report: Report | None = None, budget: float = BUDGET_S
+    scene: TradeScene,
+    *,
+    quick: bool = False,
+    report: Report | None = None,
+    budget: float = BUDGET_S,
 ) -> Trade:
     """Runs all cells of a scene. A cell that fails is a row with the reason."""
     start, wanted = perf_counter(), cells(scene)
     tell = report or _silent
     tell(0, len(wanted), "reference")
-    bench = _Bench(scene, budget)
+    bench = Bench(scene, budget)
     reference = bench.best(*scene.reference)
     gap = bench.law_gap()
     rows = []
@@ -159,10 +183,10 @@ def trade(
         tell(i, len(wanted), f"{cell.solver.name}, {cell.element} {cell.level}")
         rows.append(bench.row(cell, reference, gap))
     tell(len(wanted), len(wanted), "convergence")
-    pair = scene.pair
+    pair, found = scene.pair, tuple(bench.ladders())
     words = f"{pair.element} mesh {pair.level}, steps of {pair.dt:g}"
     return Trade(
-        scene, tuple(rows), tuple(bench.ladders()), rms(reference), rms(gap), words,
+        scene, tuple(rows), found, reference, gap, found[0].found.error, words,
         perf_counter() - start, quick,
     )  # fmt: skip
 
@@ -172,11 +196,13 @@ def rms(u: Floats) -> float:
     return float(np.sqrt((np.asarray(u) ** 2).sum(axis=-1).mean()))
 
 
-class _Bench:
+class Bench:
     """Runs cells and keeps the answers (no, p, d) m that others are compared with."""
 
     def __init__(self, scene: TradeScene, budget: float) -> None:
         self.scene, self.budget = scene, budget
+        self._kept: tuple[tuple[str, str, int], System] | None = None
+        self._setups: dict[tuple[str, str, int], float] = {}
         self._best: dict[tuple[str, int], Floats] = {}
         self._over_steps: dict[tuple[str, str, int], dict[float, Floats]] = {}
 
@@ -194,9 +220,7 @@ class _Bench:
         declared = self._answer(p.declared(p.dt), p.element, p.level, p.dt, "linear")
         return self._answer(p.large(p.dt), p.element, p.level, p.dt, law) - declared
 
-    def _answer(
-        self, scheme: Scheme, element: str, level: int, dt: float, law: LawName
-    ) -> Floats:
+    def _answer(self, scheme: Scheme, element: str, level: int, dt: float, law: LawName) -> Floats:
         system = build(self.scene.build(element, level, law))
         run = self._march(scheme.prepare(system), dt, 0.0)
         if not run.finished:
@@ -225,12 +249,12 @@ class _Bench:
             return Row(cell, failed=f"refused: {error}")
 
     def _row(self, cell: Cell, reference: Floats, gap: Floats) -> Row:
-        start = perf_counter()
-        system = build(self.scene.build(cell.element, cell.level, cell.solver.law))
+        start, system = perf_counter(), self._system(cell)
         stepper = cell.solver.make(cell.dt).prepare(system)
         warmed = self._warm(stepper, cell.dt)
-        setup = perf_counter() - start
-        tried = self._march(stepper, cell.dt, setup, _PROBED)
+        self._setups.setdefault(_body(cell), perf_counter() - start)
+        setup = self._setups[_body(cell)]
+        tried = self._tried(stepper, cell.dt, setup)
         row = Row(
             cell, len(system.free), setup, tried.step_s, _field_seconds(stepper, warmed),
             held_bytes(stepper), _assembled(system),
@@ -247,6 +271,18 @@ class _Bench:
             why = f"{run.outcome.state} at step {run.outcome.step + 1}: {run.outcome.why}"
             return replace(row, step=None, failed=why)
         return self._scored(replace(row, step=run.step_s), self._read(system, run), reference, gap)
+
+    def _system(self, cell: Cell) -> System:
+        """A new system for every solver and mesh, the same one for its other steps."""
+        if self._kept is None or self._kept[0] != _body(cell):
+            scene = self.scene.build(cell.element, cell.level, cell.solver.law)
+            self._kept = _body(cell), build(scene)
+        return self._kept[1]
+
+    def _tried(self, stepper: Stepper, dt: float, setup: float) -> Run:
+        run = self._march(stepper, dt, setup, _FIRST)
+        short = run.step_s is not None and run.step_s.p50 * _PROBED < _PROBE_S
+        return self._march(stepper, dt, setup, _PROBED) if run.finished and short else run
 
     def _warm(self, stepper: Stepper, dt: float) -> Floats:
         """The largest inputs, after a step under them where there is a table to be filled."""
@@ -271,27 +307,34 @@ class _Bench:
         )  # fmt: skip
 
     def ladders(self) -> Iterator[Ladder]:
-        """Over the meshes per element, then over the steps per solver on the middle mesh."""
-        for element, levels in self.scene.meshes.items():
+        """The reference's element first, then the others' meshes, then steps on a middle mesh."""
+        scene, (of, finest) = self.scene, self.scene.reference
+        for element in sorted(scene.meshes, key=lambda e: e != of):
+            levels = scene.meshes[element] + ((finest,) if element == of else ())
             falling = levels[::-1]
+            sizes = tuple(scene.size(level) for level in falling)
+            answers = [self.best(element, level) for level in falling]
             if len(falling) > 1:
-                sizes = tuple(self.scene.size(level) for level in falling)
-                answers = [self.best(element, level) for level in falling]
-                yield Ladder(f"meshes of {element}", sizes, "m", convergence(sizes, answers, _SECOND))
+                found = convergence(sizes, answers, scene.orders[element])
+                yield Ladder(f"meshes of {element}", sizes, "m", found)
         yield from self._step_ladders()
 
     def _step_ladders(self) -> Iterator[Ladder]:
         element = next(iter(self.scene.meshes))
-        levels = self.scene.meshes[element]
-        level = levels[len(levels) // 2]
+        levels, orders = self.scene.meshes[element], {s.name: s.order for s in self.scene.solvers}
+        level = levels[(len(levels) - 1) // 2]
         for (name, of, on), answers in self._over_steps.items():
             if (of, on) == (element, level) and len(answers) > 1:
                 dts = tuple(sorted(answers))
-                found = convergence(dts, [answers[dt] for dt in dts], _SECOND)
+                found = convergence(dts, [answers[dt] for dt in dts], orders[name])
                 yield Ladder(f"steps of {name}, {of} mesh {on}", dts, "s", found)
 
 
 _LARGE: LawName = "neo_hooke"
+
+
+def _body(cell: Cell) -> tuple[str, str, int]:
+    return cell.solver.name, cell.element, cell.level
 
 
 def _field_seconds(stepper: Stepper, inputs: Floats) -> float:

@@ -25,7 +25,8 @@ class Solver:
     """A scheme of the trade: `make(dt)` s. `stepped`: whether its answer depends on dt.
 
     It runs on `elements` (none: all) at meshes up to `finest` (0: all) and down to `shortest`
-    steps (0: all): slow baselines need no fine ones. `law` is what its scenes are made of.
+    steps (0: all): slow baselines need no fine ones. `law` is what its scenes are made of; `order`
+    that of its error in dt.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Solver:
     elements: tuple[str, ...] = ()
     finest: int = 0
     shortest: float = 0.0
+    order: float = 2.0
 
     def takes(self, element: str, level: int, dt: float) -> bool:
         known = not self.elements or element in self.elements
@@ -61,10 +63,12 @@ class TradeScene:
     """A body and its loading, made on any mesh of the ladder by any element.
 
     `build(element, level, law)`; `size(level)` m is that of a cell; `meshes` the levels by element,
-    rising. `inputs(t)` (nt, k) at the steps' ends t (nt,) s; every dt of `steps` divides the time
-    between `frames` (no,) s, at which displacements at `points` (p, d) m are compared. `best(dt)`
-    is the solver without solver error, taken on `reference` (element, level) for the reference
-    and on every mesh to split the error. A static scene has one entry of `steps`, a load increment.
+    rising, `orders` their theoretical orders of convergence in displacements. `inputs(t)` (nt, k)
+    at the steps' ends t (nt,) s; every dt of `steps` divides the time between `frames` (no,) s, at
+    which displacements at `points` (p, d) m are compared. `best(dt)` is the solver without solver
+    error, taken on `reference` (element, level) for the reference and on every mesh to split the
+    error. `rise_s`: time in which the load comes on; `noise` m of a recording and where it is
+    declared. In a static scene a step is a load increment.
     """
 
     name: str
@@ -73,6 +77,7 @@ class TradeScene:
     build: Callable[[str, int, LawName], Scene]
     size: Callable[[int], float]
     meshes: Mapping[str, tuple[int, ...]]
+    orders: Mapping[str, float]
     steps: tuple[float, ...]
     inputs: Callable[[Floats], Floats]
     frames: Floats
@@ -88,6 +93,7 @@ class TradeScene:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "meshes", MappingProxyType(dict(self.meshes)))
+        object.__setattr__(self, "orders", MappingProxyType(dict(self.orders)))
         for dt in self.steps:
             ends = self.frames / dt
             if np.abs(ends - ends.round()).max() > 1e-6:

@@ -24,7 +24,7 @@ PER_DECADE = 4
 IMPOSSIBLE: tuple[tuple[str, float, str], ...] = (
     ("nu", 0.5, "Poisson"), ("nu", -1.0, "Poisson"), ("nu", 0.6, "Poisson"),
     ("E", 0.0, "modulus"), ("E", -1e3, "modulus"), ("rho", 0.0, "density"),
-    ("rho", -1.0, "density"), ("quality", 0.0, "altitude"), ("mesh", 60, "unknowns"),
+    ("rho", -1.0, "density"), ("quality", 0.0, "altitude"),
 )  # fmt: skip
 _PAIR_NU = (0.0, 0.45, 0.49, 0.4999)
 _PAIR_E = (200.0, 6e3, 1e6)
@@ -63,6 +63,7 @@ def variant_cells(base: BaseScene, quick: bool = False) -> tuple[VariantCell, ..
     drifting = drift_variant(base)
     wanted = [base.base, *(p.variant for p in base.papers), drifting, *_swept(base, quick)]
     impossible = {_changed(base.base, k, v): word for k, v, word in IMPOSSIBLE}
+    impossible[replace(base.base, mesh=2 * base.meshes[-1])] = "unknowns"
     found = dict.fromkeys([*wanted, *impossible])
     return tuple(
         _cell(base.name, v, steps, v == drifting, impossible.get(v, _of_paper(v))) for v in found

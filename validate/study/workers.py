@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import dask
 import distributed
@@ -26,6 +26,8 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 _dask: Any = distributed  # its calls carry no annotations
 Done = Callable[[Cell, CellResult], None]
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,23 @@ def run_all(job: Job, cells: Sequence[Cell], where: Where, done: Done) -> None:
         return
     with _client(where, len(cells)) as client:
         _drain(client, job, list(cells), done)
+
+
+def run_each(
+    work: Callable[[T], R], items: Sequence[T], where: Where, done: Callable[[T, R], None]
+) -> None:
+    """Calls `done` with every item's result as it is finished: one task each, of about a second.
+
+    Raises `UsageError` when no scheduler answers or a worker dies, or what `work` raises.
+    """
+    if not items:
+        return
+    with _client(where, len(items)) as client:
+        sent = {client.submit(work, item, pure=False): item for item in items}
+        for future in _dask.as_completed(list(sent)):
+            if future.status == "error" and isinstance(future.exception(), KilledWorker):
+                raise UsageError(f"a worker died on {sent[future]}: out of memory? fewer --workers")
+            done(sent[future], future.result())
 
 
 def cores() -> int:

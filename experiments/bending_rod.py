@@ -1,0 +1,97 @@
+"""Paper 002's bending rod: a soft bar held at one end, gravity switched on at t = 0.
+
+As in the paper the truth is the implicit run with consistent mass on the same mesh of hexahedra;
+beside it stand truths on a finer mesh and with smaller steps.
+"""
+
+from pathlib import Path
+
+from validate.arrays import Floats
+from validate.compare.verdict import Accept
+from validate.replay.paper_002 import rod_published
+from validate.replay.paper_002_rod import tell
+from validate.replay.solver_benchmark import (
+    FIVE,
+    FRAMES,
+    SWITCHES,
+    Benchmark,
+    Body,
+    Clock,
+    Parameters,
+    TwinCard,
+    card,
+    changed,
+    solvers,
+)
+from validate.replay.tracking import Case, Follower, Tracking
+from validate.scene.needle import STEP
+from validate.scene.rod import MP3, SIZE, bending_rod, gravity_inputs
+from validate.scene.scene import Material, Scene
+from validate.solve.modal import Modal
+
+RECORDING = Path(__file__).parents[1] / "recordings" / "bending_rod.mcap"
+PARAMETERS = Parameters(card(MP3), Body(3), Clock(), TwinCard(), str(RECORDING))
+
+
+def scene(material: Material, body: Body) -> Scene:
+    return bending_rod(body.cells, material)
+
+
+def gravity(t: Floats) -> Floats:
+    return gravity_inputs(t)[:, 0]
+
+
+BENCHMARK = Benchmark(
+    "bending_rod",
+    scene,
+    "gravity",
+    "m/s^2",
+    gravity,
+    {
+        "f1": (0.0, 0.0, 0.0),
+        "f2": (0.0, SIZE[1], 0.0),
+        "f3": (0.0, 0.0, SIZE[2]),
+        "f4": (0.0, 0.6 * SIZE[1], 0.8 * SIZE[2]),
+    },
+)
+METHODS = {
+    **FIVE,
+    **SWITCHES,
+    **solvers(),
+    "modal": Follower("all modes, by the implicit rule", Modal(STEP, propagate="average")),
+    "modal_10": Follower("10 modes, exact in time", Modal(STEP, 10)),
+}
+CASES = (
+    Case("finer_mesh", "the truth has twice as many cells along every edge",
+         changed("twin", refined=2), methods=tuple(FIVE)),
+    Case("small_steps", "the truth takes 20 steps in one of the models'",
+         changed("twin", finer=20), methods=tuple(FIVE)),
+)  # fmt: skip
+
+EXPERIMENT = Tracking(
+    name="bending_rod",
+    title="Solvers against the implicit run on a rod that bends under gravity",
+    source="paper 002 (accuracy metrics and benchmarks), sections IV.B and VI",
+    parameters=PARAMETERS,
+    methods=METHODS,
+    accepted=("explicit",),
+    accept=(Accept("tip", 2e-3, "two percent of the largest displacement there (ours)"),),
+    load=BENCHMARK.load,
+    record=BENCHMARK.record,
+    truth=BENCHMARK.truth,
+    build=BENCHMARK.build,
+    place=BENCHMARK.place,
+    stepper=BENCHMARK.stepper,
+    axis="z",
+    reference="implicit",
+    cases=CASES,
+    tell=tell,
+    published=rod_published,
+    frames=FRAMES,
+    same_model=True,
+    seed=TwinCard().seed,
+    twin_notice=(
+        "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
+        "markers. Errors are between solvers; no tissue was measured."
+    ),
+)

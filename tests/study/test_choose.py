@@ -1,0 +1,81 @@
+"""Which cell is chosen, on tables made by hand."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from validate.errors import RecordingError, UsageError
+from validate.solve.newmark import Newmark
+from validate.solve.types import StepTimes
+from validate.study.choose import Wanted, meeting, misses, nearest, wanted
+from validate.study.trade import Cell, Row
+from validate.study.trade_scene import Solver
+
+WANTED = Wanted(0.5e-3, 1000.0)
+ANY = Solver("any", "prefactored", Newmark)
+
+
+def row(name: str, error: float | None, time: float, dt: float = 0.01) -> Row:
+    """A cell with an error in mm and a time in ms."""
+    step = StepTimes(1e-3 * time, 1e-3 * time, 1e-3 * time, 9)
+    value = None if error is None else 1e-3 * error
+    return Row(Cell(replace(ANY, name=name), "P1", 1, dt), step=step, total=value)
+
+
+def names(rows: Sequence[Row]) -> list[str]:
+    return [r.cell.solver.name for r in rows]
+
+
+TABLE = (row("quick", 0.8, 0.1), row("good", 0.4, 0.5), row("best", 0.1, 0.9),
+         row("slow", 0.05, 3.0), row("untold", None, 0.01))  # fmt: skip
+
+
+def test_the_fastest_that_meets_both_is_first() -> None:
+    assert names(meeting(TABLE, WANTED, "total", dynamic=False)) == ["good", "best"]
+
+
+def test_limits_count_as_met() -> None:
+    edge = (row("edge", 0.5, 1.0),)
+    assert names(meeting(edge, WANTED, "total", dynamic=False)) == ["edge"]
+
+
+def test_inertia_must_keep_up_with_the_clock() -> None:
+    late = row("late", 0.1, 0.9, dt=0.0005)
+    assert not meeting((late,), WANTED, "total", dynamic=True)
+    assert meeting((late,), WANTED, "total", dynamic=False)
+
+
+def test_where_nothing_meets_the_smaller_miss_is_nearest() -> None:
+    hard = Wanted(0.04e-3, 1000.0)
+    assert meeting(TABLE, hard, "total", dynamic=False) == []
+    found = nearest(TABLE, hard, "total", dynamic=False)
+    assert found.cell.solver.name == "best"  # 2.5 times too wrong; slow is 3 times too slow
+    assert misses(found, hard, "total", dynamic=False) == pytest.approx((2.5, 0.9))
+
+
+def test_rows_without_an_error_are_never_chosen() -> None:
+    with pytest.raises(UsageError, match="none of 1 pilot runs has an error"):
+        nearest((row("untold", None, 0.01),), WANTED, "total", dynamic=False)
+
+
+def test_quantities_are_read_with_their_units() -> None:
+    assert wanted("0.5mm", "1000Hz") == Wanted(0.5e-3, 1000.0)
+    assert wanted("50 um", "1 kHz").error == pytest.approx(5e-5)
+    assert wanted("1e-3m", "60Hz") == Wanted(1e-3, 60.0)
+
+
+@pytest.mark.parametrize(
+    ("error", "rate"),
+    [("0.5", "1000Hz"), ("half mm", "1000Hz"), ("0.5mm", "1000"), ("0.5mm", "3 m"),
+     ("0mm", "1Hz"), ("-1mm", "1Hz"), ("1mm", "nanHz"), ("1e999mm", "1Hz")],
+)  # fmt: skip
+def test_what_is_no_quantity_is_refused_in_one_line(error: str, rate: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        wanted(error, rate)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_unit_of_something_else_is_refused() -> None:
+    with pytest.raises(RecordingError, match="no unit of length"):
+        wanted("0.5N", "1000Hz")

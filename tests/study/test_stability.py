@@ -1,0 +1,371 @@
+"""The stability map: exact limits of one mode, the 2 % rule, refusals, resume, no NaN anywhere."""
+
+import csv
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from validate.errors import SceneError, UsageError
+from validate.fem.critical import cell_altitudes
+from validate.fem.system import build
+from validate.report.store import schema
+from validate.solve.amplification import amplification
+from validate.solve.central import CentralDifference
+from validate.solve.explicit_linear import ExplicitLinear
+from validate.solve.newmark import Newmark
+from validate.study import stability as stability_module
+from validate.study.base_scenes import BASE_SCENES, base_scene, squeezed
+from validate.study.precision import drift
+from validate.study.stability import SCHEMES, Stability, points, stability
+from validate.study.stability_cell import (
+    VariantResult,
+    frequencies,
+    measured_limit,
+    read_variants,
+    run_variant,
+    write_variant,
+)
+from validate.study.stepping import misprint_limit
+from validate.study.stored_stability import write_stability
+from validate.study.variants import VariantCell, drift_variant, step_grid, variant_cells
+
+W, ALPHA, BETA = 30.0, 0.7, 0.02
+
+
+def crossing(scheme: str, w: float, alpha: float, beta: float, near: float) -> float | None:
+    own = SCHEMES[scheme]
+    return measured_limit(
+        lambda h: own.radius(h, np.array([w / 9, w]), alpha, beta), near, 1 + own.rounding
+    )
+
+
+def lagged(w: float, c: float) -> float:
+    return (math.sqrt(c * c + 4 * w * w) - c) / w**2
+
+
+EXACT = [
+    ("explicit_consistent", 2 / W),
+    ("explicit_lumped", 2 / W),
+    ("central", 2 / W),
+    ("explicit_consistent_lagged", lagged(W, ALPHA + BETA * W * W)),
+    ("explicit_lumped_lagged", lagged(W, ALPHA + BETA * W * W)),
+    ("central_lagged", math.hypot(2 / W, BETA) - BETA),
+]
+
+
+@pytest.mark.parametrize(("scheme", "limit"), EXACT)
+def test_one_oscillators_radius_crosses_one_at_the_formula(scheme: str, limit: float) -> None:
+    assert crossing(scheme, W, ALPHA, BETA, 1.7 * limit) == pytest.approx(limit, rel=1e-6)
+
+
+@pytest.mark.parametrize(("xi", "x"), [(0.0, 2 / math.sqrt(3)), (0.1, 1.29), (0.3, 1.55)])
+def test_the_misprints_cubic_is_where_its_radius_crosses_one(xi: float, x: float) -> None:
+    limit = misprint_limit(W, 2 * xi * W)
+    assert limit * W == pytest.approx(x, abs=0.005)
+    # One mode only: alpha damps a second one otherwise.
+    own = SCHEMES["newmark_misprinted"]
+    found = measured_limit(
+        lambda h: own.radius(h, np.array([W]), 2 * xi * W, 0.0), 1.3 * limit, 1 + own.rounding
+    )
+    assert found == pytest.approx(limit, rel=1e-6)
+
+
+@pytest.mark.parametrize("scheme", ["newmark_average", "backward_euler", "generalised_alpha"])
+@pytest.mark.parametrize("damping", [(0.0, 0.0), (ALPHA, BETA)])
+def test_unconditional_schemes_stay_at_one_over_twelve_decades(
+    scheme: str, damping: tuple[float, float]
+) -> None:
+    own = SCHEMES[scheme]
+    radii = [own.radius(h, np.array([W]), *damping) for h in np.geomspace(1e-6, 1e6, 25)]
+    assert max(radii) <= 1 + own.rounding
+    assert measured_limit(lambda h: own.radius(h, np.array([W]), *damping), 1.0, 1.001) is None
+
+
+def test_a_mode_walked_exactly_has_the_radius_of_its_decay() -> None:
+    under, over = 0.5, 200.0
+    for c in (under, over):
+        slow = max((-c + s * np.emath.sqrt(c * c - 4 * W * W)).real / 2 for s in (1, -1))
+        assert SCHEMES["modal"].radius(0.1, np.array([W]), c, 0.0) == pytest.approx(
+            math.exp(slow * 0.1), rel=1e-12
+        )
+
+
+def small(name: str = "needle_block", **changes: Any) -> VariantCell:
+    """A cell of a base scene's coarsest mesh with three steps."""
+    base = BASE_SCENES[name]
+    variant = replace(base.base, mesh=base.meshes[0], **changes)
+    return VariantCell(name, variant, (base.dt / 100, base.dt, 30 * base.dt), False, "", "k")
+
+
+@pytest.fixture(scope="module")
+def needle() -> VariantResult:
+    return run_variant(small())
+
+
+def test_the_cells_radii_are_those_of_the_schemes_themselves(needle: VariantResult) -> None:
+    cell = small()
+    system = build(base_scene("needle_block").build(cell.variant))
+    settings = {
+        "newmark_average": Newmark(),
+        "generalised_alpha": Newmark(rule="generalised_alpha"),
+        "newmark_misprinted": Newmark(update="misprinted"),
+        "explicit_consistent": ExplicitLinear(mass="consistent", damping_terms="full"),
+        "explicit_lumped": ExplicitLinear(),
+        "explicit_lumped_lagged": ExplicitLinear(damping_terms="full", update="lagged"),
+    }
+    found = {s.scheme: s for s in needle.schemes}
+    for name, own in settings.items():
+        for dt, radius in zip(cell.steps, found[name].radii, strict=True):
+            expected = amplification(system, replace(own, dt=dt)).radius  # type: ignore[type-var]
+            assert radius == pytest.approx(expected, rel=1e-6), (name, dt)
+
+
+def test_central_difference_itself_turns_at_the_maps_limit() -> None:
+    """The compiled kernel, a small kick: finite below the limit, over all bounds above."""
+    base = BASE_SCENES["ekf_cube"]
+    scene = base.build(replace(base.base, mesh=2))
+    large = replace(scene, material=replace(scene.material, law="svk"))
+    system = build(large)
+    own = SCHEMES["central"]
+    omegas = frequencies(build(scene), "lumped")
+    limit = measured_limit(lambda h: own.radius(h, omegas, 0.0, 0.0), 1e-3, 1 + own.rounding)
+    assert limit == pytest.approx(2 / omegas[-1], rel=1e-6)
+    assert limit is not None
+    sizes = []
+    for share in (0.98, 1.02):
+        stepper = CentralDifference(share * limit, beyond_limit="run", watch=10**6).prepare(system)
+        state = stepper.rest()
+        for k in range(60):
+            state = stepper.step(state, np.array([1e-9 if k == 0 else 0.0]))
+        assert state.u is not None
+        sizes.append(np.abs(state.u).max())
+    assert sizes[1] > 1e4 * sizes[0]
+
+
+def test_limits_agree_to_two_percent_and_cells_cost_what_the_note_says(
+    needle: VariantResult,
+) -> None:
+    limits = [(s.predicted, s.measured) for s in needle.schemes if s.predicted is not None]
+    assert len(limits) == 5
+    for predicted, measured in limits:
+        assert measured == pytest.approx(predicted, rel=0.02)
+    stiff = run_variant(small(nu=0.4999))
+    assert stiff.locking is not None
+    assert needle.locking is not None
+    assert stiff.locking < 0.1 * needle.locking < 0.1
+    assert stiff.conditions["K"] > 5 * needle.conditions["K"]
+    assert "lock" in stiff.warning
+    assert not needle.warning
+    assert needle.rounding is not None
+    assert needle.rounding.positions is not None
+    assert needle.rounding.velocities is not None
+    assert 1e-8 < needle.rounding.velocities < needle.rounding.positions / 5 < 1e-3
+    assert stiff.rounding is not None
+    assert stiff.rounding.static is not None
+    assert 1e-8 < stiff.rounding.static < 1e-2
+
+
+def test_energy_over_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("validate.study.precision.DRIFT_STEPS", 2000)
+    omegas = np.array([1.0, 7.0, 30.0])
+    for scheme in SCHEMES.values():
+        if scheme.conserves:
+            found = drift(scheme, 0.03, omegas)
+            assert found.double == pytest.approx(1.0, abs=1e-11), scheme.name
+            assert found.single == pytest.approx(1.0, abs=1e-2), scheme.name
+    lost = drift(SCHEMES["backward_euler"], 0.03, omegas).double
+    assert lost is not None
+    assert lost < 0.1
+    grown = drift(SCHEMES["explicit_lumped"], 0.07, omegas)
+    assert grown.single is None  # beyond the limit: not finite, so no number
+
+
+def test_squeezed_cells_have_the_altitude_ratio_they_are_named_for() -> None:
+    mesh = BASE_SCENES["kf_cube"].build(BASE_SCENES["kf_cube"].base).mesh
+    flat = squeezed(mesh, 0.05)
+    np.testing.assert_allclose(np.ptp(flat.nodes, axis=0), np.ptp(mesh.nodes, axis=0), rtol=1e-12)
+    widths = np.diff(np.unique(flat.nodes[:, 0].round(9)))
+    assert widths.min() / widths.max() == pytest.approx(0.05, rel=1e-3)
+    one = replace(BASE_SCENES["kf_cube"].build(BASE_SCENES["kf_cube"].base), mesh=flat)
+    assert cell_altitudes(one).min() < 1.1 * widths.min()
+
+
+# --- the study -----------------------------------------------------------------------------------
+
+
+def in_process(work: Callable[..., Any], items: Any, where: Any, done: Callable[..., None]) -> None:
+    for item in items:
+        done(item, work(item))
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> tuple[VariantCell, ...]:
+    """A base, a sweep of nu, what must be refused: without a cluster, on a coarse mesh."""
+    cells = variant_cells(BASE_SCENES["needle_block"], quick=True)
+    base = BASE_SCENES["needle_block"].base
+    picked = [c for c in cells if c.expected or (c.variant.nu < 0.4 and c.variant.E == base.E)]
+    picked += [cells[0]]
+    monkeypatch.setattr("validate.study.workers.run_each", in_process)
+    monkeypatch.setattr(stability_module, "variant_cells", lambda base, quick: tuple(picked))
+    return tuple(picked)
+
+
+def leaves(content: Any) -> Iterator[Any]:
+    if isinstance(content, dict):
+        for value in content.values():
+            yield from leaves(value)
+    elif isinstance(content, list):
+        for value in content:
+            yield from leaves(value)
+    else:
+        yield content
+
+
+def test_the_folder_has_no_number_that_is_not_finite(
+    few: tuple[VariantCell, ...], tmp_path: Path
+) -> None:
+    found = stability("needle_block", out=tmp_path)
+    page = write_stability(found, tmp_path / "needle_block" / "study-stability")
+    content = json.loads((page.parent / "results.json").read_text("utf-8"))
+    jsonschema.validate(content, schema())
+    numbers = [v for v in leaves(content) if isinstance(v, float)]
+    assert len(numbers) > 500
+    assert all(map(math.isfinite, numbers))
+    for table in (page.parent / "tables").glob("*.csv"):
+        with table.open(encoding="utf-8") as file:
+            texts = [v.lower() for row in csv.reader(file) for v in row]
+        assert not {"nan", "inf", "-inf"} & set(texts), table.name
+    with (page.parent / "tables" / "cells.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == found.points == content["study"]["points"]
+    assert {r["regime"] for r in rows} == {"stable", "unresolved", "unstable", "refused"}
+    assert all(r["why"] and not r["radius"] for r in rows if r["regime"] == "refused")
+    assert (page.parent / "figures" / "regimes_nu.png").stat().st_size > 5000
+    # No cell of this handful was stepped for drift: that claim compared nothing, so it fails.
+    failed = [p["name"] for p in content["study"]["predictions"] if not p["holds"]]
+    assert failed == ["drift"]
+    assert content["passed"] is False
+    assert "Predictions fail" in page.read_text("utf-8")
+
+
+def test_a_second_call_runs_only_what_is_missing(
+    few: tuple[VariantCell, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = tuple(c for c in few if c.expected)
+    monkeypatch.setattr(stability_module, "variant_cells", lambda base, quick: refused)
+    assert stability("needle_block", out=tmp_path).reused == 0
+    ran: list[VariantCell] = []
+
+    def counted(work: Any, items: Any, where: Any, done: Any) -> None:
+        ran.extend(items)
+        in_process(work, items, where, done)
+
+    monkeypatch.setattr("validate.study.workers.run_each", counted)
+    kept = tmp_path / "needle_block" / "study-stability" / "cells"
+    (kept / f"{refused[2].key}.json").write_text('{"key": 1', encoding="utf-8")
+    again = stability("needle_block", out=tmp_path)
+    assert again.reused == len(refused) - 1
+    assert ran == [refused[2]]
+
+
+def test_results_come_back_as_they_were_kept(needle: VariantResult, tmp_path: Path) -> None:
+    cell = replace(small(), key="k")
+    write_variant(tmp_path, needle)
+    assert read_variants(tmp_path, [cell]) == {"k": needle}
+
+
+def fabricated(needle: VariantResult, off: float) -> Stability:
+    """One finished cell whose first limit is measured `off` from the predicted one."""
+    schemes = tuple(
+        replace(s, measured=s.predicted * (1 + off)) if s.predicted else s for s in needle.schemes
+    )
+    cell = small()
+    result = replace(needle, schemes=schemes)
+    return Stability(BASE_SCENES["needle_block"], (cell,), {cell.key: result}, False, 0, 0.0, "")
+
+
+@pytest.mark.parametrize(("off", "holds"), [(0.019, True), (-0.019, True), (0.021, False)])
+def test_two_percent_is_the_rule(needle: VariantResult, off: float, holds: bool) -> None:
+    limits = [p for p in fabricated(needle, off).predictions if p.name.startswith("limit.explicit")]
+    assert [p.holds for p in limits] == 4 * [holds]
+    assert all(p.count == 1 for p in limits)
+
+
+def test_growth_where_none_is_predicted_a_missing_limit_and_few_points_fail(
+    needle: VariantResult,
+) -> None:
+    study = fabricated(needle, 0.0)
+    cell = study.cells[0]
+    broken = tuple(
+        replace(s, radii=(1.0, 1.0, 1.01), measured=None) for s in study.results[cell.key].schemes
+    )
+    bad = replace(study, results={cell.key: replace(needle, schemes=broken)})
+    verdicts = {p.name: p.holds for p in bad.predictions}
+    assert not verdicts["no_limit.newmark_average"]
+    assert not verdicts["limit.explicit_lumped"]
+    assert not verdicts["points"]
+    assert not bad.passed
+
+
+def test_a_variant_is_refused_for_its_own_reason_or_the_claim_fails() -> None:
+    wanted = [c for c in variant_cells(BASE_SCENES["ekf_cube"], quick=True) if c.expected]
+    results = {c.key: run_variant(c) for c in wanted}
+    assert all(results[c.key].refused for c in wanted)
+    study = Stability(BASE_SCENES["ekf_cube"], tuple(wanted), results, True, 0, 0.0, "")
+    assert {p.name: p.holds for p in study.predictions}["refusals"]
+    quiet = {**results, wanted[0].key: replace(results[wanted[0].key], refused="")}
+    assert not {p.name: p.holds for p in replace(study, results=quiet).predictions}["refusals"]
+    rows = list(points(wanted[0], results[wanted[0].key], ("central",)))
+    assert {r.regime for r in rows} == {"refused"}
+    assert all("Poisson ratio nu = 0.5" in r.why and r.radius is None for r in rows)
+
+
+def test_regimes_by_radius_and_by_turn(needle: VariantResult) -> None:
+    found = {(p.scheme, i % 3): p for i, p in enumerate(points(small(), needle, ()))}
+    assert found["newmark_average", 0].regime == "stable"
+    assert found["newmark_average", 2].regime == "unresolved"
+    assert "h too large to resolve" in found["newmark_average", 2].why
+    assert found["explicit_lumped", 2].regime == "unstable"
+    assert "times the limit" in found["explicit_lumped", 2].why
+    assert found["modal", 2].regime == "stable"
+
+
+def test_grids_span_what_was_asked_for() -> None:
+    steps = step_grid(0.002)
+    assert steps[-1] / steps[0] == pytest.approx(1e6)
+    assert steps[len(steps) // 2] == pytest.approx(0.002)
+    for base in BASE_SCENES.values():
+        variants = [c.variant for c in variant_cells(base)]
+        assert len(set(variants)) == len(variants)
+        assert {0.0, 0.4999} <= {v.nu for v in variants}
+        assert {200.0, 1e6} <= {v.E for v in variants}
+        assert drift_variant(base) in variants
+        for paper in base.papers:
+            assert paper.variant in variants
+            assert np.isclose(step_grid(base.dt), paper.dt).any()
+        sizes = [base.build(replace(base.base, mesh=n)).mesh.nodes.size for n in base.meshes]
+        assert max(sizes) <= 1000
+
+
+def test_unknown_scenes_and_bodies_too_large_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"no base scene 'kf_cub'.*kf_cube"):
+        stability("kf_cub")
+    base = BASE_SCENES["needle_block"]
+    with pytest.raises(SceneError, match="unknowns at mesh 30: a stability map has at most 1000"):
+        base.build(replace(base.base, mesh=30))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(2400)
+@pytest.mark.parametrize("name", sorted(BASE_SCENES))
+def test_all_predictions_hold_on_the_full_map(name: str, tmp_path: Path) -> None:
+    found = stability(name, out=tmp_path)
+    assert [p.name for p in found.predictions if not p.holds] == []
+    assert found.points > 20_000

@@ -1,0 +1,164 @@
+"""A small trade whose answers are known, and fronts and memory by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from validate.errors import SceneError, UsageError
+from validate.fem.factor import factorise
+from validate.fem.system import build
+from validate.scene.box import box
+from validate.scene.mesh import quadratic
+from validate.scene.scene import LawName, Load, Material, Scene, Support
+from validate.solve.explicit_linear import ExplicitLinear
+from validate.solve.implicit import NewtonDynamics
+from validate.solve.modal import Modal
+from validate.solve.newmark import Newmark
+from validate.solve.quasi_static import QuasiStatic
+from validate.solve.types import StepTimes
+from validate.study.choose import choose, principal_strains, wanted
+from validate.study.choose_exhibits import choose_exhibits
+from validate.study.held import held_bytes
+from validate.study.trade import Cell, Row, Trade, front, trade
+from validate.study.trade_exhibits import trade_exhibits
+from validate.study.trade_page import trade_document
+from validate.study.trade_scene import LawPair, Solver, TradeScene
+from validate.study.trade_scenes import trade_scene
+
+STEPS = (0.02, 0.01, 0.005)
+STATIC = Solver("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
+AVERAGE = Solver("average", "prefactored", Newmark)
+
+
+def block(element: str, level: int, law: LawName) -> Scene:
+    """A block that is pulled, in level^3 boxes."""
+    mesh = box((0.1, 0.1, 0.1), (level, level, level))
+    return Scene(
+        quadratic(mesh) if element == "P2" else mesh,
+        Material(4e3, 0.3, law, rho=1000.0, mass_damping=2.0, stiffness_damping=1e-3),
+        (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+    )
+
+
+def small() -> TradeScene:
+    return TradeScene(
+        "small", "A block", "test", block, lambda level: 0.1 / level,
+        {"P1": (1, 2), "P2": (1,)}, {"P1": 2.0, "P2": 3.0}, STEPS,
+        lambda t: np.full((len(t), 1), 0.8), np.arange(0.04, 0.21, 0.04),
+        np.array([[0.05, 0.05, 0.1], [0.05, 0.05, 0.05]]), ("P2", 2),
+        lambda dt: Modal(dt, propagate="constant"),
+        (
+            STATIC,
+            Solver("all modes", "modal", lambda dt: Modal(dt, propagate="constant"), stepped=False),
+            AVERAGE,
+            Solver("explicit", "explicit", lambda dt: ExplicitLinear(dt, damping_terms="full")),
+            Solver("large", "large strain",
+                   lambda dt: NewtonDynamics(dt, mass="consistent"), law="neo_hooke",
+                   elements=("P1",), finest=1, shortest=STEPS[0]),
+        ),
+        LawPair("P1", 1, STEPS[0], Newmark, lambda dt: NewtonDynamics(dt, mass="consistent")),
+        dynamic=True, rise_s=0.0,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def traded() -> Trade:
+    return trade(small())
+
+
+def rows_of(found: Trade, name: str, element: str = "P1", level: int = 2) -> list[Row]:
+    return [
+        r for r in found.rows
+        if (r.cell.solver.name, r.cell.element, r.cell.level) == (name, element, level)
+    ]  # fmt: skip
+
+
+def test_every_solver_runs_on_every_mesh_element_and_step(traded: Trade) -> None:
+    assert len(traded.rows) == 3 * (1 + 1 + 3 + 3) + 1
+    assert all(r.step is not None and r.step.n > 0 for r in traded.rows if not r.failed)
+    assert [r.cell.dt for r in rows_of(traded, "average")] == list(STEPS)
+
+
+def test_a_solver_without_error_leaves_the_meshes(traded: Trade) -> None:
+    for element, level in (("P1", 1), ("P1", 2), ("P2", 1)):
+        (row,) = rows_of(traded, "all modes", element, level)
+        assert row.solver_error == pytest.approx(0.0, abs=1e-12)
+        assert row.error == pytest.approx(row.mesh_error)
+        assert row.error is not None
+        assert 0 < row.error < traded.moved
+
+
+def test_the_step_error_is_of_second_order_and_the_mesh_rules(traded: Trade) -> None:
+    errors = [r.solver_error or 0.0 for r in rows_of(traded, "average")]
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.3)
+    assert errors[2] < 0.1 * (rows_of(traded, "average")[2].mesh_error or 0.0)
+    ladder = next(x for x in traded.ladders if x.what.startswith("steps of average"))
+    assert ladder.found.order == pytest.approx(2.0, abs=0.6)
+
+
+def test_too_long_explicit_steps_are_rows_with_the_reason(traded: Trade) -> None:
+    failed = [r for r in traded.rows if r.cell.solver.name == "explicit" and r.failed]
+    assert failed
+    assert all("times the critical step" in r.failed and r.error is None for r in failed)
+
+
+def test_statics_assemble_no_mass_and_say_so(traded: Trade) -> None:
+    assert rows_of(traded, "static")[0].assembled == "K"
+    assert "M" in rows_of(traded, "average")[0].assembled
+
+
+def test_large_strain_is_held_against_its_own_truth(traded: Trade) -> None:
+    (large,) = rows_of(traded, "large", level=1)
+    linear = rows_of(traded, "average", level=1)[0]
+    assert traded.law_error > 0
+    # On the pair's own mesh and step the law's share cancels: what is left is the linear error.
+    assert large.total == pytest.approx(linear.error, rel=1e-9)
+
+
+def test_a_trade_is_told_in_numbers_that_are_finite(traded: Trade) -> None:
+    made = trade_exhibits(traded)
+    assert [e.anchor for e in made] == ["front", "shares", "costs", "convergence", "unscored"]
+    told = trade_document(traded)
+    assert len(told["cells"]) == len(traded.rows)
+    choice = choose(traded, wanted("1mm", "1Hz"))
+    assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
+    assert [c.rung for c in choice.ladder if c.verdict == "nothing ran"] == ["condensed"]
+
+
+def timed(name: str, error: float, time: float, solver: Solver = AVERAGE) -> Row:
+    step = StepTimes(time, time, time, 9)
+    cell = Cell(replace(solver, name=name), "P1", 1, 0.01)
+    return Row(cell, step=step, error=error, total=error)
+
+
+def test_the_front_by_hand() -> None:
+    rows = (timed("fast", 4.0, 1.0), timed("mean", 2.0, 3.0), timed("slow", 1.0, 9.0),
+            timed("beaten", 3.0, 4.0), timed("worst", 5.0, 20.0))  # fmt: skip
+    found = front(rows, "error")
+    assert [r.cell.solver.name for r in found.rows] == ["fast", "mean", "slow"]
+    assert found.dominated == ("beaten", "worst")
+    assert [r.cell.solver.name for r in front(rows, "error", floor=2.5).rows] == ["fast", "mean"]
+
+
+def test_memory_counts_every_array_once() -> None:
+    one = np.zeros(1000)
+    assert held_bytes((one, one[10:], {"again": one})) == 8000
+    system = build(block("P1", 2, "linear"))
+    K = system.K[system.free][:, system.free]
+    factor = factorise(K, system.free // 3, system.scene.mesh.nodes)
+    assert held_bytes(factor) == 12 * factor.lu.nnz + factor.order.nbytes
+
+
+def test_principal_strains_of_a_stretched_block() -> None:
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    u = mesh.nodes * np.array([0.02, -0.05, 0.01])
+    assert principal_strains(mesh, u) == pytest.approx(np.full(len(mesh.cells), 0.05))
+
+
+def test_steps_must_land_on_frames_and_names_be_known() -> None:
+    with pytest.raises(SceneError, match="do not land on the frames"):
+        replace(small(), steps=(0.03,))
+    with pytest.raises(UsageError, match="bending_rod"):
+        trade_scene("bending_rood")

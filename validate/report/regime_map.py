@@ -1,0 +1,107 @@
+"""What happens over a logarithmic axis and rows, as coloured squares: one panel a method.
+
+Colours, hatches and words tell regimes apart; the predicted border is a line, named settings are
+marks.
+"""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Mark, Panel, RegimeMap
+from validate.report.page import Picture
+from validate.report.style import draw
+
+_COLOURS = ("#56B4E9", "#CFE8F7", "#D55E00", "#7F7F7F")  # Okabe-Ito, the second a paler first
+_COLUMNS = 4
+_PANEL = (2.75, 1.25)  # inches, before the rows
+_ROW = 0.13  # inches of a row
+_BORDER, _MARK = "#000000", "#F0E442"
+_SIGNS = ("o", "s", "D", "^", "v", "P")
+
+
+def picture(shown: RegimeMap) -> Picture:
+    """The map drawn; its caption explains line and marks."""
+    columns = min(_COLUMNS, len(shown.panels))
+    rows = -(-len(shown.panels) // columns)
+    height = _PANEL[1] + _ROW * len(shown.rows)
+    pixels = draw(
+        lambda f: _fill(f, shown, rows, columns), columns * _PANEL[0] + 0.6, rows * height + 0.7
+    )
+    counted = ", ".join(
+        f"{name} {sum(int((p.codes == i).sum()) for p in shown.panels)}"
+        for i, name in enumerate(shown.regimes)
+    )
+    return Picture(
+        f"regimes_{shown.name}",
+        f"{shown.title}. Points: {counted}. {shown.caption}".strip(),
+        f"Map of regimes: {shown.title}; {shown.x_label} and {shown.y_label}, "
+        f"{len(shown.panels)} panels of {len(shown.rows)} by {len(shown.x)}.",
+        pixels,
+    )
+
+
+def _fill(figure: Figure, shown: RegimeMap, rows: int, columns: int) -> None:
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for ax, panel in zip(axes.flat, shown.panels, strict=False):
+        _panel(ax, shown, panel)
+    for ax in axes.flat[len(shown.panels) :]:
+        ax.set_axis_off()
+    for ax in axes.flat[: len(shown.panels)][-columns:]:  # the lowest of every column
+        ax.set_xlabel(shown.x_label)
+        ax.tick_params(labelbottom=True)
+    for ax in axes[:, 0]:
+        ax.set_ylabel(shown.y_label)
+        ax.set_yticks(range(len(shown.rows)), shown.rows, fontsize=7)
+    _legend(figure, shown)
+
+
+def _panel(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
+    colours = ListedColormap(_COLOURS[: len(shown.regimes)])
+    norm = BoundaryNorm(np.arange(len(shown.regimes) + 1) - 0.5, len(shown.regimes))
+    edges = np.arange(len(shown.rows) + 1) - 0.5
+    ax.set_xscale("log")
+    ax.pcolormesh(
+        _edges(shown.x), edges, panel.codes, cmap=colours, norm=norm,
+        edgecolors="white", linewidth=0.2,
+    )  # fmt: skip
+    span = _edges(shown.x)[[0, -1]]
+    for row, at in enumerate(panel.border):
+        if np.isfinite(at) and span[0] < at < span[1]:
+            ax.plot([at, at], [row - 0.5, row + 0.5], color=_BORDER, linewidth=1.6)
+    for i, mark in enumerate(shown.marks):
+        ax.plot(mark.x, mark.row, **_look(i, mark))
+    ax.set(title=panel.title, xlim=tuple(span), ylim=(edges[0], edges[-1]))
+    ax.grid(visible=False)
+    ax.minorticks_off()
+
+
+def _look(i: int, mark: Mark) -> dict[str, Any]:
+    """Filled on the map, hollow where the place only lies above."""
+    face = _MARK if mark.on_map else "none"
+    return {"marker": _SIGNS[i % len(_SIGNS)], "markerfacecolor": face, "markersize": 7,
+            "markeredgecolor": "black", "markeredgewidth": 1.3, "linestyle": "none"}  # fmt: skip
+
+
+def _edges(x: Floats) -> Floats:
+    """Borders (k + 1,) halfway between logarithms of x (k,)."""
+    logs = np.log(x)
+    middles = (logs[1:] + logs[:-1]) / 2
+    ends = 2 * logs[0] - middles[0], 2 * logs[-1] - middles[-1]
+    return np.asarray(np.exp(np.array([ends[0], *middles, ends[1]])))
+
+
+def _legend(figure: Figure, shown: RegimeMap) -> None:
+    entries: list[Patch | Line2D] = [
+        Patch(color=_COLOURS[i], label=name) for i, name in enumerate(shown.regimes)
+    ]
+    entries.append(Line2D([], [], color=_BORDER, linewidth=1.6, label="predicted limit"))
+    for i, mark in enumerate(shown.marks):
+        entries.append(Line2D([], [], label=mark.label, **_look(i, mark)))
+    figure.legend(handles=entries, loc="outside lower center", ncols=min(len(entries), 6))

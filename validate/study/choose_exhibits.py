@@ -1,0 +1,134 @@
+"""What a choice shows: the verdict, the scene's numbers, the ladder with its evidence."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
+from validate.study.choose import Choice, error_of, misses
+from validate.study.trade import Row
+from validate.study.trade_exhibits import trade_exhibits
+
+_MM, _US = 1e3, 1e6
+
+
+def choose_exhibits(choice: Choice) -> tuple[Exhibit, ...]:
+    """The verdict and its evidence, then the table that it rests on."""
+    return (
+        Exhibit("choice", "The choice", tuple(words(choice)), charts=(_chart(choice),)),
+        Exhibit("numbers", "The scene's own numbers", tables=(_facts(choice),)),
+        Exhibit("ladder", "The ladder", tuple(choice.rejected), tables=(_ladder(choice),)),
+        *trade_exhibits(choice.trade),
+    )
+
+
+def words(choice: Choice) -> Iterator[str]:
+    """The verdict in sentences, plainly."""
+    want = choice.wanted
+    asked = f"{_MM * want.error:.3g} mm and {want.rate:.4g} Hz"
+    if choice.pick is not None:
+        yield f"{described(choice.pick, choice)} meets {asked}: the fastest cell that does."
+        yield from _confirmed(choice)
+    else:
+        yield f"Nothing meets both {asked}."
+        yield f"Nearest: {described(choice.nearest, choice)}; {_missed(choice)}."
+        yield from _one_sided(choice)
+    what = "with what the linear law costs" if choice.by == "total" else "within the declared law"
+    yield f"Errors are {what}; the rate is that of steps with the displacements of all nodes."
+
+
+def described(row: Row, choice: Choice) -> str:
+    """A row by its numbers."""
+    error, time = error_of(row, choice.by) or 0.0, row.time_s or 0.0
+    step = f", steps of {_MM * row.cell.dt:.3g} ms" if row.cell.solver.stepped else ""
+    return f"{row.label}{step}: {_MM * error:.3g} mm at {1 / time:.4g} Hz ({_US * time:.3g} us)"
+
+
+def _confirmed(choice: Choice) -> Iterator[str]:
+    if choice.confirmed is not None:
+        ms = _MM * choice.confirmed.cell.dt
+        yield (
+            f"Run again with a new state every {ms:.3g} ms, as the rate asks: "
+            f"{described(choice.confirmed, choice)}."
+        )
+    elif choice.trade.scene.dynamic:
+        yield "Its own step is no longer than a tick of the rate."
+
+
+def _missed(choice: Choice) -> str:
+    wrong, late = misses(choice.nearest, choice.wanted, choice.by, choice.trade.scene.dynamic)
+    if max(wrong, late) <= 1:
+        return "it meets both at its own step, but not with a new state at every tick"
+    error = f"its error is {wrong:.3g} times the one wanted"
+    time = f"it is {late:.3g} times too slow"
+    return " and ".join([error] * (wrong > 1) + [time] * (late > 1))
+
+
+def _one_sided(choice: Choice) -> Iterator[str]:
+    dynamic = choice.trade.scene.dynamic
+    miss = [(misses(r, choice.wanted, choice.by, dynamic), r) for r in choice.trade.rows]
+    exact = [r for (wrong, _), r in miss if wrong <= 1]
+    quick = [(wrong, r) for (wrong, late), r in miss if late <= 1]
+    if exact:
+        fastest = min(exact, key=lambda r: r.time_s or 0.0)
+        yield f"The fastest that meets the error: {described(fastest, choice)}."
+    else:
+        yield "No cell meets the error: finer meshes than the ladder's would be needed."
+    if quick:
+        best = min(quick, key=lambda pair: pair[0])[1]
+        yield f"The least error at that rate: {described(best, choice)}."
+    else:
+        yield "No cell meets the rate."
+
+
+def _facts(choice: Choice) -> NumberTable:
+    rows = tuple((f.name, f.value, f.means) for f in choice.facts)
+    return NumberTable("numbers", "The scene's own numbers", ("what", "value", "asks for"), rows)
+
+
+def _ladder(choice: Choice) -> NumberTable:
+    head = (
+        "rung",
+        "verdict",
+        "cells",
+        "scored",
+        "error / mm",
+        "time / us",
+        "rate / Hz",
+        "evidence",
+    )
+    rows = []
+    for rung in choice.ladder:
+        error = time = None
+        if rung.best is not None:
+            error, time = error_of(rung.best, choice.by), rung.best.time_s
+        rows.append(
+            (rung.rung, rung.verdict, rung.run, rung.scored,
+             None if error is None else _MM * error, None if time is None else _US * time,
+             None if time is None else 1 / time, rung.evidence)
+        )  # fmt: skip
+    title = "Every rung's fastest cell that meets both, else its nearest"
+    return NumberTable("ladder", title, head, tuple(rows))
+
+
+def _chart(choice: Choice) -> Chart:
+    by, want = choice.by, choice.wanted
+    rows = [r for r in choice.trade.rows if error_of(r, by) and r.time_s]
+    rungs = dict.fromkeys(r.cell.solver.rung for r in rows)
+    series = [_series(rung, [r for r in rows if r.cell.solver.rung == rung], by) for rung in rungs]
+    left = 0.5 * min(r.time_s or 1.0 for r in rows)
+    low = 0.5 * min(error_of(r, by) or 1.0 for r in rows)
+    x = _US * np.array([min(left, 0.5 / want.rate), 1 / want.rate, 1 / want.rate])
+    y = _MM * np.array([want.error, want.error, min(low, 0.5 * want.error)])
+    series.append(Series("wanted: left of and below this line", x, y))
+    shown = choice.pick or choice.nearest
+    series.append(_series("the choice" if choice.pick else "the nearest", [shown], by))
+    return Chart(
+        "choice", "What is wanted and what there is", "time of a step with its displacements / us",
+        "error / mm", tuple(series), log="xy",
+    )  # fmt: skip
+
+
+def _series(label: str, rows: list[Row], by: str) -> Series:
+    x = np.array([_US * (r.time_s or 0.0) for r in rows])
+    return Series(label, x, np.array([_MM * (error_of(r, by) or 0.0) for r in rows]), "points")

@@ -1,0 +1,274 @@
+"""What a stability map shows: claims, the papers' settings, maps, limits, what cells cost."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from validate.compare.exhibit import Entry, Exhibit, Mark, NumberTable, Panel, RegimeMap
+from validate.study.base_scenes import PaperSetting, Variant
+from validate.study.precision import DRIFT_STEPS, STEPS
+from validate.study.stability import (
+    SCHEMES,
+    Point,
+    Stability,
+    limit_error,
+    points,
+)
+from validate.study.stability_cell import VariantResult
+from validate.study.variants import VariantCell, axis, drift_variant
+
+REGIMES = ("stable", "unresolved", "unstable", "refused")
+_WORDS = ("stable", "stable, h too large to resolve", "unstable", "refused")
+_WORST = 15  # limits shown; tables/cells.csv and results.json have them all
+_MM = 1e3
+VARIANT = ("E / Pa", "nu / 1", "rho / kg/m3", "alpha / 1/s", "beta / s", "mesh", "altitude ratio")
+_LABELS = {
+    "nu": "Poisson ratio", "E": "modulus / Pa", "damping": "damping alpha 1/s, beta s",
+    "quality": "worst altitude ratio", "mesh": "cells across",
+}  # fmt: skip
+# Rows that must be refused, before or after the axis itself.
+_BEYOND = {"nu": ("nu", 0.5, True), "E": ("E", 0.0, False), "quality": ("quality", 0.0, True)}
+
+
+def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
+    """In the order of a reader's questions: does it hold, where am I, where is the border, why."""
+    maps = tuple(m for name in _LABELS if (m := _map(study, name)) is not None)
+    return (
+        _claims(study),
+        _papers(study),
+        Exhibit("maps", "Where every scheme is stable", tuple(_map_words(study)), regimes=maps),
+        _limits(study),
+        _conditions(study),
+        _drifts(study),
+        _refused(study),
+    )
+
+
+def variant_row(v: Variant) -> tuple[Entry, ...]:
+    return (v.E, v.nu, v.rho, v.mass_damping, v.stiffness_damping, v.mesh, v.quality)
+
+
+def _claims(study: Stability) -> Exhibit:
+    rows = tuple(
+        (p.name, p.value, p.limit, p.count, "holds" if p.holds else "fails", p.why)
+        for p in study.predictions
+    )
+    head = ("claim", "worst / 1", "limit / 1", "count", "verdict", "what")
+    table = NumberTable("predictions", "Predictions against what was measured", head, rows)
+    words = (
+        "Measured: the spectral radius of the step map over all modes of the body, and for limits "
+        "the step at which it passes 1 (bisection). Predicted: the schemes' own formulas with the "
+        "highest frequency by Lanczos. CG, Gauss-Seidel and direct solvers share one step map.",
+        "Large strain schemes (central, newton_dynamics) are judged at rest, where they are "
+        "linear; their limit moves as a body deforms.",
+    )
+    return Exhibit("predictions", "Predictions", words, tables=(table,))
+
+
+def _papers(study: Stability) -> Exhibit:
+    rows = [row for p in study.base.papers for row in _paper_rows(study, p)]
+    head = ("setting", "source", "h / ms", "scheme", "regime", "radius / 1", "h over limit / 1",
+            "why")  # fmt: skip
+    note = "Refused: nothing runs with that material; no radius."
+    table = NumberTable("papers", "The papers' own settings", head, tuple(rows), note)
+    return Exhibit("papers", "The papers' own settings", (), tables=(table,))
+
+
+def _paper_rows(study: Stability, paper: PaperSetting) -> Iterator[tuple[Entry, ...]]:
+    cell = _cell(study, paper.variant)
+    if cell is None:
+        return
+    result = study.results[cell.key]
+    limits = {s.scheme: s.predicted for s in result.schemes}
+    for p in _at(points(cell, result, study.schemes), paper.dt):
+        limit = limits.get(p.scheme)
+        times = None if limit is None else paper.dt / limit
+        yield (paper.label, paper.source, _MM * p.dt, p.scheme, _WORDS[REGIMES.index(p.regime)],
+               p.radius, times, p.why)  # fmt: skip
+
+
+def _at(found: Iterator[Point], dt: float) -> Iterator[Point]:
+    return (p for p in found if np.isclose(p.dt, dt, rtol=1e-6))
+
+
+# --- maps ----------------------------------------------------------------------------------------
+
+
+def _map_words(study: Stability) -> Iterator[str]:
+    yield (
+        f"Base: {study.base.words}; {_described(study.base.base)}. One quantity is changed at a "
+        "time here; pairs are in tables/cells.csv."
+    )
+    yield (
+        "Stable says that nothing grows, not that the motion is right: 'too large to resolve' are "
+        "steps with fewer than ten in the slowest period."
+    )
+
+
+def _map(study: Stability, name: str) -> RegimeMap | None:
+    """None where fewer than two rows were run."""
+    variants = _rows(study, name)
+    cells = [(v, c) for v in variants if (c := _cell(study, v)) is not None]
+    if len(cells) < 2:
+        return None
+    found = [list(points(c, study.results[c.key], study.schemes)) for _, c in cells]
+    panels = tuple(_panel(study, s, [c for _, c in cells], found) for s in study.schemes)
+    shown = tuple(_text(name, v) for v, _ in cells)
+    marks = tuple(_marks(study, name, [v for v, _ in cells]))
+    return RegimeMap(
+        name,
+        f"{study.base.name}: time step against {_LABELS[name].split(' / ')[0]}",
+        "time step / s",
+        _LABELS[name],
+        np.array(cells[0][1].steps),
+        shown,
+        _WORDS,
+        panels,
+        marks,
+        _caption(marks),
+    )
+
+
+def _caption(marks: tuple[Mark, ...]) -> str:
+    hollow = any(not m.on_map for m in marks)
+    more = " Hollow: differs from the base in more than this; see the table." if hollow else ""
+    return f"Line: predicted limit. Marks: the papers' own settings.{more}"
+
+
+def _rows(study: Stability, name: str) -> tuple[Variant, ...]:
+    along = axis(study.base, name)
+    if name not in _BEYOND:
+        return along
+    where, value, after = _BEYOND[name]
+    beyond = _with(study.base.base, where, value)
+    return (*along, beyond) if after and name != "quality" else (beyond, *along)
+
+
+def _with(v: Variant, name: str, value: float) -> Variant:
+    return replace(v, **{name: value})  # type: ignore[arg-type]
+
+
+def _panel(
+    study: Stability, scheme: str, cells: list[VariantCell], found: list[list[Point]]
+) -> Panel:
+    codes = [[REGIMES.index(p.regime) for p in row if p.scheme == scheme] for row in found]
+    results = (study.results[c.key] for c in cells)
+    limits = [next((s.predicted for s in r.schemes if s.scheme == scheme), None) for r in results]
+    border = np.array([np.nan if x is None else x for x in limits])
+    return Panel(scheme, np.array(codes), border)
+
+
+def _marks(study: Stability, name: str, rows: list[Variant]) -> Iterator[Mark]:
+    """Papers' settings whose value of this quantity is a row, or lies between two of E."""
+    for paper in study.base.papers:
+        at = _row_of(name, paper.variant, rows)
+        if at is not None:
+            on_map = any(_alike(paper.variant, v, name) for v in rows)
+            yield Mark(paper.label, paper.dt, at, on_map)
+
+
+def _row_of(name: str, v: Variant, rows: list[Variant]) -> float | None:
+    if name == "E":
+        known = [(i, r.E) for i, r in enumerate(rows) if r.E > 0]
+        indices, logs = [i for i, _ in known], [float(np.log(e)) for _, e in known]
+        return float(np.interp(np.log(v.E), logs, indices))
+    texts = [_text(name, r) for r in rows]
+    own = _text(name, v)
+    return float(texts.index(own)) if own in texts else None
+
+
+def _alike(one: Variant, other: Variant, name: str) -> bool:
+    """Equal, or but for a modulus between two rows of moduli."""
+    return one == other or (name == "E" and replace(one, E=other.E) == other)
+
+
+def _text(name: str, v: Variant) -> str:
+    if name == "damping":
+        return f"{v.mass_damping:g}, {v.stiffness_damping:g}"
+    return f"{getattr(v, name):g}"
+
+
+def _described(v: Variant) -> str:
+    return (
+        f"E {v.E:g} Pa, nu {v.nu:g}, rho {v.rho:g} kg/m3, alpha {v.mass_damping:g} 1/s, beta "
+        f"{v.stiffness_damping:g} s, {v.mesh} cells across"
+    )
+
+
+def _cell(study: Stability, v: Variant) -> VariantCell | None:
+    return next((c for c in study.cells if c.variant == v), None)
+
+
+# --- tables --------------------------------------------------------------------------------------
+
+
+def _limits(study: Stability) -> Exhibit:
+    rows: list[tuple[Entry, ...]] = []
+    for cell in study.cells:
+        for s in study.results[cell.key].schemes:
+            if s.predicted is not None:
+                error = limit_error(s)
+                row = (*variant_row(cell.variant), s.predicted, s.measured, error)
+                rows.append((s.scheme, *row))
+    rows.sort(key=lambda r: -abs(float(r[-1])) if isinstance(r[-1], float) else -np.inf)
+    head = ("scheme", *VARIANT, "predicted limit / s", "measured limit / s", "apart / 1")
+    title = f"Predicted and measured limits: the {min(_WORST, len(rows))} furthest apart"
+    table = NumberTable("limits", f"{title} of {len(rows)}", head, tuple(rows[:_WORST]))
+    return Exhibit("limits", "Limits", (), tables=(table,))
+
+
+def _conditions(study: Stability) -> Exhibit:
+    """Along every axis from the base: what a solver and a linear cell have to bear."""
+    wanted = dict.fromkeys(v for name in _LABELS for v in axis(study.base, name))
+    rows = [
+        (*variant_row(v), *_cost(study.results[c.key]))
+        for v in wanted
+        if (c := _cell(study, v)) is not None
+    ]
+    head = (*VARIANT, "cond K / 1", "cond M / 1", "cond J / 1", "locking factor / 1",
+            "float32 static / 1", f"float32 {STEPS} steps, positions / 1",
+            f"float32 {STEPS} steps, velocities / 1", "warning")  # fmt: skip
+    words = (
+        "Locking factor: compliance under the static load over that of mixed Taylor-Hood elements "
+        "on the same mesh (1: no locking, .1: ten times too stiff). It holds the mesh error, too.",
+        "float32: largest difference from float64 over the largest displacement, of a direct "
+        f"static solution and of {STEPS} explicit steps at 2 % of the limit. J is that of average "
+        "acceleration at the paper's step; M is consistent.",
+    )
+    table = NumberTable("conditions", "Conditioning, locking, single precision", head, tuple(rows))
+    return Exhibit("conditions", "What the cells cost", words, tables=(table,))
+
+
+def _cost(r: VariantResult) -> tuple[Entry, ...]:
+    kept = r.rounding
+    single = (kept.static, kept.positions, kept.velocities) if kept else (None, None, None)
+    conditions = (r.conditions.get(name) for name in ("K", "M", "J"))
+    return (*conditions, r.locking, *single, r.warning or None)
+
+
+def _drifts(study: Stability) -> Exhibit:
+    rows = [
+        (d.scheme, _MM * d.dt, "yes" if SCHEMES[d.scheme].conserves else "no", d.double, d.single)
+        for r in study.results.values()
+        for d in r.drifts
+    ]
+    head = ("scheme", "h / ms", "keeps energy", "energy left, float64 / 1",
+            "energy left, float32 / 1")  # fmt: skip
+    words = (
+        f"Undamped, {_described(drift_variant(study.base))}: all modes stepped {DRIFT_STEPS:g} "
+        "times by their step maps from the same strain energy; explicit schemes at half their "
+        "limit, implicit ones at the paper's step. Explicit schemes keep an energy of half steps.",
+    )
+    table = NumberTable("drift", "Energy after 1e5 steps over that at the start", head, tuple(rows))
+    return Exhibit("drift", "Drift", words, tables=(table,))
+
+
+def _refused(study: Stability) -> Exhibit:
+    rows = [
+        (*variant_row(c.variant), r.refused or r.failed)
+        for c in study.cells
+        if (r := study.results[c.key]).refused or r.failed
+    ]
+    table = NumberTable("refused", "Refused, and why", (*VARIANT, "why"), tuple(rows))
+    return Exhibit("refused", "Refused", (), tables=(table,))

@@ -1,0 +1,256 @@
+"""What a trade shows: front, what each error is made of, set-up, memory, convergence, failures."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.study.held import DEFINITION
+from validate.study.ranking import SAME_TIME
+from validate.study.trade import ERROR, Front, Ladder, Row, Trade
+from validate.study.trade_scene import RUNGS
+
+_MM, _US, _MB = 1e3, 1e6, 1e-6
+_NAMES = {"error": "error", "total": "error with the law's share"}
+_EVEN = 2.0  # of two shares neither dominates within this ratio
+_CASE = ("solver", "element", "mesh", "step / ms")
+_TIMES = (
+    "All cells ran one after another in one process, linear algebra on one thread: times of cells "
+    "side by side would be those of their quarrel over memory. A time is the median of a step plus "
+    "that of forming the displacements of all nodes; a busy machine's clock is noisy, so times "
+    f"within {SAME_TIME:g} times count as the same."
+)
+
+
+def trade_exhibits(trade: Trade) -> tuple[Exhibit, ...]:
+    """In the order of a reader's questions."""
+    found = [_front_exhibit(trade), _shares(trade), _costs(trade), _convergence(trade)]
+    rest = [r for r in trade.rows if r.failed]
+    return (*found, *((_failures(rest),) if rest else ()))
+
+
+def case(row: Row) -> tuple[Entry, ...]:
+    """Which cell it is; a solver without a step of its own has none."""
+    c = row.cell
+    step = _MM * c.dt if c.solver.stepped else None
+    return (c.solver.name, c.element, c.level, step)
+
+
+def millimetres(value: float | None) -> float | None:
+    return None if value is None else _MM * value
+
+
+def dominant(row: Row, trade: Trade) -> str:
+    """Which share of the error is largest: mesh, solver, law, or none clearly."""
+    shares = {"mesh": row.mesh_error, "solver": row.solver_error}
+    if row.cell.solver.law == "linear":
+        shares["law"] = trade.law_error
+    known = sorted(((v, k) for k, v in shares.items() if v is not None), reverse=True)
+    if len(known) < 2 or known[0][0] > _EVEN * known[1][0]:
+        return known[0][1] if known else "unknown"
+    return f"{known[0][1]} and {known[1][1]}"
+
+
+# --- the front -----------------------------------------------------------------------------------
+
+
+def _front_exhibit(trade: Trade) -> Exhibit:
+    scene = trade.scene
+    words = [
+        f"Error: {ERROR}. {len(scene.points)} points, {len(scene.frames)} frames; the reference "
+        f"({scene.reference[0]} mesh {scene.reference[1]}, no solver error) moves "
+        f"{_MM * trade.moved:.4g} mm rms and is itself off by about {_MM * trade.floor:.2g} mm "
+        "(Richardson): smaller errors count as equal.",
+        f"The declared law is linear. On a coarse pair ({trade.law_words}) large strain changes "
+        f"the answer by {_MM * trade.law_error:.3g} mm rms; the second front adds that difference "
+        "to the reference and so holds the linear and the large-strain solvers against one truth.",
+        _TIMES,
+    ]
+    words += [s for by in _NAMES for s in _dominated(trade.front(by))]
+    words += list(scene.notes)
+    fronts = [trade.front(by) for by in _NAMES]
+    return Exhibit(
+        "front", "Error against time per step", tuple(words),
+        tables=tuple(_front_table(f, trade) for f in fronts),
+        charts=tuple(_front_chart(f, trade) for f in fronts),
+    )  # fmt: skip
+
+
+def _dominated(front: Front) -> Iterable[str]:
+    if front.dominated:
+        named = "; ".join(front.dominated)
+        yield f"Dominated by {_NAMES[front.by]}, on every mesh and step tried: {named}."
+
+
+def _front_table(front: Front, trade: Trade) -> NumberTable:
+    head = (*_CASE, "time / us", "rate / Hz", f"{_NAMES[front.by]} / mm", "of the motion / %",
+            "mesh's share / mm", "solver's share / mm", "dominates")  # fmt: skip
+    rows = tuple(_front_row(r, front.by, trade) for r in front.rows)
+    title = f"Pareto front of {_NAMES[front.by]}, fastest first: nothing is less wrong and faster"
+    return NumberTable(f"front_{front.by}", title, head, rows)
+
+
+def _front_row(row: Row, by: str, trade: Trade) -> tuple[Entry, ...]:
+    time, error = row.time_s or 0.0, float(getattr(row, by))
+    return (
+        *case(row), _US * time, 1 / time, _MM * error, 100 * error / trade.moved,
+        millimetres(row.mesh_error), millimetres(row.solver_error), dominant(row, trade),
+    )  # fmt: skip
+
+
+def _front_chart(front: Front, trade: Trade) -> Chart:
+    rows = [*front.rows, *(r for r, _ in front.beaten)]
+    series = []
+    for rung in RUNGS:
+        mine = [r for r in rows if r.cell.solver.rung == rung]
+        if mine:
+            series.append(Series(rung, *_points(mine, front.by), "points"))
+    series.append(Series("Pareto front", *_points(front.rows, front.by)))
+    levels = [("reference", _MM * trade.floor)]
+    if front.by == "total":
+        levels.append(("the law", _MM * trade.law_error))
+    return Chart(
+        f"front_{front.by}", f"{_NAMES[front.by].capitalize()} against time per step",
+        "time of a step with its displacements / us", f"{_NAMES[front.by]} / mm", tuple(series),
+        levels=tuple(levels), log="xy",
+        caption="A point is one solver on one mesh with one element and one step. Levels: the "
+        "reference's own error" + (", what the linear law costs" if len(levels) > 1 else ""),
+    )  # fmt: skip
+
+
+def _points(rows: Sequence[Row], by: str) -> tuple[np.ndarray, np.ndarray]:
+    x = np.array([_US * (r.time_s or 0.0) for r in rows])
+    return x, np.array([_MM * float(getattr(r, by)) for r in rows])
+
+
+# --- what an error is made of --------------------------------------------------------------------
+
+
+def _shares(trade: Trade) -> Exhibit:
+    """Mesh beside solver, for every solver and element over the meshes at its best step."""
+    rows = _least(trade.rows)
+    head = (*_CASE, "unknowns", "error / mm", "mesh's share / mm", "solver's share / mm",
+            "with the law's / mm", "dominates")  # fmt: skip
+    shown = tuple(
+        (*case(r), r.unknowns, millimetres(r.error), millimetres(r.mesh_error),
+         millimetres(r.solver_error), millimetres(r.total), dominant(r, trade))
+        for r in rows
+    )  # fmt: skip
+    counts: dict[str, int] = {}
+    scored = [r for r in trade.rows if r.error is not None]
+    for r in scored:
+        counts[dominant(r, trade)] = counts.get(dominant(r, trade), 0) + 1
+    named = ", ".join(f"{k} {v}" for k, v in sorted(counts.items(), key=lambda kv: -kv[1]))
+    words = (
+        "The mesh's share is the error of a solver that makes none on that mesh, the solver's "
+        "share (time step, masses, damping, iterations, modes left out) the distance from that "
+        "answer. They are lengths in different directions: they add at most, and may cancel.",
+        f"Of {len(scored)} cells the largest share is that of: {named}.",
+    )
+    note = "Of every solver, element and mesh the step with the least error; cells.csv has all."
+    table = NumberTable("shares", "What each error is made of", head, shown, note)
+    return Exhibit("shares", "Mesh error beside solver error", words, tables=(table,),
+                   charts=(_mesh_chart(trade),))  # fmt: skip
+
+
+def _least(rows: Iterable[Row]) -> list[Row]:
+    best: dict[tuple[str, str, int], Row] = {}
+    for r in rows:
+        key = (r.cell.solver.name, r.cell.element, r.cell.level)
+        if r.error is not None and (key not in best or r.error < (best[key].error or 0.0)):
+            best[key] = r
+    return list(best.values())
+
+
+def _mesh_chart(trade: Trade) -> Chart:
+    """Mesh error over the cells' size, one line an element."""
+    series = []
+    for element, levels in trade.scene.meshes.items():
+        found = {r.cell.level: r.mesh_error for r in trade.rows
+                 if r.cell.element == element and r.mesh_error}  # fmt: skip
+        at = [level for level in levels if level in found]
+        if at:
+            x = _MM * np.array([trade.scene.size(level) for level in at])
+            series.append(Series(element, x, _MM * np.array([found[level] for level in at])))
+    return Chart(
+        "mesh_error", "What the mesh costs", "cell size / mm", "mesh's share / mm", tuple(series),
+        levels=(("reference", _MM * trade.floor), ("the law", _MM * trade.law_error)), log="xy",
+    )  # fmt: skip
+
+
+# --- set-up, steps, memory -----------------------------------------------------------------------
+
+
+def _costs(trade: Trade) -> Exhibit:
+    head = (*_CASE, "unknowns", "set-up / ms", "assembled", "p50 / us", "p99 / us", "max / us",
+            "steps timed", "field / us", "memory / MB")  # fmt: skip
+    shortest = {(r.cell.solver.name, r.cell.element, r.cell.level): r
+                for r in trade.rows if r.step is not None}  # fmt: skip
+    shown = tuple(_cost_row(r) for r in shortest.values())
+    words = (
+        "Set-up is from the scene to the first step, at the first of the solver's steps. Matrices "
+        "are assembled when first asked for: K stiffness, M mass, C damping, m lumped masses; a "
+        "solver without inertia has made no mass, an explicit one at large strain no K.",
+        f"Memory: {DEFINITION}.",
+        "The field's time is 0 where a step leaves the displacements of all nodes behind.",
+    )
+    note = "Of every solver, element and mesh one step; cells.csv has all."
+    table = NumberTable("costs", "Set-up, time per step, memory", head, shown, note)
+    return Exhibit("costs", "Set-up, steps and memory", words, tables=(table,))
+
+
+def _cost_row(r: Row) -> tuple[Entry, ...]:
+    assert r.step is not None
+    s = r.step
+    return (
+        *case(r), r.unknowns, _MM * r.setup_s, r.assembled, _US * s.p50, _US * s.p99, _US * s.max,
+        s.n, _US * r.field_s, _MB * r.memory,
+    )  # fmt: skip
+
+
+# --- convergence ---------------------------------------------------------------------------------
+
+
+def _convergence(trade: Trade) -> Exhibit:
+    head = ("ladder", "sizes, finest first", "conduct", "observed order", "order used",
+            "last difference / mm", "Richardson's error / mm", "index (GCI) / mm",
+            "GCI of the motion / %")  # fmt: skip
+    shown = tuple(_ladder_row(x, trade.moved) for x in trade.ladders)
+    words = (
+        "Of the finest answer of each ladder: the observed order from three answers, Richardson's "
+        "estimate of its error, and the grid convergence index, 1.25 times that where the order is "
+        "observed and plausible, else 3 times (Roache 1994; Celik et al. 2008). Two answers show "
+        "no order: the theoretical one is used. Ladders over steps are on one mesh.",
+        _compared(trade.ladders),
+    )
+    table = NumberTable("convergence", "Discretisation error", head, shown)
+    return Exhibit("convergence", "Observed order and grid convergence index", words,
+                   tables=(table,))  # fmt: skip
+
+
+def _compared(ladders: Sequence[Ladder]) -> str:
+    """The meshes' largest and the steps' largest estimate side by side."""
+    meshes = [x.found.error for x in ladders if x.unit == "m"]
+    steps = [x.found.error for x in ladders if x.unit == "s"]
+    if not (meshes and steps):
+        return "The scene has no time steps: the meshes are all there is to refine."
+    return (
+        f"At the finest of each ladder meshes leave {_MM * min(meshes):.2g} to "
+        f"{_MM * max(meshes):.2g} mm, time steps {_MM * min(steps):.2g} to {_MM * max(steps):.2g} "
+        f"mm: refine the {'mesh' if max(meshes) > max(steps) else 'step'} first."
+    )
+
+
+def _ladder_row(x: Ladder, moved: float) -> tuple[Entry, ...]:
+    f, sizes = x.found, ", ".join(f"{_MM * s:.3g}" for s in x.sizes)
+    return (
+        x.what, f"{sizes} m{x.unit}", f.conduct, f.order, f.used, _MM * f.differences[0],
+        _MM * f.error, _MM * f.index, 100 * f.index / moved,
+    )  # fmt: skip
+
+
+def _failures(rows: Sequence[Row]) -> Exhibit:
+    shown = tuple((*case(r), r.failed) for r in rows)
+    table = NumberTable("unscored", "Cells without an error", (*_CASE, "why"), shown)
+    words = (f"{len(rows)} cells were refused, ended early or were timed only; none is hidden.",)
+    return Exhibit("unscored", "Cells without an error", words, tables=(table,))
