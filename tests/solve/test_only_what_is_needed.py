@@ -16,6 +16,7 @@ import validate.solve.equilibrium as equilibrium_module
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.box import box
+from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Material, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
@@ -112,6 +113,11 @@ def test_linear_dynamics_build_no_tangent_and_run_no_pressure_code(
     assert not PRESSURE & set(calls)
     assert calls["stiffness"] == 1
     assert calls["mass"] <= 2  # M, and alpha M of C
+
+
+def test_a_quadratic_body_without_mass_damping_is_lumped_without_a_warning() -> None:
+    scene = block(replace(DENSE, stiffness_damping=0.0))
+    stepped(ExplicitLinear(1e-4), replace(scene, mesh=quadratic(scene.mesh)), 0.01)
 
 
 def test_an_explicit_step_at_large_strain_makes_neither_stiffness_nor_tangent(

@@ -35,6 +35,14 @@ def test_the_fastest_that_meets_both_is_first() -> None:
     assert names(meeting(TABLE, WANTED, "total", dynamic=False)) == ["good", "best"]
 
 
+def test_what_leaves_out_a_part_of_the_scene_is_never_chosen() -> None:
+    cell = TABLE[1].cell
+    dry = replace(TABLE[1], cell=replace(cell, solver=replace(cell.solver, lacks="the fluid")))
+    rows = (dry, TABLE[2])
+    assert names(meeting(rows, WANTED, "total", dynamic=False)) == ["best"]
+    assert nearest(rows, WANTED, "total", dynamic=False) is TABLE[2]
+
+
 def test_limits_count_as_met() -> None:
     edge = (row("edge", 0.5, 1.0),)
     assert names(meeting(edge, WANTED, "total", dynamic=False)) == ["edge"]

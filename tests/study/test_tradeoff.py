@@ -1,10 +1,14 @@
 """A small trade whose answers are known, and fronts and memory by hand."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from validate.cli import trading
+from validate.cli.main import run
 from validate.errors import SceneError, UsageError
 from validate.fem.factor import factorise
 from validate.fem.system import build
@@ -125,6 +129,52 @@ def test_a_trade_is_told_in_numbers_that_are_finite(traded: Trade) -> None:
     choice = choose(traded, wanted("1mm", "1Hz"))
     assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
     assert [c.rung for c in choice.ladder if c.verdict == "nothing ran"] == ["condensed"]
+
+
+@pytest.fixture
+def measured(traded: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line's trade is the one above."""
+    monkeypatch.setattr(trading, "trade_scene", lambda name, quick: traded.scene)
+    monkeypatch.setattr(trading, "trade", lambda scene, **rest: traded)
+
+
+@pytest.mark.usefixtures("measured")
+def test_choose_writes_its_folder_and_exits_by_its_verdict(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["study", "choose", "small", "--rate", "1Hz", "--out", str(tmp_path)]
+    assert run([*asked, "--error", "10mm", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["study"]
+    fastest = min(
+        (c for c in told["cells"] if c["error_m"] is not None and c["with_law_m"] <= 0.01),
+        key=lambda c: c["time_s"],
+    )
+    assert told["pick"]["solver"] == fastest["solver"]
+    assert told["pick"]["time_s"] == fastest["time_s"]
+    assert run([*asked, "--error", "1nm"]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Nothing meets both 1e-06 mm and 1 Hz. Nearest: " in said
+    folder = tmp_path / "small" / "study-choose"
+    assert (folder / "tables" / "cells.csv").is_file()
+    assert (folder / "figures" / "chart_choice.png").is_file()
+
+
+@pytest.mark.usefixtures("measured")
+def test_tradeoff_writes_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["study", "tradeoff", "small", "--out", str(tmp_path)]) == 0
+    assert "the front runs from" in capsys.readouterr().out
+    text = (tmp_path / "small" / "study-tradeoff" / "report.html").read_text(encoding="utf-8")
+    assert "Pareto front of error" in text
+    assert "Observed order and grid convergence index" in text
+
+
+def test_bad_input_exits_with_2_and_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["study", "choose", "bending_rod", "--error", "0.5", "--rate", "1000Hz"]) == 2
+    assert run(["study", "tradeoff", "bending_rood"]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 2
+    assert "as in 0.5mm" in lines[0]
+    assert "bending_rod" in lines[1]
 
 
 def timed(name: str, error: float, time: float, solver: Solver = AVERAGE) -> Row:

@@ -98,6 +98,8 @@ def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
     if scene.mesh.order == 1:
         return np.asarray(M.sum(axis=1), dtype=np.float64).ravel()
     diagonal: Floats = M.diagonal()
+    if not diagonal.any():  # the damping of a body without mass damping
+        return diagonal
     return np.asarray(diagonal * (M.sum() / diagonal.sum()))
 
 

@@ -74,18 +74,8 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     shapes = Exhibit(
         "shapes", "Deformed shapes", maps=tuple(shape_maps(main, ("implicit", "quasi_static"), 1.0))
     )
-    return Told(
-        (
-            shown,
-            shapes,
-            switches,
-            still,
-            dip,
-            _limits(p),
-            _mesh_error(finer, mesh_words(finer, errors)),
-        ),
-        numbers,
-    )
+    mesh = _mesh_error(finer, mesh_words(finer, errors))
+    return Told((shown, shapes, switches, still, dip, _limits(p), mesh), numbers)
 
 
 def _words(errors: Mapping[str, Errors]) -> tuple[str, ...]:
@@ -115,13 +105,13 @@ def _dips() -> tuple[Exhibit, dict[str, float]]:
     for n in _MESHES:
         system = build_system(bending_rod(n))
         tip, static = _tips(system, t)
-        crossing = _first_crossing(t, tip, static)
+        crossing = first_crossing(t, tip, static)
         rows.append((n, len(system.scene.mesh.cells), -1e3 * static, crossing))
         lines.append(Series(f"{2 * n} x {n} x {n}", t, 1e3 * (tip - static)))
         numbers[f"crossing.{n}"] = crossing or 0.0
         numbers[f"static.{n}"] = -static
-    rows.append(("Euler-Bernoulli", None, 1e3 * _beam(shear=False), None))
-    rows.append(("Timoshenko", None, 1e3 * _beam(shear=True), None))
+    rows.append(("Euler-Bernoulli", None, 1e3 * beam(shear=False), None))
+    rows.append(("Timoshenko", None, 1e3 * beam(shear=True), None))
     table = NumberTable(
         "crossing", "First time at which the tip passes below its static place, implicit run.",
         ("cells across", "cells", "static tip / mm", "first crossing / s"), tuple(rows),
@@ -148,7 +138,8 @@ def _tips(system: System, t: Floats) -> tuple[Floats, float]:
     return tip.traces["tip.z"].y, float(still.traces["tip.z"].y[0])
 
 
-def _first_crossing(t: Floats, tip: Floats, static: float) -> float | None:
+def first_crossing(t: Floats, tip: Floats, static: float) -> float | None:
+    """Time s at which the tip (nt,) m first falls below `static` m, between steps; None: never."""
     below = tip < static
     if not below.any():
         return None
@@ -156,7 +147,7 @@ def _first_crossing(t: Floats, tip: Floats, static: float) -> float | None:
     return float(t[k - 1] + (t[k] - t[k - 1]) * (static - tip[k - 1]) / (tip[k] - tip[k - 1]))
 
 
-def _beam(*, shear: bool) -> float:
+def beam(*, shear: bool) -> float:
     """Tip m of a cantilever under its weight; the shear coefficient is Cowper's for a square."""
     assert MP3.rho is not None
     length, b, h = SIZE

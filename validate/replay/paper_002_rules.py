@@ -77,8 +77,8 @@ def rules_exhibit() -> tuple[Exhibit, dict[str, float]]:
         "'2 beta >= gamma >= 1/2' is the rule for the usual beta; the paper's own is twice that, "
         f"so beta = .25, gamma = .5 passes it and is unstable beyond w h = {found[1]:.3f}.",
         "The printed update of u has v at the new time where the old one belongs: unstable from "
-        f"w h = {found[2]:.3f} without damping. The benchmarks' own damping hides it (radii below 1 "
-        "in the second table), and what is left is a wrong path.",
+        f"w h = {found[2]:.3f} without damping. The benchmarks' own damping hides it (radii below "
+        "1 in the second table), and what is left is a wrong path.",
     )
     tables = (table, _misprint_table())
     return Exhibit("rules", "The rules as printed", words, tables, (chart,)), numbers

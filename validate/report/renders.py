@@ -14,7 +14,7 @@ _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
 )
 SIZE = [1100, 760]
-_CELL = {4: 10, 10: 24}  # VTK_TETRA, VTK_QUADRATIC_TETRA: the same local order as ours
+_CELL = {4: 10, 8: 12, 10: 24}  # VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA: local order as ours
 BAR: dict[str, Any] = {
     "vertical": True,
     "height": 0.6,

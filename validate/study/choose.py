@@ -32,7 +32,9 @@ _LOCKS = 0.45  # Poisson ratio from which linear tetrahedra lock noticeably
 _TRIES = 4  # cells that are run again at the rate's own step
 _QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
 
-Meets = Literal["meets both", "too slow", "too wrong", "neither", "nothing ran"]
+_LEFT_OUT = "left out: --declared-law judges the linear law only"
+
+Meets = Literal["meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran"]
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,6 @@ class Choice:
     nearest: Row
     rejected: tuple[str, ...]
 
-    @property
-    def command_holds(self) -> bool:
-        return self.pick is not None
-
 
 def wanted(error: str, rate: str) -> Wanted:
     """`0.5mm` and `1000Hz` in SI; raises `UsageError`, or `RecordingError` for an unknown unit."""
@@ -134,14 +132,15 @@ def misses(row: Row, want: Wanted, by: str, dynamic: bool) -> tuple[float, float
 
 
 def meeting(rows: Sequence[Row], want: Wanted, by: str, dynamic: bool) -> list[Row]:
-    """The rows that meet both, fastest first."""
-    good = [r for r in rows if max(misses(r, want, by, dynamic)) <= 1]
+    """The rows that meet both and leave nothing of the scene out, fastest first."""
+    whole = [r for r in rows if not r.cell.solver.lacks]
+    good = [r for r in whole if max(misses(r, want, by, dynamic)) <= 1]
     return sorted(good, key=lambda r: r.time_s or 0.0)
 
 
 def nearest(rows: Sequence[Row], want: Wanted, by: str, dynamic: bool) -> Row:
     """The row whose worse miss is least; raises `UsageError` when no row has an error."""
-    scored = [r for r in rows if error_of(r, by) is not None]
+    scored = [r for r in rows if error_of(r, by) is not None and not r.cell.solver.lacks]
     if not scored:
         raise UsageError(f"none of {len(rows)} pilot runs has an error; see 'study tradeoff'")
     return min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
@@ -159,7 +158,7 @@ def choose(trade: Trade, want: Wanted, declared_law: bool = False) -> Choice:
             pick, confirmed = row, again
             break
         rejected.append(_refusal(again, by))
-    ladder = tuple(_climbed(rung, rows, want, by, dynamic) for rung in RUNGS)
+    ladder = tuple(_climbed(trade, rung, rows, want, by) for rung in RUNGS)
     closest = nearest(rows, want, by, dynamic)
     return Choice(
         trade, want, by, facts(trade, want), ladder, pick, confirmed, closest, tuple(rejected)
@@ -184,28 +183,36 @@ def _refusal(row: Row, by: str) -> str:
     )
 
 
-def _climbed(rung: Rung, rows: Sequence[Row], want: Wanted, by: str, dynamic: bool) -> Climbed:
+def _climbed(trade: Trade, rung: Rung, rows: Sequence[Row], want: Wanted, by: str) -> Climbed:
+    dynamic = trade.scene.dynamic
     mine = [r for r in rows if r.cell.solver.rung == rung]
     scored = [r for r in mine if error_of(r, by) is not None]
     if not scored:
-        why = _why_not(mine, dynamic)
+        left = rung == "large strain" and len(rows) < len(trade.rows)
+        why = _LEFT_OUT if left else _why_not(mine, dynamic)
         return Climbed(rung, len(mine), 0, None, "nothing ran", why)
+    lacks = scored[0].cell.solver.lacks
+    if lacks:
+        best = min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
+        words = f"{evidence(best, by)}; never chosen: it leaves out {lacks}"
+        return Climbed(rung, len(mine), len(scored), best, "not the scene", words)
     good = meeting(scored, want, by, dynamic)
     best = good[0] if good else nearest(scored, want, by, dynamic)
     wrong, late = misses(best, want, by, dynamic)
     verdict: Meets = "meets both"
     if wrong > 1 or late > 1:
         verdict = "neither" if min(wrong, late) > 1 else "too wrong" if wrong > 1 else "too slow"
-    return Climbed(rung, len(mine), len(scored), best, verdict, evidence(best, by, len(good)))
+    words = f"{evidence(best, by)}; {len(good)} of its cells meet both"
+    return Climbed(rung, len(mine), len(scored), best, verdict, words)
 
 
-def evidence(row: Row, by: str, good: int) -> str:
+def evidence(row: Row, by: str) -> str:
     """What a rung's best row reached, and what its error is made of."""
     error, time = error_of(row, by) or 0.0, row.time_s or np.nan
     words = f"{row.label}: {1e3 * error:.3g} mm at {1 / time:.3g} Hz"
     if row.solver_error is not None and row.mesh_error is not None:
         words += f" (mesh {1e3 * row.mesh_error:.3g} mm, solver {1e3 * row.solver_error:.3g} mm)"
-    return f"{words}; {good} of its cells meet both"
+    return words
 
 
 def _why_not(mine: Sequence[Row], dynamic: bool) -> str:

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
-from validate.study.choose import Choice, error_of, misses
+from validate.study.choose import Choice, error_of, meeting, misses
+from validate.study.ranking import SAME_TIME
 from validate.study.trade import Row
 from validate.study.trade_exhibits import trade_exhibits
 
@@ -29,6 +30,7 @@ def words(choice: Choice) -> Iterator[str]:
     if choice.pick is not None:
         yield f"{described(choice.pick, choice)} meets {asked}: the fastest cell that does."
         yield from _confirmed(choice)
+        yield from _as_fast(choice)
     else:
         yield f"Nothing meets both {asked}."
         yield f"Nearest: {described(choice.nearest, choice)}; {_missed(choice)}."
@@ -55,6 +57,25 @@ def _confirmed(choice: Choice) -> Iterator[str]:
         yield "Its own step is no longer than a tick of the rate."
 
 
+def _as_fast(choice: Choice) -> Iterator[str]:
+    """A cell of less error whose time the clock can hardly tell from the pick's."""
+    assert choice.pick is not None
+    dynamic = choice.trade.scene.dynamic
+    limit = SAME_TIME * (choice.pick.time_s or 0.0)
+    rows = [r for r in _judged(choice) if (r.time_s or 0.0) <= limit]
+    equal = meeting(rows, choice.wanted, choice.by, dynamic)
+    best = min(equal, key=lambda r: error_of(r, choice.by) or 0.0, default=choice.pick)
+    if best is not choice.pick:
+        yield f"Within {SAME_TIME:g} times its time and less wrong: {described(best, choice)}."
+
+
+def _judged(choice: Choice) -> list[Row]:
+    """The rows that may be chosen."""
+    laws = ("linear",) if choice.by == "error" else ("linear", "neo_hooke")
+    rows = [r for r in choice.trade.rows if r.cell.solver.law in laws]
+    return [r for r in rows if not r.cell.solver.lacks]
+
+
 def _missed(choice: Choice) -> str:
     wrong, late = misses(choice.nearest, choice.wanted, choice.by, choice.trade.scene.dynamic)
     if max(wrong, late) <= 1:
@@ -66,7 +87,7 @@ def _missed(choice: Choice) -> str:
 
 def _one_sided(choice: Choice) -> Iterator[str]:
     dynamic = choice.trade.scene.dynamic
-    miss = [(misses(r, choice.wanted, choice.by, dynamic), r) for r in choice.trade.rows]
+    miss = [(misses(r, choice.wanted, choice.by, dynamic), r) for r in _judged(choice)]
     exact = [r for (wrong, _), r in miss if wrong <= 1]
     quick = [(wrong, r) for (wrong, late), r in miss if late <= 1]
     if exact:

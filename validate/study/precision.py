@@ -90,9 +90,10 @@ def drift(scheme: Stepping, h: float, omegas: Floats) -> Drift:
     for kind in (np.float64, np.float32):
         state = start.astype(kind)
         steps = np.ascontiguousarray(maps.astype(kind).transpose(1, 2, 0))
-        for _ in range(DRIFT_STEPS):
-            state = (steps * state).sum(axis=1)
-        energy = _energy(scheme, rates.x, state.astype(np.float64))
+        with np.errstate(over="ignore", invalid="ignore"):  # growth ends in None
+            for _ in range(DRIFT_STEPS):
+                state = (steps * state).sum(axis=1)
+            energy = _energy(scheme, rates.x, state.astype(np.float64))
         ratio = energy / _energy(scheme, rates.x, start)
         found.append(float(ratio) if np.isfinite(ratio) else None)
     return Drift(scheme.name, h, *found)

@@ -26,7 +26,8 @@ class Solver:
 
     It runs on `elements` (none: all) at meshes up to `finest` (0: all) and down to `shortest`
     steps (0: all): slow baselines need no fine ones. `law` is what its scenes are made of; `order`
-    that of its error in dt.
+    that of its error in dt. `lacks`: what the scene has and it leaves out; it is run as evidence
+    and never chosen.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Solver:
     finest: int = 0
     shortest: float = 0.0
     order: float = 2.0
+    lacks: str = ""
 
     def takes(self, element: str, level: int, dt: float) -> bool:
         known = not self.elements or element in self.elements

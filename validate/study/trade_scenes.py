@@ -229,7 +229,7 @@ def _phantom_solvers(rise: float) -> tuple[Solver, ...]:
     table = lambda dt: Tabulated(StaticNewton(), _TABLE)  # noqa: E731
     return (
         Solver("superposition, cavity empty", "static superposition", lambda dt: NoFluid(),
-               stepped=False),
+               stepped=False, lacks="the fluid and its pressure"),
         Solver("condensed, exact pressure", "condensed", lambda dt: ExactPressure(), stepped=False),
         Solver("condensed, paper's loop at 1 %", "condensed", lambda dt: PressureLoop(),
                stepped=False),

@@ -1,0 +1,91 @@
+"""The block and the needle: the road in the plane, its checks, and all its claims (slow)."""
+
+import numpy as np
+import pytest
+
+from validate.compare.result import MethodResult, Result
+from validate.errors import RegistrationError
+from validate.recording.types import Markers
+from validate.register.observe import observe_markers
+from validate.replay import compare, load
+from validate.replay.tracking import Tracking
+from validate.scene.box import grid
+
+
+@pytest.fixture(scope="module")
+def experiment(project_root) -> Tracking:  # type: ignore[no-untyped-def]
+    return load(str(project_root / "experiments" / "needle_block.py"))  # type: ignore[return-value]
+
+
+@pytest.fixture(scope="module")
+def quick(experiment: Tracking) -> Result:
+    return compare(experiment, {}, ("implicit", "explicit", "explicit_lagged"), quick=True)
+
+
+def method(result: Result, name: str) -> MethodResult:
+    return next(m for m in result.methods if m.name == name)
+
+
+def test_the_explicit_run_agrees_with_markers_of_the_implicit_one(quick: Result) -> None:
+    assert quick.passed
+    assert [c.count for c in quick.checks] == [300, 300]
+    assert all(c.u_val > 0 for c in quick.checks)
+
+
+def test_markers_of_a_plane_body_have_two_coordinates(quick: Result) -> None:
+    seen = method(quick, "implicit").registered[0].markers
+    assert seen is not None
+    assert seen.x.shape == (301, 6, 2)
+    assert seen.rest[seen.names.index("inside")] == pytest.approx([0.75, 0.5])
+    off = method(quick, "implicit").residuals["inside@all"].values
+    assert off.shape == (300, 2)
+    assert off.std() == pytest.approx(1e-4, rel=0.1)  # the markers' noise and nothing else
+
+
+def test_damping_that_is_dropped_is_seen(experiment: Tracking) -> None:
+    values = {"methods.explicit.settings.damping_terms": "mass"}
+    result = compare(experiment, values, ("explicit",), quick=True)
+    assert not result.passed
+    assert {c.verdict for c in result.checks} == {"differs"}
+
+
+def test_lagged_damping_is_refused_at_the_papers_step(quick: Result) -> None:
+    """n = 20, lumped: 1.8949e-2 s (an independent reconstruction) against 1/30 s."""
+    outcome = method(quick, "explicit_lagged").run.outcome
+    assert outcome.state == "refused"
+    assert "1.759 times the critical step 0.01895 s" in outcome.why
+
+
+def test_a_marker_outside_a_plane_mesh_is_refused() -> None:
+    rest = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.7, 0.0], [1.5, 0.4, 0.0]])
+    names = ("a", "b", "c", "d")
+    markers = Markers(np.array([0.0, 1.0]), names, np.stack([rest, rest]), 1e-4, "camera")
+    layout = dict(zip(names, rest, strict=True))
+    up = (np.array([0.0, 0.0, 1.0]),) * 2
+    with pytest.raises(RegistrationError, match="outside"):
+        observe_markers(
+            markers, layout, grid((1.0, 1.0), (2, 2)),
+            method="rigid", sampling="barycentric", up=up,
+        )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_all_claims_stand(experiment: Tracking) -> None:
+    """The numbers of an independent reconstruction of paper 002, by way of the report's tables."""
+    result = compare(experiment)
+    assert result.passed
+    assert [(p.name, p.fault) for p in result.published if p.fault] == []
+    assert len(result.published) == 10
+    tables = {t.name: t for e in result.exhibits for t in e.tables}
+    rows = {(r[0], r[1]): r[2:] for r in tables["solver_errors"].rows}
+    assert rows["explicit, lumped M, C = αM", "E_n / 1"] == pytest.approx(
+        (0.1290, 0.0731, 0.0259, 0.0294, 0.0157, 0.0024), abs=6e-5
+    )
+    assert rows["quasi-static", "E_n / 1"] == pytest.approx(
+        (1.352, 0.7986, 0.3194, 0.0741, 0.0302, 0.0021), abs=6e-5, rel=4e-4
+    )
+    slopes = [r[3] for r in tables["needle_force"].rows]
+    exact = 2 * (1 - 0.47**2) / (np.pi * 200)  # 2 (1 - nu^2)/(pi E), plane strain
+    assert slopes[2] == pytest.approx(exact, rel=2e-3)
+    told = next(e for e in result.exhibits if e.anchor == "mesh-error").words[1]
+    assert "93 % of a mixed reference's motion with MP1 and 76 % with MP2" in told
