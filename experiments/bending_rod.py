@@ -89,6 +89,7 @@ EXPERIMENT = Tracking(
     published=rod_published,
     frames=FRAMES,
     same_model=True,
+    remake=("body.", "clock.", "twin."),
     seed=TwinCard().seed,
     twin_notice=(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "

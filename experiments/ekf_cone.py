@@ -224,7 +224,8 @@ def _pushed(markers: MarkerObservation, cell: Signal, scale: float) -> Registere
     t = cell.t[later]
     slope = float(t @ cell.y[later, 0] / (t @ t))
     stage = Signal(t / scale, (slope * t)[:, None], "N", cell.sd, "machine")
-    return Registered(stage, _ends(stage), replace(markers, t=markers.t / scale), None, ())
+    scaled = replace(markers, t=markers.t / scale)
+    return Registered(stage, _ends(stage), scaled, None, (), time_scale=scale)
 
 
 def _ends(stage: Signal) -> tuple[Hold, Hold]:

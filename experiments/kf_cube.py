@@ -42,7 +42,14 @@ from validate.solve.march import march, output_frames
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.types import Run, Stepper
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracked import (
+    Camera,
+    Origin,
+    Reading,
+    points_of,
+    record_tracked,
+    require_noise,
+)
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "kf_cube.mcap"
 NODES = {"node_A": (2, 2, 7), "node_B": (2, 2, 5), "corner": (0, 0, 7)}  # in cells
@@ -94,6 +101,9 @@ class TwinCard:
     finer: int = quantity(1, "1", "its steps in one of the models'")
     every: int = quantity(1, "1", "steps between two looks of the tracker")
     missing: float = quantity(0.0, "1", "share of the looks at which a marker is not seen")
+
+    def __post_init__(self) -> None:
+        require_noise(self.noise)
 
 
 @dataclass(frozen=True)
@@ -312,6 +322,11 @@ EXPERIMENT = Tracking(
     cases=CASES,
     tell=tell,
     published=published,
+    remake=("twin.", "clock.", "body.", "loading.traction", "loading.off"),
+    captions={
+        "displacement_node_A": "As Figs. 3 and 4 of paper 001: what was measured, FEM and KF-FEM.",
+        "displacement_node_B": "As Fig. 5 of paper 001: a node 2 mm below, given to no filter.",
+    },
     same_model=True,
     seed=TwinCard().seed,
     twin_notice="The recording is a twin: the same mesh and law as the models, plus white noise.",

@@ -1,8 +1,8 @@
 """The block of paper 001 made ten times as large and lightly damped, so that inertia matters.
 
 The paper's own block creeps: every mode has the same time constant of 0.1 s, and no integrator can
-be told from another. Here the traction is switched on and released, the block swings at 4 Hz, and
-the twin takes ten steps in one of the models'.
+be told from another. Here the traction is switched on and released, the block swings along
+its axis at 12 Hz, and the twin takes ten steps in one of the models'.
 """
 
 from dataclasses import replace
@@ -70,6 +70,7 @@ EXPERIMENT = replace(
     twin_notice=(
         "The recording is a twin: the same mesh and law as the models, ten of its steps in one of "
         "theirs, plus white noise. Models know the load at the ends of their steps only, so a load "
-        "that is switched acts up to half a step late: that is most of the plain models' error."
+        "that is switched acts up to half a step late: most of the plain models' error, and no "
+        "part of u_num here."
     ),
 )

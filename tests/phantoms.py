@@ -30,7 +30,7 @@ def phantom_scene(
     bonded: bool = False,
     dilatation: Dilatation = "pointwise",
 ) -> Scene:
-    """The set-up of science note 000: stage driven along -x, rigid modes removed."""
+    """The set-up of paper 000: stage driven along -x, rigid modes removed."""
     supports = [Support("probe_plate", (0,)), Support("bottom", (1,))]
     if bonded:
         supports = [Support("probe_plate", (0, 1, 2)), Support("stage_plate", (1, 2))]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.measured import measurements
 from validate.fem.system import build as build_system
@@ -108,7 +109,8 @@ def stepper(method, p, system, seen):
 
 EXPERIMENT = Tracking(
     name="pulled", title="A pulled block", source="made for tests", parameters=Parameters(),
-    methods={"kf": Filter(), "plain": Solver()}, accepted=("kf",), accept=(), same_model=True,
+    methods={"kf": Filter(), "plain": Solver()}, accepted=("kf",),
+    accept=(Accept("top", 1e-3, "made for tests"),), same_model=True,
     load=lambda p, folder: (record(p, lambda _: None),), record=record, truth=truth,
     build=lambda recording, p, method: scene(1e4), place=place, stepper=stepper, axis="z",
     reference="plain", seed=5,

@@ -57,11 +57,23 @@ def test_the_best_line_is_the_best_cell(made: Path) -> None:
     cells = [c for c in scored if c["values"]["twin.noise"] == noise]
     first = min(cells, key=lambda c: c["scores"]["all.rmse"]["mean"])
     assert first["values"] == values
-    assert words[-2:] == ["--methods", "kf"]
+    assert words[-2:] == ["--methods", "kf,plain"]
     scores = compare(load_file(made / "experiments" / "pulled.py"), Options(values, ("kf",)))
     rmse = {s.name: s.value for s in scores.methods[0].scores}["top.rmse"]
     found = first["scores"]["top.rmse"]
     assert abs(rmse - found["mean"]) < 3 * found["half_95"]  # one seed of three
+
+
+def test_the_best_line_decides_and_names_what_decides(
+    made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = made / "reports" / "pulled" / "study-filters"
+    told = json.loads((folder / "results.json").read_text("utf-8"))["study"]
+    monkeypatch.chdir(made)
+    words = shlex.split(told["best"][0]["command"])
+    assert run(words[1:]) == 0
+    assert "top" in capsys.readouterr().out
+    assert run([*words[1:-1], "plain"]) == 1  # no check of its own: nothing is decided
 
 
 def test_a_finished_study_is_not_run_again(

@@ -24,7 +24,7 @@ TOP, BELOW, CORNER = "top", "below", "corner"
 
 @cache
 def cube(E: float = 1e4, shape: tuple = SMALL) -> System:  # type: ignore[type-arg]
-    """Science note 001: E Pa, nu .47, rho 1068, stiffness damping .1 s, pulled at the top."""
+    """An earlier study: E Pa, nu .47, rho 1068, stiffness damping .1 s, pulled at the top."""
     (x, y, z), _ = shape
     probes = ((TOP, (x / 2, y / 2, z)), (BELOW, (x / 2, y / 2, z - 0.002)), (CORNER, (0.0, 0.0, z)))
     return build(

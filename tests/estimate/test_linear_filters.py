@@ -1,4 +1,4 @@
-"""KF-FEM against itself in other coordinates, filterpy, chi-square, and science note 001."""
+"""KF-FEM against itself in other coordinates, filterpy, chi-square, and an earlier study."""
 
 from dataclasses import replace
 
@@ -224,7 +224,7 @@ def test_truth_of_the_filters_own_model_is_consistent(
     """NIS of all steps and NEES at the independent ends lie in their 99.9 % bands.
 
     The error of a filter whose truth follows its own model is e' = A e + w, whatever the inputs.
-    Science note 001 on the paper's cube: 2.997 of 3 and 526.6 of 525.
+    An earlier study on the paper's cube: 2.997 of 3 and 526.6 of 525.
     """
     pulled = case(steps, shape)
     stepper = KfFem(gains="every_step").prepare(pulled.system, pulled.measured(1))
@@ -247,7 +247,7 @@ def test_truth_of_the_filters_own_model_is_consistent(
 
 
 def test_tiny_noise_keeps_the_claim_positive_and_nis_flags_it(pulled: Case) -> None:
-    """R of 1e-12 mm^2 against noise of .001 mm^2 (science note 001, extremes)."""
+    """R of 1e-12 mm^2 against noise of .001 mm^2 (an extreme)."""
     seen = pulled.measured(1)
     for settings in (KfFem(gains="every_step", R=1e-18), ModalKf(R=1e-18, Q=1e-13)):
         stepper = settings.prepare(pulled.system, seen)
@@ -368,7 +368,7 @@ def test_a_wrong_modulus_is_mended_where_the_noise_model_reaches(pulled: Case) -
     assert scale.traces["load.scale"].y[-1] == pytest.approx(1.2, abs=0.05)
 
 
-PAPER_TABLE = (  # Q mm^2, NRMSE of science note 001 (v, a from the prior)
+PAPER_TABLE = (  # Q mm^2, NRMSE of an earlier study (v, a from the prior)
     (1e-6, 0.00163), (1e-5, 0.00339), (1e-4, 0.00656),
     (1e-3, 0.01146), (1e-2, 0.01586), (1e-1, 0.01708),
 )  # fmt: skip
@@ -404,7 +404,7 @@ def test_the_papers_figure_needs_v_and_a_from_the_prior() -> None:
 
 @pytest.mark.slow
 def test_the_papers_cube_with_a_wrong_modulus() -> None:
-    """Science note 001: plain 15.7 % everywhere; white 1.2 %, 15.68 % below; rank 1 1.1-1.2 %;
+    """An earlier study: plain 15.7 % everywhere; white 1.2 %, 15.68 % below; rank 1 1.1-1.2 %;
     two states .3 %."""
     pulled = case(500, PAPER)
     wrong, seen = cube(1.2e4, PAPER), pulled.measured(3)

@@ -110,7 +110,7 @@ def _by_filterpy(
 
 @pytest.mark.parametrize("block", ["component", "node"])
 def test_the_printed_gain_at_the_measured_node_is_99_percent(system: System, block: Any) -> None:
-    """P = K R after an update: .990 leaves 99 % of the noise in (science note 003)."""
+    """P = K R after an update: .990 leaves 99 % of the noise in."""
     inputs = ramp(H, 120, 0.5, 0.04)
     truth = plain(system, H, inputs)
     a = node_a(system)
@@ -198,7 +198,7 @@ def test_a_late_first_measurement_leaves_nothing_of_the_printed_covariance(
 def test_measured_every_few_steps_it_diverges_unless_both_states_are_corrected(
     system: System, every: int
 ) -> None:
-    """Correcting U_t alone is a kick of y/dt at every measurement (science note 003)."""
+    """Correcting U_t alone is a kick of y/dt at every measurement."""
     inputs = ramp(H, 500, 0.5, 0.1)
     truth = plain(system, H, inputs)
     measured = noisy(system, truth, [node_a(system)], every)

@@ -187,7 +187,7 @@ FORMS = {
 def test_one_measured_node_corrects_the_whole_field_of_a_wrong_model(
     wrong_model: tuple[System, Floats, Measurements, Floats], form: str
 ) -> None:
-    """E 25 % too stiff, one node at 200 Hz (science note 003): at least an eighth of the error,
+    """E 25 % too stiff, one node at 200 Hz: at least an eighth of the error,
     at all nodes, and a bias of a quarter of the load."""
     stiff, truth, measured, inputs = wrong_model
     settings = FORMS[form]

@@ -91,7 +91,7 @@ def test_unknowns_are_node_major(order: int, dilatation: Dilatation) -> None:
 
 
 def test_cube_oracle() -> None:
-    """Science note 002: 5 x 5 x 8 nodes at 1 mm, z = 0 fixed, 3000 Pa on top, E 1e4, nu .47."""
+    """An earlier study: 5 x 5 x 8 nodes at 1 mm, z = 0 fixed, 3000 Pa on top, E 1e4, nu .47."""
     mesh = grid_mesh((5, 5, 8), (4e-3, 4e-3, 7e-3))
     K = stiffness(Scene(mesh, Material(1e4, 0.47)))
     load = np.zeros_like(mesh.nodes)

@@ -1,4 +1,4 @@
-"""The critical step: dense eigenvalues, one cell, slivers, the numbers of science note 003."""
+"""The critical step: dense eigenvalues, one cell, slivers, an earlier study of paper 003."""
 
 from dataclasses import replace
 from itertools import product
@@ -146,7 +146,7 @@ def five_tets(n: int, size: float) -> Mesh:
 
 
 def test_eq_16_is_no_safe_step_on_a_regular_mesh() -> None:
-    """Science note 003: the least altitude allows 283 us, the limit is 268.7 us."""
+    """An earlier study: the least altitude allows 283 us, the limit is 268.7 us."""
     found = critical_step(build(Scene(five_tets(9, 0.1), GEL, HELD)))
     assert found.eq_16_altitude == pytest.approx(283e-6, abs=0.5e-6)
     assert found.lanczos == pytest.approx(268.7e-6, abs=0.05e-6)
@@ -156,7 +156,7 @@ def test_eq_16_is_no_safe_step_on_a_regular_mesh() -> None:
 
 
 def test_frequencies_of_paper_001s_block() -> None:
-    """Science note 001: 264.08 and 43191 rad/s with the consistent mass."""
+    """An earlier study: 264.08 and 43191 rad/s with the consistent mass."""
     mesh = box((0.004, 0.004, 0.007), (4, 4, 7))
     lowest, highest = frequency_range(build(Scene(mesh, Material(1e4, 0.47, rho=1068.0), HELD)))
     assert lowest == pytest.approx(264.08, abs=0.005)
@@ -164,7 +164,7 @@ def test_frequencies_of_paper_001s_block() -> None:
 
 
 def test_the_limit_of_a_stretched_body_is_lower() -> None:
-    """St. Venant-Kirchhoff at a stretch of 1.3 in every direction: -38 % (science note 003)."""
+    """St. Venant-Kirchhoff at a stretch of 1.3 in every direction: -38 % (an earlier study)."""
     scene = replace(block().scene, material=replace(GEL, law="svk"))
     system, body = build(scene), Body(scene)
     free, masses = system.free, system.masses[system.free]

@@ -79,7 +79,7 @@ def test_zero_pivots_are_refused() -> None:
 
 @pytest.mark.parametrize("drop", ["pin", "bottom", "probe_plate"])
 def test_body_that_can_move_rigidly_is_refused(drop: str) -> None:
-    """The missing z pin of science note 000 is silent in the library."""
+    """The missing z pin of paper 000's set-up is silent in the library."""
     scene = phantom_scene(phantom_mesh((5, 5, 6)))
     if drop == "pin":
         loose = Scene(scene.mesh, scene.material, scene.supports, (), scene.drives)

@@ -184,7 +184,7 @@ def _disordered(mesh: Mesh, rng: np.random.Generator) -> Mesh:
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 def test_uniaxial_saint_venant_kirchhoff(nu: float) -> None:
-    """Science note 003: slipping plates, P = E lambda (lambda^2 - 1) / 2 for any nu."""
+    """An earlier study: slipping plates, P = E lambda (lambda^2 - 1) / 2 for any nu."""
     law = law_of(Material(30e3, nu, "svk"))
     for stretch, newton in ((0.9, -25.65), (0.8, -43.20)):
         side = np.sqrt(1 - nu * (stretch**2 - 1))

@@ -223,7 +223,7 @@ def static(system: System, newtons: float) -> Floats:
 
 
 def test_the_cube_that_six_codes_agree_on() -> None:
-    """Science note 002: NGSolve, GetFEM, MFEM, felupe, OpenSees, scikit-fem, to 4e-16 m."""
+    """An earlier study: NGSolve, GetFEM, MFEM, felupe, OpenSees, scikit-fem, to 4e-16 m."""
     u = static(cube(), 3000 * 16e-6)
     corner = [6.7129710205e-4, 6.7129710205e-4, 2.1343991963e-3]
     middle = [3.8851967165e-4, 3.8851967165e-4, 1.8707896467e-3]
@@ -233,7 +233,7 @@ def test_the_cube_that_six_codes_agree_on() -> None:
 
 
 def test_the_cubes_other_readings() -> None:
-    """Science note 001: equal nodal forces 1.7333 mm; quadratic cells 1.98789 and 1.38692 mm."""
+    """An earlier study: equal nodal forces 1.7333 mm; quadratic cells 1.98789 and 1.38692 mm."""
     assert static(cube(spread="nodal"), 3000 * 16e-6)[187, 2] == pytest.approx(1.7333e-3, abs=5e-8)
     u = static(cube(2), 3000 * 16e-6)
     assert u[[187, 137], 2] == pytest.approx([1.98789e-3, 1.38692e-3], abs=5e-9)

@@ -1,4 +1,4 @@
-"""The plane block of paper 000, Fig. 4: counts, slope, gain and pressures of the science note."""
+"""The plane block of paper 000, Fig. 4: counts, slope, gain and pressures computed apart."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def slope(r: Responses) -> float:
 
 
 def test_the_block_of_the_note() -> None:
-    """Science note 000, Block, a = 10 mm, N = 50."""
+    """An earlier study, Block, a = 10 mm, N = 50."""
     r = block(50)
     mesh = r.scene.mesh
     assert (len(mesh.nodes), len(mesh.facets["cavity"])) == (2520, 40)

@@ -150,7 +150,7 @@ def test_work_of_the_plate_is_strain_energy() -> None:
 
 
 def test_work_of_the_pressure_is_strain_energy() -> None:
-    """Compliance dV/dP = u_p . K u_p > 0: f_p . u_p of the science note, by the volume form."""
+    """Compliance dV/dP = u_p . K u_p > 0: f_p . u_p, by the volume form."""
     r, K = phantom_responses(COARSE_GRID), build(phantom_scene(phantom_mesh(COARSE_GRID))).K
     u = r.fields[1].ravel()
     assert u @ (K @ u) == pytest.approx(3 * r.volumes[0, 0, 0, 2], rel=1e-11)

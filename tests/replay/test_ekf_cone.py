@@ -183,7 +183,7 @@ def test_the_recordings_are_what_the_twin_records(cone: Tracking) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(cone: Tracking) -> None:
-    """Locking at nu .4995 is ours; science note 003 has .855 and .460 at .49 and .499 on its mesh
+    """Locking at nu .4995 is ours; an earlier study has .855 and .460 at .49 and .499 on its mesh
     with slipping plates, ours are bonded."""
     found = compare_with(cone, Options({}))
     assert found.passed

@@ -1,6 +1,7 @@
 """Paper 003's cube: what the printed step and filter do, and what our recording says of them.
 
-Numbers from science note 003 hold for its own meshes; ours stand beside with their tolerance.
+Numbers from an earlier study of the paper hold for its own meshes; ours stand beside with their
+tolerance.
 """
 
 from dataclasses import replace
@@ -19,7 +20,7 @@ from validate.replay.run import compare as compare_with
 from validate.replay.tracking import Tracking
 from validate.scene.scene import Scene
 
-STEP = 0.29447e-3  # s, critical on the shipped mesh (ours); the note's is 0.24 ms on its own
+STEP = 0.29447e-3  # s, critical on the shipped mesh (ours); an earlier study's is 0.24 ms on its own
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_the_printed_step_is_refused_with_its_ratio(printed: Result) -> None:
 
 
 def test_the_printed_step_diverges_about_step_10_with_finite_traces(printed: Result) -> None:
-    """Science note 003: 4 times its critical step, non-finite at step 10."""
+    """An earlier study: 4 times its critical step, non-finite at step 10."""
     run = of(printed, "nfem_printed_run").run
     assert run.outcome.state == "diverged"
     assert 8 <= run.outcome.step <= 12
@@ -124,7 +125,7 @@ def test_table_1_stands_beside_ours_and_is_not_called_reproduced(printed: Result
 
 
 def test_only_a_reduced_filter_corrects_a_node_that_nobody_measures(stiff: Result) -> None:
-    """Science note 003: node-level filters transfer nothing, 20 modes and a load bias do. Ours
+    """An earlier study: node-level filters transfer nothing, 20 modes and a load bias do. Ours
     leave .87 and .34 of the plain error under a ramp."""
     plain = scores(stiff, "nfem")["node_B.rmse@stiff_model_200Hz"]
     node = scores(stiff, "ekf_companion")["node_B.rmse@stiff_model_200Hz"]
@@ -165,7 +166,7 @@ def test_the_whole_experiment_stands(cube: Tracking) -> None:
     assert not [(p.name, p.fault) for p in result.published if p.fault]
     tables = {t.name: t for e in result.exhibits for t in e.tables}
     rows = {row[0]: row for row in tables["force_readings"].rows}
-    # Science note 003, on its own P1 mesh: A .310 mm, B .392; other meshes .298-.317, .393-.451.
+    # An earlier study, on its own P1 mesh: A .310 mm, B .392; other meshes .298-.317, .393-.451.
     assert rows["consistent"][2] == pytest.approx(0.310, rel=0.01)
     assert 0.38 < float(rows["consistent"][3] or 0) < 0.46
     locked = {row[0]: row[1] for row in tables["locking"].rows}

@@ -52,7 +52,7 @@ def test_rivals_are_told_apart_by_pressure_and_outline(phantom_result: Result) -
 
 
 def test_the_error_budget_of_the_9_mm_contour(phantom_result: Result) -> None:
-    """Largest change of the contour, mm, ours. The science note's centred phantom, with its own
+    """Largest change of the contour, mm, ours. The earlier study's centred phantom, with its own
     sampling of the contour, has 0.51, 0.47, 0.33, 0.59, 0.12, 0.15 in this order."""
     budget = {
         e.name: 1e3 * next(c.max for c in e.changes if c.name == "contour@9mm")
@@ -93,7 +93,7 @@ def test_the_twin_is_not_judged_by_its_own_mesh(phantom_result: Result) -> None:
 
 
 def test_the_1328_node_mesh_of_the_note_is_reached_by_set(phantom: Experiment) -> None:
-    """Science note 000, PH-1328, P1, slip: P 480 / 1101 / 1865 Pa, force 6.99 N at 9 mm."""
+    """An earlier study, PH-1328, P1, slip: P 480 / 1101 / 1865 Pa, force 6.99 N at 9 mm."""
     result = compare(phantom, Options(PH_1328, ("p1_fluid",)))
     mesh = result.methods[0].scene.mesh
     assert (len(mesh.nodes), len(mesh.cells), len(mesh.facet_nodes("cavity"))) == (1328, 5748, 80)

@@ -25,7 +25,7 @@ def found(result: Result, method: str, name: str) -> float:
 
 
 def test_a_linear_model_misses_the_force_and_hardly_the_contour(cheap: Result) -> None:
-    """Science note 000: force -15 %, pressure +8 %, contour 0.05-0.09 mm, vertical 0.3 mm."""
+    """An earlier study: force -15 %, pressure +8 %, contour 0.05-0.09 mm, vertical 0.3 mm."""
     measured = found(cheap, "md_fluid", "force.plate.measured@9mm")
     assert found(cheap, "md_fluid", "force.plate@9mm") / measured == pytest.approx(-0.15, abs=0.02)
     assert found(cheap, "md_neo_hooke", "force.plate@9mm") / measured == pytest.approx(0, abs=0.02)

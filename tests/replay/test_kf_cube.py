@@ -1,8 +1,8 @@
 """Paper 001's block: its printed figures beside ours, and the error that it leaves elsewhere.
 
-Numbers are those of science note 001. Its wrong model is 20 % stiffer than a truth of 10 kPa; here
-the truth is softer than a model of 10 kPa, which is the same experiment with 1.2 times the range:
-noise in NRMSE is 1/1.2 of the note's, the models' own error is not.
+Numbers are those of an earlier study of the paper. Its wrong model is 20 % stiffer than a truth of
+10 kPa; here the truth is softer than a model of 10 kPa, which is the same experiment with 1.2 times
+the range: noise in NRMSE is 1/1.2 of that study's, the models' own error is not.
 """
 
 from collections.abc import Iterator
@@ -79,7 +79,7 @@ def test_the_block_has_the_printed_mesh_and_the_notes_displacements(some: Result
 
 
 def test_the_printed_error_and_what_noise_is_left_over_50_seeds(some: Result) -> None:
-    """NRMSE .01146 +- .0004 of the note, two thirds of the measurement's .0172."""
+    """NRMSE .01146 +- .0004 of an earlier study, two thirds of the measurement's .0172."""
     found = figures(some)
     mean = found["NRMSE at the observation point"]
     assert mean.ours == pytest.approx(0.01146, abs=4e-4)

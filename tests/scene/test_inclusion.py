@@ -1,4 +1,4 @@
-"""The block with a capsule-shaped hole: the mesh of science note 000 and what is refused."""
+"""The block with a capsule-shaped hole: the mesh of paper 000 and what is refused."""
 
 import numpy as np
 import pytest

@@ -23,7 +23,7 @@ def cube(
     order: int = 1,
     dilatation: Dilatation = "pointwise",
 ) -> Scene:
-    """The cube of science note 003: 0.1 m, E 30 kPa, pressed from above by slipping plates."""
+    """The cube of paper 003: 0.1 m, E 30 kPa, pressed from above by slipping plates."""
     mesh = grid_mesh((n, n, n), 3 * (SIDE,), kind="tet10" if order == 2 else "tet4")
     supports = [Support("z0", (2,)), Support("x0", (0,)), Support("y0", (1,))]
     if contact == "bonded":

@@ -1,4 +1,4 @@
-"""Pressure schemes on the phantom of science note 000: its numbers, its extremes, contracts."""
+"""Pressure schemes on the phantom of paper 000: its numbers, its extremes, contracts."""
 
 from dataclasses import FrozenInstanceError, is_dataclass, replace
 
@@ -93,7 +93,7 @@ def test_modulus_moves_pressure_and_force_only(
     assert other.reactions @ two.inputs / factor == pytest.approx(force, rel=1e-10)
 
 
-# Numbers of the science note
+# Numbers computed apart, with another code
 
 
 def test_dry_cavity_loses_volume(phantom: Responses) -> None:
@@ -126,7 +126,7 @@ def test_fluid_and_bonded_plates_resist(phantom: Responses) -> None:
 
 
 def test_tuned_gain_is_the_line_through_61_points(phantom: Responses) -> None:
-    """Kp of the note's definition, fitted here with the normal equations, from roots found here."""
+    """Kp as section 3.3 defines it, fitted here with the normal equations, from roots found here."""
     ratios = np.linspace(0.7, 1.3, 61)
     form, at = phantom.volumes[0], 2
     terms = [form[at, at, at], 3 * form[0, at, at], 3 * form[0, 0, at], form[0, 0, 0]]

@@ -114,7 +114,7 @@ def test_average_acceleration_conserves_energy() -> None:
 @pytest.mark.parametrize("dt", [1e-5, 2e-3, 10.0])
 @pytest.mark.parametrize("rule", RULES)
 def test_nothing_diverges_without_damping(rule: RuleName, dt: float) -> None:
-    """alpha_1 from .1 to 0 (science note 001): at most twice the static u where a mode is alone."""
+    """alpha_1 from .1 to 0: at most twice the static u where a mode is alone."""
     system = cube(0.0)
     z = run(Newmark(dt, rule), system, np.full((300, 1), TOTAL), dt).traces["top.z"].y
     assert len(z) == 300
@@ -208,7 +208,7 @@ def test_average_acceleration_rings_on_a_ramp_by_its_rule_alone() -> None:
 
 
 def test_the_numbers_of_paper_001s_block() -> None:
-    """Science note 001: 500 steps of 2 ms against u_static (1 - exp(-t/.1)), and both a0."""
+    """An earlier study: 500 steps of 2 ms against u_static (1 - exp(-t/.1)), and both a0."""
     system, load = cube(), np.full((500, 1), TOTAL)
     t = 0.002 * np.arange(1, 501)
     z = run(Newmark(), system, load).traces["top.z"].y

@@ -37,7 +37,7 @@ def at(stepper: NewtonStepper, state: State, d: float) -> State:
 def test_saint_venant_kirchhoff_between_slipping_plates(
     nu: float, order: int, dilatation: Dilatation
 ) -> None:
-    """Science note 003: 25.65 N at stretch .9 and 43.20 N at .8, any nu."""
+    """An earlier study: 25.65 N at stretch .9 and 43.20 N at .8, any nu."""
     stepper = prepared(cube("svk", nu, n=3, order=order, dilatation=dilatation))
     first = pressed(stepper, 0.01)
     assert force(first) == pytest.approx(25.65, rel=1e-8)

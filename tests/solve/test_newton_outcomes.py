@@ -65,7 +65,7 @@ def test_end_of_the_law_is_invalid_with_the_last_good_load() -> None:
 
 
 def test_no_static_solution_beyond_a_load() -> None:
-    """Bonded plates, science note 003: Newton stops near stretch .69 to .75."""
+    """Bonded plates: Newton stops near stretch .69 to .75."""
     stepper = prepared(cube("svk", 0.4, "bonded", n=6, dilatation="nodal_mean"))
     state, d = stepper.rest(), 0.0
     while state.failure is None and d < 0.04:

@@ -1,5 +1,7 @@
 """What a study will run: checked before anything runs, keyed by all that makes a cell."""
 
+from dataclasses import replace
+
 import pytest
 from study_samples import experiment_file
 
@@ -8,6 +10,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.replay.tracking import Tracking
+from validate.study.filters import run_line
 from validate.study.plan import Plan, plan
 from validate.study.sweep import axes
 
@@ -35,6 +38,19 @@ def test_an_axis_of_one_method_multiplies_its_cells_only(pulled: Tracking) -> No
 def test_swept_methods_are_the_methods(pulled: Tracking) -> None:
     assert planned(pulled, "methods.kf.Q=1e-12,1e-11").methods == ("kf",)
     assert planned(pulled, "twin.noise=1e-11,1e-10").methods == ("kf", "plain")
+
+
+def test_the_command_names_what_decides_and_what_speeds_are_compared_with(
+    pulled: Tracking,
+) -> None:
+    more = replace(pulled, methods={**pulled.methods, "other": pulled.methods["kf"]})
+    values = {"methods.kf.R": "1e-10", "methods.other.R": "2e-10"}
+    swept = planned(more, "methods.other.Q=1e-12,1e-11", values=values)
+    line = "validate run pulled --set methods.kf.R=1e-10 --set methods.other.R=2e-10 --set "
+    found = run_line(swept, swept.cells[0])
+    assert found == f"{line}methods.other.Q=1e-12 --methods kf,plain,other"
+    found = run_line(planned(more, values=values), planned(more, values=values).cells[0])
+    assert found == "validate run pulled --set methods.kf.R=1e-10 --methods kf,plain"
 
 
 def test_keys_know_values_seeds_methods_and_the_file(pulled: Tracking) -> None:

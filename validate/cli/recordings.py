@@ -19,6 +19,8 @@ from validate.recording.png_stack import read_png_stack
 from validate.recording.summary import summary
 from validate.recording.types import Recording, Source
 from validate.replay.find import find
+from validate.replay.made import stamped
+from validate.replay.tracking import Tracking
 
 PNG_STACK = "png-stack"
 
@@ -97,6 +99,8 @@ def record(name: str, out: Path, values: tuple[str, ...]) -> None:
     with progress(f"record {name}") as bar:
         done = iter(range(10))
         made = experiment.record(parameters, lambda text: bar(next(done), 3, text))
+    if isinstance(experiment, Tracking):
+        made = stamped(made, parameters)
     write_recording(made, out)
     written = read_recording(out)
     beside = out.with_suffix(".json")

@@ -26,6 +26,8 @@ PublishedVerdict = Literal[
 
 # Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
 SAFETY = 3.0 / 2
+# The name of the part of u_val that a filter itself claims.
+OWN_COVARIANCE = "the filter's own covariance"
 
 
 @dataclass(frozen=True)
@@ -152,14 +154,21 @@ def _verdict(E: float, u_val: float, limit: float, parts: dict[str, float]) -> t
         return "differs", f"|E| is {abs(E) / u_val:.1f} u_val" if u_val else "u_val is zero"
     if 2 * u_val > limit:
         return "cannot decide", (
-            f"2 u_val = {2 * u_val:.3g} exceeds the limit {limit:.3g}; a better measurement of "
-            f"'{largest}' would decide"
+            f"2 u_val = {2 * u_val:.3g} exceeds the limit {limit:.3g}; {_better(largest)} would "
+            "decide"
         )
     if u_val == 0:
         return "agrees", "the error is exactly zero, and so is u_val"
     blunt = abs(E) / parts["measurement"] if parts["measurement"] else 0.0
     beyond = f" but {blunt:.0f} times u_D" if blunt > 5 else ""
     return "agrees", f"|E| is {abs(E) / u_val:.1f} u_val{beyond}; largest part: {largest}"
+
+
+def _better(part: str) -> str:
+    """What would make a part of u_val smaller."""
+    if part == OWN_COVARIANCE:
+        return "a filter that is surer of its estimate"
+    return f"a better measurement of '{part}'"
 
 
 def _scalar(residual: Residual) -> bool:

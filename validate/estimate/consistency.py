@@ -3,7 +3,8 @@
 For a consistent filter NIS = y^T S_yy^-1 y is chi-square with as many degrees of freedom as
 components were measured, and innovations are white; NEES = e^T P^-1 e likewise over the states
 (Bar-Shalom, Li & Kirubarajan 2001, ch. 5.4). NIS sees measured components only: a filter can look
-consistent while unmeasured nodes are wrong (science note 001), so look at NEES or nodal errors too.
+consistent while unmeasured nodes are wrong (as in the experiment kf_cube), so look at NEES or at
+nodal errors too.
 """
 
 from dataclasses import dataclass
@@ -66,6 +67,11 @@ class Consistency:
         """ "" or that the model is of a wrong class: far more error than any tuning explains."""
         if self.mean <= WRONG_CLASS:
             return ""
+        if self.kind == "NEES":
+            return (
+                f"the claimed covariance does not hold here: NEES per degree of freedom "
+                f"{self.mean:.3g} over {self.samples} steps, 1 expected"
+            )
         return (
             f"wrong model class: {self.kind} per degree of freedom {self.mean:.3g} over "
             f"{self.samples} steps, 1 expected, above {WRONG_CLASS:g} no tuning explains it"

@@ -128,7 +128,7 @@ class Guest:
     load_start: float = quantity(0.1, "N", "sd of every load's bias at the start")
     load_walk: float = quantity(0.1, "N/s^0.5", "random walk of every load's bias")
     load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
-    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+    R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     seed: int = quantity(0, "1", "of filters that draw")
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:

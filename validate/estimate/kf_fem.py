@@ -61,9 +61,9 @@ class DisplacementNoise:
     """
 
     dt: float = quantity(0.002, "s", "time step")
-    Q: float = quantity(1e-9, "m^2", "model error of a step; the paper's .001, read as mm^2")
-    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
-    P0: float = quantity(1e-9, "m^2", "variance at the start")
+    Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, read as mm2")
+    R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
+    P0: float = quantity(1e-9, "m2", "variance at the start")
     recursion: Recursion = quantity("prior", "1", "which displacement v and a follow")
     structure: Structure = quantity("white", "1", "where the model errs")
     gains: Gains = quantity("shared", "1", "computed beforehand, or at every step")

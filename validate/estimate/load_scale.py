@@ -1,9 +1,9 @@
 """The smallest sound filter of a quasi-static scene: one shape, its amplitude, the load's scale.
 
 u = a s with the static displacement s of the load; a follows scale * a_static with the shape's own
-time constant (science note 001: all modes of paper 001's cube share it). A wrong modulus is a wrong
-scale, which one measured node shows and every node then gains from. No inertia: where the shape
-would swing, `prepare` refuses.
+time constant, which all modes share under stiffness damping alone, as in paper 001's cube. A wrong
+modulus is a wrong scale, which one measured node shows and every node then gains from. No inertia:
+where the shape would swing, `prepare` refuses.
 """
 
 from dataclasses import dataclass
@@ -33,8 +33,8 @@ class LoadScale:
     dt: float = quantity(0.002, "s", "time step")
     scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")
     walk: float = quantity(0.0, "1/s^0.5", "random walk of the scale")
-    Q: float = quantity(1e-14, "m^2", "variance that a step adds to the amplitude")
-    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+    Q: float = quantity(1e-14, "m2", "variance that a step adds to the amplitude")
+    R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""

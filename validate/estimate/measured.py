@@ -62,6 +62,19 @@ class Measurements:
         names = tuple(self.names[i] for i in pick)
         return Measurements(self.t, self.H[pick], self.z[:, pick], self.sd[pick], names)
 
+    def moving(self, free: Ints) -> "Measurements":
+        """The components that any free unknown moves: what is held or driven teaches a filter
+        nothing, and its noise would count as degrees of freedom.
+
+        Raises `ComparisonError` when nothing is left.
+        """
+        reach = np.asarray(abs(self.H[:, free]).sum(axis=1)).ravel()
+        pick = np.flatnonzero(reach > 0)
+        if len(pick) == 0:
+            raise ComparisonError("every measured component is held or driven: nothing to estimate")
+        names = tuple(self.names[i] for i in pick)
+        return Measurements(self.t, self.H[pick], self.z[:, pick], self.sd[pick], names)
+
     def free(self, free: Ints) -> Floats:
         """H over the free unknowns, dense (m, free)."""
         return np.ascontiguousarray(self.H[:, free].toarray())

@@ -41,9 +41,9 @@ class NodeEKF:
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
-    P0: float = quantity(1e-9, "m^2", "initial variance; the paper's .001, read as mm^2")
-    Qp: float = quantity(1e-7, "m^2", "process noise per explicit step; the paper's .1, mm^2")
-    Qm: float | None = quantity(1e-9, "m^2", "measurement variance (.001 mm^2); none: declared")
+    P0: float = quantity(1e-9, "m2", "initial variance; the paper's .001, read as mm2")
+    Qp: float = quantity(1e-7, "m2", "process noise per explicit step; the paper's .1, mm2")
+    Qm: float | None = quantity(1e-9, "m2", "measurement variance (.001 mm2); none: declared")
     block: Block = quantity("component", "1", "what is filtered together")
     covariance: Literal["printed", "joseph"] = quantity("printed", "1", "P - K H P, or Joseph's")
     correct_previous: bool = quantity(False, "1", "shift U_{t-dt} with U_t")

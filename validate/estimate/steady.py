@@ -42,7 +42,7 @@ class ReducedKf:
     load_start: float = quantity(0.1, "N", "sd of every load's bias at the start")
     load_walk: float = quantity(0.1, "N/s^0.5", "random walk of every load's bias")
     load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
-    R: float | None = quantity(None, "m^2", "variance of a measurement; none: declared")
+    R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
     gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or where it settles")
 

@@ -104,7 +104,8 @@ class Registered:
     """All observations of a recording in the scene's frame, and the drive that was measured.
 
     `windows` are ranges (from, to] m of the stage by label, for curves without holds; `outside`
-    counts the samples left out because they lie beyond the law's validity.
+    counts the samples left out because they lie beyond the law's validity. `time_scale` are the
+    recorded seconds in one second of these times, where a slow recording is walked faster.
     """
 
     stage: Signal
@@ -115,6 +116,7 @@ class Registered:
     windows: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     outside: int = 0
     findings: tuple[str, ...] = ()
+    time_scale: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "windows", MappingProxyType(dict(self.windows)))

@@ -1,12 +1,13 @@
 """What every experiment over time shows: displacements, errors, what each method cost."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.compare.track import TRACK_METRICS, TrackError, nrmse, track_error
-from validate.replay.tracking import Cases, Followed, Tracking
+from validate.replay.tracking import Cases, Followed, Tracking, own_time
 
 _MM = 1e3
 _MAPS = 6  # pictures of the mesh in one report
@@ -34,7 +35,10 @@ def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
 def _displacements(experiment: Tracking, scored: Mapping[str, Followed]) -> Exhibit:
     first, axis = next(iter(scored.values())), experiment.axis
     probes = tuple(first.truth.probes)
-    charts = [_track_chart(scored, probe, axis) for probe in probes]
+    charts = [
+        replace(chart, caption=experiment.captions.get(chart.name, ""))
+        for chart in (_track_chart(scored, probe, axis) for probe in probes)
+    ]
     charts += [_error_chart(scored, probe, axis) for probe in probes]
     return Exhibit(
         "displacements",
@@ -52,14 +56,14 @@ def _track_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     first = next(iter(scored.values()))
     series = [*_measured(first, probe, axis)]
     truth = _MM * first.truth.probes[probe][:, "xyz".index(axis)]
-    series.append(Series("reference (twin)", first.seen.stage.t, truth))
+    series.append(Series("reference (twin)", first.seen.time_scale * first.seen.stage.t, truth))
     series += [
-        Series(f.label, f.run.t, _MM * f.run.traces[f"{probe}.{axis}"].y)
+        Series(f.label, own_time(f), _MM * f.run.traces[f"{probe}.{axis}"].y)
         for f in scored.values()
         if probe in f.scored
     ]
     return Chart(
-        f"displacement_{probe}", f"Displacement at {probe}", "time / s", f"u_{axis} / mm",
+        f"displacement_{probe}", f"Displacement at {probe}", "recorded time / s", f"u_{axis} / mm",
         tuple(series),
     )  # fmt: skip
 
@@ -71,7 +75,8 @@ def _measured(followed: Followed, probe: str, axis: str) -> list[Series]:
     j, c = seen.names.index(probe), "xyz".index(axis)
     moved = seen.x[:, j, c] - seen.rest[j, c]
     there = np.isfinite(moved)
-    return [Series("measured", seen.t[there], _MM * moved[there], "points")]
+    t = followed.seen.time_scale * seen.t[there]
+    return [Series("measured", t, _MM * moved[there], "points")]
 
 
 def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
@@ -80,12 +85,12 @@ def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     lines = [np.abs(error_at(f, probe, axis).values) for f in mine]
     floor = max((float(y.max()) for y in lines), default=0.0) * 1e-5 or 1e-12
     series = tuple(
-        Series(f.label, f.run.t, _MM * np.maximum(y, floor))
+        Series(f.label, own_time(f), _MM * np.maximum(y, floor))
         for f, y in zip(mine, lines, strict=True)
     )
     return Chart(
-        f"error_{probe}", f"Error at {probe}", "time / s", f"|u_{axis} − reference| / mm", series,
-        log="y", caption=f"Errors below {_MM * floor:.1e} mm are drawn there.",
+        f"error_{probe}", f"Error at {probe}", "recorded time / s",
+        f"|u_{axis} − reference| / mm", series, log="y", caption=f"Errors below {_MM * floor:.1e} mm are drawn there.",
     )  # fmt: skip
 
 
@@ -143,31 +148,43 @@ def _nis(followed: Followed) -> float | None:
 
 def _speeds(experiment: Tracking, main: Mapping[str, Followed]) -> Exhibit:
     base = main.get(experiment.reference)
-    unit = base.run.step_s.p50 if base and base.run.step_s else None
-    rows = [_speed_row(f, unit) for f in main.values()]
+    factor = _real_time(base) if base else None
     named = base.label if base else "not run"
     table = NumberTable(
         "speeds",
-        "What one step of the recording costs, every method in this run on this machine; the ratio "
-        f"is to '{named}'. Real-time factor: simulated over computing time.",
-        ("method", "set-up / s", "step p50 / ms", "p99 / ms", "ratio / 1", "rate / Hz",
-         "real-time factor / 1", "steps", "ended"),
-        tuple(rows),
+        "Time per step, every method in this run on this machine, one thread. The real-time factor "
+        "is recorded over computing time; cost is computing time per recorded time over that of "
+        f"'{named}'. dt is that of a step of the integration.",
+        ("method", "set-up / s", "step p50 / ms", "p99 / ms", "rate / Hz", "dt / ms",
+         "dt over critical / 1", "real-time factor / 1", "cost / 1", "steps", "ended"),
+        tuple(_speed_row(f, factor) for f in main.values()),
     )  # fmt: skip
     return Exhibit("speeds", "Time per step", tables=(table,))
 
 
-def _speed_row(f: Followed, unit: float | None) -> tuple[Entry, ...]:
-    times, end = f.run.step_s, f.run.outcome
+def _real_time(f: Followed) -> float | None:
+    times = f.run.step_s
+    return float(own_time(f)[0]) * times.rate_hz if times else None  # the first step starts at 0
+
+
+def _speed_row(f: Followed, base: float | None) -> tuple[Entry, ...]:
+    times, end, factor = f.run.step_s, f.run.outcome, _real_time(f)
     ended = end.state if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
-    if times is None:
-        return (f.label, f.run.setup_s, None, None, None, None, None, 0, ended)
-    dt = float(f.run.t[0])  # the first step starts at 0
-    ratio = times.p50 / unit if unit else None
+    if times is None or factor is None:
+        return (f.label, f.run.setup_s, *(7 * (None,)), 0, ended)
+    parts = max(float(f.run.traces["updates"].y[0]), 1.0) if _limit(f) else 1.0
+    dt = float(f.run.t[0]) / parts
+    limit = _limit(f)
     return (
-        f.label, f.run.setup_s, 1e3 * times.p50, 1e3 * times.p99, ratio, times.rate_hz,
-        dt * times.rate_hz, len(f.run.t), ended,
+        f.label, f.run.setup_s, 1e3 * times.p50, 1e3 * times.p99, times.rate_hz, 1e3 * dt,
+        dt / limit if limit else None, factor, base / factor if base else None, len(f.run.t), ended,
     )  # fmt: skip
+
+
+def _limit(f: Followed) -> float | None:
+    """The critical step s that an explicit run watched, the least of the run."""
+    trace = f.run.traces.get("critical_step")
+    return float(trace.y.min()) if trace is not None and len(trace.y) else None
 
 
 def _maps(scored: Mapping[str, Followed]) -> Exhibit | None:

@@ -39,7 +39,9 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     }
     raw = _raw(parameters, cases[""]["kf_printed"])
     mean, half = _interval(found[PRINTED, "prior"])
-    numbers = {"nrmse.mean": mean, "nrmse.half_interval": half, "nrmse.raw": _interval(raw)[0]}
+    mesh = cases[""]["kf_printed"].scene.mesh
+    numbers = {"nodes": float(len(mesh.nodes)), "elements": float(len(mesh.cells))}
+    numbers |= {"nrmse.mean": mean, "nrmse.half_interval": half, "nrmse.raw": _interval(raw)[0]}
     return Told((_ensemble(found, raw), _oracle()), numbers)
 
 
@@ -140,16 +142,22 @@ def _oracle() -> Exhibit:
 
 def published(values: Values) -> tuple[Published, ...]:
     """Every printed figure; those whose method was not run are left out."""
-    return (*_mesh(), *_error(values), *_speed(values), *_claims(values))
+    return (*_mesh(values), *_error(values), *_speed(values), *_claims(values))
 
 
-def _mesh() -> tuple[Published, ...]:
+def _mesh(values: Values) -> tuple[Published, ...]:
+    told = values.get("told", {})
+    if "nodes" not in told:
+        return ()
+    how = "5 x 5 x 8 nodes, six tetrahedra a box"
     return (
-        Published("nodes", 200.0, 200.0, 0.0, "1", "reproduced",
-                  "5 x 5 x 8 nodes, six tetrahedra a box", "Table 1", 200.0, 0.0),
-        Published("elements", 672.0, 672.0, 0.0, "1", "reproduced",
-                  "5 x 5 x 8 nodes, six tetrahedra a box", "Table 1", 672.0, 0.0),
-    )  # fmt: skip
+        Published(
+            "nodes", told["nodes"], 200.0, 0.0, "1", "reproduced", how, "Table 1", 200.0, 0.0
+        ),
+        Published(
+            "elements", told["elements"], 672.0, 0.0, "1", "reproduced", how, "Table 1", 672.0, 0.0
+        ),
+    )
 
 
 def _error(values: Values) -> tuple[Published, ...]:
@@ -207,7 +215,7 @@ def _claims(values: Values) -> tuple[Published, ...]:
         Published(
             "as accurate as FEM", kf.get("node_A.nrmse"), 0.0, None, "1", "not reproduced",
             "the FEM made the measurement: its own error is 0, so the filter is strictly worse",
-            "abstract",
+            "abstract", 0.0119, 5e-4,
         ),
     ]  # fmt: skip
     if key in kf and key in fem:

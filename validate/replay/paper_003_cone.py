@@ -183,10 +183,15 @@ def _cards(parameters: Any, main: Mapping[str, Followed]) -> NumberTable:
 
 # --- printed figures ------------------------------------------------------------------------------
 
+# MAE, RMSE, SD m: theirs, and ours when the verdicts were written.
 _TABLE_3 = {
-    "node_A": (0.060494e-3, 0.086648e-3, 0.062242e-3),
-    "node_B": (0.007254e-3, 0.009434e-3, 0.006051e-3),
-}
+    "node_A": (
+        (0.060494e-3, 0.017057e-3), (0.086648e-3, 0.021244e-3), (0.062242e-3, 0.012705e-3),
+    ),
+    "node_B": (
+        (0.007254e-3, 0.015196e-3), (0.009434e-3, 0.020183e-3), (0.006051e-3, 0.013326e-3),
+    ),
+}  # fmt: skip
 
 
 def published_cone(values: Values) -> tuple[Published, ...]:
@@ -203,9 +208,11 @@ def published_cone(values: Values) -> tuple[Published, ...]:
             "a total of 0.15 N moves this cone by less than the printed error: only a force on "
             "every node, or some 15 N, gives motions of that size",
             "Table 3",
+            ours,
+            0.02 * ours,
         )
         for node, triple in _TABLE_3.items()
-        for name, theirs in zip(("mae", "rmse", "sd"), triple, strict=True)
+        for name, (theirs, ours) in zip(("mae", "rmse", "sd"), triple, strict=True)
         if f"{node}.{name}@small" in found
     )
     return (*table, *_mesh(told))
@@ -217,10 +224,10 @@ def _mesh(told: Mapping[str, float]) -> tuple[Published, ...]:
     return (
         Published("nodes of the cone's mesh", told["nodes"], 559.0, 6.0, "1", "reproduced",
                   "a mesh of our own making, as near as it came", "section 3.4",
-                  told["nodes"], 0.0),
+                  555.0, 0.0),
         Published("tetrahedra of the cone's mesh", told["cells"], 2349.0, 24.0, "1", "reproduced",
                   "a mesh of our own making, as near as it came", "section 3.4",
-                  told["cells"], 0.0),
+                  2357.0, 0.0),
         Published("Poisson ratio", None, 0.5, None, "1", "not reproducible as printed",
                   "lambda = E nu / ((1 + nu)(1 - 2 nu)) is infinite at 0.5", "section 3.4, eq 8"),
     )  # fmt: skip

@@ -18,7 +18,6 @@ from validate.fem.locate import barycentric_rows
 from validate.fem.system import System
 from validate.replay.tracking import Followed, Follower
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Scene
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
 from validate.solve.march import march
 from validate.solve.types import Run
@@ -164,11 +163,6 @@ def ordered_share(errors: Mapping[str, Errors], name: str = "E_i", until: float 
     lumped = np.stack([errors[n].values[name] for n in ("implicit_lumped", "explicit_lumped")])
     holds = (best < lumped.min(axis=0)) & (lumped.max(axis=0) < worst)
     return float(holds[1:][errors["explicit"].t[1:] <= until + 1e-9].mean())
-
-
-def ordered_means(errors: Mapping[str, Errors], name: str = "E_i") -> tuple[float, ...]:
-    """Means over time of explicit, the two lumped methods and quasi-static."""
-    return tuple(float(errors[n].values[name].mean()) for n in RIVALS)
 
 
 def sum_ratio(errors: Mapping[str, Errors], name: str = "E_i") -> tuple[float, float]:
@@ -318,8 +312,3 @@ def shape_maps(case: Mapping[str, Followed], methods: Sequence[str], t: float) -
             )
         )  # fmt: skip
     return found
-
-
-def shown_scene(scene: Scene) -> str:
-    """Kind and size of a mesh in words."""
-    return f"{len(scene.mesh.cells)} {scene.mesh.kind}, {len(scene.mesh.nodes)} nodes"

@@ -16,18 +16,25 @@ from validate.estimate.consistency import (
     whiteness,
 )
 from validate.fem.locate import barycentric_rows
-from validate.replay.tracking import Cases, Followed
+from validate.replay.tracking import Cases, Followed, own_time
 
 _LAGS = 10
+_HELD = 1e-12  # m: a component without error and without doubt is held, and no estimate
+# m: what a filter that claims no doubt at all is taken to claim; an error beside it is far over-
+# confident, whatever this is.
+_LEAST_SD = 1e-9
 _HEADS = (
     "case", "filter", "what", "per dof / 1", "95 % band from / 1", "to / 1", "steps", "dof",
     "verdict", "alarm",
 )  # fmt: skip
 
 
-def consistency_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
+def consistency_exhibit(
+    main: Mapping[str, Followed], others: Cases, accepted: tuple[str, ...]
+) -> Exhibit | None:
     """Tables and the NIS over time; None where no method is a filter that measured anything."""
-    filters = {n: f for n, f in main.items() if nis_of(f)}
+    found = {n: f for n, f in main.items() if nis_of(f)}
+    filters = dict(sorted(found.items(), key=lambda item: item[0] not in accepted))
     if not filters:
         return None
     rows = [row for f in filters.values() for row in _rows(f)]
@@ -43,7 +50,7 @@ def consistency_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit 
     white = NumberTable(
         "whiteness",
         f"Whiteness of the innovations, Ljung-Box over {_LAGS} lags: a small p means that the "
-        "innovation has memory, so model or Q is wrong.",
+        "innovation has memory, so model or Q is wrong (white: p of 0.001 and more).",
         ("filter", "component", "p / 1", "lag-1 correlation / 1", "samples", "white"),
         tuple(row for f in filters.values() for row in _white_rows(f)),
     )
@@ -76,10 +83,10 @@ def nees_of(followed: Followed) -> dict[str, Consistency]:
         rows = barycentric_rows(mesh, np.array([probe.point]))
         error = np.array([rows.apply(u)[0] for u in run.u]) - reference[run.at]
         sd = np.array([rows.apply(s)[0] for s in run.sd])
-        sure = sd > 0
-        if sure.any():
-            terms = np.where(sure, error / np.where(sure, sd, 1.0), 0.0) ** 2
-            found[probe.name] = nees_consistency(terms.sum(axis=1), sure.sum(axis=1))
+        free = (sd > 0).any(axis=0) | (np.abs(error).max(axis=0) > _HELD)
+        if free.any():
+            terms = (error[:, free] / np.maximum(sd[:, free], _LEAST_SD)) ** 2
+            found[probe.name] = nees_consistency(terms.sum(axis=1), np.full(len(sd), free.sum()))
     return found
 
 
@@ -131,13 +138,14 @@ def _white(w: Whiteness) -> tuple[Entry, ...]:
 
 def _chart(followed: Followed) -> Chart:
     """NIS of every measured step per degree of freedom, with the band of one step."""
-    traces, t = followed.run.traces, followed.run.t
+    traces, t = followed.run.traces, own_time(followed)
     dof = traces["nis.dof"].y
     seen = dof > 0
     per = traces["nis"].y[seen] / dof[seen]
     low, high = (_band(dof[seen], p) for p in (0.025, 0.975))
     return Chart(
-        f"nis_{followed.method}", f"NIS of {followed.label}", "time / s", "NIS per dof / 1",
+        f"nis_{followed.method}", f"NIS of {followed.label}", "recorded time / s",
+        "NIS per dof / 1",
         (
             Series("95 % band of one step", t[seen], low, "band", high),
             Series("NIS", t[seen], np.maximum(per, 1e-6), "points"),

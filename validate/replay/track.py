@@ -12,7 +12,7 @@ from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
-from validate.compare.verdict import Check, Sensitivity, judge
+from validate.compare.verdict import OWN_COVARIANCE, Check, Sensitivity, judge
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows
 from validate.fem.locking import locking_warning
@@ -21,6 +21,7 @@ from validate.parameters import describe
 from validate.recording.types import Recording
 from validate.register.observe import MarkerObservation, Registered, SignalObservation
 from validate.replay.follow import error_at, standard_exhibits
+from validate.replay.made import made_by
 from validate.replay.options import Options, Report, configure, folder_of
 from validate.replay.sentence import verdict_sentence
 from validate.replay.sureness import consistency_exhibit, consistency_scores
@@ -37,9 +38,10 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
     parameters, methods = configure(experiment, options)
     cases = () if options.quick else _cases(experiment, methods)
     road = _Road(experiment, methods, report, _total(experiment, methods, cases))
-    recordings = experiment.load(parameters, folder_of(experiment))
-    main = road.case(MAIN, recordings[0], parameters, parameters, tuple(methods))
-    others = {case.name: road.other(case, parameters) for case in cases}
+    shipped = experiment.load(parameters, folder_of(experiment))[0]
+    recording, true, remade = road.made_by(shipped, parameters)
+    main = road.case(MAIN, recording, parameters, true, tuple(methods))
+    others = {case.name: road.other(case, parameters, true) for case in cases}
     told = _told(experiment, parameters, {MAIN: main, **others}, road, options)
     results = tuple(_method(experiment, road, parameters, main[n], others) for n in methods)
     values = {m.name: {s.name: s.value for s in m.scores} for m in results}
@@ -53,11 +55,11 @@ def track(experiment: Tracking, options: Options, report: Report | None = None) 
         sentence=verdict_sentence(results, quick=options.quick),
         parameters=describe(parameters) + describe(methods, "methods."),
         methods=results,
-        recordings=recordings,
+        recordings=(recording,),
         rest=(),
         effects=(),
         published=printed,
-        notes=(*first.seen.findings, *_locking(main)),
+        notes=(*remade, *first.seen.findings, *_locking(main)),
         quick=options.quick,
         same_model=experiment.same_model,
         seed=experiment.seed,
@@ -83,7 +85,7 @@ def _exhibits(
     told: Told,
 ) -> tuple[Exhibit, ...]:
     docs = {case.name: case.doc for case in experiment.cases}
-    sure = consistency_exhibit(main, others)
+    sure = consistency_exhibit(main, others, experiment.accepted)
     standard = standard_exhibits(experiment, main, others, docs)
     return (*standard, *((sure,) if sure else ()), *told.exhibits)
 
@@ -117,12 +119,23 @@ class _Road:
         if self._report:
             self._report(min(self._done, self._total), self._total, what)
 
-    def other(self, case: Case, parameters: Any) -> dict[str, Followed]:
-        true = case.change(parameters)
+    def made_by(
+        self, recording: Recording, parameters: Any
+    ) -> tuple[Recording, Any, tuple[str, ...]]:
+        """The recording, the parameters of its truth, and what is to be said of them."""
+        experiment = self.experiment
+        return made_by(
+            recording, parameters, experiment.remake, lambda p: experiment.record(p, self.tell)
+        )
+
+    def other(self, case: Case, parameters: Any, true: Any) -> dict[str, Followed]:
+        """A case: the truth's parameters changed, its recording shipped or made in memory."""
         experiment = self.experiment
         if case.shipped:
-            recording = experiment.load(true, folder_of(experiment))[0]
+            shipped = experiment.load(case.change(parameters), folder_of(experiment))[0]
+            recording, true, _ = self.made_by(shipped, case.change(parameters))
         else:
+            true = case.change(true)
             recording = experiment.record(true, self.tell)
         names = _of_case(experiment, self.methods, case)
         return self.case(case.name, recording, parameters, true, names)
@@ -287,7 +300,7 @@ def _own_doubt(mine: Followed, residuals: Mapping[str, Residual]) -> dict[str, l
             rows = barycentric_rows(mine.scene.mesh, np.array([probe.point]))
             sd = np.array([rows.apply(s)[0] for s in mine.run.sd])
             claimed = replace(residuals[key], values=sd, sd=0.0)
-            found[key] = [Sensitivity("the filter's own covariance", claimed, 1.0)]
+            found[key] = [Sensitivity(OWN_COVARIANCE, claimed, 1.0)]
     return found
 
 
@@ -303,7 +316,8 @@ def _uncertain(
         if not experiment.same_model:
             raise ComparisonError(f"{experiment.name}: no uncertainty is declared; u_val unknown")
         return residuals, {}, 1.0
-    recording = experiment.load(parameters, folder_of(experiment))[0]
+    shipped = experiment.load(parameters, folder_of(experiment))[0]
+    recording, _, _ = road.made_by(shipped, parameters)
 
     def moved(changed: Any) -> dict[str, Residual]:
         scene, seen, run = road.run(uncertainty.surrogate, recording, changed)

@@ -16,6 +16,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
 from validate.compare.verdict import Accept, Published
+from validate.errors import UsageError
 from validate.estimate.measured import measurements
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -44,6 +45,11 @@ class Truth:
 
 
 Cases = Mapping[str, Mapping[str, "Followed"]]
+
+
+def own_time(followed: "Followed") -> Floats:
+    """Recorded times (nt,) s of the run's steps: explicit runs may walk a slow recording faster."""
+    return followed.run.t * followed.seen.time_scale
 
 
 def truth_of(run: Run, scene: Scene) -> Truth:
@@ -118,13 +124,28 @@ class Follower:
     stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
 
     def prepare(self, system: System, seen: Registered, **changed: Any) -> Stepper:
-        """The prepared scheme or filter, with `changed` settings where it has them."""
-        own = {f.name for f in fields(self.settings)}
-        settings = replace(self.settings, **{k: v for k, v in changed.items() if k in own})
+        """The prepared scheme or filter, with the experiment's settings where it has them.
+
+        Filters get what moves freely of their markers. Raises `UsageError` where a user set one of
+        the experiment's own settings to something else.
+        """
+        settings = replace(self.settings, **self._given(changed))
         if not self.markers:
             return cast(Stepper, settings.prepare(system))
-        given = measurements(seen, system.scene.mesh).of(*self.markers)
+        given = measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
         return cast(Stepper, settings.prepare(system, given))
+
+    def _given(self, changed: Mapping[str, Any]) -> dict[str, Any]:
+        defaults = {f.name: f.default for f in fields(self.settings)}
+        mine = {k: v for k, v in changed.items() if k in defaults}
+        for name, value in mine.items():
+            own = getattr(self.settings, name)
+            if own not in (defaults[name], value):
+                raise UsageError(
+                    f"settings.{name} = {own} of '{self.label}': the experiment sets {value}; "
+                    "change its own parameter"
+                )
+        return mine
 
 
 def followed_load(recording: Recording, scene: Scene, signal: str, unit: str) -> Registered:
@@ -156,7 +177,9 @@ class Tracking:
     a baseline that is timed, not scored). `stepper` prepares a method: schemes ignore what was
     measured, filters take the markers they are given. `truth` repeats the twin. `axis` is the
     component that scores follow, `reference` the method that speeds are compared with. `tell` adds
-    what this experiment shows besides, from all runs by case ("" is the recorded one) and method.
+    what this experiment shows besides, from all runs by case ("" is the recorded one) and method;
+    `captions` are sentences under charts, by name.
+    `remake` are prefixes of parameters that the twin reads: changing one makes the recording anew.
     """
 
     name: str
@@ -178,6 +201,8 @@ class Tracking:
     uncertainty: Uncertainty | None = None
     tell: Callable[[Any, Cases, Progress], Told] | None = None
     published: Callable[[Mapping[str, Mapping[str, float]]], tuple[Published, ...]] | None = None
+    remake: tuple[str, ...] = ("twin.",)
+    captions: Mapping[str, str] = field(default_factory=dict)
     frames: int = 200
     quick: Change = unchanged
     same_model: bool = False

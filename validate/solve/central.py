@@ -20,6 +20,7 @@ from validate.fem.assemble import lumped, mass
 from validate.fem.critical import lanczos_step
 from validate.fem.explicit import ExplicitBody, Look, Motion, Rule
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.dynamic import input_kind
 from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
@@ -34,7 +35,7 @@ Damping = Literal["none", "mass", "lagged"]
 
 @dataclass(frozen=True)
 class CentralDifference:
-    """Steps of dt s in `substeps` equal parts, inputs linear between.
+    """Settings; inputs are linear over the substeps.
 
     `damping`: "mass" is eq 18 with C = alpha M and refuses a scene with stiffness damping, "lagged"
     takes that too, "none" is eq 19. A substep above (1 - margin) of the critical step is refused
@@ -43,13 +44,13 @@ class CentralDifference:
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
 
-    dt: float = 1e-4
-    substeps: int = 1
-    damping: Damping = "mass"
-    beyond_limit: Literal["refuse", "run"] = "refuse"
-    margin: float = 0.05
-    watch: int = 20
-    threads: int = 1
+    dt: float = quantity(1e-4, "s", "time step of the run")
+    substeps: int = quantity(1, "1", "equal explicit steps in each")
+    damping: Damping = quantity("mass", "1", "none, alpha M, or beta K too at the last half step")
+    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    margin: float = quantity(0.05, "1", "share of the critical step kept free")
+    watch: int = quantity(20, "1", "steps between looks at energy, det F, critical step")
+    threads: int = quantity(1, "1", "cores that share the cells of a step")
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1 and self.watch >= 1):

@@ -21,6 +21,7 @@ from validate.errors import SceneError
 from validate.fem.factor import factorise
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.solve.dynamic import (
     InertialStepper,
     StartName,
@@ -47,19 +48,21 @@ _ROUNDING = 1e-12  # of the critical step
 
 @dataclass(frozen=True)
 class ExplicitLinear:
-    """Steps of dt s. `mass` and `damping_terms` ("mass" drops beta K) are separate switches.
+    """Settings. `a0`, `drive_rates` as in `Newmark`.
 
-    `a0`, `drive_rates` as in `Newmark`. A dt above the critical step is refused at the first step,
-    or with `beyond_limit` "run" goes on until displacements are 100 times the body's size.
+    A dt above the critical step is refused at the first step, or with `beyond_limit` "run" goes on
+    until displacements are 100 times the body's size.
     """
 
-    dt: float = 1e-4
-    mass: MassName = "lumped"
-    damping_terms: DampingTerms = "mass"
-    update: UpdateName = "printed"
-    a0: StartName = "equilibrium"
-    drive_rates: DriveRates = "difference"
-    beyond_limit: Literal["refuse", "run"] = "refuse"
+    dt: float = quantity(1e-4, "s", "time step")
+    mass: MassName = quantity("lumped", "1", "mass matrix")
+    damping_terms: DampingTerms = quantity("mass", "1", "alpha M + beta K, or alpha M alone")
+    update: UpdateName = quantity(
+        "printed", "1", "damping at the step's end, or half a step before"
+    )
+    a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
+    drive_rates: DriveRates = quantity("difference", "1", "v and a of prescribed unknowns")
+    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
 
     def __post_init__(self) -> None:
         rule_of("average", self.dt)

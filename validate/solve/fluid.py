@@ -12,6 +12,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
+from validate.parameters import quantity
 from validate.solve.linear import LinearStepper, condensed
 from validate.solve.types import Scheme, State, Stepper
 
@@ -38,7 +39,7 @@ class ExactPressure:
     Departures from paper 000: eq 10 is replaced by the root it tends to; no tolerance, no gain.
     """
 
-    volume_ratio: float = 1.0
+    volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
 
     def __post_init__(self) -> None:
         if not self.volume_ratio > 0:
@@ -60,10 +61,10 @@ class PressureLoop:
     `warm_start` begins each step at the last pressure, as the haptic loop does.
     """
 
-    gain: float | None = None
-    tolerance: float = 0.01
-    max_updates: int = 100
-    warm_start: bool = True
+    gain: float | None = quantity(None, "Pa", "Kp; none: tuned on the volume's response")
+    tolerance: float = quantity(0.01, "1", "|1 - V/V0| at which it stops")
+    max_updates: int = quantity(100, "1", "of the pressure in a step")
+    warm_start: bool = quantity(True, "1", "begin at the last step's pressure")
 
     def prepare(self, system: System) -> Stepper:
         return self.on(responses_of(system))

@@ -21,6 +21,7 @@ from validate.fem.assemble import stiffness_damping
 from validate.fem.factor import elimination_order, factorise, factorise_indefinite
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central import lumped_damping, numbered
 from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
@@ -32,18 +33,17 @@ _ROUNDING = 1e-15  # of the body's unit force: below it a residual is nothing bu
 
 @dataclass(frozen=True)
 class NewtonDynamics:
-    """Steps of dt s. `mass` "lumped" is what the explicit schemes use.
+    """Settings. `mass` "lumped" is what the explicit schemes use.
 
-    `tolerance`: residual relative to the forces that act. `cuts`: a static load step that finds no
-    equilibrium is halved up to so many times; a dynamic step fails at once: take a smaller dt.
+    `cuts`: for load steps of statics; a dynamic step fails at once: take a smaller dt.
     """
 
-    dt: float = 0.01
-    rule: RateRule = "average"
-    mass: Literal["lumped", "consistent"] = "lumped"
-    tolerance: float = 1e-9
-    max_iterations: int = 20
-    cuts: int = 6
+    dt: float = quantity(0.01, "s", "time step")
+    rule: RateRule = quantity("average", "1", "how v and a follow u; static: neither")
+    mass: Literal["lumped", "consistent"] = quantity("lumped", "1", "mass matrix")
+    tolerance: float = quantity(1e-9, "1", "residual, of the forces that act")
+    max_iterations: int = quantity(20, "1", "of Newton in a step")
+    cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):

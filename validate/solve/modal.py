@@ -18,6 +18,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.solve.dynamic import (
     InertialStepper,
     Reactions,
@@ -40,19 +41,21 @@ from validate.solve.types import State, Stepper
 
 @dataclass(frozen=True)
 class Modal:
-    """The lowest `modes` modes (None: all) in steps of dt s.
+    """Settings of the lowest modes, each stepped on its own.
 
     `propagate`: "linear" and "constant" are exact for forces linear within the step or held at
     its end value; the others are Newmark's rules per mode. `a0` as in `Newmark`: with
     "equilibrium" the loads of the first step already act at t = 0, with "zero" they rise there.
     """
 
-    dt: float = 0.002
-    modes: int | None = None
-    propagate: Literal["linear", "constant"] | RuleName = "linear"
-    static_correction: bool = True
-    a0: StartName = "equilibrium"
-    rho_inf: float = 0.8
+    dt: float = quantity(0.002, "s", "time step")
+    modes: int | None = quantity(None, "1", "lowest modes kept; none: all")
+    propagate: Literal["linear", "constant", RuleName] = quantity(
+        "linear", "1", "exact for a force linear or constant in a step, or a rule"
+    )
+    static_correction: bool = quantity(True, "1", "modes left out answer at once")
+    a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
+    rho_inf: float = quantity(0.8, "1", "spectral radius at infinity; generalised alpha alone")
 
     def __post_init__(self) -> None:
         rule_of("average", self.dt, self.rho_inf)

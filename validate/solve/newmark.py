@@ -19,6 +19,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.matrices import DampingTerms, MassName
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.solve.dynamic import (
     InertialStepper,
     StartName,
@@ -46,7 +47,7 @@ UpdateName = Literal["newmark", "misprinted"]
 
 @dataclass(frozen=True)
 class Newmark:
-    """Steps of dt s by one of three rules; rho_inf is for generalised alpha alone.
+    """Settings: one of three rules, one linear solve a step.
 
     `a0`: "equilibrium" starts from M a0 = f with the first step's loads, as for a load that is
     switched on at t = 0; "zero" starts without them (where damping rules, the first step of average
@@ -55,16 +56,16 @@ class Newmark:
     which makes average acceleration ring with growing amplitude on a ramp.
     """
 
-    dt: float = 0.002
-    rule: RuleName = "average"
-    a0: StartName = "equilibrium"
-    solver: SolverName = "prefactored"
-    mass: MassName = "consistent"
-    rho_inf: float = 0.8
-    drive_rates: DriveRates = "difference"
-    damping_terms: DampingTerms = "full"
-    update: UpdateName = "newmark"
-    tolerance: float = TOLERANCE
+    dt: float = quantity(0.002, "s", "time step")
+    rule: RuleName = quantity("average", "1", "how v and a follow u within a step")
+    a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
+    solver: SolverName = quantity("prefactored", "1", "of the one linear system a step")
+    mass: MassName = quantity("consistent", "1", "mass matrix")
+    rho_inf: float = quantity(0.8, "1", "spectral radius at infinity; generalised alpha alone")
+    drive_rates: DriveRates = quantity("difference", "1", "v and a of prescribed unknowns")
+    damping_terms: DampingTerms = quantity("full", "1", "alpha M + beta K, or alpha M alone")
+    update: UpdateName = quantity("newmark", "1", "of u: Newmark's, or as paper 002 prints it")
+    tolerance: float = quantity(TOLERANCE, "1", "iterative solvers: residual, of the right side")
 
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt, self.rho_inf)

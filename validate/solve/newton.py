@@ -16,6 +16,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
 from validate.solve.types import Ending, State, Stepper, Trace
@@ -30,18 +31,17 @@ _HALVINGS = 8  # of a Newton correction in the line search
 class StaticNewton:
     """Settings. `fluid` "exact" keeps every cavity at volume_ratio V0, "none" leaves it empty.
 
-    `tolerance`: residual relative to the forces that act. `contraction`: the factorisation is kept
-    while iterations shrink the error to this share of the last; 0 makes a new one every time.
-    `watch`: the tangent's inertia is taken anew when drives moved by this share of the body's size.
+    `contraction` 0 makes a new factorisation at every iteration. `watch`: negative pivots of the
+    tangent are counted anew when drives have moved so far.
     """
 
-    fluid: Literal["exact", "none"] = "exact"
-    volume_ratio: float = 1.0
-    tolerance: float = 1e-9
-    max_iterations: int = 25
-    max_cuts: int = 6
-    contraction: float = 0.2
-    watch: float = 0.01
+    fluid: Literal["exact", "none"] = quantity("exact", "1", "keeps its volume, or is not there")
+    volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
+    tolerance: float = quantity(1e-9, "1", "residual, of the forces that act")
+    max_iterations: int = quantity(25, "1", "of Newton in a load step")
+    max_cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
+    contraction: float = quantity(0.2, "1", "of the error, that keeps a factorisation")
+    watch: float = quantity(0.01, "1", "motion between looks at the inertia, of the body's size")
 
     def __post_init__(self) -> None:
         if not self.volume_ratio > 0:

@@ -6,7 +6,7 @@ of fourth order between. Its step time is that of the interpolation, not of a so
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,10 +22,10 @@ _BEYOND = 0.01  # grid steps of extrapolation: the noise of a stage that stands 
 
 @dataclass(frozen=True)
 class Tabulated:
-    """Solves `inner` at whole multiples of `step` m of the one drive."""
+    """Settings: solves `inner` at whole multiples of `step` of the one drive."""
 
     inner: Scheme
-    step: float
+    step: float = field(metadata={"unit": "m", "doc": "between the loads that are solved"})
 
     def __post_init__(self) -> None:
         if not self.step > 0:

@@ -35,8 +35,11 @@ def words(choice: Choice) -> Iterator[str]:
         yield f"Nothing meets both {asked}."
         yield f"Nearest: {described(choice.nearest, choice)}; {_missed(choice)}."
         yield from _one_sided(choice)
+    floor = choice.trade.floor
+    if want.error < floor:
+        yield f"The reference is itself off by {_MM * floor:.2g} mm: no cell can show that."
     what = "with what the linear law costs" if choice.by == "total" else "within the declared law"
-    yield f"Errors are {what}; the rate is that of steps with the displacements of all nodes."
+    yield f"Errors are {what}; the rate is that of median steps with the displacements of all nodes."
 
 
 def described(row: Row, choice: Choice) -> str:

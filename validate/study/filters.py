@@ -177,14 +177,19 @@ def _edges(planned: Plan, cell: Cell) -> tuple[str, ...]:
 
 
 def run_line(planned: Plan, cell: Cell) -> str:
-    """The `validate run` command of a cell."""
+    """The `validate run` command of a cell, with the methods it is judged beside: the reference
+    that speeds are compared with and those whose checks decide, as `cell` alone may have none."""
+    experiment = planned.experiment
+    beside = [m for m in experiment.methods if m in (*experiment.accepted, experiment.reference)]
+    methods = tuple(dict.fromkeys((*beside, cell.method)))
     values = {**dict(planned.job.values), **cell.values}
-    kept = {k: v for k, v in values.items() if _concerns(k, cell.method)}
-    parts = ["validate", "run", planned.experiment.name]
+    kept = {k: v for k, v in values.items() if _concerns(k, methods)}
+    parts = ["validate", "run", experiment.name]
     for path, value in kept.items():
         parts += ["--set", f"{path}={value}"]
-    return shlex.join([*parts, "--methods", cell.method])
+    return shlex.join([*parts, "--methods", ",".join(methods)])
 
 
-def _concerns(path: str, method: str) -> bool:
-    return not path.startswith(METHODS) or path.startswith(f"{METHODS}{method}.")
+def _concerns(path: str, methods: Sequence[str]) -> bool:
+    mine = tuple(f"{METHODS}{m}." for m in methods)
+    return not path.startswith(METHODS) or path.startswith(mine)

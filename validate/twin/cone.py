@@ -130,7 +130,7 @@ def cone_scene(settings: TwinSettings) -> Scene:
 
 
 def marker_places(settings: TwinSettings) -> dict[str, Floats]:
-    """node_A at the top's centre, on the plate; the others around the side at half height (3,) m."""
+    """node_A at the top's centre, on the plate; others around the side at half height (3,) m."""
     r, z = (settings.bottom + settings.top) / 4, settings.height / 2
     sides = {name: np.array([r * x, r * y, z]) for name, (x, y) in _SIDES.items()}
     return {"node_A": np.array([0.0, 0.0, settings.height]), **sides}

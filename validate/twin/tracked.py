@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, checked
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.recording.types import Markers, Record, Recording, Source
 from validate.scene.scene import Scene
 from validate.solve.types import Run
@@ -86,6 +86,14 @@ class Camera:
         unseen[0] = False
         x[unseen] = np.nan
         return Markers(points.t[pick], points.names, x, self.sd, "camera")
+
+
+def require_noise(variance: float) -> None:
+    """Raises `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
+    if not variance > 0:
+        raise UsageError(
+            f"twin.noise = {variance:g} m2: a variance above 0; 1e-16 is a tracker without noise"
+        )
 
 
 @dataclass(frozen=True)

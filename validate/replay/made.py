@@ -1,0 +1,63 @@
+"""What made a twin's recording is kept in it: the truth follows the recording, not the settings.
+
+A user who changes a material asks what a wrong model does, so the truth must stay; a user who
+changes the twin asks for another recording, so it is made anew in memory.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+from validate.parameters import describe, with_values
+from validate.recording.types import Recording
+
+_RECORD = "made_with"
+
+
+def stamped(recording: Recording, parameters: Any) -> Recording:
+    """The recording with a record of every parameter but files."""
+    kept = MappingProxyType({**recording.metadata, _RECORD: _texts(parameters)})
+    return replace(recording, metadata=kept)
+
+
+def made_by(
+    recording: Recording,
+    parameters: Any,
+    remake: tuple[str, ...],
+    record: Callable[[Any], Recording],
+) -> tuple[Recording, Any, tuple[str, ...]]:
+    """The recording to use, the parameters that made it, and what is to be said of it.
+
+    `remake` are prefixes of the twin's own parameters: where the user's differ from the recording's
+    it is made anew with them. A recording without the record counts as made with `parameters`.
+    """
+    made = dict(recording.metadata.get(_RECORD, {}))
+    mine = _texts(parameters)
+    known = {path: text for path, text in made.items() if path in mine}
+    true = with_values(parameters, known)
+    changed = {
+        path: mine[path]
+        for path, text in known.items()
+        if path.startswith(remake) and mine[path] != text
+    }
+    if not changed:
+        return recording, true, ()
+    true = with_values(true, changed)
+    said = ", ".join(f"{path} = {text}" for path, text in changed.items())
+    note = f"The twin was recorded anew in memory with {said}; the shipped recording was not used."
+    return record(true), true, (note,)
+
+
+def _texts(parameters: Any) -> dict[str, str]:
+    """Values by path, as `--set` takes them; files are left out."""
+    found = {p.path: p.default for p in describe(parameters)}
+    return {path: _text(v) for path, v in found.items() if not (isinstance(v, str) and "/" in v)}
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return ",".join(_text(v) for v in value)
+    if value is None or isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else repr(value)
