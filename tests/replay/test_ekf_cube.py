@@ -20,7 +20,9 @@ from validate.replay.run import compare as compare_with
 from validate.replay.tracking import Tracking
 from validate.scene.scene import Scene
 
-STEP = 0.29447e-3  # s, critical on the shipped mesh (ours); an earlier study's is 0.24 ms on its own
+STEP = (
+    0.29447e-3  # s, critical on the shipped mesh (ours); an earlier study's is 0.24 ms on its own
+)
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from validate.compare.result import MethodResult, Result
+from validate.errors import UsageError
 from validate.replay import compare, load, paper_001
 from validate.replay.options import Options
 from validate.replay.run import compare as compare_with
@@ -139,3 +140,24 @@ def test_the_whole_experiment_stands(cube: Tracking) -> None:
     assert wrong_nu["KF-FEM as printed, gains shared"] == "none"  # blind: it sees A alone
     # A node that the plain model has right is made worse by a filter.
     assert nrmse(result, "load_scale", "@nu")[2] > 2 * nrmse(result, "fem", "@nu")[2]
+
+
+def test_a_changed_model_leaves_the_truth_and_a_changed_twin_is_recorded_anew(
+    cube: Tracking,
+) -> None:
+    """A recording keeps what made it: the truth follows that, and not the user's settings."""
+    small = ("fem",)
+    stiff = compare_with(cube, Options({"material.E": "12000"}, small, True))
+    error = {s.name: s.value for s in of(stiff, "fem").scores}["node_B.nrmse"]
+    assert error == pytest.approx(1 - 1 / 1.2, abs=0.012)
+    assert not any("anew" in note for note in stiff.notes)
+    other = compare_with(cube, Options({"twin.stiffness": "0.8"}, small, True))
+    error = {s.name: s.value for s in of(other, "fem").scores}["node_B.nrmse"]
+    assert error == pytest.approx(0.2, abs=0.012)
+    assert any("twin.stiffness = 0.8" in note for note in other.notes)
+
+
+def test_a_setting_that_the_experiment_itself_sets_is_refused(cube: Tracking) -> None:
+    options = Options({"methods.fem.settings.dt": "0.001"}, ("fem",), True)
+    with pytest.raises(UsageError, match=r"settings.dt = 0.001 .* sets 0.002"):
+        compare_with(cube, options)

@@ -260,6 +260,7 @@ def test_a_stepper_gets_the_models_parameters_and_what_was_registered() -> None:
         assert type(seen) is Registered
         assert {f.name for f in fields(seen)} == {
             "stage", "holds", "markers", "outline", "signals", "windows", "outside", "findings",
+            "time_scale",
         }  # fmt: skip
 
 
@@ -336,7 +337,8 @@ def test_long_steps_are_scored_at_their_own_times(whole: Result) -> None:
     assert value == pytest.approx(float(np.abs(off).max()), rel=1e-12)
     assert value > 0
     speed = next(row for row in table(whole, "speeds") if row[0] == "FEM, long steps")
-    assert speed[6] == pytest.approx(3 * DT * speed[5], rel=1e-12)  # real-time factor, rate
+    assert speed[5] == pytest.approx(3e3 * DT, rel=1e-12)  # ms
+    assert speed[7] == pytest.approx(3 * DT * speed[4], rel=1e-12)  # real-time factor, rate
 
 
 def test_a_baseline_is_timed_and_neither_scored_nor_run_on_other_cases(whole: Result) -> None:

@@ -59,7 +59,7 @@ def followed(
 
 
 def rows_of(found: Followed, others: dict[str, Any] | None = None) -> list[dict[str, Any]]:
-    shown = consistency_exhibit({"kf": found}, others or {})
+    shown = consistency_exhibit({"kf": found}, others or {}, ())
     assert shown is not None
     table = shown.tables[0]
     return [dict(zip(table.headings, row, strict=True)) for row in table.rows]
@@ -95,9 +95,9 @@ def test_a_model_of_another_kind_raises_the_alarm() -> None:
 
 
 def test_nees_is_squared_error_over_claimed_variance_where_any_is_claimed() -> None:
-    """Errors 2, 3 and 5 sd, the last claimed exact: (4 + 9) / 2 per degree, 20 frames of 2."""
+    """Errors 2 and 3 sd, the last component held: (4 + 9) / 2 per degree, 20 frames of 2."""
     dof = np.full(STEPS, 3.0)
-    error, sd = np.tile([0.02, 0.06, 0.05], (20, 1)), np.tile([0.01, 0.02, 0.0], (20, 1))
+    error, sd = np.tile([0.02, 0.06, 0.0], (20, 1)), np.tile([0.01, 0.02, 0.0], (20, 1))
     found = followed(dof, dof, error, sd)
     nees = nees_of(found)
     assert set(nees) == {"tip"}  # the other probe has no truth
@@ -107,6 +107,15 @@ def test_nees_is_squared_error_over_claimed_variance_where_any_is_claimed() -> N
     scores = {s.name: (s.value, s.count, s.against) for s in consistency_scores(found)}
     assert scores["nis.per_dof"] == (pytest.approx(1.0), 120, "measured recording")
     assert scores["tip.nees.per_dof"] == (pytest.approx(6.5), 40, "truth of the twin")
+
+
+def test_an_error_beside_no_claimed_doubt_at_all_is_over_confidence() -> None:
+    """P - K H P reaches exactly zero: such frames must not be left out."""
+    dof = np.full(STEPS, 3.0)
+    error, sd = np.tile([0.02, 0.0, 0.0], (20, 1)), np.zeros((20, 3))
+    nees = nees_of(followed(dof, dof, error, sd))["tip"]
+    assert (nees.verdict, nees.samples, nees.dof) == ("over-confident", 20, 20)
+    assert "does not hold" in nees.alarm
 
 
 def test_nees_reads_the_truth_at_the_times_of_the_frames() -> None:
@@ -127,7 +136,7 @@ def test_solvers_and_filters_that_measured_nothing_say_nothing() -> None:
     for nothing in (followed(None, None), followed(np.zeros(STEPS), np.zeros(STEPS))):
         assert nis_of(nothing) is None
         assert consistency_scores(nothing) == ()
-        assert consistency_exhibit({"kf": nothing}, {}) is None
+        assert consistency_exhibit({"kf": nothing}, {}, ()) is None
     unclaimed = followed(np.full(STEPS, 3.0), np.full(STEPS, 3.0), sd=np.zeros((20, 3)))
     assert nees_of(unclaimed) == {}
 
@@ -136,7 +145,7 @@ def test_solvers_and_filters_that_measured_nothing_say_nothing() -> None:
 def test_whiteness_tells_noise_from_memory(white: bool) -> None:
     dof, rng = np.full(STEPS, 3.0), np.random.default_rng(4)
     y = rng.standard_normal(STEPS) if white else np.sin(0.2 * np.arange(STEPS))
-    shown = consistency_exhibit({"kf": followed(dof, dof, innovation=y)}, {})
+    shown = consistency_exhibit({"kf": followed(dof, dof, innovation=y)}, {}, ())
     assert shown is not None
     (row,) = shown.tables[1].rows
     lag = float(y[1:] @ y[:-1] / (y @ y))
@@ -147,7 +156,7 @@ def test_whiteness_tells_noise_from_memory(white: bool) -> None:
 
 def test_the_chart_shows_measured_steps_and_the_band_of_one_step() -> None:
     dof = np.where(np.arange(STEPS) % 2 == 0, 3.0, 0.0)
-    shown = consistency_exhibit({"kf": followed(0.7 * dof, dof)}, {})
+    shown = consistency_exhibit({"kf": followed(0.7 * dof, dof)}, {}, ())
     assert shown is not None
     band, points = shown.charts[0].series
     assert points.x == pytest.approx(T[::2])

@@ -4,8 +4,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from validate.cli.display import console, shown, table
+from rich.table import Table
+
+from validate.cli.display import console, table
+from validate.report.numbers import shown_unit, text
 from validate.study.stored import Row, SideBySide, read_run, side_by_side
+from validate.study.stored_pairs import Pair, pairs
 
 
 def compare(paths: tuple[Path, ...], as_json: bool) -> None:
@@ -17,14 +21,18 @@ def compare(paths: tuple[Path, ...], as_json: bool) -> None:
     screen, error = console(), console(error=True)
     for warning in found.warnings:
         error.print(f"warning: {warning}", soft_wrap=True)
-    head = ["method", "score", *found.columns, *(f"change of {c}" for c in found.columns[1:])]
-    screen.print(table("Scores", head, [_row(r) for r in found.rows]))
+    shown, more, unseen = pairs(found)
+    for pair in shown:
+        screen.print(_scores(pair), "")
+    if more or unseen:
+        left = f"left out: {more} pairs of methods, {unseen} scores; --json has all"
+        screen.print(left, soft_wrap=True)
     if found.parameters:
         rows = [[path, *values] for path, values in found.parameters.items()]
         names = [f"{r.name} ({r.created})" for r in found.runs]
-        screen.print(table("\nParameters that differ", ["path", *names], rows))
+        screen.print(table("Parameters that differ", ["path", *names], rows))
     else:
-        screen.print("\nNo parameter differs.")
+        screen.print("No parameter differs.")
     screen.print(f"\n{len(found.rows)} scores of {len(found.runs)} runs compared")
 
 
@@ -48,7 +56,21 @@ def document(found: SideBySide) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _scores(pair: Pair) -> Table:
+    """One table of two columns, which fits where a table of all would not."""
+    by_method = any(r.method for r in pair.rows)
+    head = ["score", "one", "other", "difference", "unit"]
+    rows = [_row(r) for r in pair.rows]
+    if by_method:
+        head = ["method", *head]
+        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
+    return table(f"One: {pair.one}; other: {pair.other}", head, rows)
+
+
 def _row(row: Row) -> list[str]:
-    values = ["–" if v is None else shown(v, row.unit) for v in row.values]
-    changes = ["–" if c is None else f"{100 * c:+.3g} %" for c in row.changes[1:]]
-    return [row.method or "–", row.score, *values, *changes]
+    one, other = row.values
+    difference = text(row.differences[1], row.unit)
+    change = row.changes[1]
+    share = "" if change is None else f" ({100 * change:+.3g} %)"
+    return [row.score, text(one, row.unit), text(other, row.unit), difference + share,
+            shown_unit(row.unit)]  # fmt: skip

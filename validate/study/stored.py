@@ -33,6 +33,7 @@ class StoredRun:
     parameters: Mapping[str, tuple[Any, str]]
     recordings: tuple[str, ...]
     quick: bool
+    accepted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,13 +60,17 @@ class Row:
 
 @dataclass(frozen=True)
 class SideBySide:
-    """`columns` name what each value is of; parameters that differ, by path, text per run."""
+    """`columns` name what each value is of: runs, or with `by_score` every method of every run.
+
+    `parameters` that differ, of the experiments and of shared methods, by path with a text per run.
+    """
 
     runs: tuple[StoredRun, ...]
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
     parameters: Mapping[str, tuple[str, ...]]
     warnings: tuple[str, ...]
+    by_score: bool = False
 
 
 def read_run(path: Path) -> StoredRun:
@@ -94,7 +99,8 @@ def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
     runs = tuple(runs)
     names = _distinct([r.name for r in runs])
     columns, found = _by_method(runs, names)
-    if not found:
+    by_score = not found
+    if by_score:
         columns, found = _by_score(runs, names)
     warnings = list(_warnings(runs, names))
     rows = []
@@ -111,7 +117,7 @@ def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
             f"{n} has {len(r.scores)} scores" for n, r in zip(names, runs, strict=True)
         )
         raise ComparisonError(f"0 scores shared, nothing compared: {have}" + _also(warnings))
-    return SideBySide(runs, columns, tuple(rows), _parameters(runs), tuple(warnings))
+    return SideBySide(runs, columns, tuple(rows), _parameters(runs), tuple(warnings), by_score)
 
 
 def _also(warnings: Sequence[str]) -> str:
@@ -158,8 +164,13 @@ def _warnings(runs: tuple[StoredRun, ...], names: tuple[str, ...]) -> list[str]:
 
 
 def _parameters(runs: tuple[StoredRun, ...]) -> dict[str, tuple[str, ...]]:
-    """Paths whose values differ, or that a run lacks, with every run's value as text."""
-    paths = dict.fromkeys(p for r in runs for p in r.parameters)
+    """Paths whose values differ, or that a run lacks, with every run's value as text.
+
+    Settings of a method that only one run has are no difference: that run has the method.
+    """
+    shared = {m for r in runs for m in r.methods if sum(m in o.methods for o in runs) >= 2}
+    every = dict.fromkeys(p for r in runs for p in r.parameters)
+    paths = [p for p in every if not p.startswith("methods.") or p.split(".")[1] in shared]
     rows = {p: tuple(_shown(r.parameters.get(p)) for r in runs) for p in paths}
     return {p: row for p, row in rows.items() if len(set(row)) > 1}
 
@@ -183,6 +194,7 @@ def _run(path: Path, content: dict[str, Any]) -> StoredRun:
         {k: (v["value"], v["unit"]) for k, v in content["parameters"].items()},
         tuple(str(i["sha256"]) for i in content["inputs"]),
         bool(content.get("quick", False)),
+        tuple(str(m["name"]) for m in methods if m.get("accepted")),
     )
 
 
