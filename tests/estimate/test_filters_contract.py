@@ -1,7 +1,7 @@
 """The contract of every filter: prepare, rest, step, field, sd, traces; it never sees the truth."""
 
 import ast
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -135,3 +135,13 @@ def test_every_filter_is_in_the_tuple(project_root: Path) -> None:
         and "Protocol" not in [ast.unparse(b) for b in node.bases]
     }
     assert written == {f.__name__ for f in FILTERS}
+
+
+def test_every_setting_says_what_it_is_and_in_which_unit() -> None:
+    from validate.estimate.filters import FILTERS
+
+    for filter_ in FILTERS:
+        for f in fields(filter_):  # type: ignore[arg-type]
+            assert f.metadata["doc"], f"{filter_.__name__}.{f.name}"
+            variance = f.name in ("Q", "R", "P0", "Qp", "Qm")
+            assert (f.metadata["unit"] == "m2") == variance, f"{filter_.__name__}.{f.name}"

@@ -1,6 +1,6 @@
 """The contract of every scheme: prepare, rest, step, field, traces."""
 
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, fields, replace
 
 import numpy as np
 import pytest
@@ -8,9 +8,11 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
 from validate.fem.system import System, build
+from validate.parameters import with_values
 from validate.scene.box import box
 from validate.scene.scene import Drive, LawName, Load, Material, Scene, Support
 from validate.solve.fluid import LINEAR
+from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton
 from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, SCHEMES
 from validate.solve.tabulated import Tabulated
@@ -154,3 +156,16 @@ def test_dynamics_at_large_strain_refuse_cavities_and_the_linear_law(
         scheme().prepare(large)
     with pytest.raises(SceneError, match="law 'linear' has no form at large strain"):
         scheme().prepare(build(replace(pressed.scene, material=Material(1e4, 0.4, rho=1000.0))))
+
+
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_every_setting_says_what_it_is_and_in_which_unit(kind: type[Scheme]) -> None:
+    for f in fields(kind):  # type: ignore[arg-type]
+        if f.name != "inner":  # itself a scheme
+            assert f.metadata["doc"], f.name
+            assert (f.metadata["unit"] == "s") == (f.name == "dt"), f.name
+
+
+@pytest.mark.parametrize("propagate", ["linear", "constant", "average", "generalised_alpha"])
+def test_every_propagation_of_modes_can_be_set_as_text(propagate: str) -> None:
+    assert with_values(Modal(), {"propagate": propagate}).propagate == propagate

@@ -1,14 +1,18 @@
 """Stored runs side by side: what is shared is compared, nothing shared is refused."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from validate.cli import comparing
 from validate.cli.main import BAD_INPUT, run
 from validate.errors import ComparisonError, UsageError
 from validate.study.stored import read_run, side_by_side
+from validate.study.stored_pairs import pairs
 
 
 def stored(folder: Path, **changes: Any) -> Path:
@@ -108,9 +112,76 @@ def test_the_command_prints_a_table_or_one_document(
     assert run(["compare", *runs]) == 0
     text = capsys.readouterr().out
     assert "node_A.rmse" in text
-    assert "2.000 mm" in text
+    assert re.search(r"kf +node_A.rmse +2.00 +2.00 +0 +mm", text)
     assert "No parameter differs" in text
     assert run(["compare", *runs, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["columns"] == ["one", "two"]
     assert told["scores"][0]["differences"] == [0.0, 0.0]
+
+
+def many(folder: Path, experiment: str, *names: str) -> Path:
+    """A run of 14 methods, the last two accepted, with long score names and settings each."""
+    scores = [_score("node_B.nees.per_dof@stiff_model_200Hz", 1.23456e-7, "1"),
+              _score("corner.rmse@stiff_model_200Hz", 1.5e-3)]  # fmt: skip
+    methods = [
+        {"name": n, "accepted": n in names[-2:], "scores": scores if i else scores[:1]}
+        for i, n in enumerate(names)
+    ]
+    settings = {f"methods.{n}.Q": {"value": 1e-9 * len(experiment), "unit": "m2"} for n in names}
+    settings["material.E"] = {"value": 1e3 * len(experiment), "unit": "Pa"}
+    return stored(folder, experiment=experiment, methods=methods, parameters=settings)
+
+
+def printed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *runs: Path
+) -> list[str]:
+    """Lines of the command on a terminal of 100 columns."""
+    narrow = lambda error=False: Console(stderr=error, width=100, highlight=False)  # noqa: E731
+    monkeypatch.setattr(comparing, "console", narrow)
+    assert run(["compare", *map(str, runs)]) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def test_runs_without_a_shared_method_fit_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [[f"{kind}_filter_{i}" for i in range(14)] for kind in ("first", "second")]
+    runs = many(tmp_path / "one", "kf", *names[0]), many(tmp_path / "other", "ekf", *names[1])
+    lines = printed(monkeypatch, capsys, *runs)
+    assert max(map(len, lines)) <= 100
+    heads = [line.strip() for line in lines if line.startswith("One:")]
+    assert heads == [f"One: one: first_filter_{i}; other: other: second_filter_{i}"
+                     for i in (12, 13)]  # fmt: skip
+    for score in ("node_B.nees.per_dof@stiff_model_200Hz", "corner.rmse@stiff_model_200Hz"):
+        assert sum(line.startswith(f"{score} ") for line in lines) == 2  # on one line each
+    assert "left out: 194 pairs of methods, 0 scores; --json has all" in lines
+    text = "\n".join(lines)
+    assert re.search(r"material.E +2000 Pa +3000 Pa", text)
+    assert "methods." not in text
+
+
+def test_runs_that_share_methods_fit_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [many(tmp_path / n, n, "shared_filter", f"of_{n}") for n in ("kf", "ekf", "other")]
+    lines = printed(monkeypatch, capsys, *runs)
+    assert max(map(len, lines)) <= 100
+    assert [x.strip() for x in lines if x.startswith("One:")] == [
+        "One: kf; other: ekf", "One: kf; other: other",
+    ]  # fmt: skip
+    rows = [line.split()[:2] for line in lines if "nees" in line]
+    assert rows == [["shared_filter", "node_B.nees.per_dof@stiff_model_200Hz"]] * 2
+    text = "\n".join(lines)
+    assert "methods.shared_filter.Q" in text
+    assert "methods.of_" not in text
+
+
+def test_scores_that_the_first_run_lacks_are_counted(tmp_path: Path) -> None:
+    both = method("kf", _score("node_A.rmse", 3e-3), _score("node_B.rmse", 4e-3))
+    folders = [stored(tmp_path / "a")] + [stored(tmp_path / n, methods=both) for n in "bc"]
+    shown, more, unseen = pairs(side_by_side([read_run(f) for f in folders]))
+    assert [(p.one, p.other, [r.values for r in p.rows]) for p in shown] == [
+        ("a", "b", [(2e-3, 3e-3)]), ("a", "c", [(2e-3, 3e-3)]),
+    ]  # fmt: skip
+    assert (more, unseen) == (0, 1)

@@ -7,7 +7,7 @@ from typing import Any
 from rich.table import Table
 
 from validate.cli.display import console, table
-from validate.report.numbers import shown_unit, text
+from validate.report.numbers import shown_unit, significant, text
 from validate.study.stored import Row, SideBySide, read_run, side_by_side
 from validate.study.stored_pairs import Pair, pairs
 
@@ -17,7 +17,11 @@ def compare(paths: tuple[Path, ...], as_json: bool) -> None:
     found = side_by_side([read_run(path) for path in paths])
     if as_json:
         print(json.dumps(document(found), allow_nan=False, ensure_ascii=False, indent=1))
-        return
+    else:
+        _show(found)
+
+
+def _show(found: SideBySide) -> None:
     screen, error = console(), console(error=True)
     for warning in found.warnings:
         error.print(f"warning: {warning}", soft_wrap=True)
@@ -69,8 +73,8 @@ def _scores(pair: Pair) -> Table:
 
 def _row(row: Row) -> list[str]:
     one, other = row.values
-    difference = text(row.differences[1], row.unit)
-    change = row.changes[1]
-    share = "" if change is None else f" ({100 * change:+.3g} %)"
-    return [row.score, text(one, row.unit), text(other, row.unit), difference + share,
-            shown_unit(row.unit)]  # fmt: skip
+    difference, change = text(row.differences[1], row.unit), row.changes[1]
+    if change:
+        difference += f" ({'+' if change > 0 else ''}{significant(100 * change)} %)"
+    values = [text(one, row.unit), text(other, row.unit)]
+    return [row.score, *values, difference, shown_unit(row.unit)]

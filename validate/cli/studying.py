@@ -7,10 +7,11 @@ from validate.cli.main import pairs
 from validate.errors import UsageError
 from validate.replay.find import find
 from validate.report.numbers import MISSING, significant
-from validate.study.exhibits import RANKING, named, ranking_row
+from validate.study.exhibits import RANKING, ranking_row
 from validate.study.filters import Study, cells_folder, study, study_folder
 from validate.study.ranking import Ranking
 from validate.study.stored_study import sentence, write_study
+from validate.study.wording import named
 
 _PLACES = 10  # of every ranking on the terminal
 _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",

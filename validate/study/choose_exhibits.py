@@ -39,7 +39,7 @@ def words(choice: Choice) -> Iterator[str]:
     if want.error < floor:
         yield f"The reference is itself off by {_MM * floor:.2g} mm: no cell can show that."
     what = "with what the linear law costs" if choice.by == "total" else "within the declared law"
-    yield f"Errors are {what}; the rate is that of median steps with the displacements of all nodes."
+    yield f"Errors are {what}; the rate is that of median steps with all displacements."
 
 
 def described(row: Row, choice: Choice) -> str:

@@ -1,17 +1,14 @@
 """What a filter study shows: the best settings, rankings with ties, Pareto front, NIS maps."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from validate.compare.exhibit import Chart, Entry, Exhibit, Heat, NumberTable, Series
-from validate.estimate.consistency import Consistency, nis_consistency
+from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.study.filters import Study
-from validate.study.outcome import CellResult
-from validate.study.plan import METHODS, Cell
+from validate.study.over_axes import over_axes
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
-from validate.study.score import NIS
-from validate.study.sweep import Axis
+from validate.study.wording import consistency, named, seeds_text
 
 _MM = 1e3
 _SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
@@ -33,22 +30,9 @@ _NAMED = 3  # overlapping places that are named
 def study_exhibits(study: Study) -> tuple[Exhibit, ...]:
     """In the order of a reader's questions: which, how sure, at what cost, is it honest."""
     found = [best_exhibit(study), _ranking_exhibit(study), _pareto_exhibit(study)]
-    found += list(_over_axes(study))
+    found += list(over_axes(study))
     failed = _failed_exhibit(study)
     return (*(e for e in found if e is not None), *((failed,) if failed else ()))
-
-
-def consistency(result: CellResult) -> Consistency | None:
-    """NIS of all seeds together; None for a method without innovations."""
-    if result.nis is None or not result.nis_dof:
-        return None
-    return nis_consistency([result.nis], [result.nis_dof])
-
-
-def named(values: Mapping[str, str] | Sequence[tuple[str, str]]) -> str:
-    """Settings as read: `Q=1e-09, R=1e-09`."""
-    pairs = values.items() if isinstance(values, Mapping) else values
-    return ", ".join(f"{_short(k)}={v}" for k, v in pairs) or "as declared"
 
 
 def ranking_row(r: Ranked) -> tuple[Entry, ...]:
@@ -125,10 +109,6 @@ def _ranking_words(study: Study) -> Iterator[str]:
         yield _SAME_MODEL
 
 
-def seeds_text(count: int) -> str:
-    return "1 seed" if count == 1 else f"{count} seeds"
-
-
 def _overlapping(r: Ranked) -> str:
     if r.score.half is None:
         return "one seed"
@@ -147,12 +127,6 @@ def _tied(r: Ranked) -> str:
 
 def _under(ranking: Ranking) -> str:
     return f" with {named(ranking.condition)}" if ranking.condition else ""
-
-
-def _short(path: str) -> str:
-    """`Q` of `methods.kf.Q`, `twin.noise` as it is."""
-    inner = path.split(".", 2)[2] if path.startswith(METHODS) else path
-    return inner.removeprefix("settings.")
 
 
 # --- error against time --------------------------------------------------------------------------
@@ -217,106 +191,6 @@ def _pareto_chart(study: Study, ranking: Ranking, i: int) -> Chart:
 def _points(rows: Sequence[Ranked]) -> tuple[np.ndarray, np.ndarray]:
     x = np.array([_MM * (r.result.step_s or 0.0) for r in rows])
     return x, np.array([_MM * r.score.mean for r in rows])
-
-
-# --- over the swept axes -------------------------------------------------------------------------
-
-
-def _over_axes(study: Study) -> Iterator[Exhibit]:
-    """Per method: NIS and error over its first two swept axes, or over the only one."""
-    charts: list[Chart] = []
-    heats: list[Heat] = []
-    words: list[str] = []
-    for method in study.plan.methods:
-        axes = [a for a in _axes_of(study, method) if len(a.values) > 1]
-        if not axes:
-            continue
-        fixed = _fixed(study, method, axes[2:])
-        cells = [c for c in _cells_of(study, method) if fixed.items() <= c.values.items()]
-        if fixed:
-            words.append(f"{method}: the other axes are held at {named(fixed)}, its best cell.")
-        if len(axes) == 1:
-            charts += _curves(study, method, axes[0], cells)
-        else:
-            heats += _heats(study, method, axes[0], axes[1], cells)
-    if charts or heats:
-        yield Exhibit(
-            "axes", "Over the swept values",
-            ("NIS per degree of freedom is 1 for a filter that knows how wrong it is; above it is "
-             "over-confident, below under-confident. It sees measured components only.", *words),
-            charts=tuple(charts), heats=tuple(heats),
-        )  # fmt: skip
-
-
-def _axes_of(study: Study, method: str) -> list[Axis]:
-    own = f"{METHODS}{method}."
-    mine = [a for a in study.plan.axes if a.path.startswith(own)]
-    return mine + [a for a in study.plan.axes if not a.path.startswith(METHODS)]
-
-
-def _cells_of(study: Study, method: str) -> list[Cell]:
-    return [c for c in study.plan.cells if c.method == method]
-
-
-def _fixed(study: Study, method: str, axes: Sequence[Axis]) -> dict[str, str]:
-    rows = [r for ranking in study.rankings for r in ranking.rows if r.cell.method == method]
-    if not rows or not axes:
-        return {}
-    best = min(rows, key=lambda r: r.score.mean).cell.values
-    return {a.path: best[a.path] for a in axes}
-
-
-def _value(study: Study, cell: Cell, what: str) -> float | None:
-    result = study.results.get(cell.key)
-    if result is None or result.failed:
-        return None
-    if what == NIS:
-        seen = consistency(result)
-        return seen.mean if seen else None
-    return _MM * float(np.mean(result.scores[what]))
-
-
-def _heats(study: Study, method: str, x: Axis, y: Axis, cells: Sequence[Cell]) -> Iterator[Heat]:
-    for what, label, centre in ((NIS, "NIS per dof / 1", 1.0), (study.by, "error / mm", None)):
-        at = {(c.values[x.path], c.values[y.path]): _value(study, c, what) for c in cells}
-        values = np.array([[_nan(at.get((i, j))) for i in x.values] for j in y.values])
-        if np.isfinite(values).any():
-            name = "nis" if what == NIS else "error"
-            yield Heat(
-                f"{name}_{method}", f"{method}: {'NIS' if what == NIS else what} over "
-                f"{_short(x.path)} and {_short(y.path)}", _short(x.path), _short(y.path),
-                x.values, y.values, values, label, centre,
-            )  # fmt: skip
-
-
-def _nan(value: float | None) -> float:
-    return np.nan if value is None else value
-
-
-def _curves(study: Study, method: str, axis: Axis, cells: Sequence[Cell]) -> Iterator[Chart]:
-    """Over an axis of numbers; other values have the ranking alone."""
-    numbers = axis.numbers
-    if numbers is None:
-        return
-    at = dict(zip(axis.values, numbers, strict=True))
-    log = "x" if min(numbers) > 0 and max(numbers) >= 20 * min(numbers) else ""
-    for what, label in ((NIS, "NIS per dof / 1"), (study.by, f"{study.by} / mm")):
-        pairs = sorted(
-            (at[c.values[axis.path]], value)
-            for c in cells
-            if (value := _value(study, c, what)) is not None
-        )
-        if len({y for _, y in pairs}) < 2:
-            continue
-        x, y = (np.array(column) for column in zip(*pairs, strict=True))
-        scale = "xy" if log else "y"
-        name = "nis" if what == NIS else "error"
-        yield Chart(
-            f"{name}_{method}", f"{method}: {name.upper() if name == 'nis' else what} over "
-            f"{_short(axis.path)}", _short(axis.path), label, (Series(method, x, y),),
-            (("consistent", 1.0),) if what == NIS else (),
-            scale if y.min() > 0 else log,  # type: ignore[arg-type]
-        )  # fmt: skip
 
 
 # --- failures ------------------------------------------------------------------------------------

@@ -95,17 +95,32 @@ def study(
     `UsageError` for bad names and values before anything runs, `ComparisonError` when no cell has
     a score.
     """
-    from validate.study.workers import Where, cores, run_all  # a second to import
-
     start = perf_counter()
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     planned = plan(found, Options(dict(values or {}), methods, quick), axes(sweeps), seeds)
     folder = cells_folder(found, out)
     folder.mkdir(parents=True, exist_ok=True)
     before = read_cells(folder, planned.cells)
+    results, where = _finish(planned, folder, before, workers, scheduler, report or _silent)
+    _require_score(planned, results, by)
+    ranked = rankings(planned.cells, results, by)
+    seconds = perf_counter() - start
+    return Study(planned, by, results, ranked, len(before), seconds, where)
+
+
+def _finish(
+    planned: Plan,
+    folder: Path,
+    before: Mapping[str, CellResult],
+    workers: int | None,
+    scheduler: str,
+    tell: Report,
+) -> tuple[dict[str, CellResult], str]:
+    """Runs the cells that are not in `before`, keeping each in `folder`; all results, and where."""
+    from validate.study.workers import Where, cores, run_all  # a second to import
+
     results = dict(before)
     left = [c for c in planned.cells if c.key not in before]
-    tell = report or _silent
 
     def done(cell: Cell, result: CellResult) -> None:
         results[cell.key] = result
@@ -115,17 +130,8 @@ def study(
 
     tell(len(results), len(planned.cells), "workers")
     run_all(planned.job, left, Where(workers, scheduler), done)
-    _require_score(planned, results, by)
-    named = f"Dask at {scheduler}" if scheduler else f"{workers or min(cores(), len(left))} local"
-    return Study(
-        planned,
-        by,
-        results,
-        rankings(planned.cells, results, by),
-        len(before),
-        perf_counter() - start,
-        named,
-    )
+    local = f"{workers or min(cores(), len(left))} local"
+    return results, f"Dask at {scheduler}" if scheduler else local
 
 
 def study_folder(experiment: AnyExperiment, out: Path | None) -> Path:

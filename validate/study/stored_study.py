@@ -8,11 +8,12 @@ from validate.compare.result import Result
 from validate.parameters import describe
 from validate.replay.options import Options, configure
 from validate.report.study_page import Row, StudyPage, write_study_page
-from validate.study.exhibits import consistency, seeds_text, study_exhibits
+from validate.study.exhibits import study_exhibits
 from validate.study.filters import CELLS, Study
 from validate.study.interval import interval
 from validate.study.outcome import CellResult
 from validate.study.plan import Cell
+from validate.study.wording import consistency, seeds_text
 
 
 def write_study(study: Study, folder: Path) -> Path:
