@@ -93,7 +93,7 @@ def test_the_energy_norm_does_not_drift_with_the_mesh_and_the_printed_norm_does(
 
 @pytest.mark.parametrize("kind", ["tri3", "quad4", "tet4", "hex8"])
 def test_the_weighted_nodal_sum_bounds_the_mean_distance(kind: str) -> None:
-    """|interpolated| is at most interpolated |.|; here by 0.1 to 10 %, as an earlier study found."""
+    """|interpolated| is at most interpolated |.|; here by 0.1 to 10 %, as found before."""
     make = grid if kind in ("quad4", "hex8") else box
     mesh = make((1.0, 1.0), (10, 10)) if kind in ("tri3", "quad4") else make((1.0,) * 3, (5,) * 3)
     x = mesh.nodes

@@ -126,7 +126,7 @@ def test_fluid_and_bonded_plates_resist(phantom: Responses) -> None:
 
 
 def test_tuned_gain_is_the_line_through_61_points(phantom: Responses) -> None:
-    """Kp as section 3.3 defines it, fitted here with the normal equations, from roots found here."""
+    """Kp as section 3.3 defines it, fitted here with the normal equations on roots found here."""
     ratios = np.linspace(0.7, 1.3, 61)
     form, at = phantom.volumes[0], 2
     terms = [form[at, at, at], 3 * form[0, at, at], 3 * form[0, 0, at], form[0, 0, 0]]
