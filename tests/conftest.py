@@ -1,6 +1,8 @@
 """Shared fixtures: where real recordings lie, and a folder of this clone's own files."""
 
 import os
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -38,3 +40,14 @@ def phantom(project_root: Path) -> Experiment:
 def phantom_result(phantom: Experiment) -> Result:
     """The whole fluid phantom, all methods, as `validate run fluid_phantom` compares it."""
     return compare(phantom, Options({}))
+
+
+@pytest.fixture(scope="session")
+def whole(project_root: Path) -> Callable[[str], Result]:
+    """A whole experiment over time, as `validate run` compares it: minutes, once a session."""
+
+    @cache
+    def run(name: str) -> Result:
+        return compare(load_file(project_root / "experiments" / f"{name}.py"), Options({}))
+
+    return run

@@ -51,6 +51,7 @@ def test_the_first_crossing_lies_between_two_steps() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_all_claims_stand(experiment: Tracking) -> None:
     result = compare(experiment)
     assert result.passed

@@ -4,7 +4,7 @@ Default tests take a coarse twin (3 by 3 quadratic cells) and the shipped record
 truth; the whole experiment is slow.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,6 @@ from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
 from validate.recording.types import Recording
 from validate.replay import compare, load, paper_003_cone
-from validate.replay.options import Options
-from validate.replay.run import compare as compare_with
 from validate.replay.tracking import Tracking, Truth
 from validate.twin.cone import record_cone
 
@@ -182,10 +180,10 @@ def test_the_recordings_are_what_the_twin_records(cone: Tracking) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_the_whole_experiment_stands(cone: Tracking) -> None:
+def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     """Locking at nu .4995 is ours; an earlier study has .855 and .460 at .49 and .499 on its mesh
     with slipping plates, ours are bonded."""
-    found = compare_with(cone, Options({}))
+    found = whole("ekf_cone")
     assert found.passed
     assert len(found.checks) == 3
     assert all(c.u_num > 0 and c.u_input > 0 for c in found.checks)

@@ -5,7 +5,7 @@ Numbers are those of an earlier study of the paper. Its wrong model is 20 % stif
 the range: noise in NRMSE is 1/1.2 of that study's, the models' own error is not.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -117,8 +117,8 @@ def test_noise_along_the_load_and_two_states_correct_every_node(some: Result) ->
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_the_whole_experiment_stands(cube: Tracking) -> None:
-    result = compare_with(cube, Options({}))
+def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
+    result = whole("kf_cube")
     assert result.passed
     assert len(result.checks) == 4
     assert not [(p.name, p.fault) for p in result.published if p.fault]

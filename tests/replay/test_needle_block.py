@@ -70,6 +70,7 @@ def test_a_marker_outside_a_plane_mesh_is_refused() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_all_claims_stand(experiment: Tracking) -> None:
     """The numbers of an independent reconstruction of paper 002, by way of the report's tables."""
     result = compare(experiment)

@@ -90,7 +90,8 @@ def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     )
     return Chart(
         f"error_{probe}", f"Error at {probe}", "recorded time / s",
-        f"|u_{axis} − reference| / mm", series, log="y", caption=f"Errors below {_MM * floor:.1e} mm are drawn there.",
+        f"|u_{axis} − reference| / mm", series, log="y",
+        caption=f"Errors below {_MM * floor:.1e} mm are drawn there.",
     )  # fmt: skip
 
 
