@@ -26,7 +26,8 @@ def checks(result: Result) -> Section | None:
     table = Table(
         "E = simulation less measurement; for many points the part of the rms that noise does not "
         "explain. u_val² = u_D² (measurement) + u_num² (mesh) + u_input² (declared ranges, and "
-        "what a filter claims of its own error), standard uncertainties. Agrees: |E| ≤ 2 u_val ≤ limit. Differs: |E| > 2 u_val. Cannot "
+        "what a filter claims of its own error), standard uncertainties. "
+        "Agrees: |E| ≤ 2 u_val ≤ limit. Differs: |E| > 2 u_val. Cannot "
         "decide: 2 u_val exceeds the limit.",
         ("method", "check", "unit", "E", "2\u00a0u_val", "u_D", "u_num", "u_input", "limit",
          "values", "verdict", "why"),
