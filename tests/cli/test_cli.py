@@ -102,6 +102,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path: Path, setting: str, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_run_without_an_accepted_method_fails_but_reports(tmp_path: Path) -> None:
     arguments = ["run", "fluid_phantom", "--methods", "p1_fluid,p1_loop", "--out", str(tmp_path)]
     done = called(*arguments, *COARSE, cwd=tmp_path)
@@ -112,6 +113,7 @@ def test_a_run_without_an_accepted_method_fails_but_reports(tmp_path: Path) -> N
     assert [m["name"] for m in results["methods"]] == ["p1_fluid", "p1_loop"]
 
 
+@pytest.mark.slow
 def test_json_on_standard_output_is_one_document(tmp_path: Path) -> None:
     done = called(
         "run", "fluid_phantom", "--json", "--methods", "p1_dry", "--out", str(tmp_path), *COARSE
@@ -120,6 +122,7 @@ def test_json_on_standard_output_is_one_document(tmp_path: Path) -> None:
     assert done.stderr == ""  # no progress bar where there is no terminal
 
 
+@pytest.mark.slow
 def test_an_experiment_file_anywhere_and_from_any_folder(
     tmp_path: Path, project_root: Path
 ) -> None:

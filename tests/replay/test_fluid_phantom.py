@@ -92,6 +92,7 @@ def test_the_twin_is_not_judged_by_its_own_mesh(phantom_result: Result) -> None:
     assert "share the law" in phantom_result.twin_notice
 
 
+@pytest.mark.slow
 def test_the_1328_node_mesh_of_the_note_is_reached_by_set(phantom: Experiment) -> None:
     """An earlier study, PH-1328, P1, slip: P 480 / 1101 / 1865 Pa, force 6.99 N at 9 mm."""
     result = compare(phantom, Options(PH_1328, ("p1_fluid",)))
@@ -278,6 +279,7 @@ def test_settings_that_mean_nothing_are_refused(
         compare(phantom, Options({**quick, **setting}, ("p2_fluid",)))
 
 
+@pytest.mark.slow
 def test_an_inclusion_meshed_elsewhere_is_told(phantom: Experiment) -> None:
     result = compare(phantom, Options({"inclusion.centre_x": "0.030"}, ("p1_dry",)))
     assert any("centre is 1.5" in note or "centre is 1.6" in note for note in result.notes)
@@ -285,6 +287,7 @@ def test_an_inclusion_meshed_elsewhere_is_told(phantom: Experiment) -> None:
     assert not any("meshed inclusion" in note for note in untouched.notes)
 
 
+@pytest.mark.slow
 def test_another_order_is_in_the_label(phantom: Experiment) -> None:
     result = compare(phantom, Options({"mesh.order": "2"}, ("p1_dry",)))
     assert result.methods[0].label == "P1 without fluid [order 2]"
