@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from validate.study.outcome import CellResult
 from validate.study.plan import Cell
-from validate.study.ranking import Ranking, rankings
+from validate.study.ranking import Ranking, dominator, rankings
 
 
 def ranked(**cells: tuple[Sequence[float], float]) -> Ranking:
@@ -60,3 +60,9 @@ def test_conditions_are_ranked_apart_and_failures_are_rows() -> None:
     one, two = rankings(cells, results, "e")
     assert (len(one.rows), len(two.rows)) == (1, 1)
     assert two.failed == ((cells[2], "diverged at step 3"),)
+
+
+def test_errors_that_differ_by_rounding_are_one_error() -> None:
+    """Two solvers of one system: the slower one is no point of the front."""
+    assert dominator(0, [1.0 - 1e-12, 1.0], [168.0, 118.0]) == 1
+    assert dominator(1, [1.0 - 1e-12, 1.0], [168.0, 118.0]) is None

@@ -57,7 +57,8 @@ def looks(result: Result) -> dict[str, Look]:
             found[method.name] = Look(ACCEPTED, "-", "o", 1.8)
             continue
         i = rivals % len(_RIVALS)
-        found[method.name] = Look(_RIVALS[i], _DASHES[i], _POINTS[i], 1.2)
+        other = (rivals + rivals // len(_RIVALS)) % len(_DASHES)  # a second round looks different
+        found[method.name] = Look(_RIVALS[i], _DASHES[other], _POINTS[other], 1.2)
         rivals += 1
     return found
 

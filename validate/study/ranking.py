@@ -9,6 +9,7 @@ from validate.study.plan import Cell
 
 # Medians of one step on a machine that does other things too: closer than this is the same time.
 SAME_TIME = 1.25
+SAME_ERROR = 1 + 1e-6
 
 Condition = tuple[tuple[str, str], ...]
 
@@ -96,10 +97,11 @@ def tied(mine: Sequence[float], best: Sequence[float]) -> tuple[Interval, bool]:
 
 def dominator(i: int, errors: Sequence[float], times: Sequence[float]) -> int | None:
     """The first that has less error than i in at most its time, or no more error in less time;
-    times within `SAME_TIME` are equal. None on the Pareto front."""
+    times within `SAME_TIME` are equal, and so are errors within `SAME_ERROR`: two solvers of one
+    system differ by rounding. None on the Pareto front."""
     for j, (error, time) in enumerate(zip(errors, times, strict=True)):
-        better = error < errors[i] and time <= SAME_TIME * times[i]
-        faster = error <= errors[i] and SAME_TIME * time < times[i]
+        better = SAME_ERROR * error < errors[i] and time <= SAME_TIME * times[i]
+        faster = error <= SAME_ERROR * errors[i] and SAME_TIME * time < times[i]
         if j != i and (better or faster):
             return j
     return None
