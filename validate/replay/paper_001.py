@@ -221,7 +221,7 @@ def _claims(values: Values) -> tuple[Published, ...]:
     if key in kf and key in fem:
         found.append(
             Published(
-                "error left 2 mm below the measured node, model 20 % too stiff",
+                "share of the error left 2 mm below the measured node, model 20 % too stiff",
                 kf[key] / fem[key],
                 0.0,
                 None,
