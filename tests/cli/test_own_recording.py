@@ -47,6 +47,7 @@ def called(arguments: list[str]) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
+@pytest.mark.slow
 def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root: Path) -> None:
     outputs = {}
     for program, *arguments in commands(project_root):

@@ -110,6 +110,7 @@ def test_the_1328_node_mesh_of_the_note_is_reached_by_set(phantom: Experiment) -
     )
 
 
+@pytest.mark.slow
 def test_a_quick_run_has_a_banner_and_no_published_verdicts(phantom: Experiment) -> None:
     result = compare(phantom, Options({}, ("p2_fluid",), quick=True))
     assert result.quick
@@ -293,6 +294,7 @@ def test_another_order_is_in_the_label(phantom: Experiment) -> None:
     assert result.methods[0].label == "P1 without fluid [order 2]"
 
 
+@pytest.mark.slow
 def test_lost_markers_are_left_out_and_counted(phantom: Experiment, good: Recording) -> None:
     def lost(markers: Markers) -> Markers:
         x = markers.x.copy()
