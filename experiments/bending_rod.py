@@ -8,6 +8,8 @@ from pathlib import Path
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
+from validate.replay.experiment import Case, Experiment
+from validate.replay.method import Method
 from validate.replay.paper_002 import rod_published
 from validate.replay.paper_002_rod import tell
 from validate.replay.solver_benchmark import (
@@ -23,7 +25,6 @@ from validate.replay.solver_benchmark import (
     changed,
     solvers,
 )
-from validate.replay.tracking import Case, Follower, Tracking
 from validate.scene.needle import STEP
 from validate.scene.rod import MP3, SIZE, bending_rod, gravity_inputs
 from validate.scene.scene import Material, Scene
@@ -58,8 +59,8 @@ METHODS = {
     **FIVE,
     **SWITCHES,
     **solvers(),
-    "modal": Follower("all modes, by the implicit rule", Modal(STEP, propagate="average")),
-    "modal_10": Follower("10 modes, exact in time", Modal(STEP, 10)),
+    "modal": Method("all modes, by the implicit rule", Modal(STEP, propagate="average")),
+    "modal_10": Method("10 modes, exact in time", Modal(STEP, 10)),
 }
 CASES = (
     Case("finer_mesh", "the truth has twice as many cells along every edge",
@@ -68,7 +69,7 @@ CASES = (
          changed("twin", finer=20), methods=tuple(FIVE)),
 )  # fmt: skip
 
-EXPERIMENT = Tracking(
+EXPERIMENT = Experiment(
     name="bending_rod",
     title="Solvers against the implicit run on a rod that bends under gravity",
     source="paper 002 (accuracy metrics and benchmarks), sections IV.B and VI",
@@ -77,21 +78,16 @@ EXPERIMENT = Tracking(
     accepted=("explicit",),
     accept=(Accept("tip", 2e-3, "two percent of the largest displacement there (ours)"),),
     load=BENCHMARK.load,
-    record=BENCHMARK.record,
-    truth=BENCHMARK.truth,
     build=BENCHMARK.build,
     place=BENCHMARK.place,
-    stepper=BENCHMARK.stepper,
+    sets=BENCHMARK.sets,
     axis="z",
     reference="implicit",
     cases=CASES,
-    tell=tell,
+    exhibits=tell,
     published=rod_published,
     frames=FRAMES,
-    same_model=True,
-    remake=("body.", "clock.", "twin."),
-    seed=TwinCard().seed,
-    twin_notice=(
+    twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
         "markers. Errors are between solvers; no tissue was measured."
     ),

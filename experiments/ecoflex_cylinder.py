@@ -15,7 +15,6 @@ from typing import Literal
 
 import numpy as np
 
-from validate.compare.curve import curve_residuals
 from validate.compare.score import Score
 from validate.compare.verdict import Accept, Published
 from validate.errors import RecordingError
@@ -33,9 +32,11 @@ from validate.identify.modulus import (
 )
 from validate.parameters import quantity, require_ranges
 from validate.recording.instron import read_instron
-from validate.recording.types import Recording, Signal
-from validate.register.observe import Hold, Registered, SignalObservation
+from validate.recording.types import Recording
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, windows_of
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+from validate.replay.method import Method
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact
@@ -43,7 +44,6 @@ from validate.scene.scene import Drive, LawName, Material, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
-from validate.solve.types import Scheme
 
 DATA_SET = "abubakardawood/tissue-phantom-material-database (CC BY 4.0)"
 FOLDER = "force/ecoflex-compression"
@@ -101,8 +101,9 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Method:
-    label: str = quantity("", "1", "what reports call it")
+class Model:
+    """What a method's scene is built with."""
+
     plates: Contact = quantity("slip", "1", "contact of both plates")
     modulus: Literal["slip", "bonded", "svk_slip", "neo_slip", "neo_bonded"] = quantity(
         "slip", "1", "modulus identified for"
@@ -111,21 +112,27 @@ class Method:
     radial: int | None = quantity(None, "1", "elements from axis to rim; none: the mesh's")
     axial: int | None = quantity(None, "1", "elements along the axis; none: the mesh's")
     order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
-    load_step: float = quantity(0.0015, "m", "grid of loads that large strain is solved at")
 
 
+TABLE = Tabulated(StaticNewton("none"), 0.0015)
 METHODS: Mapping[str, Method] = {
-    "slip": Method("linear, slipping plates"),
-    "bonded": Method("linear, bonded plates", "bonded", "bonded"),
-    "bonded_upper": Method("linear, bonded plates, modulus of slipping ones", "bonded", "slip"),
-    "slip_lower": Method("linear, slipping plates, modulus of bonded ones", "slip", "bonded"),
-    # Slipping plates leave the deformation homogeneous: two elements are exact.
-    "svk_slip": Method("SVK, slipping plates", "slip", "svk_slip", "svk", 2, 2),
-    "neo_slip": Method("neo-Hooke, slipping plates", "slip", "neo_slip", "neo_hooke", 2, 2),
-    "neo_bonded": Method(
-        "neo-Hooke, bonded plates", "bonded", "neo_bonded", "neo_hooke", 5, 6, order=1
+    "slip": Method("linear, slipping plates", NoFluid(), Model()),
+    "bonded": Method("linear, bonded plates", NoFluid(), Model("bonded", "bonded")),
+    "bonded_upper": Method(
+        "linear, bonded plates, modulus of slipping ones", NoFluid(), Model("bonded", "slip")
     ),
-    "svk_bonded": Method("SVK, bonded plates", "bonded", "bonded", "svk", 5, 6, order=1),
+    "slip_lower": Method(
+        "linear, slipping plates, modulus of bonded ones", NoFluid(), Model("slip", "bonded")
+    ),
+    # Slipping plates leave the deformation homogeneous: two elements are exact.
+    "svk_slip": Method("SVK, slipping plates", TABLE, Model("slip", "svk_slip", "svk", 2, 2)),
+    "neo_slip": Method(
+        "neo-Hooke, slipping plates", TABLE, Model("slip", "neo_slip", "neo_hooke", 2, 2)
+    ),
+    "neo_bonded": Method(
+        "neo-Hooke, bonded plates", TABLE, Model("bonded", "neo_bonded", "neo_hooke", 5, 6, 1)
+    ),
+    "svk_bonded": Method("SVK, bonded plates", TABLE, Model("bonded", "bonded", "svk", 5, 6, 1)),
 }
 
 
@@ -155,21 +162,19 @@ def _data_folder(parameters: Parameters, folder: Path) -> Path:
     return (Path(shared) if shared else folder.parents[1] / "shared" / "data") / FOLDER
 
 
-def build(recording: Recording, parameters: Parameters, method: Method) -> Scene:
+def build(recording: Recording, parameters: Parameters, model: Model) -> Scene:
     p = parameters
-    E: float | None = getattr(p.material, f"E_{method.modulus}")
+    E: float | None = getattr(p.material, f"E_{model.modulus}")
     if E is None:
-        raise RecordingError(f"no modulus identified; set material.E_{method.modulus}")
-    return _method_scene(_size(recording, p), p, method, E)
+        raise RecordingError(f"no modulus identified; set material.E_{model.modulus}")
+    return _model_scene(_size(recording, p), p, model, E)
 
 
-def _method_scene(size: tuple[float, float], p: Parameters, method: Method, E: float) -> Scene:
-    grid = replace(
-        p.mesh, radial=method.radial or p.mesh.radial, axial=method.axial or p.mesh.axial
-    )
-    material = Material(E, p.material.nu, method.law)
-    scene = cylinder_scene(*size, grid, material, method.plates)
-    if method.order == 2:
+def _model_scene(size: tuple[float, float], p: Parameters, model: Model, E: float) -> Scene:
+    grid = replace(p.mesh, radial=model.radial or p.mesh.radial, axial=model.axial or p.mesh.axial)
+    material = Material(E, p.material.nu, model.law)
+    scene = cylinder_scene(*size, grid, material, model.plates)
+    if model.order == 2:
         return scene
     linear = quarter_cylinder(*size, grid.radial, grid.axial, grid.grading)
     return replace(scene, mesh=linear, dilatation="nodal_mean")
@@ -192,12 +197,6 @@ def cylinder_scene(
     return Scene(mesh, material, tuple(supports), drives=(drive,), copies=4)
 
 
-def scheme(method: Method) -> Scheme:
-    return (
-        NoFluid() if method.law == "linear" else Tabulated(StaticNewton("none"), method.load_step)
-    )
-
-
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
     """Displacement less contact and toe, force less the cell's offset, to the law's limit."""
     p = parameters
@@ -205,23 +204,16 @@ def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registe
     fit = fit_modulus(recording, window=(p.fit_from, p.fit_to))
     _, height = _size(recording, p)
     d, force = recording.signal("displacement", "m"), recording.signal("force", "N")
-    moved = d.y[:, 0] - fit.contact - fit.toe * height
-    last = int(np.argmax(moved > limit * height)) or len(moved)
-    t, moved = d.t[:last], moved[:last]
-    stage = Signal(t, moved[:, None], "m", d.sd, "machine")
-    seen = SignalObservation(
-        "force", "stage.force", t, force.y[:last, 0] - fit.offset, "N", fit.noise
+    moved = d.y - fit.contact - fit.toe * height
+    last = int(np.argmax(moved[:, 0] > limit * height)) or len(moved)
+    t, offset = d.t[:last], force.y[:last] - fit.offset
+    stage = SignalObservation("displacement", "drives", t, moved[:last], "m", d.sd)
+    cell = SignalObservation(
+        "force", "validates", t, offset, "N", fit.noise, "force", "stage.force"
     )
-    holds = (Hold("0mm", 0.0, float(t[0])), Hold("end", float(moved[-1]), float(t[-1])))
-    windows = {
-        label: (a * height, b * height)
-        for label, (a, b) in zip(
-            WINDOWS, pairwise((p.fit_from, p.fit_to, *_limits(p))), strict=True
-        )
-        if b <= limit
-    }
-    outside = len(d.t) - last
-    return Registered(stage, holds, None, None, (seen,), windows, outside)
+    strains = zip(WINDOWS, pairwise((p.fit_from, p.fit_to, *_limits(p))), strict=True)
+    windows = {label: (a * height, b * height) for label, (a, b) in strains if b <= limit}
+    return Registered((stage, cell), windows_of(stage, windows), outside=len(d.t) - last)
 
 
 def _size(recording: Recording, p: Parameters) -> tuple[float, float]:
@@ -278,15 +270,15 @@ def identify(recordings: Sequence[Recording], parameters: Parameters) -> Identif
 
 def _law_fit(recordings: Sequence[Recording], p: Parameters, method: Method) -> LawFit:
     """The law's modulus over its whole range, by the method's own mesh."""
-    scene = _method_scene(_size(recordings[0], p), p, method, 1.0)
-    stepper = scheme(method).prepare(build_system(scene))
+    scene = _model_scene(_size(recordings[0], p), p, method.scene, 1.0)
+    stepper = method.settings.prepare(build_system(scene))
     curves, forces = [], []
     for recording in recordings:
         seen = place(recording, p, scene)
-        states = [stepper.step(stepper.rest(), q) for q in seen.stage.y]
+        states = [stepper.step(stepper.rest(), q) for q in seen.inputs]
         good = [s.failure is None for s in states]
         curves.append(stepper.traces(states)["stage.force"].y[good])
-        forces.append(seen.signals[0].y[good])
+        forces.append(seen.of(SignalObservation)[0].y[good, 0])
     return fit_scale(curves, forces)
 
 
@@ -393,11 +385,10 @@ EXPERIMENT = Experiment(
     accept=(Accept("force", 2.1, "a tenth of the force at 10 % strain (ours)", ("10pct",)),),
     load=load,
     build=build,
-    scheme=scheme,
     place=place,
-    residuals=curve_residuals,
     uncertainty=Uncertainty(_finer, _refinement, INPUTS, surrogate="slip"),
     published=published,
     identify=identify,
     band=lambda p: float(p.ranges.specimen),
+    frames=2,
 )

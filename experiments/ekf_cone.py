@@ -5,6 +5,7 @@ models follow it: bodies moved by the tracked plate, which predict force and bul
 paper's, pushed by the measured force, with and without filters that see the plate's marker.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -15,15 +16,16 @@ import numpy as np
 from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
-from validate.fem.system import System
 from validate.parameters import quantity, require_ranges
 from validate.recording.mcap_read import read_recording
-from validate.recording.types import Recording, Signal
-from validate.register.observe import Hold, MarkerObservation, Registered, SignalObservation
-from validate.register.placed import placed
-from validate.replay.experiment import Input, Progress, Uncertainty
+from validate.recording.types import Recording
+from validate.register.markers import MarkerObservation, placed_markers
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, driving
+from validate.replay.experiment import Case, Experiment, Input, Progress, Twin, Uncertainty
+from validate.replay.followed import Truth
+from validate.replay.method import Method
 from validate.replay.paper_003_cone import published_cone, tell_cone
-from validate.replay.tracking import Case, Follower, Tracking, Truth
 from validate.scene.cone import quarter_cone
 from validate.scene.mesh import quadratic
 from validate.scene.mesh_file import read_mesh
@@ -31,7 +33,6 @@ from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
-from validate.solve.types import Stepper
 from validate.twin.cone import (
     LoadTable,
     TwinSettings,
@@ -99,46 +100,46 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Method:
+class Model:
     """`plate`: moved by the tracked plate; else pushed by the force, lateral motion held on top."""
 
-    label: str = quantity("", "1", "what reports call it")
-    settings: Any = quantity(None, "1", "of the scheme or filter")
-    markers: tuple[str, ...] = quantity((), "1", "markers that a filter is given")
     plate: bool = quantity(False, "1", "moved by the plate, not pushed by the force")
     element: Literal["p1", "p1_mean", "p2"] = quantity("p1", "1", "p1_mean: nodal mean dilatation")
     law: Literal["svk", "neo_hooke"] = quantity("svk", "1", "law of the material")
-
-    def follower(self) -> Follower:
-        return Follower(self.label, self.settings, self.markers)
 
 
 QUASI_STATIC = Tabulated(StaticNewton("none"), 0.4e-3)
 A = ("node_A",)
 METHODS = {
-    "plate_p2": Method("plate moved, P2 neo-Hooke", QUASI_STATIC, (), True, "p2", "neo_hooke"),
+    "plate_p2": Method("plate moved, P2 neo-Hooke", QUASI_STATIC, Model(True, "p2", "neo_hooke")),
     "plate_mean": Method(
-        "plate moved, P1 mean dilatation, neo-Hooke", QUASI_STATIC, (), True, "p1_mean", "neo_hooke"
+        "plate moved, P1 mean dilatation, neo-Hooke",
+        QUASI_STATIC,
+        Model(True, "p1_mean", "neo_hooke"),
     ),
-    "plate_p1": Method("plate moved, P1 (locks)", QUASI_STATIC, (), True, "p1", "neo_hooke"),
-    "nfem": Method("NFEM, force, explicit", CentralDifference(watch=1)),
-    "ekf_held": Method("node-level EKF as printed, held", NodeEKF(overflow="hold"), A),
-    "ekf_companion": Method("node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), A),
-    "reduced_modes": Method("reduced EKF, 20 modes and load bias", ReducedEKF(), A),
-    "reduced_pod": Method("reduced EKF, POD and load bias", ReducedEKF(basis="pod", shapes=5), A),
+    "plate_p1": Method("plate moved, P1 (locks)", QUASI_STATIC, Model(True, "p1", "neo_hooke")),
+    "nfem": Method("NFEM, force, explicit", CentralDifference(watch=1), Model()),
+    "ekf_held": Method("node-level EKF as printed, held", NodeEKF(overflow="hold"), Model(), A),
+    "ekf_companion": Method(
+        "node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), Model(), A
+    ),
+    "reduced_modes": Method("reduced EKF, 20 modes and load bias", ReducedEKF(), Model(), A),
+    "reduced_pod": Method(
+        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", shapes=5), Model(), A
+    ),
 }
 
 
-def build(recording: Recording, parameters: Parameters, method: Method) -> Scene:
-    return _quarter(parameters, method) if method.plate else _whole(parameters, method)
+def build(recording: Recording, parameters: Parameters, model: Model) -> Scene:
+    return _quarter(parameters, model) if model.plate else _whole(parameters, model)
 
 
-def _material(p: Parameters, method: Method, nu: float, damping: float) -> Material:
+def _material(p: Parameters, model: Model, nu: float, damping: float) -> Material:
     mu = p.material.scale * SHEAR[p.material.card]
-    return Material(2 * mu * (1 + nu), nu, method.law, p.material.rho, damping)
+    return Material(2 * mu * (1 + nu), nu, model.law, p.material.rho, damping)
 
 
-def _quarter(p: Parameters, method: Method) -> Scene:
+def _quarter(p: Parameters, model: Model) -> Scene:
     """A quarter between bonded plates, the upper one driven down."""
     s, grid = p.twin, p.mesh
     mesh = quarter_cone(s.bottom, s.top, s.height, grid.radial, grid.axial, grid.grading)
@@ -146,19 +147,19 @@ def _quarter(p: Parameters, method: Method) -> Scene:
     inside = {n: at for n, at in marker_places(s).items() if (at >= 0).all()}
     return replace(
         scene,
-        mesh=quadratic(mesh) if method.element == "p2" else mesh,
-        material=_material(p, method, p.material.nu, 0.0),
-        dilatation="nodal_mean" if method.element == "p1_mean" else "pointwise",
+        mesh=quadratic(mesh) if model.element == "p2" else mesh,
+        material=_material(p, model, p.material.nu, 0.0),
+        dilatation="nodal_mean" if model.element == "p1_mean" else "pointwise",
         drives=(Drive("plate", "top", (0.0, 0.0, -1.0)),),
         probes=tuple(Probe(n, tuple(at)) for n, at in inside.items()),
     )
 
 
-def _whole(p: Parameters, method: Method) -> Scene:
+def _whole(p: Parameters, model: Model) -> Scene:
     """The shipped mesh, bonded below, pushed from above without lateral motion there."""
     return Scene(
         read_mesh(Path(p.mesh.file)),
-        _material(p, method, p.material.nu_explicit, p.material.mass_damping),
+        _material(p, model, p.material.nu_explicit, p.material.mass_damping),
         (Support("bottom", (0, 1, 2)), Support("top", (0, 1))),
         loads=(Load("press", "top", (0.0, 0.0, -1.0)),),
         probes=tuple(Probe(n, tuple(at)) for n, at in marker_places(p.twin).items()),
@@ -197,49 +198,40 @@ def _table(s: TwinSettings) -> LoadTable:
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
     """The plate's path, or the load cell's ramp, each fitted by least squares; explicit runs in
     scaled time."""
-    markers = placed(recording, read_mesh(Path(parameters.mesh.file))).within(scene.mesh)
-    cell = recording.signal("load_cell", "N")
+    whole = placed_markers(recording, read_mesh(Path(parameters.mesh.file)))
+    markers = whole.within(scene.mesh)
+    cell = driving(recording, "load_cell", "N", after_rest=True)
     if scene.drives:
         return _plate(markers, cell)
     return _pushed(markers, cell, parameters.clock.scale)
 
 
-def _plate(markers: MarkerObservation, cell: Signal) -> Registered:
-    """Compression by a cubic through the plate's marker, from rest."""
+def _plate(markers: MarkerObservation, cell: SignalObservation) -> Registered:
+    """Compression by a cubic through the plate's marker, from rest; the cell's force validates."""
     j = markers.names.index("node_A")
     down = markers.rest[j, 2] - markers.x[:, j, 2]
     seen = np.isfinite(down)
     powers = markers.t[:, None] ** np.arange(1, 4)
     path = powers @ np.linalg.lstsq(powers[seen], down[seen], rcond=None)[0]
-    later = cell.t > 0
-    y = np.interp(cell.t[later], markers.t, path)
-    stage = Signal(cell.t[later], y[:, None], "m", markers.sd, "machine")
-    force = SignalObservation("force", "plate.force", cell.t[later], cell.y[later, 0], "N", cell.sd)
-    return Registered(stage, _ends(stage), markers, None, (force,))
+    y = np.interp(cell.t, markers.t, path)[:, None]
+    plate = SignalObservation("plate", "drives", cell.t, y, "m", markers.sd)
+    force = replace(cell, role="validates", quantity="force", trace="plate.force")
+    return Registered((plate, markers, force))
 
 
-def _pushed(markers: MarkerObservation, cell: Signal, scale: float) -> Registered:
+def _pushed(markers: MarkerObservation, cell: SignalObservation, scale: float) -> Registered:
     """A straight ramp through the load cell's samples, in time divided by `scale`."""
-    later = cell.t > 0
-    t = cell.t[later]
-    slope = float(t @ cell.y[later, 0] / (t @ t))
-    stage = Signal(t / scale, (slope * t)[:, None], "N", cell.sd, "machine")
-    scaled = replace(markers, t=markers.t / scale)
-    return Registered(stage, _ends(stage), scaled, None, (), time_scale=scale)
+    t = cell.t
+    slope = float(t @ cell.y[:, 0] / (t @ t))
+    press = replace(cell, t=t / scale, y=(slope * t)[:, None])
+    return Registered((press, replace(markers, t=markers.t / scale)), time_scale=scale)
 
 
-def _ends(stage: Signal) -> tuple[Hold, Hold]:
-    first, last = float(stage.t[0]), float(stage.t[-1])
-    return Hold("start", 0.0, first), Hold("end", float(stage.y[-1, 0]), last)
-
-
-def stepper(method: Method, parameters: Parameters, system: System, seen: Registered) -> Stepper:
+def sets(parameters: Parameters, seen: Registered) -> Mapping[str, Any]:
     p = parameters
-    if method.plate:
-        quasi_static: Tabulated = replace(method.settings, step=p.mesh.load_step)
-        return quasi_static.prepare(system)
-    dt = float(seen.stage.t[0])
-    return method.follower().prepare(system, seen, dt=dt, substeps=p.clock.substeps)
+    return {
+        "dt": float(seen.t[0]), "substeps": p.clock.substeps, "step": p.mesh.load_step,
+    }  # fmt: skip
 
 
 def _finer(p: Parameters) -> Parameters:
@@ -275,7 +267,7 @@ def _small(p: Parameters) -> Parameters:
     return replace(p, recording=str(SMALL), twin=replace(p.twin, force=0.15))
 
 
-EXPERIMENT = Tracking(
+EXPERIMENT = Experiment(
     name="ekf_cone",
     title="Ecoflex cone on a testing machine, with and without filters",
     source="paper 003 (EKF-NFEM), section 3.4, Table 3",
@@ -288,20 +280,22 @@ EXPERIMENT = Tracking(
         Accept("node_C", 0.15e-3, "a tenth of the largest displacement there (ours)"),
     ),
     load=load,
-    record=record,
-    truth=truth,
     build=build,
     place=place,
-    stepper=stepper,
+    sets=sets,
     axis="z",
     reference="nfem",
     cases=(Case("small", "the printed 0.15 N instead of 15 N", _small, shipped=True),),
     uncertainty=UNCERTAINTY,
-    tell=tell_cone,
+    exhibits=tell_cone,
     published=published_cone,
-    seed=TwinSettings().seed,
-    twin_notice=(
-        "The recording is a twin: it shares its law with the bodies that the plate moves, not "
-        "their mesh; explicit runs have another law, element and loading."
+    twin=Twin(
+        record,
+        truth,
+        seed=TwinSettings().seed,
+        notice=(
+            "The recording is a twin: it shares its law with the bodies that the plate moves, not "
+            "their mesh; explicit runs have another law, element and loading."
+        ),
     ),
 )

@@ -5,6 +5,7 @@ face, bottom held, node A measured with white noise. The paper's step of 1 ms is
 one on any such mesh: it is shown refused and run; every other method takes a sound step.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,22 +16,16 @@ from validate.arrays import Floats, Ints
 from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
-from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Recording
-from validate.register.observe import Registered
-from validate.replay.experiment import Change, Progress
+from validate.register.follow import follow_signal
+from validate.register.registered import Registered
+from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
+from validate.replay.followed import Truth, truth_of
+from validate.replay.method import Method
 from validate.replay.paper_003 import published_cube, tell_cube
-from validate.replay.tracking import (
-    Case,
-    Follower,
-    Tracking,
-    Truth,
-    followed_load,
-    truth_of,
-)
 from validate.scene.box import box
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import read_mesh
@@ -38,7 +33,7 @@ from validate.scene.scene import LawName, Load, Material, Probe, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march, output_frames
-from validate.solve.types import Run, Stepper
+from validate.solve.types import Run
 from validate.twin.tracked import (
     Camera,
     Origin,
@@ -131,7 +126,7 @@ def _scene(p: Parameters, E: float, nu: float) -> Scene:
     )
 
 
-def build(recording: Recording, parameters: Parameters, method: Follower) -> Scene:
+def build(recording: Recording, parameters: Parameters, model: None) -> Scene:
     return _scene(parameters, parameters.material.E, parameters.material.nu)
 
 
@@ -183,11 +178,11 @@ def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
 
 
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
-    return followed_load(recording, scene, "push", "N")
+    return follow_signal(recording, scene.mesh, "push", "N")
 
 
-def stepper(method: Follower, parameters: Parameters, system: System, seen: Registered) -> Stepper:
-    return method.prepare(system, seen, dt=parameters.clock.dt * method.stride)
+def sets(parameters: Parameters, seen: Registered) -> Mapping[str, Any]:
+    return {"dt": parameters.clock.dt}
 
 
 A = ("node_A",)
@@ -195,27 +190,29 @@ A = ("node_A",)
 # ramp, so that it claims .046 mm at node B, seven times its error there and above the limit.
 PROCESS = 2e-7
 METHODS = {
-    "nfem": Follower("NFEM, central difference", CentralDifference()),
-    "nfem_printed": Follower("NFEM at the printed 1 ms", CentralDifference(), stride=5),
-    "nfem_printed_run": Follower(
+    "nfem": Method("NFEM, central difference", CentralDifference()),
+    "nfem_printed": Method("NFEM at the printed 1 ms", CentralDifference(), stride=5),
+    "nfem_printed_run": Method(
         "NFEM at the printed 1 ms, run all the same",
         CentralDifference(beyond_limit="run"),
         stride=5,
     ),
-    "nfem_implicit": Follower(
+    "nfem_implicit": Method(
         "NFEM, implicit Newton at 1 ms, 10 steps timed", NewtonDynamics(), steps=10, stride=5
     ),
-    "ekf_printed": Follower("node-level EKF as printed", NodeEKF(), A),
-    "ekf_held": Follower(
-        "node-level EKF as printed, overflowing variances held", NodeEKF(overflow="hold"), A
+    "ekf_printed": Method("node-level EKF as printed", NodeEKF(), markers=A),
+    "ekf_held": Method(
+        "node-level EKF as printed, overflowing variances held", NodeEKF(overflow="hold"), markers=A
     ),
-    "ekf_node": Follower("node-level EKF, 3 x 3 blocks", NodeEKF(block="node"), A),
-    "ekf_companion": Follower("node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), A),
-    "reduced_modes": Follower(
-        "reduced EKF, 20 modes and load bias", ReducedEKF(process=PROCESS), A
+    "ekf_node": Method("node-level EKF, 3 x 3 blocks", NodeEKF(block="node"), markers=A),
+    "ekf_companion": Method(
+        "node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), markers=A
     ),
-    "reduced_pod": Follower(
-        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", process=PROCESS), A
+    "reduced_modes": Method(
+        "reduced EKF, 20 modes and load bias", ReducedEKF(process=PROCESS), markers=A
+    ),
+    "reduced_pod": Method(
+        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", process=PROCESS), markers=A
     ),
 }
 
@@ -245,7 +242,7 @@ CASES = (
 )
 
 
-EXPERIMENT = Tracking(
+EXPERIMENT = Experiment(
     name="ekf_cube",
     title="Extended Kalman filter on a St. Venant-Kirchhoff cube",
     source="paper 003 (EKF-NFEM), section 3.1, Table 1",
@@ -254,18 +251,20 @@ EXPERIMENT = Tracking(
     accepted=("nfem", "reduced_modes"),
     accept=(Accept("node_B", 0.03e-3, "a tenth of the largest displacement there (ours)"),),
     load=load,
-    record=record,
-    truth=truth,
     build=build,
     place=place,
-    stepper=stepper,
+    sets=sets,
     axis="x",
     reference="nfem",
     cases=CASES,
-    tell=tell_cube,
-    remake=("twin.", "clock.", "loading.force"),
+    exhibits=tell_cube,
     published=published_cube,
-    same_model=True,
-    seed=TwinCard().seed,
-    twin_notice="The recording is a twin: the same mesh and law as the models, plus white noise.",
+    twin=Twin(
+        record,
+        truth,
+        remake=("twin.", "clock.", "loading.force"),
+        same_model=True,
+        seed=TwinCard().seed,
+        notice="The recording is a twin: the same mesh and law as the models, plus white noise.",
+    ),
 )

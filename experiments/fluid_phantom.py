@@ -15,9 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.compare.effects import Sensor
-from validate.compare.residual import static_residuals
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.identify.interval import profile_interval
@@ -26,26 +24,23 @@ from validate.recording.contour import outlines_of
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.inclusion import outlined_capsule
-from validate.register.observe import (
-    Registered,
-    Sampling,
-    SignalObservation,
-    find_holds,
-    nearest_sample,
-    observe_markers,
-    observe_outlines,
-    require_rising,
-)
+from validate.register.markers import Sampling, Together, placed_markers
+from validate.register.observation import Selection, nearest_sample
+from validate.register.outlines import Corner, observe_outlines
 from validate.register.plane import cavity_sampler
+from validate.register.registered import Registered
+from validate.register.signals import driving, holds_at, require_rising, validating
 from validate.replay.experiment import (
     EffectSpec,
     Experiment,
     Identified,
     Input,
     Progress,
+    Twin,
     Uncertainty,
     Variant,
 )
+from validate.replay.method import Method
 from validate.replay.paper_000 import figures
 from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
@@ -53,9 +48,6 @@ from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact, between_plates
 from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
-from validate.solve.types import Scheme
 from validate.twin.phantom import TwinSettings, record_phantom
 
 
@@ -166,26 +158,23 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Method:
-    label: str = quantity("", "1", "what reports call it")
+class Model:
+    """What a method's scene is built with."""
+
     order: Literal[1, 2] = quantity(1, "1", "element order")
     dilatation: Dilatation = quantity("pointwise", "1", "volume strain per cell or nodal mean")
     law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
-    load_step: float = quantity(0.0015, "m", "grid of loads that large strain is solved at")
     plates: Contact = quantity("slip", "1", "contact of both plates")
-    fluid: Literal["exact", "loop", "none"] = quantity("exact", "1", "pressure of the fluid")
-    gain: float | None = quantity(None, "Pa", "gain of the loop; none: tuned (paper 000, 3.3)")
-    tolerance: float = quantity(0.01, "1", "volume error at which the loop stops")
-    warm_start: bool = quantity(True, "1", "the loop starts at the last pressure")
 
 
+MEAN_DILATATION = Model(dilatation="nodal_mean")
 METHODS: Mapping[str, Method] = {
-    "p1_fluid": Method("P1 with fluid"),
-    "p1_loop": Method("P1 with fluid, the paper's loop", fluid="loop"),
-    "p1_dry": Method("P1 without fluid", fluid="none"),
-    "p1_bonded": Method("P1 with fluid, bonded plates", plates="bonded"),
-    "md_fluid": Method("P1 mean dilatation with fluid", dilatation="nodal_mean"),
-    "p2_fluid": Method("P2 with fluid", order=2),
+    "p1_fluid": Method("P1 with fluid", ExactPressure(), Model()),
+    "p1_loop": Method("P1 with fluid, the paper's loop", PressureLoop(), Model()),
+    "p1_dry": Method("P1 without fluid", NoFluid(), Model()),
+    "p1_bonded": Method("P1 with fluid, bonded plates", ExactPressure(), Model(plates="bonded")),
+    "md_fluid": Method("P1 mean dilatation with fluid", ExactPressure(), MEAN_DILATATION),
+    "p2_fluid": Method("P2 with fluid", ExactPressure(), Model(order=2)),
 }
 
 
@@ -209,16 +198,16 @@ def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
     return (recording,)
 
 
-def build(recording: Recording, parameters: Parameters, method: Method) -> Scene:
+def build(recording: Recording, parameters: Parameters, model: Model) -> Scene:
     p = parameters
     mesh = block_with_inclusion(_block(p), p.mesh.nodes, inclusion(recording, p))
-    order = p.mesh.order or method.order
-    contact = method.plates if p.plates == "as_method" else p.plates
+    order = p.mesh.order or model.order
+    contact = model.plates if p.plates == "as_method" else p.plates
     return between_plates(
         mesh if order == 1 else quadratic(mesh),
-        Material(p.material.E, p.material.nu, method.law),
+        Material(p.material.E, p.material.nu, model.law),
         contact,
-        "pointwise" if order == 2 else method.dilatation,
+        "pointwise" if order == 2 else model.dilatation,
         friction=p.friction,
         membrane=_membrane(p.membrane),
     )
@@ -230,49 +219,58 @@ def _membrane(wall: Wall) -> tuple[Membrane, ...]:
     return (Membrane("cavity", wall.thickness, Material(wall.E, wall.nu)),)
 
 
-def scheme(method: Method) -> Scheme:
-    if method.law != "linear":
-        return Tabulated(
-            StaticNewton("none" if method.fluid == "none" else "exact"), method.load_step
-        )
-    if method.fluid == "none":
-        return NoFluid()
-    if method.fluid == "exact":
-        return ExactPressure()
-    return PressureLoop(method.gain, method.tolerance, warm_start=method.warm_start)
-
-
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
     p = parameters
-    stage = recording.signal("stage", "m")
+    stage = driving(recording, "stage", "m")
     contours = _shifted(recording.contour("outline"), p)
-    markers = recording.marker("markers")
     capsule = measured_inclusion(recording, p)
     shape = None if p.registration.wall == "facets" else capsule
     nearest = p.registration.wall == "nearest_node"
     wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=nearest)
-    pen = recording.record("pen")
-    signals = (
-        _scalar(recording, "load_cell", "force.plate", "stage.force", "N"),
-        _scalar(recording, "pressure", "pressure", "inclusion.pressure", "Pa"),
-    )
+    signals = tuple(validating(recording, *names, quantity=q, trace=t) for names, q, t in SIGNALS)
     for signal in signals:
         require_rising(stage, signal)
+    rest, *holds = holds_at(stage, contours.t, p.loads, within=0.1e-3)
+    outline = observe_outlines(contours, wall, rest=_instant(rest), corners=(TOP_LEFT,))
+    markers = placed_markers(
+        recording,
+        scene.mesh,
+        method=p.registration.method,
+        sampling=p.registration.sampling,
+        together=TOP_FACE,
+        tracker="pen",
+        up=(0.0, 1.0, 0.0),
+    )
     return Registered(
-        stage,
-        find_holds(stage, contours.t, p.loads, within=0.1e-3),
-        observe_markers(
-            markers,
-            {k: _vector(v) for k, v in recording.record("marker_layout").items()},
-            scene.mesh,
-            method=p.registration.method,
-            sampling=p.registration.sampling,
-            up=(_vector(pen["up"]), np.array([0.0, 1.0, 0.0])),
-        ),
-        observe_outlines(contours, wall),
-        signals,
+        (stage, outline, markers, *signals),
+        tuple(holds),
+        rest,
         findings=_misplaced(capsule, inclusion(recording, p)),
     )
+
+
+def _instant(hold: Selection) -> float:
+    assert hold.t is not None
+    return float(hold.t[0])
+
+
+SIGNALS = (
+    (("load_cell", "N"), "force.plate", "stage.force"),
+    (("pressure", "Pa"), "pressure", "inclusion.pressure"),
+)
+TOP_LEFT = Corner(
+    "contour.top_left",
+    np.deg2rad(225.0),
+    "displacement of the corner nearest the probe and lowest in image x (225 deg)",
+)
+TOP_FACE = (
+    Together(
+        "marker.inplane",
+        (0, 2),
+        "position in the plane of the top face (x along the stage, z lateral)",
+    ),
+    Together("marker.vertical", (1,), "position along the vertical y"),
+)
 
 
 def _misplaced(measured: Capsule, meshed: Capsule) -> tuple[str, ...]:
@@ -306,9 +304,9 @@ def inclusion(recording: Recording, parameters: Parameters) -> Capsule:
 def measured_inclusion(recording: Recording, parameters: Parameters) -> Capsule:
     """Centre x, z and radius of the rest outline; height and length from the declared sweep."""
     contours = _shifted(recording.contour("outline"), parameters)
-    rest = find_holds(recording.signal("stage", "m"), contours.t, (), within=0.1e-3)[0]
+    rest = holds_at(driving(recording, "stage", "m"), contours.t, (), within=0.1e-3)[0]
     moved = abs(parameters.registration.image_shift_x), abs(parameters.registration.image_shift_z)
-    index = nearest_sample(contours.t, rest.t, "outlines")
+    index = nearest_sample(contours.t, _instant(rest), "outlines")
     return outlined_capsule(contours, index, recording.record("inclusion"), sum(moved))
 
 
@@ -316,17 +314,6 @@ def _shifted(contours: Contours, parameters: Parameters) -> Contours:
     pose = contours.pose.copy()
     pose[[0, 2], 3] += parameters.registration.image_shift_x, parameters.registration.image_shift_z
     return replace(contours, pose=pose)
-
-
-def _scalar(
-    recording: Recording, topic: str, quantity_name: str, trace: str, unit: str
-) -> SignalObservation:
-    s = recording.signal(topic, unit)
-    return SignalObservation(quantity_name, trace, s.t, s.y[:, 0], unit, s.sd)
-
-
-def _vector(text: str) -> Floats:
-    return np.array([float(part) for part in text.split()])
 
 
 # --- what is judged ------------------------------------------------------------------------------
@@ -483,9 +470,7 @@ EXPERIMENT = Experiment(
     accept=ACCEPT,
     load=load,
     build=build,
-    scheme=scheme,
     place=place,
-    residuals=static_residuals,
     uncertainty=Uncertainty(
         finer=_finer,
         refinement=lambda p: float(p.mesh.ratio**2 - 1),
@@ -496,12 +481,14 @@ EXPERIMENT = Experiment(
     sensors=ADDED_SENSORS,
     published=figures,
     identify=identify,
-    record=record,
     quick=_quick,
-    seed=Parameters().twin.seed,
-    twin_notice=(
-        "The recording is a twin: it and the accepted model share the law (linear elasticity), "
-        "not the mesh. A real phantom's force would differ from every linear model by about 15 % "
-        "at 9 mm; this recording cannot show that."
+    twin=Twin(
+        record,
+        seed=Parameters().twin.seed,
+        notice=(
+            "The recording is a twin: it and the accepted model share the law (linear "
+            "elasticity), not the mesh. A real phantom's force would differ from every linear "
+            "model by about 15 % at 9 mm; this recording cannot show that."
+        ),
     ),
 )

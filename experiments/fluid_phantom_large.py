@@ -6,31 +6,40 @@ elements; linear and large-strain models are judged against it side by side.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 from validate.compare.verdict import Accept
-from validate.replay.experiment import EffectSpec, Experiment, Variant
+from validate.replay.experiment import EffectSpec, Variant
 from validate.replay.find import load_file
+from validate.replay.method import Method
+from validate.scene.scene import LawName
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
 
-LINEAR = cast(Experiment, load_file(Path(__file__).with_name("fluid_phantom.py")))
-_p = LINEAR.parameters
+LINEAR = load_file(Path(__file__).with_name("fluid_phantom.py"))
+_p, _twin = LINEAR.parameters, LINEAR.twin
+assert _twin is not None
+assert LINEAR.uncertainty is not None
 PARAMETERS = replace(
     _p,
     recording=str(Path(__file__).parents[1] / "recordings" / "fluid_phantom_large.mcap"),
     outlines="images",
     twin=replace(_p.twin, law="neo_hooke", seed=20040328, frames=True),
 )
-_linear = LINEAR.methods
+_mean, _quadratic = LINEAR.methods["md_fluid"], LINEAR.methods["p2_fluid"]
+
+
+def _large(label: str, linear: Method, law: LawName, step: float) -> Method:
+    """A method at large strain, solved on a grid of loads of `step` m."""
+    scheme = Tabulated(StaticNewton(), step)
+    return Method(label, scheme, replace(linear.scene, law=law))
+
+
 METHODS = {
-    "md_fluid": _linear["md_fluid"],
-    "p2_fluid": replace(_linear["p2_fluid"], label="P2 linear with fluid"),
-    "md_svk": replace(_linear["md_fluid"], label="P1 mean dilatation, SVK", law="svk"),
-    "md_neo_hooke": replace(
-        _linear["md_fluid"], label="P1 mean dilatation, neo-Hooke", law="neo_hooke"
-    ),
-    "p2_neo_hooke": replace(
-        _linear["p2_fluid"], label="P2 neo-Hooke with fluid", law="neo_hooke", load_step=0.003
-    ),
+    "md_fluid": _mean,
+    "p2_fluid": replace(_quadratic, label="P2 linear with fluid"),
+    "md_svk": _large("P1 mean dilatation, SVK", _mean, "svk", 0.0015),
+    "md_neo_hooke": _large("P1 mean dilatation, neo-Hooke", _mean, "neo_hooke", 0.0015),
+    "p2_neo_hooke": _large("P2 neo-Hooke with fluid", _quadratic, "neo_hooke", 0.003),
 }
 
 EXPERIMENT = replace(
@@ -55,10 +64,9 @@ EXPERIMENT = replace(
     ),
     identify=None,
     published=None,
-    seed=PARAMETERS.twin.seed,
-    twin_notice=(
+    twin=replace(_twin, seed=PARAMETERS.twin.seed, notice=(
         "The outlines are extracted from synthetic B-mode images. The recording is a twin: it and "
         "the accepted model share the law (neo-Hookean), not the mesh. u_num of the accepted model "
         "is that of the linear quadratic elements."
-    ),
+    )),
 )  # fmt: skip

@@ -5,6 +5,7 @@ The paper measures its own model (same model); what that cannot show stands besi
 the models do not know, nodes that nobody measured, other filters, other solvers.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -18,22 +19,16 @@ from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.steady import ReducedKf
-from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Recording
-from validate.register.observe import Registered
-from validate.replay.experiment import Change, Progress
+from validate.register.follow import follow_signal
+from validate.register.registered import Registered
+from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
+from validate.replay.followed import Truth, truth_of
+from validate.replay.method import Method
 from validate.replay.paper_001 import published, tell
-from validate.replay.tracking import (
-    Case,
-    Follower,
-    Tracking,
-    Truth,
-    followed_load,
-    truth_of,
-)
 from validate.scene.box import box, centroids
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
@@ -41,7 +36,7 @@ from validate.solve.dynamic import StartName
 from validate.solve.march import march, output_frames
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
-from validate.solve.types import Run, Stepper
+from validate.solve.types import Run
 from validate.twin.tracked import (
     Camera,
     Origin,
@@ -142,7 +137,7 @@ def _scene(p: Parameters, E: float, nu: float, regions: tuple[Region, ...] = ())
     )
 
 
-def build(recording: Recording, parameters: Parameters, method: Follower) -> Scene:
+def build(recording: Recording, parameters: Parameters, model: None) -> Scene:
     m = parameters.material
     return _scene(parameters, m.E, m.nu)
 
@@ -227,51 +222,57 @@ def load(parameters: Parameters, folder: Path) -> tuple[Recording, ...]:
 
 
 def place(recording: Recording, parameters: Parameters, scene: Scene) -> Registered:
-    return followed_load(recording, scene, "pull", "N")
+    return follow_signal(recording, scene.mesh, "pull", "N")
 
 
-def stepper(method: Follower, parameters: Parameters, system: System, seen: Registered) -> Stepper:
-    p = parameters
-    return method.prepare(system, seen, dt=p.clock.dt, a0=p.loading.a0)
+def sets(parameters: Parameters, seen: Registered) -> Mapping[str, Any]:
+    return {"dt": parameters.clock.dt, "a0": parameters.loading.a0}
 
 
 MM2 = 1e-6
 PRINTED = 1e-3 * MM2  # the paper's .001, read as mm2
 A = ("node_A",)
 METHODS = {
-    "fem": Follower("FEM, factorised once", Newmark()),
-    "fem_gauss": Follower(
+    "fem": Method("FEM, factorised once", Newmark()),
+    "fem_gauss": Method(
         "FEM, Gaussian elimination anew every step", Newmark(solver="gaussian_elimination"), steps=5
     ),
-    "fem_dense": Follower(
+    "fem_dense": Method(
         "FEM, dense solve anew every step", Newmark(solver="dense_solve"), steps=50
     ),
-    "fem_sparse": Follower("FEM, sparse LU anew every step", Newmark(solver="sparse_lu"), steps=50),
-    "fem_inverse": Follower("FEM, dense inverse", Newmark(solver="dense_inverse"), steps=200),
-    "fem_modal": Follower("FEM, all 525 modes", Modal(propagate="average")),
-    "kf_dense": Follower(
+    "fem_sparse": Method("FEM, sparse LU anew every step", Newmark(solver="sparse_lu"), steps=50),
+    "fem_inverse": Method("FEM, dense inverse", Newmark(solver="dense_inverse"), steps=200),
+    "fem_modal": Method("FEM, all 525 modes", Modal(propagate="average")),
+    "kf_dense": Method(
         "KF-FEM as printed, dense every step",
         KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, gains="every_step"),
-        A,
+        markers=A,
         steps=60,
     ),
-    "kf_printed": Follower(
-        "KF-FEM as printed, gains shared", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED), A
+    "kf_printed": Method(
+        "KF-FEM as printed, gains shared", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED), markers=A
     ),
-    "kf_posterior": Follower(
+    "kf_posterior": Method(
         "KF-FEM, v and a from the posterior",
         KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, recursion="posterior"),
-        A,
+        markers=A,
     ),
-    "kf_modal": Follower(
-        "KF-FEM in modes, exact every step", ModalKf(Q=PRINTED, R=PRINTED, P0=PRINTED), A, steps=200
+    "kf_modal": Method(
+        "KF-FEM in modes, exact every step",
+        ModalKf(Q=PRINTED, R=PRINTED, P0=PRINTED),
+        markers=A,
+        steps=200,
     ),
-    "kf_load": Follower(
-        "KF-FEM, Q along the load", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, structure="load"), A
+    "kf_load": Method(
+        "KF-FEM, Q along the load",
+        KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, structure="load"),
+        markers=A,
     ),
-    "load_scale": Follower("two states: amplitude and load scale", LoadScale(), A),
-    "kf_reduced": Follower("20 modes and load bias, steady gain", ReducedKf(gains="steady"), A),
-    "filterpy": Follower("filterpy's KalmanFilter, 5 modes", Guest(), A),
+    "load_scale": Method("two states: amplitude and load scale", LoadScale(), markers=A),
+    "kf_reduced": Method(
+        "20 modes and load bias, steady gain", ReducedKf(gains="steady"), markers=A
+    ),
+    "filterpy": Method("filterpy's KalmanFilter, 5 modes", Guest(), markers=A),
 }
 
 
@@ -300,7 +301,7 @@ CASES = (
 )  # fmt: skip
 
 
-EXPERIMENT = Tracking(
+EXPERIMENT = Experiment(
     name="kf_cube",
     title="Kalman filter finite elements on a block under traction",
     source="paper 001 (KF-FEM), section 3, Table 1",
@@ -312,22 +313,24 @@ EXPERIMENT = Tracking(
         Accept("corner", 0.2e-3, "a tenth of the largest displacement there (ours)"),
     ),
     load=load,
-    record=record,
-    truth=truth,
     build=build,
     place=place,
-    stepper=stepper,
+    sets=sets,
     axis="z",
     reference="fem",
     cases=CASES,
-    tell=tell,
+    exhibits=tell,
     published=published,
-    remake=("twin.", "clock.", "body.", "loading.traction", "loading.off"),
     captions={
         "displacement_node_A": "As Figs. 3 and 4 of paper 001: what was measured, FEM and KF-FEM.",
         "displacement_node_B": "As Fig. 5 of paper 001: a node 2 mm below, given to no filter.",
     },
-    same_model=True,
-    seed=TwinCard().seed,
-    twin_notice="The recording is a twin: the same mesh and law as the models, plus white noise.",
+    twin=Twin(
+        record,
+        truth,
+        remake=("twin.", "clock.", "body.", "loading.traction", "loading.off"),
+        same_model=True,
+        seed=TwinCard().seed,
+        notice="The recording is a twin: the same mesh and law as the models, plus white noise.",
+    ),
 )

@@ -7,19 +7,20 @@ its axis at 12 Hz, and the twin takes ten steps in one of the models'.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.steady import ReducedKf
+from validate.replay.experiment import Case
 from validate.replay.find import load_file
-from validate.replay.tracking import Case, Follower, Tracking
+from validate.replay.method import Method
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic
 
-CREEPING = cast(Tracking, load_file(Path(__file__).with_name("kf_cube.py")))
-_p = CREEPING.parameters
+CREEPING = load_file(Path(__file__).with_name("kf_cube.py"))
+_p, _twin = CREEPING.parameters, CREEPING.twin
+assert _twin is not None
 PARAMETERS = replace(
     _p,
     material=replace(_p.material, stiffness_damping=1e-3),
@@ -31,16 +32,18 @@ PARAMETERS = replace(
 A = ("node_A",)
 PRINTED = 1e-9  # m2
 METHODS = {
-    "average": Follower("FEM, average acceleration", Newmark()),
-    "generalised_alpha": Follower("FEM, generalised alpha", Newmark(rule="generalised_alpha")),
-    "backward_euler": Follower("FEM, backward Euler", Newmark(rule="backward_euler")),
-    "modal": Follower("FEM, 20 modes, exact in time", Modal(modes=20)),
-    "quasi_static": Follower("FEM, quasi-static", QuasiStatic()),
-    "kf_printed": Follower("KF-FEM as printed", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED), A),
-    "kf_load": Follower(
-        "KF-FEM, Q along the load", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, structure="load"), A
+    "average": Method("FEM, average acceleration", Newmark()),
+    "generalised_alpha": Method("FEM, generalised alpha", Newmark(rule="generalised_alpha")),
+    "backward_euler": Method("FEM, backward Euler", Newmark(rule="backward_euler")),
+    "modal": Method("FEM, 20 modes, exact in time", Modal(modes=20)),
+    "quasi_static": Method("FEM, quasi-static", QuasiStatic()),
+    "kf_printed": Method("KF-FEM as printed", KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED), markers=A),
+    "kf_load": Method(
+        "KF-FEM, Q along the load",
+        KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, structure="load"),
+        markers=A,
     ),
-    "kf_reduced": Follower("20 modes and load bias", ReducedKf(), A),
+    "kf_reduced": Method("20 modes and load bias", ReducedKf(), markers=A),
 }
 RIVALS = ("average", "kf_printed", "kf_load", "kf_reduced")
 
@@ -64,13 +67,16 @@ EXPERIMENT = replace(
     ),
     reference="average",
     cases=tuple(_named(name) for name in ("stiff_model", "layer", "sparse")),
-    tell=None,
+    exhibits=None,
     published=None,
-    seed=PARAMETERS.twin.seed,
-    twin_notice=(
-        "The recording is a twin: the same mesh and law as the models, ten of its steps in one of "
-        "theirs, plus white noise. Models know the load at the ends of their steps only, so a load "
-        "that is switched acts up to half a step late: most of the plain models' error, and no "
-        "part of u_num here."
+    twin=replace(
+        _twin,
+        seed=PARAMETERS.twin.seed,
+        notice=(
+            "The recording is a twin: the same mesh and law as the models, ten of its steps in one "
+            "of theirs, plus white noise. Models know the load at the ends of their steps only, so "
+            "a load that is switched acts up to half a step late: most of the plain models' error, "
+            "and no part of u_num here."
+        ),
     ),
 )

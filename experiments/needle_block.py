@@ -10,6 +10,8 @@ from pathlib import Path
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
+from validate.replay.experiment import Case, Experiment
+from validate.replay.method import Method
 from validate.replay.paper_002 import needle_published
 from validate.replay.paper_002_needle import tell
 from validate.replay.solver_benchmark import (
@@ -25,7 +27,6 @@ from validate.replay.solver_benchmark import (
     changed,
     solvers,
 )
-from validate.replay.tracking import Case, Follower, Tracking
 from validate.scene.needle import MP1, MP2, STEP, needle_block, needle_depth
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
@@ -54,8 +55,8 @@ METHODS = {
     **FIVE,
     **SWITCHES,
     **solvers(),
-    "modal": Follower("all modes, by the implicit rule", Modal(STEP, propagate="average")),
-    "modal_40": Follower("40 modes, exact in time", Modal(STEP, 40)),
+    "modal": Method("all modes, by the implicit rule", Modal(STEP, propagate="average")),
+    "modal_40": Method("40 modes, exact in time", Modal(STEP, 40)),
 }
 CASES = (
     Case("prostate", "the truth is MP2, the models are MP1",
@@ -68,7 +69,7 @@ CASES = (
          changed("body", plane="stress"), methods=tuple(FIVE)),
 )  # fmt: skip
 
-EXPERIMENT = Tracking(
+EXPERIMENT = Experiment(
     name="needle_block",
     title="Solvers against the implicit run on a block poked by a needle",
     source="paper 002 (accuracy metrics and benchmarks), sections IV.A and VI",
@@ -80,21 +81,16 @@ EXPERIMENT = Tracking(
         Accept("inside", 1e-3, "some percent of the largest displacement there (ours)"),
     ),
     load=BENCHMARK.load,
-    record=BENCHMARK.record,
-    truth=BENCHMARK.truth,
     build=BENCHMARK.build,
     place=BENCHMARK.place,
-    stepper=BENCHMARK.stepper,
+    sets=BENCHMARK.sets,
     axis="x",
     reference="implicit",
     cases=CASES,
-    tell=tell,
+    exhibits=tell,
     published=needle_published,
     frames=FRAMES,
-    same_model=True,
-    remake=("body.", "clock.", "twin."),
-    seed=TwinCard().seed,
-    twin_notice=(
+    twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
         "markers. Errors are between solvers; no tissue was measured."
     ),

@@ -19,6 +19,12 @@ def quantity(default: Any, unit: str, doc: str) -> Any:
     return field(default=default, metadata={"unit": unit, "doc": doc})
 
 
+def part(default: Any, doc: str) -> Any:
+    """A field whose own fields belong to its owner's paths: `methods.NAME.tolerance`, wherever in
+    the method the tolerance lies."""
+    return field(default=default, metadata={"unit": "1", "doc": doc, "part": True})
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One settable value, as `validate list NAME` shows it."""
@@ -35,7 +41,9 @@ def describe(settings: Any, prefix: str = "") -> tuple[Parameter, ...]:
     found: list[Parameter] = []
     for name, value, hint, meta in _members(settings):
         path = f"{prefix}{name}"
-        if is_dataclass(value) or isinstance(value, Mapping):
+        if meta.get("part"):
+            found += describe(value, prefix) if is_dataclass(value) else ()
+        elif is_dataclass(value) or isinstance(value, Mapping):
             found += describe(value, f"{path}.")
         else:
             unit, doc = meta.get("unit", "1"), meta.get("doc", "")
@@ -48,12 +56,33 @@ def with_values(settings: Any, values: Mapping[str, str]) -> Any:
 
     Raises `UsageError` for an unknown path (naming the nearest) or a value of another type.
     """
-    known = {p.path for p in describe(settings)}
     for path, text in values.items():
-        if path not in known:
+        names = _resolved(settings, path.split("."))
+        if names is None:
+            known = {p.path for p in describe(settings)}
             raise UsageError(f"unknown parameter '{path}'; {_nearest(path, known)}")
-        settings = _set(settings, path.split("."), path, text)
+        settings = _set(settings, names, path, text)
     return settings
+
+
+def _resolved(settings: Any, names: list[str]) -> list[str] | None:
+    """The way to a value through the parts that paths leave out; None where there is no value."""
+    if not (is_dataclass(settings) or isinstance(settings, Mapping)):
+        return None
+    members = {name: (value, meta) for name, value, _, meta in _members(settings)}
+    head, rest = names[0], names[1:]
+    if head in members:
+        value = members[head][0]
+        if not rest and not (is_dataclass(value) or isinstance(value, Mapping)):
+            return [head]
+        inner = _resolved(value, rest) if rest else None
+        if inner:
+            return [head, *inner]
+    for name, (value, meta) in members.items():
+        inner = _resolved(value, names) if meta.get("part") else None
+        if inner:
+            return [name, *inner]
+    return None
 
 
 def require_ranges(ranges: Any) -> None:

@@ -10,7 +10,7 @@ from validate.compare.result import Result
 from validate.compare.verdict import Published
 from validate.replay.find import experiment_files, find
 from validate.replay.options import Options
-from validate.replay.run import compare
+from validate.replay.road import compare
 
 
 def check(names: tuple[str, ...], as_json: bool) -> int:

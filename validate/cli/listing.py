@@ -6,8 +6,8 @@ from typing import Any
 
 from validate.cli.display import console, table
 from validate.parameters import Parameter, describe
+from validate.replay.experiment import Experiment
 from validate.replay.find import experiment_files, find, load_file
-from validate.replay.options import AnyExperiment
 
 
 def show(name: str | None, as_json: bool) -> None:
@@ -28,16 +28,16 @@ def show(name: str | None, as_json: bool) -> None:
         print(json.dumps(document, indent=2, allow_nan=False))
 
 
-def parameters_of(experiment: AnyExperiment) -> tuple[Parameter, ...]:
+def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:
     """Every settable path of an experiment, methods included."""
     return describe(experiment.parameters) + describe(experiment.methods, "methods.")
 
 
-def _summary(experiment: AnyExperiment) -> dict[str, Any]:
+def _summary(experiment: Experiment) -> dict[str, Any]:
     return {"name": experiment.name, "title": experiment.title, "source": experiment.source}
 
 
-def _details(experiment: AnyExperiment) -> dict[str, Any]:
+def _details(experiment: Experiment) -> dict[str, Any]:
     return {
         "parameters": [
             {"path": p.path, "type": p.type, "unit": p.unit, "default": p.default, "doc": p.doc}
@@ -54,7 +54,7 @@ def _details(experiment: AnyExperiment) -> dict[str, Any]:
     }
 
 
-def _print(experiment: AnyExperiment) -> None:
+def _print(experiment: Experiment) -> None:
     out = console()
     out.print(f"[bold]{experiment.name}[/]: {experiment.title}\n{experiment.source}\n")
     rows = [

@@ -19,8 +19,7 @@ from validate.recording.png_stack import read_png_stack
 from validate.recording.summary import summary
 from validate.recording.types import Recording, Source
 from validate.replay.find import find
-from validate.replay.made import stamped
-from validate.replay.tracking import Tracking
+from validate.replay.remade import stamped
 
 PNG_STACK = "png-stack"
 
@@ -93,13 +92,14 @@ def _seconds(topic: str, text: str) -> tuple[float, float]:
 def record(name: str, out: Path, values: tuple[str, ...]) -> None:
     """Makes an experiment's twin recording, with a JSON beside it of what must be read."""
     experiment = find(name, Path.cwd())
-    if experiment.record is None:
+    twin = experiment.twin
+    if twin is None:
         raise UsageError(f"experiment '{name}' has no synthetic recording; its data are measured")
     parameters = with_values(experiment.parameters, pairs(values, "--set"))
     with progress(f"record {name}") as bar:
         done = iter(range(10))
-        made = experiment.record(parameters, lambda text: bar(next(done), 3, text))
-    if isinstance(experiment, Tracking):
+        made = twin.record(parameters, lambda text: bar(next(done), 3, text))
+    if twin.truth is not None:
         made = stamped(made, parameters)
     write_recording(made, out)
     written = read_recording(out)

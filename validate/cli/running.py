@@ -7,9 +7,10 @@ from time import perf_counter
 from validate.cli.display import console, progress, relative, shown, table
 from validate.cli.main import FAILED, pairs
 from validate.compare.result import Result
+from validate.replay.experiment import Experiment
 from validate.replay.find import experiment_files, find, root_of
-from validate.replay.options import AnyExperiment, Options
-from validate.replay.run import compare
+from validate.replay.options import Options
+from validate.replay.road import compare
 from validate.report.write import write_report
 
 
@@ -32,7 +33,7 @@ def run(
     return 0 if all(passed) else FAILED
 
 
-def _one(experiment: AnyExperiment, options: Options, out: Path, as_json: bool) -> bool:
+def _one(experiment: Experiment, options: Options, out: Path, as_json: bool) -> bool:
     start = perf_counter()
     with progress(experiment.name) as report:
         result = compare(experiment, options, report)

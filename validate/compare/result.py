@@ -11,7 +11,7 @@ from validate.compare.score import Score
 from validate.compare.verdict import Check, Published
 from validate.parameters import Parameter
 from validate.recording.types import Recording
-from validate.register.observe import Registered
+from validate.register.registered import Registered
 from validate.scene.scene import Scene
 from validate.solve.types import Run
 

@@ -9,7 +9,8 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
-from validate.register.observe import Registered
+from validate.register.markers import MarkerObservation
+from validate.register.registered import Registered
 from validate.scene.mesh import Mesh
 
 OFF_STEP = 0.01  # of a step: clock jitter that moves no estimate; more would be a wrong time
@@ -140,15 +141,17 @@ def measurements(registered: Registered, mesh: Mesh) -> Measurements:
 
     Raises `ComparisonError` without markers and for rows of another mesh.
     """
-    seen = registered.markers
-    if seen is None:
+    found = registered.of(MarkerObservation)
+    if not found:
         raise ComparisonError("the recording has no markers: a filter has nothing to measure")
+    seen = found[0]
     n, d = mesh.nodes.shape
-    if seen.rows.weights.shape[1] != n:
+    weights = seen.positions.weights
+    if weights.shape[1] != n:
         raise ComparisonError(
-            f"marker rows of {seen.rows.weights.shape[1]} nodes on a mesh of {n}: register again"
+            f"marker rows of {weights.shape[1]} nodes on a mesh of {n}: register again"
         )
-    H = sparse.csr_array(sparse.kron(seen.rows.weights, sparse.eye_array(d), format="csr"))
+    H = sparse.csr_array(sparse.kron(weights, sparse.eye_array(d), format="csr"))
     z = (seen.x - seen.rest).reshape(len(seen.t), -1)
     names = tuple(f"{name}.{_AXES[c]}" for name in seen.names for c in range(d))
     return Measurements(seen.t, H, z, np.full(len(names), seen.sd), names)

@@ -10,18 +10,21 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from validate.compare.result import Result
-from validate.replay import run
+from validate.replay import road
+from validate.replay.experiment import Experiment
 from validate.replay.find import find
-from validate.replay.options import AnyExperiment, Options
+from validate.replay.options import Options
+
+__all__ = ["Experiment", "compare", "load"]
 
 
-def load(name: str) -> AnyExperiment:
+def load(name: str) -> Experiment:
     """The experiment of that name, or of that file; raises `UsageError` naming the nearest."""
     return find(name, Path.cwd())
 
 
 def compare(
-    experiment: AnyExperiment,
+    experiment: Experiment,
     values: Mapping[str, str] | None = None,
     methods: tuple[str, ...] = (),
     *,
@@ -31,4 +34,4 @@ def compare(
 
     Raises children of `ValidateError` for bad input.
     """
-    return run.compare(experiment, Options(dict(values or {}), methods, quick))
+    return road.compare(experiment, Options(dict(values or {}), methods, quick))

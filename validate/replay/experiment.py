@@ -10,13 +10,14 @@ from types import MappingProxyType
 from typing import Any
 
 from validate.compare.effects import Sensor
-from validate.compare.residual import Residual
+from validate.compare.exhibit import Exhibit
 from validate.compare.score import Score
 from validate.compare.verdict import Accept, Published
 from validate.recording.types import Recording
-from validate.register.observe import Registered
+from validate.register.registered import Registered
+from validate.replay.followed import Cases, Truth
+from validate.replay.method import Method
 from validate.scene.scene import Scene
-from validate.solve.types import Run, Scheme
 
 Change = Callable[[Any], Any]
 Progress = Callable[[str], None]
@@ -89,39 +90,102 @@ class Identified:
 
 
 @dataclass(frozen=True)
+class Case:
+    """A truth that differs from the models: `change` turns the parameters into its own.
+
+    `shipped`: its recording is a file, loaded with those parameters; else the twin makes it anew.
+    `methods` are those that are run on it (none: all that step through the whole time).
+    """
+
+    name: str
+    doc: str
+    change: Change
+    shipped: bool = False
+    methods: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Twin:
+    """How a synthetic recording is made, and what its truth was.
+
+    `truth` repeats the twin: it scores the runs, and no method sees it. `remake` are prefixes of
+    parameters that the twin reads: changing one makes the recording anew. `same_model`: the twin
+    shares law and mesh with the models, so it can only repeat itself. `notice` is printed.
+    """
+
+    record: Callable[[Any, Progress], Recording]
+    truth: Callable[[Any, Registered], Truth] | None = None
+    remake: tuple[str, ...] = ("twin.",)
+    same_model: bool = False
+    seed: int | None = None
+    notice: str = ""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What an experiment adds of its own: exhibits, and numbers by name for printed figures."""
+
+    exhibits: tuple[Exhibit, ...] = ()
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+def _sets_nothing(parameters: Any, seen: Registered) -> Mapping[str, Any]:
+    return {}
+
+
+@dataclass(frozen=True)
 class Experiment:
     """One experiment; see the fields of each part for units.
 
-    `methods` maps a name to its frozen settings, each with `label`. `load` gets the parameters and
-    the experiment's folder. `published` turns scores by (method, name) into printed figures beside
-    ours. `band` is the relative standard uncertainty of the force that the modulus brings.
-    `twin_notice` is printed on the report of a twin.
+    `methods` maps a name to a `Method`. `load` gets the parameters and the experiment's folder;
+    `build` a recording, the parameters and a method's `scene` options; `place` registers a
+    recording in that scene. `sets` are settings that the experiment itself gives every method that
+    has them, from the parameters and the registered recording: a time step, say. `exhibits` adds
+    what this experiment shows besides, from all runs by case ("" is the recorded one) and method.
+    `band` is the relative standard uncertainty of the force that the modulus brings. `axis` is the
+    component that displacement charts follow, `reference` the method that speeds are compared with.
+    `captions` are sentences under charts, by name; `frames` how many fields of a run are kept.
     """
 
     name: str
     title: str
     source: str
     parameters: Any
-    methods: Mapping[str, Any]
+    methods: Mapping[str, Method]
     accepted: tuple[str, ...]
     accept: tuple[Accept, ...]
     load: Callable[[Any, Path], tuple[Recording, ...]]
     build: Callable[[Recording, Any, Any], Scene]
-    scheme: Callable[[Any], Scheme]
     place: Callable[[Recording, Any, Scene], Registered]
-    residuals: Callable[[Registered, Run], tuple[Residual, ...]]
-    uncertainty: Uncertainty
+    sets: Callable[[Any, Registered], Mapping[str, Any]] = _sets_nothing
+    identify: Callable[[Sequence[Recording], Any], Identified] | None = None
+    uncertainty: Uncertainty | None = None
+    twin: Twin | None = None
+    cases: tuple[Case, ...] = ()
     effects: tuple[EffectSpec, ...] = ()
     sensors: tuple[Sensor, ...] = ()
-    published: Callable[[Mapping[str, Mapping[str, float]]], tuple[Published, ...]] | None = None
-    identify: Callable[[Sequence[Recording], Any], Identified] | None = None
-    record: Callable[[Any, Progress], Recording] | None = None
     band: Callable[[Any], float] | None = None
+    exhibits: Callable[[Any, Cases, Progress], Told] | None = None
+    published: Callable[[Mapping[str, Mapping[str, float]]], tuple[Published, ...]] | None = None
+    captions: Mapping[str, str] = field(default_factory=dict)
+    axis: str = "z"
+    reference: str = ""
+    frames: int = 200
     quick: Change = unchanged
-    same_model: bool = False
-    seed: int | None = None
-    twin_notice: str = ""
     path: Path | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "methods", MappingProxyType(dict(self.methods)))
+
+    @property
+    def same_model(self) -> bool:
+        """Whether recording and models are the same model."""
+        return self.twin is not None and self.twin.same_model
+
+    @property
+    def seed(self) -> int | None:
+        return self.twin.seed if self.twin else None
+
+    @property
+    def twin_notice(self) -> str:
+        return self.twin.notice if self.twin else ""

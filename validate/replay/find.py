@@ -9,8 +9,6 @@ from pathlib import Path
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
-from validate.replay.options import AnyExperiment
-from validate.replay.tracking import Tracking
 
 
 def experiment_files(start: Path) -> dict[str, Path]:
@@ -22,7 +20,7 @@ def experiment_files(start: Path) -> dict[str, Path]:
     raise UsageError("no experiments/ folder here or above, and none in the installed clone")
 
 
-def find(name: str, start: Path) -> AnyExperiment:
+def find(name: str, start: Path) -> Experiment:
     """The experiment of that name, or of that file when it ends in .py.
 
     Raises `UsageError` naming the nearest ones when there is none.
@@ -35,7 +33,7 @@ def find(name: str, start: Path) -> AnyExperiment:
     return load_file(files[name])
 
 
-def load_file(path: Path) -> AnyExperiment:
+def load_file(path: Path) -> Experiment:
     """Runs an experiment file (it is code) and returns its EXPERIMENT, which knows its path."""
     if not path.is_file():
         raise UsageError(f"no experiment file {path}")
@@ -47,14 +45,14 @@ def load_file(path: Path) -> AnyExperiment:
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     experiment = getattr(module, "EXPERIMENT", None)
-    if not isinstance(experiment, (Experiment, Tracking)):
-        raise UsageError(f"{path} defines no EXPERIMENT of type Experiment or Tracking")
+    if not isinstance(experiment, Experiment):
+        raise UsageError(f"{path} defines no EXPERIMENT of type Experiment")
     if experiment.name != path.stem:
         raise UsageError(f"{path}: EXPERIMENT.name is '{experiment.name}', not the file's name")
     return replace(experiment, path=path.resolve())
 
 
-def root_of(experiment: AnyExperiment, start: Path) -> Path:
+def root_of(experiment: Experiment, start: Path) -> Path:
     """The clone an experiment belongs to, else the folder the command was called from."""
     path = experiment.path
     return path.parents[1] if path is not None and path.parent.name == "experiments" else start

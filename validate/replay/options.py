@@ -8,10 +8,9 @@ from typing import Any
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import nearest_names, with_values
 from validate.replay.experiment import Experiment
-from validate.replay.tracking import Tracking
+from validate.replay.method import Method
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
-AnyExperiment = Experiment | Tracking
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class Options:
     quick: bool = False
 
 
-def configure(experiment: AnyExperiment, options: Options) -> tuple[Any, dict[str, Any]]:
+def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Method]]:
     """Parameters and chosen methods with the user's values; `UsageError` names the nearest."""
     known = set(experiment.methods)
     for name in options.methods:
@@ -37,7 +36,7 @@ def configure(experiment: AnyExperiment, options: Options) -> tuple[Any, dict[st
     return with_values(parameters, mine), {name: methods[name] for name in chosen}
 
 
-def folder_of(experiment: AnyExperiment) -> Path:
+def folder_of(experiment: Experiment) -> Path:
     """The folder of the experiment's file; `ComparisonError` when it was not loaded from one."""
     if experiment.path is None:
         raise ComparisonError(f"experiment '{experiment.name}' was not loaded from a file")

@@ -18,8 +18,8 @@ from validate.estimate.modal_kf import ModalKf
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress
-from validate.replay.tracking import Cases, Followed, Told
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import Cases, Followed
 
 Values = Mapping[str, Mapping[str, float]]
 
@@ -56,10 +56,10 @@ def _nrmse(
         recursion=recursion, gains="shared", a0=parameters.loading.a0,  # type: ignore[arg-type]
     )  # fmt: skip
     given = measurements(followed.seen, system.scene.mesh).of("node_A")
-    every = replace(given, t=followed.seen.stage.t, z=np.zeros((len(followed.run.t), 3)))
+    every = replace(given, t=followed.seen.t, z=np.zeros((len(followed.run.t), 3)))
     stepper = cast(DisplacementStepper, settings.prepare(system, every))
     row = _z_row(system, followed)
-    batch = shared_gain_run(stepper, followed.seen.stage.y, _noisy(followed), row)
+    batch = shared_gain_run(stepper, followed.seen.inputs, _noisy(followed), row)
     reference = followed.truth.probes["node_A"][:, 2]
     off = batch.values[..., 0] - reference
     return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))

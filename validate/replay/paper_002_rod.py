@@ -9,7 +9,8 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import Cases
 from validate.replay.solver_benchmark import FIVE, IMPLICIT, Parameters
 from validate.replay.solver_errors import (
     LIMIT_HEADS,
@@ -29,7 +30,6 @@ from validate.replay.solver_errors import (
     switches_exhibit,
     units_in,
 )
-from validate.replay.tracking import Cases, Told
 from validate.scene.rod import GRAVITY, MP3, SIZE, bending_rod, gravity_inputs
 from validate.solve.march import march
 

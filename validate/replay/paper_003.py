@@ -16,9 +16,9 @@ from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import Cases
 from validate.replay.rates import Integrator, cells_at, measured_rates, rates_exhibit
-from validate.replay.tracking import Cases, Told
 from validate.scene.scene import Load, Scene
 from validate.solve.central import CentralDifference
 from validate.solve.haptic import HAPTIC_HZ, VISUAL_HZ

@@ -7,10 +7,12 @@ import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.compare.verdict import Published
-from validate.replay.experiment import Progress
-from validate.replay.follow import error_at
+from validate.register.markers import MarkerObservation
+from validate.register.signals import SignalObservation
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import Cases, Followed
 from validate.replay.paper_003 import locking_table, readings_table, steps_table
-from validate.replay.tracking import Cases, Followed, Told
+from validate.replay.standard_exhibits import error_at
 
 Values = Mapping[str, Mapping[str, float]]
 
@@ -93,7 +95,7 @@ def _seen(followed: Followed, probe: str) -> bool:
 
 def _motion(followed: Followed, probe: str) -> tuple[float, float]:
     """Largest true displacement m of a probe, and the tracker's sd m."""
-    sd = followed.seen.markers.sd if followed.seen.markers else 0.0
+    sd = next((m.sd for m in followed.seen.of(MarkerObservation)), 0.0)
     return float(np.linalg.norm(followed.truth.probes[probe], axis=1).max()), sd
 
 
@@ -138,10 +140,10 @@ def _forces(main: Mapping[str, Followed]) -> NumberTable:
     """Force at the end by element, for bodies that the plate moves, beside what was measured."""
     rows: list[tuple[Entry, ...]] = []
     for f in main.values():
-        seen = [s for s in f.seen.signals if s.quantity == "force"]
+        seen = [s for s in f.seen.of(SignalObservation) if s.quantity == "force"]
         if not seen or not f.whole:
             continue
-        ours, theirs = float(f.run.traces[seen[0].trace].y[-1]), _end(seen[0].t, seen[0].y)
+        ours, theirs = float(f.run.traces[seen[0].trace].y[-1]), _end(seen[0].t, seen[0].y[:, 0])
         rows.append((f.label, ours, theirs, 100 * (ours / theirs - 1)))
     return NumberTable(
         "forces",

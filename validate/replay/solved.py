@@ -1,64 +1,77 @@
-"""One method with one set of parameters: from its scene to residuals against every recording."""
+"""One method with one set of parameters on the recordings of a case: scene, runs, residuals."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
-from validate.compare.residual import Residual
-from validate.fem.system import build
+from validate.compare.residual import residuals, stacked
+from validate.fem.system import System
+from validate.fem.system import build as build_system
 from validate.recording.types import Recording
-from validate.register.observe import Registered
+from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
+from validate.replay.followed import MAIN, Followed
+from validate.replay.method import Method
 from validate.scene.scene import Scene
 from validate.solve.march import march
-from validate.solve.types import Run
-
-
-@dataclass(frozen=True)
-class Solved:
-    """A scene, and per recording its registration and run; residuals over all of them."""
-
-    scene: Scene
-    registered: tuple[Registered, ...]
-    runs: tuple[Run, ...]
-    residuals: Mapping[str, Residual]
+from validate.solve.types import Run, Stepper
 
 
 def solve(
     experiment: Experiment,
     recordings: tuple[Recording, ...],
     name: str,
-    settings: Any,
+    method: Method,
     parameters: Any,
-) -> Solved:
-    """Builds, prepares, runs and compares; children of `ValidateError` for bad input."""
+    case: str = MAIN,
+) -> Followed:
+    """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input."""
     start = perf_counter()
-    scene = experiment.build(recordings[0], parameters, settings)
-    stepper = experiment.scheme(settings).prepare(build(scene))
-    setup = perf_counter() - start
+    scene = experiment.build(recordings[0], parameters, method.scene)
+    system = build_system(scene)
+    built = perf_counter() - start
     seen = tuple(experiment.place(r, parameters, scene) for r in recordings)
-    runs = tuple(
-        march(name, stepper, r.stage.t, r.stage.y, r.steps_at_holds(), setup) for r in seen
+    steppers = _Prepared(experiment, method, parameters, system, built)
+    runs = tuple(_run(experiment, name, method, steppers, r) for r in seen)
+    found = [r for pair in zip(seen, runs, strict=True) for r in residuals(*pair)]
+    return Followed(name, _label(method, scene), case, scene, seen, runs, stacked(found))
+
+
+class _Prepared:
+    """Prepares a scheme once for all recordings, a filter for each: it is given its looks."""
+
+    def __init__(
+        self, experiment: Experiment, method: Method, parameters: Any, system: System, built: float
+    ) -> None:
+        self._experiment, self._method, self._parameters = experiment, method, parameters
+        self._system, self._built = system, built
+        self._shared: tuple[Stepper, float] | None = None
+
+    def on(self, seen: Registered) -> tuple[Stepper, float]:
+        """The stepper, and the seconds that set-up took."""
+        if self._shared is not None and not self._method.markers:
+            return self._shared
+        start = perf_counter()
+        given = self._experiment.sets(self._parameters, seen)
+        stepper = self._method.prepare(self._system, seen, given)
+        self._shared = stepper, self._built + perf_counter() - start
+        return self._shared
+
+
+def _run(
+    experiment: Experiment, name: str, method: Method, steppers: _Prepared, seen: Registered
+) -> Run:
+    """The run through the recorded inputs, as many of them as the method takes."""
+    stepper, setup = steppers.on(seen)
+    every = slice(method.stride - 1, None, method.stride)
+    t, inputs = seen.t[every], seen.inputs[every]
+    steps = method.steps or len(t)
+    at = seen.frames(len(t), experiment.frames)
+    return march(name, stepper, t[:steps], inputs[:steps], at[at < steps], setup)
+
+
+def _label(method: Method, scene: Scene) -> str:
+    """The method's label, and what it was run as where parameters changed that."""
+    order = getattr(method.scene, "order", scene.mesh.order)
+    return (
+        method.label if order == scene.mesh.order else f"{method.label} [order {scene.mesh.order}]"
     )
-    found = [
-        experiment.residuals(*pair) for pair in zip(seen, runs, strict=True) if pair[1].finished
-    ]
-    return Solved(scene, seen, runs, _merged(found))
-
-
-def _merged(found: list[tuple[Residual, ...]]) -> dict[str, Residual]:
-    """Residuals of all recordings by name; repeats of one quantity are stacked."""
-    merged: dict[str, Residual] = {}
-    for residual in (r for rs in found for r in rs):
-        other = merged.get(residual.name)
-        if other is not None:
-            values = np.vstack([other.values, residual.values])
-            residual = Residual(
-                residual.quantity, residual.load, values, residual.sd, residual.systematic,
-                residual.unit, residual.definition,
-            )  # fmt: skip
-        merged[residual.name] = residual
-    return merged

@@ -13,21 +13,22 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Recording
-from validate.register.observe import Registered
-from validate.replay.experiment import Change, Progress
-from validate.replay.tracking import Follower, Truth, followed_load, truth_of
+from validate.register.follow import follow_signal
+from validate.register.registered import Registered
+from validate.replay.experiment import Change, Progress, Twin
+from validate.replay.followed import Truth, truth_of
+from validate.replay.method import Method
 from validate.scene.needle import STEP
 from validate.scene.scene import Material, PlaneState, Scene
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.march import march, output_frames
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic
-from validate.solve.types import Run, Stepper
+from validate.solve.types import Run
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
 
 FRAMES = 300  # all steps of 10 s: errors are drawn over time
@@ -112,14 +113,14 @@ class Benchmark:
     def load(self, p: Parameters, folder: Path) -> tuple[Recording, ...]:
         return (read_recording(Path(p.recording)),)
 
-    def build(self, recording: Recording, p: Parameters, method: Follower) -> Scene:
+    def build(self, recording: Recording, p: Parameters, model: None) -> Scene:
         return self.scene(p.material.material, p.body)
 
     def place(self, recording: Recording, p: Parameters, scene: Scene) -> Registered:
-        return followed_load(recording, scene, self.input, self.unit)
+        return follow_signal(recording, scene.mesh, self.input, self.unit)
 
-    def stepper(self, method: Follower, p: Parameters, system: System, seen: Registered) -> Stepper:
-        return method.prepare(system, seen, dt=p.clock.dt)
+    def sets(self, p: Parameters, seen: Registered) -> Mapping[str, Any]:
+        return {"dt": p.clock.dt}
 
     # --- the twin ---------------------------------------------------------------------------------
 
@@ -133,6 +134,11 @@ class Benchmark:
         run = march("twin", stepper, t, self.values(t)[:, None], (at + 1) * f - 1, 0.0)
         traces = {name: replace(trace, y=trace.y[f - 1 :: f]) for name, trace in run.traces.items()}
         return scene, replace(run, t=run.t[f - 1 :: f], at=at, traces=traces)
+
+    def made(self, notice: str) -> Twin:
+        """The experiment's twin, with what its report says of it."""
+        prefixes = ("body.", "clock.", "twin.")
+        return Twin(self.record, self.truth, prefixes, True, TwinCard().seed, notice)
 
     def record(self, p: Parameters, progress: Progress) -> Recording:
         progress("simulate")
@@ -164,32 +170,28 @@ class Benchmark:
 # --- methods and cases ----------------------------------------------------------------------------
 
 #: The paper's five; its "lumped" restricts the damping to alpha M as well.
-FIVE: Mapping[str, Follower] = {
-    "implicit": Follower("implicit", IMPLICIT),
-    "implicit_lumped": Follower(
+FIVE: Mapping[str, Method] = {
+    "implicit": Method("implicit", IMPLICIT),
+    "implicit_lumped": Method(
         "implicit, lumped M, C = αM", replace(IMPLICIT, mass="lumped", damping_terms="mass")
     ),
-    "explicit": Follower("explicit", EXPLICIT),
-    "explicit_lumped": Follower(
+    "explicit": Method("explicit", EXPLICIT),
+    "explicit_lumped": Method(
         "explicit, lumped M, C = αM", replace(EXPLICIT, mass="lumped", damping_terms="mass")
     ),
-    "quasi_static": Follower("quasi-static", QuasiStatic()),
+    "quasi_static": Method("quasi-static", QuasiStatic()),
 }
 #: Lumping and the restriction of C one at a time.
-SWITCHES: Mapping[str, Follower] = {
-    "implicit_lumped_full": Follower(
-        "implicit, lumped M, full C", replace(IMPLICIT, mass="lumped")
-    ),
-    "implicit_restricted": Follower(
+SWITCHES: Mapping[str, Method] = {
+    "implicit_lumped_full": Method("implicit, lumped M, full C", replace(IMPLICIT, mass="lumped")),
+    "implicit_restricted": Method(
         "implicit, consistent M, C = αM", replace(IMPLICIT, damping_terms="mass")
     ),
-    "explicit_lumped_full": Follower(
-        "explicit, lumped M, full C", replace(EXPLICIT, mass="lumped")
-    ),
-    "explicit_restricted": Follower(
+    "explicit_lumped_full": Method("explicit, lumped M, full C", replace(EXPLICIT, mass="lumped")),
+    "explicit_restricted": Method(
         "explicit, consistent M, C = αM", replace(EXPLICIT, damping_terms="mass")
     ),
-    "explicit_lagged": Follower(
+    "explicit_lagged": Method(
         "explicit, lumped M, lagged full C", replace(EXPLICIT, mass="lumped", update="lagged")
     ),
 }
@@ -204,17 +206,17 @@ def changed(part: str, **values: Any) -> Change:
     return change
 
 
-def solvers() -> dict[str, Follower]:
+def solvers() -> dict[str, Method]:
     """The linear solvers of the implicit step, and the update as misprinted."""
     return {
-        "gauss_seidel": Follower(
+        "gauss_seidel": Method(
             "implicit by Gauss-Seidel", replace(IMPLICIT, solver="gauss_seidel")
         ),
-        "cg": Follower("implicit by conjugate gradients", replace(IMPLICIT, solver="cg")),
-        "dense_inverse": Follower(
+        "cg": Method("implicit by conjugate gradients", replace(IMPLICIT, solver="cg")),
+        "dense_inverse": Method(
             "implicit by a dense inverse", replace(IMPLICIT, solver="dense_inverse")
         ),
-        "misprinted": Follower(
+        "misprinted": Method(
             "implicit, update as misprinted", replace(IMPLICIT, update="misprinted")
         ),
     }

@@ -16,7 +16,8 @@ from validate.compare.pair import Common, Field, pair, same_mesh
 from validate.compare.two_fields import METRICS_OF_FIELDS, compared
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System
-from validate.replay.tracking import Followed, Follower
+from validate.replay.followed import Followed
+from validate.replay.method import Method
 from validate.scene.mesh import Mesh
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
 from validate.solve.march import march
@@ -228,7 +229,7 @@ def at_instants(run: Run) -> list[int]:
 
 
 def static_exhibit(
-    system: System, methods: Mapping[str, Follower], dt: float, steps: int, inputs: Floats
+    system: System, methods: Mapping[str, Method], dt: float, steps: int, inputs: Floats
 ) -> tuple[Exhibit, float]:
     """|u - u_static| / |u_static| far beyond the benchmark's end, and the largest of the ends."""
     t: Floats = dt * np.arange(1, steps + 1, dtype=np.float64)

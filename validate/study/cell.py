@@ -23,9 +23,12 @@ from validate.fem.locate import barycentric_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import describe
-from validate.register.observe import Registered
+from validate.register.markers import MarkerObservation
+from validate.register.registered import Registered
+from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.tracking import Tracking, Truth
+from validate.replay.followed import Truth
+from validate.replay.method import Method
 from validate.scene.scene import Scene
 from validate.solve.march import march
 from validate.solve.types import Run, Stepper
@@ -44,7 +47,7 @@ class Ready:
     """A cell prepared for one seed."""
 
     parameters: Any
-    settings: Any
+    method: Method
     system: System
     seen: Registered
 
@@ -52,36 +55,41 @@ class Ready:
 class Bench:
     """One worker's memory of an experiment: what cells share is made once."""
 
-    def __init__(self, experiment: Tracking, job: Job) -> None:
+    def __init__(self, experiment: Experiment, job: Job) -> None:
         self.experiment, self.job = experiment, job
+        assert experiment.twin is not None
+        self.twin = experiment.twin
         self._systems: Kept[System] = Kept(4)
         self._seen: Kept[Registered] = Kept(4 * len(job.seeds))
         self._recordings: Kept[Any] = Kept(2 * len(job.seeds))
         self._truths: Kept[Truth] = Kept(4)
 
     def ready(self, cell: Cell, seed: int) -> Ready:
-        parameters, settings = set_up(self.experiment, self.job, cell, seed)
+        parameters, method = set_up(self.experiment, self.job, cell, seed)
         key = _text(parameters)
-        recording = self._recordings.get(
-            key, lambda: self.experiment.record(parameters, lambda _: None)
-        )
-        scene: Scene = self.experiment.build(recording, parameters, settings)
+        recording = self._recordings.get(key, lambda: self.twin.record(parameters, lambda _: None))
+        scene: Scene = self.experiment.build(recording, parameters, method.scene)
         mark = fingerprint(scene)
         system = self._systems.get(mark, lambda: build_system(scene))
         seen = self._seen.get(
             (key, mark), lambda: self.experiment.place(recording, parameters, system.scene)
         )
-        return Ready(parameters, settings, system, seen)
+        return Ready(parameters, method, system, seen)
 
     def truth(self, ready: Ready) -> Mapping[str, Floats]:
         """The twin's motion: noise does not touch it, so the first seed's serves all."""
         return self._truths.get(
             _text(ready.parameters),
-            lambda: replace(self.experiment.truth(ready.parameters, ready.seen), u=None, mesh=None),
+            lambda: replace(self._true(ready), u=None, mesh=None),
         ).probes
 
     def stepper(self, ready: Ready) -> Stepper:
-        return self.experiment.stepper(ready.settings, ready.parameters, ready.system, ready.seen)
+        given = self.experiment.sets(ready.parameters, ready.seen)
+        return ready.method.prepare(ready.system, ready.seen, given)
+
+    def _true(self, ready: Ready) -> Truth:
+        assert self.twin.truth is not None
+        return self.twin.truth(ready.parameters, ready.seen)
 
 
 def run_cells(job: Job, cells: tuple[Cell, ...]) -> list[CellResult]:
@@ -108,7 +116,6 @@ def _bench(job: Job) -> Bench:
     experiment = load_file(path)
     if file_sha256(path) != job.sha256:
         raise UsageError(f"{path.name} is not the file that the study began with; start it again")
-    assert isinstance(experiment, Tracking)
     return Bench(experiment, job)
 
 
@@ -120,7 +127,7 @@ def _result(bench: Bench, cell: Cell) -> CellResult:
     if isinstance(stepper, DisplacementStepper):
         shared = _all_seeds(bench, cell, stepper, first)
         if shared is not None:
-            return replace(shared, step_s=_step_time(stepper, first.seen.stage.y), setup_s=setup)
+            return replace(shared, step_s=_step_time(stepper, first.seen.inputs), setup_s=setup)
     return _one_by_one(bench, cell, stepper, first, setup)
 
 
@@ -136,7 +143,7 @@ def _all_seeds(
     shared = sharing(stepper) if z is not None else None
     if z is None or shared is None or shared.gains is None:
         return None
-    scene, inputs = first.system.scene, first.seen.stage.y
+    scene, inputs = first.system.scene, first.seen.inputs
     points = barycentric_rows(scene.mesh, np.array([p.point for p in scene.probes]))
     rows = np.kron(points.weights.toarray(), np.eye(scene.mesh.dimension))
     found = shared_gain_run(
@@ -167,7 +174,7 @@ def _measured(
 
     The filter's own table shows which those are: from the first seed's recording it must come out.
     """
-    sensor, nt = stepper.sensor, len(first.seen.stage.t)
+    sensor, nt = stepper.sensor, len(first.seen.t)
     own = _given(first, sensor.names)
     if own is None or not _equal(own, sensor.table):
         return None
@@ -185,14 +192,14 @@ def _measured(
 
 def _given(ready: Ready, names: tuple[str, ...]) -> Timetable | None:
     """Those components' timetable, on the steps of the recorded inputs."""
-    if ready.seen.markers is None:
+    if not ready.seen.of(MarkerObservation):
         return None
     seen = measurements(ready.seen, ready.system.scene.mesh)
     if any(name not in seen.names for name in names):
         return None
     pick = [seen.names.index(name) for name in names]
     given = replace(seen, H=seen.H[pick], z=seen.z[:, pick], sd=seen.sd[pick], names=names)
-    return timetable(given, float(ready.seen.stage.t[0]))
+    return timetable(given, float(ready.seen.t[0]))
 
 
 def _equal(one: Timetable, other: Timetable) -> bool:
@@ -245,7 +252,7 @@ def _one_by_one(
 
 
 def _march(cell: Cell, stepper: Stepper, ready: Ready) -> Run:
-    t, inputs = ready.seen.stage.t, ready.seen.stage.y
+    t, inputs = ready.seen.t, ready.seen.inputs
     return march(cell.method, stepper, t, inputs, np.array([len(t) - 1]), 0.0)
 
 

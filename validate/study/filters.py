@@ -13,8 +13,9 @@ from time import perf_counter
 
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import nearest_names
+from validate.replay.experiment import Experiment
 from validate.replay.find import find, root_of
-from validate.replay.options import AnyExperiment, Options
+from validate.replay.options import Options
 from validate.study.outcome import CellResult, read_cells, write_cell
 from validate.study.plan import METHODS, Cell, Plan, plan
 from validate.study.ranking import Ranked, Ranking, rankings, tied
@@ -76,7 +77,7 @@ class Study:
 
 
 def study(
-    experiment: str | AnyExperiment,
+    experiment: str | Experiment,
     sweeps: Sequence[str] = (),
     *,
     methods: tuple[str, ...] = (),
@@ -134,13 +135,13 @@ def _finish(
     return results, f"Dask at {scheduler}" if scheduler else local
 
 
-def study_folder(experiment: AnyExperiment, out: Path | None) -> Path:
+def study_folder(experiment: Experiment, out: Path | None) -> Path:
     """`out`/<name>/study-filters, by default in the reports/ of the experiment's clone."""
     reports = out or root_of(experiment, Path.cwd()) / "reports"
     return reports / experiment.name / KIND
 
 
-def cells_folder(experiment: AnyExperiment, out: Path | None) -> Path:
+def cells_folder(experiment: Experiment, out: Path | None) -> Path:
     return study_folder(experiment, out) / CELLS
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from validate.errors import UsageError
 from validate.parameters import describe, nearest_names, with_values
-from validate.replay.options import AnyExperiment, Options, configure
-from validate.replay.tracking import Tracking
+from validate.replay.experiment import Experiment
+from validate.replay.options import Options, configure
 from validate.study.sweep import Axis, grid
 
 METHODS = "methods."
@@ -51,7 +51,7 @@ class Cell:
 class Plan:
     """The job and its cells, method by method in the order of the grid."""
 
-    experiment: Tracking
+    experiment: Experiment
     job: Job
     axes: tuple[Axis, ...]
     methods: tuple[str, ...]
@@ -59,7 +59,7 @@ class Plan:
 
 
 def plan(
-    experiment: AnyExperiment, options: Options, axes: Sequence[Axis], seeds: int | tuple[int, ...]
+    experiment: Experiment, options: Options, axes: Sequence[Axis], seeds: int | tuple[int, ...]
 ) -> Plan:
     """Checks every path and value before anything runs.
 
@@ -67,9 +67,9 @@ def plan(
     method's cells only. Raises `UsageError` for another kind of experiment, unknown paths (naming
     the nearest), values of another type, methods without a sweep's name, and fewer than one seed.
     """
-    if not isinstance(experiment, Tracking):
+    if experiment.twin is None or experiment.twin.truth is None:
         raise UsageError(
-            f"'{experiment.name}' has no time: filters are studied on experiments over time"
+            f"'{experiment.name}' has no twin whose truth is known: filters are ranked against one"
         )
     parameters, _ = configure(experiment, Options(options.values, (), options.quick))
     methods = _methods(experiment, options.methods, axes)
@@ -87,7 +87,7 @@ def plan(
     return Plan(experiment, job, tuple(axes), methods, cells)
 
 
-def set_up(experiment: Tracking, job: Job, cell: Cell, seed: int) -> tuple[Any, Any]:
+def set_up(experiment: Experiment, job: Job, cell: Cell, seed: int) -> tuple[Any, Any]:
     """Parameters with that seed, and the method's settings, of a cell."""
     values = {**dict(job.values), **cell.values}
     if job.seed_path:
@@ -113,7 +113,7 @@ def code_sha256() -> str:
     return found.hexdigest()
 
 
-def _cells(experiment: Tracking, job: Job, method: str, axes: Sequence[Axis]) -> list[Cell]:
+def _cells(experiment: Experiment, job: Job, method: str, axes: Sequence[Axis]) -> list[Cell]:
     own = f"{METHODS}{method}."
     mine = [a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(own)]
     found = []
@@ -125,7 +125,7 @@ def _cells(experiment: Tracking, job: Job, method: str, axes: Sequence[Axis]) ->
 
 
 def _keyed(
-    experiment: Tracking,
+    experiment: Experiment,
     job: Job,
     method: str,
     settings: tuple[tuple[str, str], ...],
@@ -148,7 +148,7 @@ def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
 
 
 def _methods(
-    experiment: Tracking, chosen: tuple[str, ...], axes: Sequence[Axis]
+    experiment: Experiment, chosen: tuple[str, ...], axes: Sequence[Axis]
 ) -> tuple[str, ...]:
     """Those named, else those whose settings are swept, else all that run the whole time."""
     known = experiment.methods

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.options import folder_of
-from validate.replay.tracking import Tracking
 from validate.scene.box import box, grid
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.rod import GRAVITY, SIZE, bending_rod
@@ -151,10 +150,10 @@ def _cube_scene(base: Scene, size: tuple[float, ...], element: str, level: int,
 
 
 def _cube(quick: bool) -> TradeScene:
-    experiment = cast(Tracking, find("kf_cube_inertia", Path.cwd()))
+    experiment = find("kf_cube_inertia", Path.cwd())
     p = experiment.parameters
     recording = experiment.load(p, folder_of(experiment))[0]
-    base = experiment.build(recording, p, experiment.methods["average"])
+    base = experiment.build(recording, p, experiment.methods["average"].scene)
     size = tuple(float(x) for x in base.mesh.nodes.max(axis=0))
     total = p.loading.traction * size[0] * size[1]
     steps = (0.004, 0.002, 0.001)
@@ -192,7 +191,7 @@ _ELEMENTS: Mapping[str, dict[str, Any]] = {
 
 
 def _phantom(quick: bool) -> TradeScene:
-    experiment = cast(Experiment, find("fluid_phantom", Path.cwd()))
+    experiment = find("fluid_phantom", Path.cwd())
     p = experiment.parameters
     recording = experiment.load(p, folder_of(experiment))[0]
     build = partial(_phantom_scene, experiment, recording)
@@ -246,8 +245,8 @@ def _phantom_scene(
     p = experiment.parameters
     x, y, z = GRIDS[level]
     mesh = replace(p.mesh, nodes_x=x, nodes_y=y, nodes_z=z)
-    method = replace(experiment.methods["p1_fluid"], law=law, **_ELEMENTS[element])
-    return experiment.build(recording, replace(p, mesh=mesh), method)
+    model = replace(experiment.methods["p1_fluid"].scene, law=law, **_ELEMENTS[element])
+    return experiment.build(recording, replace(p, mesh=mesh), model)
 
 
 def _cell_size(p: Any, level: int) -> float:

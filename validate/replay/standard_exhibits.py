@@ -7,23 +7,31 @@ import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.compare.track import TRACK_METRICS, TrackError, nrmse, track_error
-from validate.replay.tracking import Cases, Followed, Tracking, own_time
+from validate.register.markers import MarkerObservation
+from validate.replay.consistency import consistency_exhibit, nis_of
+from validate.replay.experiment import Experiment
+from validate.replay.followed import Cases, Followed
 
 _MM = 1e3
 _MAPS = 6  # pictures of the mesh in one report
 
 
 def standard_exhibits(
-    experiment: Tracking, main: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
+    experiment: Experiment, main: Mapping[str, Followed], others: Cases
 ) -> tuple[Exhibit, ...]:
-    """Displacements and errors on the recorded case, wrong-model cases, speeds, maps."""
-    scored = {n: f for n, f in main.items() if f.scored}
-    found = [_displacements(experiment, scored)] if scored else []
+    """Displacements and errors on the recorded case, other cases, speeds, maps, consistency.
+
+    None of an experiment at holds: its displacements are those of loads, which reports draw.
+    """
+    if not any(f.over_time for f in main.values()):
+        return ()
+    shown = {n: f for n, f in main.items() if f.shown}
+    found = [_displacements(experiment, shown)] if shown else []
     if others:
-        found.append(_other_cases(experiment, main, others, docs))
+        found.append(_other_cases(experiment, main, others))
     found.append(_speeds(experiment, main))
-    maps = _maps(scored)
-    return (*found, *((maps,) if maps else ()))
+    rest = (_maps(shown), consistency_exhibit(main, others, experiment.accepted))
+    return (*found, *(exhibit for exhibit in rest if exhibit))
 
 
 def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
@@ -32,35 +40,36 @@ def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
     return track_error(probe, axis, followed.run.traces[f"{probe}.{axis}"].y, reference)
 
 
-def _displacements(experiment: Tracking, scored: Mapping[str, Followed]) -> Exhibit:
-    first, axis = next(iter(scored.values())), experiment.axis
-    probes = tuple(first.truth.probes)
+def _displacements(experiment: Experiment, shown: Mapping[str, Followed]) -> Exhibit:
+    first, axis = next(iter(shown.values())), experiment.axis
+    probes = first.scored or first.shown
     charts = [
         replace(chart, caption=experiment.captions.get(chart.name, ""))
-        for chart in (_track_chart(scored, probe, axis) for probe in probes)
+        for chart in (_track_chart(shown, probe, axis) for probe in probes)
     ]
-    charts += [_error_chart(scored, probe, axis) for probe in probes]
+    scored = {n: f for n, f in shown.items() if f.scored}
+    charts += [_error_chart(scored, probe, axis) for probe in probes if scored]
+    words = (
+        "Points are what was measured there; only the markers named in a method are given to it."
+    )
+    if scored:
+        words = f"The reference is the twin's own displacement, which no method sees. {words}"
     return Exhibit(
         "displacements",
         "Displacements over time",
-        (
-            "The reference is the twin's own displacement, which no method sees. Points are what "
-            "was measured there; only the markers named in a method are given to it.",
-        ),
-        tables=(_error_table(scored, axis),),
+        (words,),
+        tables=(_error_table(scored, axis),) if scored else (),
         charts=tuple(charts),
     )
 
 
-def _track_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
-    first = next(iter(scored.values()))
-    series = [*_measured(first, probe, axis)]
-    truth = _MM * first.truth.probes[probe][:, "xyz".index(axis)]
-    series.append(Series("reference (twin)", first.seen.time_scale * first.seen.stage.t, truth))
+def _track_chart(shown: Mapping[str, Followed], probe: str, axis: str) -> Chart:
+    first = next(iter(shown.values()))
+    series = [*_measured(first, probe, axis), *_reference(first, probe, axis)]
     series += [
-        Series(f.label, own_time(f), _MM * f.run.traces[f"{probe}.{axis}"].y)
-        for f in scored.values()
-        if probe in f.scored
+        Series(f.label, f.own_time, _MM * f.run.traces[f"{probe}.{axis}"].y)
+        for f in shown.values()
+        if probe in f.shown
     ]
     return Chart(
         f"displacement_{probe}", f"Displacement at {probe}", "recorded time / s", f"u_{axis} / mm",
@@ -68,9 +77,19 @@ def _track_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     )  # fmt: skip
 
 
+def _reference(followed: Followed, probe: str, axis: str) -> list[Series]:
+    """The twin's truth; none where nobody knows it."""
+    if probe not in followed.truth.probes:
+        return []
+    truth = _MM * followed.truth.probes[probe][:, "xyz".index(axis)]
+    t = followed.seen.time_scale * followed.seen.t
+    return [Series("reference (twin)", t, truth)]
+
+
 def _measured(followed: Followed, probe: str, axis: str) -> list[Series]:
-    seen = followed.seen.markers
-    if seen is None or probe not in seen.names:
+    markers = followed.seen.of(MarkerObservation)
+    seen = next((m for m in markers if probe in m.names), None)
+    if seen is None:
         return []
     j, c = seen.names.index(probe), "xyz".index(axis)
     moved = seen.x[:, j, c] - seen.rest[j, c]
@@ -85,7 +104,7 @@ def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     lines = [np.abs(error_at(f, probe, axis).values) for f in mine]
     floor = max((float(y.max()) for y in lines), default=0.0) * 1e-5 or 1e-12
     series = tuple(
-        Series(f.label, own_time(f), _MM * np.maximum(y, floor))
+        Series(f.label, f.own_time, _MM * np.maximum(y, floor))
         for f, y in zip(mine, lines, strict=True)
     )
     return Chart(
@@ -116,9 +135,7 @@ def _statistics(error: TrackError) -> tuple[Entry, ...]:
     return (*lengths, values["nrmse"], len(error.values))
 
 
-def _other_cases(
-    experiment: Tracking, main: Mapping[str, Followed], others: Cases, docs: Mapping[str, str]
-) -> Exhibit:
+def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: Cases) -> Exhibit:
     axis, probes = experiment.axis, tuple(next(iter(main.values())).truth.probes)
     rows: list[tuple[Entry, ...]] = []
     for name, case in others.items():
@@ -128,7 +145,8 @@ def _other_cases(
                 for p in probes
             ]
             ended = followed.run.outcome.state
-            rows.append((name, followed.label, *shown, _nis(followed), ended))
+            nis = nis_of(followed)
+            rows.append((name, followed.label, *shown, nis.mean if nis else None, ended))
     table = NumberTable(
         "cases",
         "Every other case: RMSE over the range of the reference, per node, and "
@@ -136,18 +154,11 @@ def _other_cases(
         ("truth", "method", *(f"{p} NRMSE / %" for p in probes), "NIS per dof / 1", "ended"),
         tuple(rows),
     )
-    words = tuple(f"{name}: {docs[name]}" for name in others)
+    words = tuple(f"{case.name}: {case.doc}" for case in experiment.cases if case.name in others)
     return Exhibit("cases", "Other truths than the recorded one", words, tables=(table,))
 
 
-def _nis(followed: Followed) -> float | None:
-    nis, dof = followed.run.traces.get("nis"), followed.run.traces.get("nis.dof")
-    if nis is None or dof is None or not dof.y.any():
-        return None
-    return float(nis.y.sum() / dof.y.sum())
-
-
-def _speeds(experiment: Tracking, main: Mapping[str, Followed]) -> Exhibit:
+def _speeds(experiment: Experiment, main: Mapping[str, Followed]) -> Exhibit:
     base = main.get(experiment.reference)
     factor = _real_time(base) if base else None
     named = base.label if base else "not run"
@@ -165,7 +176,7 @@ def _speeds(experiment: Tracking, main: Mapping[str, Followed]) -> Exhibit:
 
 def _real_time(f: Followed) -> float | None:
     times = f.run.step_s
-    return float(own_time(f)[0]) * times.rate_hz if times else None  # the first step starts at 0
+    return float(f.own_time[0]) * times.rate_hz if times else None  # the first step starts at 0
 
 
 def _speed_row(f: Followed, base: float | None) -> tuple[Entry, ...]:
@@ -188,13 +199,13 @@ def _limit(f: Followed) -> float | None:
     return float(trace.y.min()) if trace is not None and len(trace.y) else None
 
 
-def _maps(scored: Mapping[str, Followed]) -> Exhibit | None:
+def _maps(shown: Mapping[str, Followed]) -> Exhibit | None:
     """Rms error over the output frames at every node, where truth and model share a mesh."""
     maps = []
-    for f in scored.values():
+    for f in shown.values():
         u, mesh = f.truth.u, f.scene.mesh
         same = f.truth.mesh is not None and np.array_equal(f.truth.mesh.nodes, mesh.nodes)
-        every = len(f.run.t) == len(f.seen.stage.t)  # long steps keep other times than the truth
+        every = len(f.run.t) == len(f.seen.t)  # long steps keep other times than the truth
         if u is None or not (same and every) or u.shape != f.run.u.shape:
             continue
         error = np.sqrt(((f.run.u - u) ** 2).sum(axis=2).mean(axis=0))

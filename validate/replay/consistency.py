@@ -16,7 +16,7 @@ from validate.estimate.consistency import (
     whiteness,
 )
 from validate.fem.locate import barycentric_rows
-from validate.replay.tracking import Cases, Followed, own_time
+from validate.replay.followed import Cases, Followed
 
 _LAGS = 10
 _HELD = 1e-12  # m: a component without error and without doubt is held, and no estimate
@@ -138,7 +138,7 @@ def _white(w: Whiteness) -> tuple[Entry, ...]:
 
 def _chart(followed: Followed) -> Chart:
     """NIS of every measured step per degree of freedom, with the band of one step."""
-    traces, t = followed.run.traces, own_time(followed)
+    traces, t = followed.run.traces, followed.own_time
     dof = traces["nis.dof"].y
     seen = dof > 0
     per = traces["nis"].y[seen] / dof[seen]

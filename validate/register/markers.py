@@ -1,0 +1,226 @@
+"""Tracked markers: registered at rest, read from a run where they sit in the body."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RegistrationError
+from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
+from validate.recording.types import Markers, Recording
+from validate.register.labels import require_steady_labels
+from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
+from validate.register.quality import LINE, Registration, register_points
+from validate.register.transform import spread
+from validate.scene.mesh import Mesh
+
+Sampling = Literal["barycentric", "nearest_node"]
+_INSIDE = 1e-4  # m: a marker further out belongs to another body or frame
+_FLAT = 1e-6  # third over first rms spread of exact points in a plane
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Together:
+    """All markers' components along some axes as one quantity, in words."""
+
+    quantity: str
+    axes: tuple[int, ...]
+    words: str
+
+
+@dataclass(frozen=True)
+class MarkerObservation:
+    """Markers in the scene's frame: x (nt, k, d) m with NaN = not seen, rest layout (k, d) m.
+
+    `sd` m per axis; `tre` (k,) m, the predicted registration error at every marker. Each marker is
+    a quantity of its own, read from the run's probe of its name, unless `together` gathers them:
+    then the run's fields are read at their places.
+    """
+
+    name: str
+    role: Role
+    t: Floats
+    names: tuple[str, ...]
+    x: Floats
+    rest: Floats
+    positions: Rows
+    sd: float
+    tre: Floats
+    registration: Registration
+    together: tuple[Together, ...] = ()
+
+    def simulated(self, u: Floats) -> Floats:
+        """Marker positions (k, d) m under nodal displacements u (n, d) m."""
+        return self.rest + self.positions.apply(u)
+
+    def rows(self) -> Rows | None:
+        return self.positions
+
+    def within(self, mesh: Mesh) -> "MarkerObservation":
+        """The markers that lie in a mesh of part of the body (within 0.1 mm); the registration
+        stays that of all of them."""
+        rows = barycentric_rows(mesh, self.rest)
+        kept = np.flatnonzero(rows.outside <= _INSIDE)
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in kept),
+            x=self.x[:, kept],
+            rest=self.rest[kept],
+            positions=Rows(rows.weights[kept], rows.outside[kept]),
+            tre=self.tre[kept],
+        )
+
+    # --- comparison -------------------------------------------------------------------------------
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        return dict.fromkeys([g.quantity for g in self.together] or self.names, "m")
+
+    def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
+        if self.together:
+            return self._gathered(run, selection)
+        each = (self._one(run, selection, j) for j in range(len(self.names)))
+        return tuple(d for d in each if d is not None)
+
+    def unanswered(self, run: Simulated) -> tuple[str, ...]:
+        if self.together:
+            return ()
+        return tuple(n for n in self.names if f"{n}.x" not in run.traces)
+
+    def _gathered(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
+        selection = selection.instants(run)
+        samples = selection.samples(self.t, run.t, self.name)
+        shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
+        off = (shown - self.x[samples]).reshape(-1, self.x.shape[2])
+        off = off[np.isfinite(off).all(axis=1)]
+        tre = float(np.sqrt((self.tre**2).mean() / 3))
+        return tuple(
+            Deviation(g.quantity, off[:, list(g.axes)], "m", self.sd, tre, g.words)
+            for g in self.together
+        )
+
+    def _one(self, run: Simulated, selection: Selection, j: int) -> Deviation | None:
+        """One marker's displacement, by the run's probe of its name."""
+        name, axes = self.names[j], _AXES[: self.x.shape[2]]
+        if f"{name}.x" not in run.traces:
+            return None
+        moved = self.x[:, j] - self.rest[j]
+        samples = selection.samples(self.t, run.t, self.name)
+        seen = np.isfinite(moved[samples]).all(axis=1)
+        if not seen.any():
+            return None
+        t = self.t[samples]
+        probe = [selection.read(run.t, run.traces[f"{name}.{c}"].y, t) for c in axes]
+        words = "estimate less measured displacement of the marker, at the times it was seen"
+        off = (np.stack(probe, axis=1) - moved[samples])[seen]
+        return Deviation(name, off, "m", self.sd, float(self.tre[j]), words)
+
+
+def observe_markers(
+    markers: Markers,
+    layout: Mapping[str, Floats],
+    mesh: Mesh,
+    *,
+    method: Literal["rigid", "similarity", "two_step"] = "rigid",
+    sampling: Sampling = "barycentric",
+    up: tuple[Floats, Floats] | None = None,
+    name: str = "markers",
+    role: Role = "validates",
+    together: tuple[Together, ...] = (),
+) -> MarkerObservation:
+    """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
+
+    `up` is one direction in the markers' frame and in the scene's: without it a planar set that
+    was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the plane
+    z = 0 of the layout: what markers do across it is dropped.
+    Raises `RegistrationError` for names that the layout lacks, for markers outside the mesh, and
+    for whatever `register_points` finds.
+    """
+    unknown = [marker for marker in markers.names if marker not in layout]
+    if unknown:
+        raise RegistrationError(
+            f"{len(unknown)} of {len(markers.names)} markers are not in the layout: {unknown[:5]}"
+        )
+    rest = np.array([layout[marker] for marker in markers.names])
+    _require_scale(markers.x[0], rest)
+    registration = register_points(
+        markers.names, markers.x[0], rest, method=method, expected_sd=markers.sd, up=up
+    )
+    d = mesh.dimension
+    places = rest[:, :d]
+    rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, places)
+    if sampling == "barycentric":
+        require_inside(rows, markers.names, _INSIDE)
+    x = np.array([registration.transform.apply(frame) for frame in markers.x])
+    require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
+    return MarkerObservation(
+        name, role, markers.t, markers.names, x[..., :d], places, rows, markers.sd,
+        registration.tre_at(rest), registration, together,
+    )  # fmt: skip
+
+
+def placed_markers(
+    recording: Recording,
+    mesh: Mesh,
+    *,
+    topic: str = "markers",
+    method: Literal["rigid", "similarity", "two_step"] = "rigid",
+    sampling: Sampling = "barycentric",
+    together: tuple[Together, ...] = (),
+    tracker: str = "camera",
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0),
+) -> MarkerObservation:
+    """`observe_markers` by the recording's own records: "marker_layout" (m), and `tracker`, whose
+    "up" in the markers' frame is the scene's direction `up`.
+
+    `up` is used for a layout that is a plane within the noise; any other shows a mirror itself.
+    Raises `RecordingError` for an absent record, `RegistrationError` for one that is no vector, and
+    whatever `observe_markers` does.
+    """
+    layout = {
+        name: vector(text, f"marker_layout '{name}'")
+        for name, text in recording.record("marker_layout").items()
+    }
+    markers = recording.marker(topic)
+    seen_up = vector(recording.record(tracker).get("up", ""), f"{tracker} 'up'")
+    axes = (seen_up, np.array(up)) if _planar(layout, markers.sd) else None
+    return observe_markers(
+        markers, layout, mesh, method=method, sampling=sampling, up=axes, name=topic,
+        together=together,
+    )  # fmt: skip
+
+
+def vector(text: str, what: str) -> Floats:
+    """Three numbers of a record; raises `RegistrationError` naming `what`."""
+    try:
+        values = np.array([float(part) for part in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise RegistrationError(f"{what} is '{text[:60]}': expected three numbers")
+    return values
+
+
+def _planar(layout: Mapping[str, Floats], sd: float) -> bool:
+    points = np.array(list(layout.values()))
+    return len(points) >= 3 and bool(spread(points)[2] <= LINE * sd + _FLAT * spread(points)[0])
+
+
+def _require_scale(x: Floats, rest: Floats) -> None:
+    """A layout of another size is a wrong unit, not a bad fit."""
+    seen = np.isfinite(x).all(axis=1)
+    if seen.sum() < 3:
+        return
+    size, known = _spread(x[seen]), _spread(rest[seen])
+    if not 0.5 < size / known < 2:
+        raise RegistrationError(
+            f"the markers spread over {1e3 * size:.4g} mm, their layout over {1e3 * known:.4g} mm: "
+            f"{size / known:.4g} times as much; wrong unit? positions are metres"
+        )
+
+
+def _spread(points: Floats) -> float:
+    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))

@@ -1,0 +1,170 @@
+"""What was measured, in the scene's frame, and how a run is read where it was measured.
+
+Every kind of sensor is one file beside this one: its class keeps the measured samples and says how
+a run deviates from them. Comparison, filters and reports know nothing of a sensor but this.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import ComparisonError
+from validate.fem.locate import Rows
+
+Role = Literal["drives", "calibrates", "validates"]
+WITHIN = 1.0  # s: a sample further off in time is no match
+_SAME = 1e-9  # s: instants that are one
+
+
+class Traced(Protocol):
+    """One number a step (nt,) in `unit`."""
+
+    @property
+    def y(self) -> Floats: ...
+
+    @property
+    def unit(self) -> str: ...
+
+
+class Simulated(Protocol):
+    """What an observation reads of a run: fields u (no, n, d) m at the steps `at`, traces."""
+
+    @property
+    def method(self) -> str: ...
+
+    @property
+    def t(self) -> Floats: ...
+
+    @property
+    def at(self) -> Ints: ...
+
+    @property
+    def u(self) -> Floats: ...
+
+    @property
+    def traces(self) -> Mapping[str, Traced]: ...
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The instants t (m,) s that are compared under one label; None: every sample of a sensor.
+
+    A hold is one instant, a window of a curve many. `words` say which, for definitions.
+    """
+
+    label: str
+    t: Floats | None = None
+    words: str = ""
+
+    def instants(self, run: "Simulated") -> "Selection":
+        """Itself, or for every sample the times whose fields the run kept."""
+        return self if self.t is not None else replace(self, t=run.t[run.at])
+
+    def samples(self, t: Floats, run_t: Floats, name: str) -> Ints:
+        """Indices of the samples at t (nt,) s that are compared with a run over run_t s.
+
+        Raises `ComparisonError` where an instant has no sample near it in time.
+        """
+        if self.t is None:
+            return np.flatnonzero((t >= run_t[0] - _SAME) & (t <= run_t[-1] + _SAME))
+        return nearest_samples(t, self.t, name)
+
+    def steps(self, run_t: Floats) -> Ints:
+        """The run's steps nearest to the instants."""
+        assert self.t is not None
+        return nearest_samples(run_t, self.t, "the run")
+
+    def read(self, run_t: Floats, y: Floats, t: Floats) -> Floats:
+        """A trace y (nt,) at the instants (its nearest steps), or interpolated at times t s."""
+        return np.interp(t, run_t, y) if self.t is None else y[self.steps(run_t)]
+
+
+EVERYTHING = Selection("all")
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Simulated less measured of one quantity: values (k, c) in `unit`.
+
+    `sd` is the measurement's standard deviation per component, independent between points;
+    `systematic` what all points share (registration), per component. `simulated` and `measured`
+    are kept of scalars.
+    """
+
+    quantity: str
+    values: Floats
+    unit: str
+    sd: float
+    systematic: float
+    definition: str
+    simulated: float | None = None
+    measured: float | None = None
+
+
+class Observation(Protocol):
+    """One stream of a recording, registered.
+
+    `role`: it drives the simulation, calibrates it, or validates it. `unanswered` names what of it
+    a run over the whole time says nothing about.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def role(self) -> Role: ...
+
+    @property
+    def t(self) -> Floats: ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of each quantity that is compared."""
+        ...
+
+    def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]: ...
+
+    def unanswered(self, run: Simulated) -> tuple[str, ...]: ...
+
+    def rows(self) -> Rows | None:
+        """How a displacement field is read at the measured points, where a filter may be given
+        them."""
+        ...
+
+
+def nearest_samples(times: Floats, t: Floats, name: str) -> Ints:
+    """Indices of the samples nearest to t (m,) s, the earlier of two.
+
+    Raises `ComparisonError` for an instant without a sample within a second: nothing matches.
+    """
+    after = np.clip(np.searchsorted(times, t), 1, max(len(times) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(times) - 1)
+    index = np.where(np.abs(times[before] - t) <= np.abs(times[after] - t), before, after)
+    off = np.abs(times[index] - t)
+    if off.max(initial=0.0) > WITHIN:
+        i = int(off.argmax())
+        raise ComparisonError(
+            f"{name} has no sample within {WITHIN:g} s of t = {t[i]:.3f} s (nearest {off[i]:.3f} s "
+            "off): 0 matched samples; check the clocks with `validate inspect`"
+        )
+    return np.asarray(index)
+
+
+def nearest_sample(times: Floats, t: float, name: str) -> int:
+    """The one of `nearest_samples`."""
+    return int(nearest_samples(times, np.array([t]), name)[0])
+
+
+def frame_at(run: Simulated, selection: Selection) -> Floats:
+    """The fields (m, n, d) m at the instants; `ComparisonError` where the run kept none."""
+    kept = {int(step): i for i, step in enumerate(run.at)}
+    steps = selection.steps(run.t)
+    if any(int(s) not in kept for s in steps):
+        raise ComparisonError(
+            f"{run.method}: {len(run.at)} output frames, none at '{selection.label}'"
+        )
+    return run.u[[kept[int(s)] for s in steps]]

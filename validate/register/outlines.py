@@ -1,0 +1,160 @@
+"""Outlines seen in an image plane, against the section of the deformed wall with that plane."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.fem.locate import Rows
+from validate.recording.types import Contours
+from validate.register.observation import (
+    Deviation,
+    Role,
+    Selection,
+    Simulated,
+    frame_at,
+    nearest_sample,
+)
+from validate.register.outline_geometry import angular_points, enclosed, normal_distances
+from validate.register.plane import SurfaceSampler, require_rigid, section
+
+_ANGLES = np.deg2rad(np.arange(0.0, 360.0, 10.0))
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A place of the outline that is followed on its own: polar angle in the image, rad."""
+
+    quantity: str
+    angle: float
+    words: str
+
+
+@dataclass(frozen=True)
+class OutlineObservation:
+    """Outlines (k_i, 2) m in image coordinates, and the wall that the simulation moves.
+
+    `rest` s is the unloaded instant, from which displacements of the outline count.
+    """
+
+    name: str
+    role: Role
+    t: Floats
+    outlines: tuple[Floats, ...]
+    pose: Floats
+    sd: float
+    wall: SurfaceSampler
+    rest: float
+    corners: tuple[Corner, ...] = ()
+
+    def simulated(self, u: Floats) -> Floats:
+        """The section (k, 2) m of the deformed wall with the image plane."""
+        return section(self.wall.deformed(u), self.wall.triangles, self.pose)
+
+    def measured(self, t: float) -> Floats:
+        """The outline (k, 2) m nearest in time."""
+        return self.outlines[nearest_sample(self.t, t, self.name)]
+
+    def rows(self) -> Rows | None:
+        return None
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        lengths = ("contour", "contour.material", "contour.centroid")
+        return {
+            **dict.fromkeys((*lengths, *(c.quantity for c in self.corners)), "m"),
+            "contour.area": "m2",
+        }
+
+    def unanswered(self, run: Simulated) -> tuple[str, ...]:
+        return ()
+
+    def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
+        """Of every instant: distance; where loaded also displacement, area, centroid, corners."""
+        instants = selection.instants(run)
+        times = np.asarray(instants.t)
+        start = self.simulated(frame_at(run, Selection("rest", np.array([self.rest])))[0])
+        found: list[Deviation] = []
+        for t, u in zip(times, frame_at(run, instants), strict=True):
+            pair = (self.simulated(u), self.measured(float(t)))
+            found.append(self._distance(*pair))
+            if t != self.rest:
+                found += self._changes((start, self.measured(self.rest)), pair)
+        return _stacked(found)
+
+    def _distance(self, simulated: Floats, measured: Floats) -> Deviation:
+        apart = normal_distances(simulated, measured)[:, None]
+        words = "distance of the simulated outline from each measured outline point, outward "
+        return Deviation("contour", apart, "m", self.sd, 0.0, words + "positive")
+
+    def _changes(self, start: tuple[Floats, Floats], end: tuple[Floats, Floats]) -> list[Deviation]:
+        """What changed of the simulated and of the measured outline since rest."""
+        moved = [_moved(a, b, _ANGLES) for a, b in zip(start, end, strict=True)]
+        (area, centre), (true_area, true_centre) = enclosed(end[0]), enclosed(end[1])
+        k, radius = len(end[1]), np.sqrt(true_area / np.pi)
+        spread = self.sd * np.sqrt(2 / k)
+        return [
+            Deviation(
+                "contour.material", moved[0] - moved[1], "m", np.sqrt(2.0) * self.sd, 0.0,
+                "displacement of the outline at equal polar angle about its own centroid, every "
+                "10 deg",
+            ),
+            *(self._corner(c, start, end) for c in self.corners),
+            Deviation(
+                "contour.area", np.array([[area - true_area]]), "m2",
+                self.sd * 2 * np.pi * radius / np.sqrt(k), 0.0, "area inside the outline",
+                area, true_area,
+            ),
+            Deviation(
+                "contour.centroid", (centre - true_centre)[None], "m", spread, 0.0,
+                "centroid of the area inside the outline",
+            ),
+        ]  # fmt: skip
+
+    def _corner(
+        self, corner: Corner, start: tuple[Floats, Floats], end: tuple[Floats, Floats]
+    ) -> Deviation:
+        angle = np.array([corner.angle])
+        simulated, measured = (
+            float(np.linalg.norm(_moved(a, b, angle))) for a, b in zip(start, end, strict=True)
+        )
+        off = np.array([[simulated - measured]])
+        sd = np.sqrt(2.0) * self.sd
+        return Deviation(corner.quantity, off, "m", sd, 0.0, corner.words, simulated, measured)
+
+
+def _moved(start: Floats, end: Floats, angles: Floats) -> Floats:
+    return angular_points(end, angles) - angular_points(start, angles)
+
+
+def _stacked(found: list[Deviation]) -> tuple[Deviation, ...]:
+    """One deviation a quantity, over all instants; a scalar keeps its two values only alone."""
+    quantities = dict.fromkeys(d.quantity for d in found)
+    groups = [[d for d in found if d.quantity == q] for q in quantities]
+    return tuple(g[0] if len(g) == 1 else merged(g) for g in groups)
+
+
+def merged(group: list[Deviation]) -> Deviation:
+    """Deviations of one quantity as one."""
+    values = np.vstack([d.values for d in group])
+    first = group[0]
+    return Deviation(
+        first.quantity, values, first.unit, first.sd, first.systematic, first.definition
+    )
+
+
+def observe_outlines(
+    contours: Contours,
+    wall: SurfaceSampler,
+    rest: float,
+    *,
+    name: str = "outline",
+    role: Role = "validates",
+    corners: tuple[Corner, ...] = (),
+) -> OutlineObservation:
+    """Outlines with their pose checked; raises `RegistrationError` for an improper pose."""
+    require_rigid(contours.pose, "outline")
+    return OutlineObservation(
+        name, role, contours.t, contours.outlines, contours.pose, contours.sd, wall, rest, corners
+    )

@@ -1,0 +1,78 @@
+"""A recording in the scene's frame: its observations, and what of them is compared."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import ComparisonError
+from validate.register.observation import EVERYTHING, Observation, Selection, nearest_sample
+from validate.register.signals import SignalObservation
+
+O = TypeVar("O")
+
+
+@dataclass(frozen=True)
+class Registered:
+    """All observations of a recording in the scene's frame, and what of them is compared.
+
+    `rest` is the unloaded instant, where registration and geometry can be looked at alone.
+    `outside` counts samples left out because they lie beyond the law's validity. `time_scale` are
+    the recorded seconds in one second of these times, where a slow recording is walked faster.
+    Raises `ComparisonError` unless driving signals, on common times, are there.
+    """
+
+    observations: tuple[Observation, ...]
+    selections: tuple[Selection, ...] = (EVERYTHING,)
+    rest: Selection | None = None
+    outside: int = 0
+    findings: tuple[str, ...] = ()
+    time_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        drives = self.drives
+        if not drives:
+            raise ComparisonError("no observation drives the simulation: name the driving signal")
+        if any(not np.array_equal(d.t, drives[0].t) for d in drives):
+            raise ComparisonError(
+                f"{len(drives)} driving signals on different times; resample them onto one clock"
+            )
+
+    @property
+    def drives(self) -> tuple[SignalObservation, ...]:
+        """The driving signals, in the order of the scene's inputs."""
+        return tuple(
+            o for o in self.observations if isinstance(o, SignalObservation) and o.role == "drives"
+        )
+
+    @property
+    def t(self) -> Floats:
+        """Times (nt,) s of the steps."""
+        return self.drives[0].t
+
+    @property
+    def inputs(self) -> Floats:
+        """What every step is given (nt, k): drives in m, then loads in N, as the scene has them."""
+        return np.hstack([d.y for d in self.drives])
+
+    @property
+    def compared(self) -> tuple[Observation, ...]:
+        return tuple(o for o in self.observations if o.role != "drives")
+
+    def of(self, kind: type[O]) -> tuple[O, ...]:
+        """The observations of one kind that do not drive."""
+        return tuple(o for o in self.compared if isinstance(o, kind))
+
+    def frames(self, steps: int, most: int) -> Ints:
+        """Which of a run's `steps` keep their fields: rest and single instants, else `most`
+        evenly."""
+        compared = [s for s in (self.rest, *self.selections) if s is not None]
+        single = [s for s in compared if s.t is not None and len(s.t) == 1]
+        if single:
+            return np.unique(np.concatenate([s.steps(self.t) for s in single]))
+        return np.unique(np.linspace(0, steps - 1, min(most, steps)).round().astype(np.int64))
+
+    def stage(self, t: float) -> float:
+        """The first input at the step nearest to t s, in its own unit."""
+        return float(self.inputs[nearest_sample(self.t, t, "the drive"), 0])

@@ -1,0 +1,142 @@
+"""Signals: a number or several over time, driving a simulation or predicted by a trace of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError, RegistrationError
+from validate.fem.locate import Rows
+from validate.recording.types import Recording
+from validate.register.observation import (
+    Deviation,
+    Role,
+    Selection,
+    Simulated,
+    nearest_sample,
+)
+
+
+@dataclass(frozen=True)
+class SignalObservation:
+    """y (nt, c) in its own `unit` at t (nt,) s; the run's `trace` predicts it, where it validates.
+
+    `quantity` is what scores call it.
+    """
+
+    name: str
+    role: Role
+    t: Floats
+    y: Floats
+    unit: str
+    sd: float
+    quantity: str = ""
+    trace: str = ""
+
+    def at(self, t: float) -> float:
+        """The sample nearest in time; raises `ComparisonError` when none is within a second."""
+        return float(self.y[nearest_sample(self.t, t, f"signal '{self.quantity}'"), 0])
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        return {self.quantity: self.unit}
+
+    def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
+        """One of all samples. Raises `ComparisonError` for a trace in another unit."""
+        trace = run.traces.get(self.trace)
+        if trace is None:
+            return ()
+        if trace.unit != self.unit:
+            raise ComparisonError(
+                f"{run.method}: trace '{self.trace}' is in {trace.unit}, '{self.name}' in "
+                f"{self.unit}"
+            )
+        at = selection.samples(self.t, run.t, f"signal '{self.quantity}'")
+        if len(at) == 0:
+            return ()
+        simulated, measured = selection.read(run.t, trace.y, self.t[at]), self.y[at, 0]
+        words = f"{self.quantity}, {selection.words or 'simulated less measured at every sample'}"
+        one = (float(simulated[0]), float(measured[0])) if len(at) == 1 else (None, None)
+        off = (simulated - measured)[:, None]
+        return (Deviation(self.quantity, off, self.unit, self.sd, 0.0, words, *one),)
+
+    def unanswered(self, run: Simulated) -> tuple[str, ...]:
+        return () if self.trace in run.traces else (self.name,)
+
+    def rows(self) -> Rows | None:
+        return None
+
+
+def driving(
+    recording: Recording, name: str, unit: str, *, after_rest: bool = False
+) -> SignalObservation:
+    """The signal that drives, in `unit`; `after_rest` begins after t = 0, where all is at rest."""
+    s = recording.signal(name, unit)
+    kept = s.t > 0 if after_rest else np.ones(len(s.t), bool)
+    return SignalObservation(name, "drives", s.t[kept], s.y[kept], s.unit, s.sd)
+
+
+def validating(
+    recording: Recording, name: str, unit: str, *, quantity: str, trace: str
+) -> SignalObservation:
+    """The signal that a run's `trace` must predict, scored as `quantity`."""
+    s = recording.signal(name, unit)
+    return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace)
+
+
+def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:
+    """Raises `RegistrationError` when a signal falls as the drive closes."""
+    most = int(np.argmax(drive.y[:, 0]))
+    least = int(np.argmin(drive.y[:, 0]))
+    change = seen.at(float(drive.t[most])) - seen.at(float(drive.t[least]))
+    if change < -5 * seen.sd:
+        raise RegistrationError(
+            f"'{seen.quantity}' falls by {-change:.4g} {seen.unit} as '{drive.name}' closes by "
+            f"{1e3 * np.ptp(drive.y):.3g} mm; compression and pressure are positive: turn its sign"
+        )
+
+
+def holds_at(
+    drive: SignalObservation, t: Floats, loads: tuple[float, ...], within: float
+) -> tuple[Selection, ...]:
+    """The measurement times t (nt,) s at which the drive stood at a load m, rest first.
+
+    Raises `ComparisonError` when a load has no measurement within `within` m of it.
+    """
+    reached = [float(drive.y[nearest_sample(drive.t, ti, drive.name), 0]) for ti in t]
+    if min(loads, default=1.0) <= 0 or len(set(loads)) != len(loads):
+        shown = ", ".join(f"{1e3 * load:g}" for load in loads)
+        raise ComparisonError(f"loads {shown} mm: each must be above 0 (rest) and stand once")
+    holds = []
+    for load in (0.0, *loads):
+        off = np.abs(np.array(reached) - load)
+        if off.min() > within:
+            seen = ", ".join(f"{1e3 * r:.2f}" for r in reached)
+            raise ComparisonError(
+                f"no measurement at {1e3 * load:g} mm: 0 matched samples, '{drive.name}' was at "
+                f"{seen} mm; set the loads to those"
+            )
+        i = int(off.argmin())
+        holds.append(Selection(f"{1e3 * load:g}mm", t[i : i + 1], "one sample at the hold"))
+    return tuple(holds)
+
+
+def windows_of(
+    drive: SignalObservation, windows: dict[str, tuple[float, float]]
+) -> tuple[Selection, ...]:
+    """The samples with the drive in (from, to] m, by label.
+
+    Raises `ComparisonError` when a window holds no sample.
+    """
+    found = []
+    for label, (low, high) in windows.items():
+        inside = (drive.y[:, 0] > low) & (drive.y[:, 0] <= high)
+        span = f"between {1e3 * low:g} and {1e3 * high:g} mm"
+        if not inside.any():
+            covered = f"{1e3 * drive.y.min():.2f}..{1e3 * drive.y.max():.2f} mm"
+            raise ComparisonError(
+                f"window {label}: 0 samples {span}; '{drive.name}' covers {covered}"
+            )
+        found.append(Selection(label, drive.t[inside], f"every sample with the drive {span}"))
+    return tuple(found)

@@ -1,0 +1,188 @@
+"""Verdicts of the accepted methods: u_num from a finer mesh, u_input from declared inputs."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from validate.compare.effects import Effect, effect
+from validate.compare.residual import Residual
+from validate.compare.result import MethodResult
+from validate.compare.score import rms
+from validate.compare.verdict import OWN_COVARIANCE, SAFETY, Accept, Check, Sensitivity, judge
+from validate.errors import ComparisonError
+from validate.fem.locate import barycentric_rows
+from validate.replay.experiment import EffectSpec, Uncertainty, Variant, unchanged
+from validate.replay.followed import Followed
+from validate.replay.runs import Road
+
+_NO_UNIT = "-"  # of a quantity that no observation has
+
+
+def variants_of(road: Road) -> list[Variant]:
+    """Every variant that the road will solve on the experiment's own recordings."""
+    wanted = [Variant(name) for name in road.methods]
+    accepted = [name for name in road.experiment.accepted if name in road.methods]
+    uncertainty = road.experiment.uncertainty
+    if accepted and uncertainty:
+        own = [uncertainty.stand_in.get(name, name) for name in accepted]
+        wanted += [Variant(o, change) for o in own for change in (unchanged, uncertainty.finer)]
+        wanted += [Variant(uncertainty.surrogate)]
+        wanted += [Variant(uncertainty.surrogate, i.change) for i in uncertainty.inputs]
+    return wanted + [v for e in shown_effects(road) for v in (e.one, e.other)]
+
+
+def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
+    """The verdict on everything that the experiment accepts; what compared nothing has failed.
+
+    Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
+    """
+    refined, ratio = _refined(road, mine.method, mine.residuals)
+    inputs, own = _sensitivities(road), _own_doubt(mine)
+    found: list[Check] = []
+    for accept in road.experiment.accept:
+        keys = [k for k, r in mine.residuals.items() if _accepts(accept, r)]
+        found += [
+            judge(
+                mine.residuals[key],
+                accept.limit,
+                refined.get(key),
+                ratio,
+                inputs.get(key, []) + own.get(key, []),
+            )
+            for key in keys
+        ] or [_nothing(accept, mine)]
+    return tuple(found)
+
+
+def _accepts(accept: Accept, residual: Residual) -> bool:
+    return residual.quantity == accept.quantity and (
+        not accept.loads or residual.load in accept.loads
+    )
+
+
+def _refined(
+    road: Road, name: str, residuals: Mapping[str, Residual]
+) -> tuple[Mapping[str, Residual], float]:
+    """A method's residuals as they would be on the finer mesh, by itself or its stand-in, and
+    r^p - 1 of the two meshes.
+
+    A twin of the same model on the same mesh has no discretisation error: u_num is zero there.
+    """
+    uncertainty = _declared(road)
+    if uncertainty is None:
+        return residuals, 1.0
+    own = uncertainty.stand_in.get(name, name)
+    coarse = road.main(Variant(own)).residuals
+    finer = road.main(Variant(own, uncertainty.finer)).residuals
+    shifted = {
+        key: replace(r, values=r.values + finer[key].values - coarse[key].values)
+        for key, r in residuals.items()
+        if key in finer and key in coarse
+    }
+    return shifted, uncertainty.refinement(road.parameters)
+
+
+def _declared(road: Road) -> Uncertainty | None:
+    experiment = road.experiment
+    if experiment.uncertainty is None and not experiment.same_model:
+        raise ComparisonError(f"{experiment.name}: no uncertainty is declared; u_val unknown")
+    return experiment.uncertainty
+
+
+def _sensitivities(road: Road) -> dict[str, list[Sensitivity]]:
+    """Per residual name: what one standard uncertainty of each input does, by the surrogate."""
+    uncertainty = _declared(road)
+    found: dict[str, list[Sensitivity]] = {}
+    if uncertainty is None:
+        return found
+    base = road.main(Variant(uncertainty.surrogate)).residuals
+    for source in uncertainty.inputs:
+        moved = road.main(Variant(uncertainty.surrogate, source.change)).residuals
+        for key in base.keys() & moved.keys():
+            step = replace(base[key], values=moved[key].values - base[key].values, sd=0.0)
+            found.setdefault(key, []).append(
+                Sensitivity(source.name, step, source.scale(road.parameters))
+            )
+    return found
+
+
+def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
+    """What a filter itself claims of its error at every probe, as one more input of u_val."""
+    if mine.run.sd is None or not mine.whole:
+        return {}
+    found = {}
+    for probe in mine.scene.probes:
+        key = f"{probe.name}@all"
+        if key in mine.residuals:
+            rows = barycentric_rows(mine.scene.mesh, np.array([probe.point]))
+            sd = np.array([rows.apply(s)[0] for s in mine.run.sd])
+            claimed = replace(mine.residuals[key], values=sd, sd=0.0)
+            found[key] = [Sensitivity(OWN_COVARIANCE, claimed, 1.0)]
+    return found
+
+
+def _nothing(accept: Accept, mine: Followed) -> Check:
+    """A check that compared nothing, in the unit of what it should have compared."""
+    units = {q: unit for seen in mine.seen.compared for q, unit in seen.units.items()}
+    ends = "; ".join(f"{r.outcome.state}: {r.outcome.why}" for r in mine.runs if not r.finished)
+    why = f"compared nothing: {ends or 'no such quantity in the recording'}"
+    unit = units.get(accept.quantity, _NO_UNIT)
+    return Check(
+        accept.quantity, 0.0, accept.limit, 0.0, 0.0, 0.0, 0.0, unit, 0, "cannot decide", why
+    )
+
+
+# --- effects --------------------------------------------------------------------------------------
+
+
+def shown_effects(road: Road) -> tuple[EffectSpec, ...]:
+    """The effects whose methods the user runs anyway; none in a quick run.
+
+    None either without an accepted method: its u_num and u_input are part of what hides an effect.
+    """
+    if road.quick or not set(road.experiment.accepted) & set(road.methods):
+        return ()
+    return tuple(
+        e for e in road.experiment.effects if {e.one.method, e.other.method} <= set(road.methods)
+    )
+
+
+def effects_of(road: Road, results: tuple[MethodResult, ...]) -> tuple[Effect, ...]:
+    """Each declared effect against the noise of every sensor."""
+    shown = shown_effects(road)
+    if not shown:
+        return ()
+    inputs = _sensitivities(road)
+    meshes = [_mesh_errors(road, m) for m in results if m.accepted]
+    return tuple(
+        effect(
+            e.name,
+            e.doc,
+            road.main(e.one).residuals,
+            road.main(e.other).residuals,
+            _shared(inputs, meshes, e.itself),
+            road.experiment.sensors,
+        )
+        for e in shown
+    )
+
+
+def _mesh_errors(road: Road, method: MethodResult) -> dict[str, float]:
+    """u_num of every residual of an accepted method, SI."""
+    refined, ratio = _refined(road, method.name, method.residuals)
+    scale = SAFETY / ratio
+    return {key: scale * rms(r.values - method.residuals[key].values) for key, r in refined.items()}
+
+
+def _shared(
+    inputs: Mapping[str, list[Sensitivity]], meshes: list[dict[str, float]], itself: str
+) -> dict[str, float]:
+    """u_num and u_input of every residual, SI: what no averaging over points removes."""
+    squares: dict[str, float] = {}
+    for key, parts in inputs.items():
+        squares[key] = sum((p.scale * rms(p.change.values)) ** 2 for p in parts if p.name != itself)
+    for errors in meshes:
+        for key, u_num in errors.items():
+            squares[key] = squares.get(key, 0.0) + u_num**2
+    return {key: float(np.sqrt(square)) for key, square in squares.items()}

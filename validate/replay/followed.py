@@ -1,0 +1,106 @@
+"""One method on one case: scene, registration, runs, residuals, and the truth beside."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.residual import Residual, reached_end
+from validate.register.registered import Registered
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
+from validate.solve.types import Run
+
+MAIN = ""  # the case that was recorded
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the twin really did: displacement (nt, d) m of every probe at the steps' times.
+
+    `u` (no, n, d) m are its fields at the output frames, where its `mesh` is the models' mesh.
+    """
+
+    probes: Mapping[str, Floats]
+    u: Floats | None = None
+    mesh: Mesh | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "probes", MappingProxyType(dict(self.probes)))
+
+
+NO_TRUTH = Truth({})
+
+
+def truth_of(run: Run, scene: Scene) -> Truth:
+    """What a twin's run says of its own probes and nodes."""
+    axes = "xyz"[: scene.mesh.dimension]
+    probes = {
+        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in axes], axis=1)
+        for p in scene.probes
+    }
+    return Truth(probes, run.u, scene.mesh)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A method on a case: one registration and run for every recording, residuals over all."""
+
+    method: str
+    label: str
+    case: str
+    scene: Scene
+    registered: tuple[Registered, ...]
+    runs: tuple[Run, ...]
+    residuals: Mapping[str, Residual]
+    truth: Truth = NO_TRUTH
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "residuals", MappingProxyType(dict(self.residuals)))
+
+    @property
+    def seen(self) -> Registered:
+        """The registration of the first recording."""
+        return self.registered[0]
+
+    @property
+    def run(self) -> Run:
+        """The run of the first recording."""
+        return self.runs[0]
+
+    @property
+    def whole(self) -> bool:
+        """Whether the run reached the last recorded time."""
+        return reached_end(self.seen, self.run)
+
+    @property
+    def over_time(self) -> bool:
+        """Whether every sample is compared, not holds or windows of a load."""
+        return any(s.t is None for s in self.seen.selections)
+
+    @property
+    def own_time(self) -> Floats:
+        """Recorded times (nt,) s of the run's steps: explicit runs may walk a slow recording
+        faster."""
+        return self.run.t * self.seen.time_scale
+
+    def reference(self, probe: str) -> Floats:
+        """The truth (nt, d) m at the times of the run's own steps."""
+        at = np.searchsorted(self.seen.t, self.run.t - 1e-9)
+        return self.truth.probes[probe][at]
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Probes that the run traced to the end."""
+        return tuple(p.name for p in self.scene.probes) if self.whole else ()
+
+    @property
+    def scored(self) -> tuple[str, ...]:
+        """Those of the truth's probes that the run traced to the end."""
+        mine = set(self.shown)
+        return tuple(name for name in self.truth.probes if name in mine)
+
+
+Cases = Mapping[str, Mapping[str, Followed]]

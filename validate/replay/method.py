@@ -1,0 +1,56 @@
+"""A method of an experiment: a scheme or a filter, and the scene options it is built with."""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, cast
+
+from validate.errors import UsageError
+from validate.estimate.measured import measurements
+from validate.fem.system import System
+from validate.parameters import part, quantity
+from validate.register.registered import Registered
+from validate.solve.types import Stepper
+
+
+@dataclass(frozen=True)
+class Method:
+    """`settings` of a scheme or filter; `scene` options that the experiment's `build` reads.
+
+    The fields of both are the method's own to `--set`: `methods.NAME.tolerance=1e-3`. `markers`
+    are those that a filter is given. `steps`: run only so many, as a baseline that is timed and
+    not scored. `stride` above 1: a longer step than the recording's, so
+    that many times the `dt` that the experiment gives.
+    """
+
+    label: str = quantity("", "1", "what reports call it")
+    settings: Any = part(None, "of the scheme or filter")
+    scene: Any = part(None, "what the scene is built with")
+    markers: tuple[str, ...] = quantity((), "1", "markers that a filter is given")
+    steps: int | None = quantity(None, "1", "steps to run; none: all")
+    stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
+
+    def prepare(self, system: System, seen: Registered, given: Mapping[str, Any]) -> Stepper:
+        """The prepared scheme or filter, with the experiment's settings where it has them.
+
+        Filters get what moves freely of their markers. Raises `UsageError` where a user set one of
+        the experiment's own settings to something else.
+        """
+        settings = replace(self.settings, **self._taken(given))
+        if not self.markers:
+            return cast(Stepper, settings.prepare(system))
+        looks = measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
+        return cast(Stepper, settings.prepare(system, looks))
+
+    def _taken(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        defaults = {f.name: f.default for f in fields(self.settings)}
+        mine = {k: v for k, v in given.items() if k in defaults}
+        if "dt" in mine:
+            mine["dt"] = self.stride * mine["dt"]
+        for name, value in mine.items():
+            own = getattr(self.settings, name)
+            if own not in (defaults[name], value) and defaults[name] is not MISSING:
+                raise UsageError(
+                    f"{name} = {own} of '{self.label}': the experiment sets {value}; "
+                    "change its own parameter"
+                )
+        return mine

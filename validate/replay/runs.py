@@ -1,0 +1,118 @@
+"""The runs of an experiment: each variant on each case once, counted for the progress bar."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from validate.recording.types import Recording
+from validate.replay.experiment import Case, Experiment, Variant
+from validate.replay.followed import MAIN, Followed, Truth
+from validate.replay.method import Method
+from validate.replay.options import Report, folder_of
+from validate.replay.remade import made_by
+from validate.replay.solved import solve
+
+
+class Road:
+    """Solves each variant once on each case and counts them for the progress bar.
+
+    `truths` are kept by case: the twin is repeated once.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        methods: Mapping[str, Method],
+        parameters: Any,
+        report: Report | None,
+        *,
+        quick: bool,
+    ) -> None:
+        self.experiment, self.methods, self.parameters = experiment, methods, parameters
+        self.settings: Mapping[str, Method] = {**experiment.methods, **methods}
+        self.quick = quick
+        self.cases = () if quick else _cases(experiment, methods)
+        self.recordings: tuple[Recording, ...] = ()
+        self._true: Any = parameters
+        self._report = report
+        self._done: dict[tuple[Any, ...], Followed] = {}
+        self._truths: dict[str, Truth] = {}
+        self._total = sum(len(_of_case(methods, case)) for case in self.cases)
+
+    def expect(self, variants: list[Variant]) -> None:
+        """Says what will be asked for on the experiment's own recordings: the progress bar's
+        end."""
+        self._total += len({self._key(MAIN, v, self.parameters) for v in variants})
+
+    def start(self, shipped: tuple[Recording, ...]) -> tuple[str, ...]:
+        """Takes the recordings, made anew where the user changed their twin; what to say of it."""
+        self.recordings, self._true, said = self._made(shipped, self.parameters)
+        return said
+
+    def tell(self, what: str) -> None:
+        if self._report:
+            self._report(min(len(self._done), self._total), max(self._total, 1), what)
+
+    def main(self, variant: Variant) -> Followed:
+        """A variant on the experiment's own recordings."""
+        changed = variant.change(self.parameters)
+        return self._followed(MAIN, self.recordings, variant.method, changed, self._true)
+
+    def other(self, case: Case) -> dict[str, Followed]:
+        """A case: the truth's parameters changed, its recording shipped or made in memory."""
+        experiment = self.experiment
+        if case.shipped:
+            theirs = case.change(self.parameters)
+            recordings, true, _ = self._made(experiment.load(theirs, folder_of(experiment)), theirs)
+        else:
+            assert experiment.twin is not None
+            true = case.change(self._true)
+            recordings = (experiment.twin.record(true, self.tell),)
+        return {
+            name: self._followed(case.name, recordings, name, self.parameters, true)
+            for name in _of_case(self.methods, case)
+        }
+
+    def _made(
+        self, shipped: tuple[Recording, ...], parameters: Any
+    ) -> tuple[tuple[Recording, ...], Any, tuple[str, ...]]:
+        """The recordings, the parameters of their truth, and what is to be said of them."""
+        twin = self.experiment.twin
+        if twin is None or len(shipped) != 1:
+            return shipped, parameters, ()
+        recording, true, said = made_by(
+            shipped[0], parameters, twin.remake, lambda p: twin.record(p, self.tell)
+        )
+        return (recording,), true, said
+
+    def _followed(
+        self, case: str, recordings: tuple[Recording, ...], name: str, parameters: Any, true: Any
+    ) -> Followed:
+        key = self._key(case, Variant(name), parameters)
+        if key not in self._done:
+            self.tell(f"{name} {case}".strip())
+            found = solve(self.experiment, recordings, name, self.settings[name], parameters, case)
+            self._done[key] = self._with_truth(found, true)
+        return self._done[key]
+
+    def _with_truth(self, followed: Followed, true: Any) -> Followed:
+        twin = self.experiment.twin
+        if twin is None or twin.truth is None:
+            return followed
+        if followed.case not in self._truths:
+            self._truths[followed.case] = twin.truth(true, followed.seen)
+        return replace(followed, truth=self._truths[followed.case])
+
+    def _key(self, case: str, variant: Variant, parameters: Any) -> tuple[Any, ...]:
+        return case, variant.method, self.settings[variant.method], variant.change(parameters)
+
+
+def _cases(experiment: Experiment, methods: Mapping[str, Method]) -> tuple[Case, ...]:
+    """The cases that any of the chosen methods is run on."""
+    return tuple(case for case in experiment.cases if _of_case(methods, case))
+
+
+def _of_case(methods: Mapping[str, Method], case: Case) -> tuple[str, ...]:
+    """The methods a case is run with: those it names, or all that are not only timed."""
+    whole = [name for name, method in methods.items() if method.steps is None]
+    return tuple(name for name in whole if not case.methods or name in case.methods)
