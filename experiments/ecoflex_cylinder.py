@@ -15,8 +15,9 @@ from typing import Literal
 
 import numpy as np
 
+from validate.compare.published import Published
 from validate.compare.score import Score
-from validate.compare.verdict import Accept, Published
+from validate.compare.verdict import Accept
 from validate.errors import RecordingError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses

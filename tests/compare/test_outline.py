@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from validate.compare.outline import angular_points, enclosed, normal_distances
+
 from validate.errors import ComparisonError
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from validate.compare.verdict import Published
+from validate.compare.published import Published
 
 GOOD = Published("f", 1.02, 1.0, 0.05, "N", "reproduced", "why", "table 1", 1.0, 0.03)
 

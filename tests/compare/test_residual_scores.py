@@ -5,6 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from phantoms import CAPSULE, COARSE_GRID, phantom_mesh, phantom_responses
+from validate.register.observe import (
+    Hold,
+    MarkerObservation,
+    OutlineObservation,
+    Registered,
+    SignalObservation,
+)
 
 from validate.compare.residual import Residual, rest_residuals, static_residuals
 from validate.compare.score import (
@@ -19,13 +26,6 @@ from validate.compare.score import (
 from validate.errors import ComparisonError
 from validate.fem.locate import nearest_node_rows
 from validate.recording.types import Signal
-from validate.register.observe import (
-    Hold,
-    MarkerObservation,
-    OutlineObservation,
-    Registered,
-    SignalObservation,
-)
 from validate.register.plane import cavity_sampler
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march

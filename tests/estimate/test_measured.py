@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from cubes import DT, PAPER, case, cube
+from validate.register.observe import MarkerObservation, Registered
 
 from validate.errors import ComparisonError
 from validate.estimate.innovation import innovation
 from validate.estimate.measured import measurements, timetable
 from validate.fem.locate import barycentric_rows
 from validate.recording.types import Signal
-from validate.register.observe import MarkerObservation, Registered
 
 
 def test_measurements_land_on_the_nearest_step() -> None:

@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 import scipy.io
-
 from validate.compare.outline import normal_distances
+
 from validate.errors import RecordingError
 from validate.recording.contour import Outline, extract_outline, outlines_of
 from validate.recording.contour_path import closed_path

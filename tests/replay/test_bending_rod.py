@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from validate.replay.tracking import Tracking
 
 from validate.compare.result import Result
 from validate.replay import compare, load
 from validate.replay.paper_002_rod import beam, first_crossing
-from validate.replay.tracking import Tracking
 
 
 @pytest.fixture(scope="module")

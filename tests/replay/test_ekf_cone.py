@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from validate.replay.tracking import Tracking, Truth
 
 from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
 from validate.recording.types import Recording
 from validate.replay import compare, load, paper_003_cone
-from validate.replay.tracking import Tracking, Truth
 from validate.twin.cone import record_cone
 
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")

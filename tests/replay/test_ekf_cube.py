@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.replay import compare, load
 from validate.replay.paper_003 import published_cube, readings_table
-from validate.replay.tracking import Tracking
 from validate.scene.scene import Scene
 
 STEP = (

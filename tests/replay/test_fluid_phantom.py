@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validate.replay.run import compare
 
 from validate.compare.result import Result
 from validate.errors import RecordingError, RegistrationError, ValidateError
@@ -13,7 +14,6 @@ from validate.recording.mcap_read import read_recording
 from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options
-from validate.replay.run import compare
 
 PH_1328 = {
     "inclusion.centre_x": "0.03", "inclusion.centre_y": "0.0225", "inclusion.centre_z": "0.035",

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from validate.replay.run import compare as compare_with
+from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import UsageError
 from validate.replay import compare, load, paper_001
 from validate.replay.options import Options
-from validate.replay.run import compare as compare_with
-from validate.replay.tracking import Tracking
 
 SOME = ("fem", "kf_printed", "kf_load", "load_scale")
 PROBES = ("node_A", "node_B", "corner")

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from validate.register.observe import observe_markers
+from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import RegistrationError
 from validate.recording.types import Markers
-from validate.register.observe import observe_markers
 from validate.replay import compare, load
-from validate.replay.tracking import Tracking
 from validate.scene.box import grid
 
 

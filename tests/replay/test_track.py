@@ -7,19 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from validate.arrays import Floats
-from validate.compare.result import MethodResult, Result
-from validate.compare.score import rms
-from validate.compare.verdict import Accept, Published
-from validate.errors import ComparisonError, UsageError
-from validate.estimate.steady import ReducedKf
-from validate.fem.system import System, build
-from validate.parameters import quantity
-from validate.recording.types import Recording
 from validate.register.observe import Registered
-from validate.replay.experiment import Input, Uncertainty
-from validate.replay.options import Options
 from validate.replay.run import compare
 from validate.replay.tracking import (
     Case,
@@ -31,6 +19,19 @@ from validate.replay.tracking import (
     followed_load,
     truth_of,
 )
+
+from validate.arrays import Floats
+from validate.compare.published import Published
+from validate.compare.result import MethodResult, Result
+from validate.compare.score import rms
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError, UsageError
+from validate.estimate.steady import ReducedKf
+from validate.fem.system import System, build
+from validate.parameters import quantity
+from validate.recording.types import Recording
+from validate.replay.experiment import Input, Uncertainty
+from validate.replay.options import Options
 from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support
 from validate.solve.march import march, output_frames

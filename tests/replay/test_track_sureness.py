@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import chi2
-
-from validate.arrays import Floats
-from validate.recording.types import Signal
 from validate.register.observe import Hold, Registered
 from validate.replay.sureness import consistency_exhibit, consistency_scores, nees_of, nis_of
 from validate.replay.tracking import Followed, Truth
+
+from validate.arrays import Floats
+from validate.recording.types import Signal
 from validate.scene.box import box
 from validate.scene.scene import Material, Probe, Scene, Support
 from validate.solve.types import Outcome, Run, Trace

@@ -3,15 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+from validate.register.observe import Hold, Registered, SignalObservation
 
 from validate.compare.effects import Change, Effect
+from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
-from validate.compare.verdict import Check, Published
+from validate.compare.verdict import Check
 from validate.parameters import Parameter
 from validate.recording.types import Clock, Recording, Signal, Source
-from validate.register.observe import Hold, Registered, SignalObservation
 from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells
 from validate.scene.scene import Drive, Material, Scene, Support
 from validate.solve.types import Outcome, Run, StepTimes, Trace

@@ -8,11 +8,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 from report_samples import CHECK
-
 from validate.compare.outline import normal_distances
+from validate.replay.run import compare
+
 from validate.compare.result import Result
 from validate.replay.options import Options
-from validate.replay.run import compare
 from validate.report.html import SECTIONS
 from validate.report.observed import outline_seen
 from validate.report.page import Section

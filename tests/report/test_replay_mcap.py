@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from report_samples import bare_result, small_result
+from validate.compare.outline import normal_distances
 
 from validate.arrays import Floats
-from validate.compare.outline import normal_distances
 from validate.compare.result import Result
 from validate.recording.inspect import inspect_recording
 from validate.recording.mcap_read import read_recording

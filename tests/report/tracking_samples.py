@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from validate.register.observe import Hold, Registered, observe_markers
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series
@@ -12,7 +13,6 @@ from validate.compare.score import run_scores, scores_of
 from validate.compare.track import track_error, track_scores
 from validate.compare.verdict import Check
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.observe import Hold, Registered, observe_markers
 from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support
 from validate.solve.types import Ending, Outcome, Run, StepTimes, Trace

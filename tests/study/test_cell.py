@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from study_samples import experiment_file
+from validate.replay.run import compare
+from validate.replay.tracking import Tracking
 
 from validate.compare.track import rmse, track_error
 from validate.replay.find import load_file
 from validate.replay.options import Options
-from validate.replay.run import compare
-from validate.replay.tracking import Tracking
 from validate.study.cell import Bench, run_cell, run_cells
 from validate.study.outcome import CellResult, read_cells, write_cell
 from validate.study.plan import Plan, plan

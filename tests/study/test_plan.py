@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 from study_samples import experiment_file
+from validate.replay.tracking import Tracking
 
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
-from validate.replay.tracking import Tracking
 from validate.study.filters import run_line
 from validate.study.plan import Plan, plan
 from validate.study.sweep import axes

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validate.register.placed import placed
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
@@ -15,7 +16,6 @@ from validate.recording.mcap_read import read_recording
 from validate.recording.mcap_write import write_recording
 from validate.recording.summary import summary
 from validate.recording.types import Recording
-from validate.register.placed import placed
 from validate.scene.cone import quarter_cone
 from validate.scene.mesh_file import read_mesh
 from validate.solve.newton import StaticNewton

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validate.register.placed import placed
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, RegistrationError
@@ -12,7 +13,6 @@ from validate.fem.system import build
 from validate.recording.mcap_read import read_recording
 from validate.recording.mcap_write import write_recording
 from validate.recording.types import Recording
-from validate.register.placed import placed
 from validate.scene.box import box
 from validate.scene.scene import Drive, Material, Probe, Scene, Support
 from validate.solve.fluid import NoFluid

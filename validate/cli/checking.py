@@ -6,8 +6,8 @@ from typing import Any
 
 from validate.cli.display import console, progress, shown, table
 from validate.cli.main import FAILED
+from validate.compare.published import Published
 from validate.compare.result import Result
-from validate.compare.verdict import Published
 from validate.replay.find import experiment_files, find
 from validate.replay.options import Options
 from validate.replay.road import compare

@@ -6,9 +6,10 @@ from types import MappingProxyType
 
 from validate.compare.effects import Effect
 from validate.compare.exhibit import Exhibit
+from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.score import Score
-from validate.compare.verdict import Check, Published
+from validate.compare.verdict import Check
 from validate.parameters import Parameter
 from validate.recording.types import Recording
 from validate.register.registered import Registered

@@ -20,9 +20,6 @@ from validate.compare.score import rms
 from validate.errors import ComparisonError
 
 Verdict = Literal["agrees", "differs", "cannot decide"]
-PublishedVerdict = Literal[
-    "reproduced", "not reproduced", "not reproducible as printed", "not comparable"
-]
 
 # Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
 SAFETY = 3.0 / 2
@@ -59,41 +56,6 @@ class Check:
     @property
     def holds(self) -> bool:
         return self.verdict == "agrees"
-
-
-@dataclass(frozen=True)
-class Published:
-    """A printed figure beside ours: `verdict` says whether it reproduces and `reason` why not.
-
-    `expected` is our own value when the verdict was written, good to `drift` (absolute, in `unit`).
-    """
-
-    name: str
-    ours: float | None
-    theirs: float | None
-    tolerance: float | None
-    unit: str
-    verdict: PublishedVerdict
-    reason: str
-    source: str
-    expected: float | None = None
-    drift: float | None = None
-
-    @property
-    def fault(self) -> str:
-        """Why the verdict no longer stands: ours moved, or it left its tolerance; else empty."""
-        if self.verdict == "reproduced" and self.ours is None:
-            return "marked reproduced, and compared nothing"
-        if self.ours is None:
-            return ""
-        if self.expected is not None and abs(self.ours - self.expected) > (self.drift or 0.0):
-            return f"ours moved from {self.expected:g} to {self.ours:g}, beyond {self.drift:g}"
-        known = self.theirs is not None and self.tolerance is not None
-        if self.verdict == "reproduced" and known:
-            off = abs(self.ours - float(self.theirs or 0.0))
-            if off > float(self.tolerance or 0.0):
-                return f"off by {off:g}, beyond the tolerance {self.tolerance:g}"
-        return ""
 
 
 @dataclass(frozen=True)

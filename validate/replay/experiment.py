@@ -11,8 +11,9 @@ from typing import Any
 
 from validate.compare.effects import Sensor
 from validate.compare.exhibit import Exhibit
+from validate.compare.published import Figure
 from validate.compare.score import Score
-from validate.compare.verdict import Accept, Published
+from validate.compare.verdict import Accept
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.followed import Cases, Truth
@@ -166,7 +167,7 @@ class Experiment:
     sensors: tuple[Sensor, ...] = ()
     band: Callable[[Any], float] | None = None
     exhibits: Callable[[Any, Cases, Progress], Told] | None = None
-    published: Callable[[Mapping[str, Mapping[str, float]]], tuple[Published, ...]] | None = None
+    published: tuple[Figure, ...] = ()
     captions: Mapping[str, str] = field(default_factory=dict)
     axis: str = "z"
     reference: str = ""

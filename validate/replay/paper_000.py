@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from validate.compare.verdict import Published
+from validate.compare.published import Published
 from validate.fem.system import Responses, build, responses
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.plates import between_plates

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.compare.verdict import Published
+from validate.compare.published import Published
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.filterpy_oracle import oracle_table

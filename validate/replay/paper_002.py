@@ -5,7 +5,7 @@ The paper prints few numbers; its figures are curves. Each claim is turned into 
 
 from collections.abc import Mapping
 
-from validate.compare.verdict import Published
+from validate.compare.published import Published
 
 Values = Mapping[str, Mapping[str, float]]
 

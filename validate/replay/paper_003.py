@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.compare.verdict import Published
+from validate.compare.published import Published
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step

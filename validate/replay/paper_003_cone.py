@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.compare.verdict import Published
+from validate.compare.published import Published
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told

@@ -5,11 +5,11 @@ One for every experiment, at holds or over time, with a twin's truth beside or w
 
 from collections.abc import Mapping
 
+from validate.compare.published import Published
 from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
-from validate.compare.verdict import Published
 from validate.fem.locking import locking_warning
 from validate.parameters import describe
 from validate.register.markers import MarkerObservation
@@ -116,13 +116,18 @@ def _outside(followed: Followed) -> tuple[Score, ...]:
 def _published(
     road: Road, results: tuple[MethodResult, ...], identified: Identified | None, told: Told
 ) -> tuple[Published, ...]:
-    """Printed figures beside ours; none in a quick run."""
-    if road.experiment.published is None or road.quick:
+    """Printed figures beside ours; none in a quick run.
+
+    One that is not computed stands among them with its fault, unless methods were left out.
+    """
+    if road.quick:
         return ()
     values = {m.name: {s.name: s.value for s in m.scores} for m in results}
     values["identified"] = {s.name: s.value for s in (identified.scores if identified else ())}
     values["told"] = dict(told.numbers)
-    return road.experiment.published(values)
+    figures = [figure.beside(values) for figure in road.experiment.published]
+    whole = set(road.methods) == set(road.experiment.methods)
+    return tuple(figure for figure in figures if whole or not figure.missing)
 
 
 def _opening(identified: Identified | None) -> str:

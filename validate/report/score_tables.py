@@ -2,9 +2,9 @@
 
 import re
 
+from validate.compare.published import Published
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
-from validate.compare.verdict import Published
 from validate.report.numbers import at_load, duration, rate, shown_unit, spaced, text
 from validate.report.observed import timed
 from validate.report.page import Cell, Items, Mark, Section, Table, cells, section

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.compare.effects import Effect
+from validate.compare.published import Published
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
-from validate.compare.verdict import Check, Published
+from validate.compare.verdict import Check
 from validate.recording.types import Source
 from validate.report.environment import environment, file_name, without_folder
 from validate.report.observed import timed
