@@ -7,9 +7,9 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
+from validate.compare.outline import normal_distances
 
 from validate.arrays import Floats
-from validate.compare.outline import normal_distances
 from validate.errors import RecordingError
 from validate.recording.contour import extract_outline
 from validate.recording.raster import coverage

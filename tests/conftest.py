@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from validate.replay.run import compare
+from validate.replay.road import compare
 
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from validate.cli.main import cli, run
 from validate.cli.new import written
+from validate.recording.mcap_read import read_recording
 from validate.recording.mcap_write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import compare
@@ -68,7 +69,8 @@ def test_it_names_channels_rates_units_and_what_is_not_recorded(tmp_path: Path) 
     assert "not in the recording: measure it" in text
     assert "from the recording's header" in written("my_gel", log(**SIZES), "../gel.mcap")
     sides = written("g", log(area_m2="0.0004", height_m="0.02"), "../gel.mcap")
-    assert "quantity(0.0225676, " in sides
+    assert "diameter=0.0225676,  # m, of the header's area" in sides
+    assert len(text.splitlines()) <= 60
     assert "$" not in text
     assert "TODO" not in text
 
@@ -111,6 +113,11 @@ def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> Non
     assert "holds ['pressure']" in message
     assert not (tmp_path / "experiments").exists()
     assert run(["new", "mine", "--from", str(tmp_path / "absent.mcap")]) == 2
+
+
+def test_the_file_of_an_inclusion_is_short(project_root: Path) -> None:
+    recording = read_recording(project_root / "recordings" / "fluid_phantom.mcap")
+    assert len(written("mine", recording, "../x.mcap").splitlines()) <= 60
 
 
 def test_outlines_stage_and_markers_become_an_experiment(

@@ -18,7 +18,8 @@ from validate.errors import UsageError
 from validate.recording.mcap_read import read_recording
 from validate.recording.types import Recording, Signal
 
-TEMPLATES = {"force": "new_force.py.txt", "phantom": "new_phantom.py.txt"}
+TEMPLATES = {"force": "new_force.py.txt", "inclusion": "new_inclusion.py.txt"}
+_MOST_CHANNELS = 7  # lines of what the recording holds: the file stays short
 _LONGEST = 76  # characters of a text of the recording in a comment
 
 
@@ -44,7 +45,7 @@ def new(name: str, source: Path, out: Path | None) -> None:
 def written(name: str, recording: Recording, source: str) -> str:
     """The experiment file's text; `source` is the recording's path from the file's folder."""
     kind = _kind(recording)
-    fields = _force(recording) if kind == "force" else _phantom(recording)
+    fields = _force(recording) if kind == "force" else _block(recording)
     template = Template((Path(__file__).parent / TEMPLATES[kind]).read_text("utf-8"))
     title = f"{_plain(recording.name)}: measured against linear FEM"
     return template.substitute(
@@ -65,7 +66,7 @@ def _kind(recording: Recording) -> str:
         return "force"
     known = {"marker_layout", "inclusion"} <= recording.metadata.keys()
     if recording.contours and recording.markers and "m" in units.values() and known:
-        return "phantom"
+        return "inclusion"
     raise UsageError(
         f"{recording.name} holds {_topics(recording)} and records {sorted(recording.metadata)}; "
         "an experiment is written from signals 'displacement' (m) and 'force' (N), or from "
@@ -94,7 +95,9 @@ def _channels(recording: Recording) -> list[str]:
     for record, values in recording.metadata.items():
         lines.append(_plain(f"record '{record}', {len(values)} entries"))
         lines += [_plain(f"  {key}: {value}") for key, value in list(values.items())[:8]]
-    return lines
+    more = len(lines) - _MOST_CHANNELS
+    said = [f"... and {more + 1} more lines: `validate inspect`"] if more > 0 else []
+    return lines[: _MOST_CHANNELS - len(said)] + said
 
 
 def _line(topic: str, what: str, t: np.ndarray) -> str:
@@ -146,7 +149,7 @@ def _sizes(specimen: Mapping[str, str]) -> dict[str, tuple[float, str]]:
     return found
 
 
-def _phantom(recording: Recording) -> dict[str, str]:
+def _block(recording: Recording) -> dict[str, str]:
     outline, contours = next(iter(recording.contours.items()))
     topic = next(iter(recording.markers))
     layout = recording.record("marker_layout")
@@ -154,17 +157,16 @@ def _phantom(recording: Recording) -> dict[str, str]:
     places = np.array([[float(x) for x in v.split()] for v in layout.values()])
     reached = np.interp(contours.t, stage.t, stage.y[:, 0])
     loads = tuple(sorted({round(float(x), 4) for x in reached if abs(x) > 1e-4}))
-    up = '(_vector(recording.record("pen")["up"]), np.array([0.0, 1.0, 0.0]))'
+    tracker = next((k for k, record in recording.metadata.items() if "up" in record), "pen")
+    named = {"stage": stage_topic, "outline": outline, "markers": topic, "tracker": tracker}
+    streams = [f"{key}={value!r}" for key, value in named.items() if key != value]
+    streams.append(f"signals={_scalars(recording)!r}")
     return {
         "block_x": f"{_side(places[:, 0]):.6g}",
         "block_y": f"{float(places[:, 1].max()):.6g}",
         "block_z": f"{_side(places[:, 2]):.6g}",
         "loads": repr(loads),
-        "outline": repr(outline),
-        "markers": repr(topic),
-        "stage": repr(stage_topic),
-        "up": up if "up" in recording.metadata.get("pen", {}) else "None",
-        "signals": repr(_scalars(recording)),
+        "streams": ", ".join(streams),
     }
 
 
@@ -179,10 +181,10 @@ def _side(x: np.ndarray) -> float:
     return round(float(x.min() + x.max()) / 5e-3) * 5e-3
 
 
-def _scalars(recording: Recording) -> tuple[tuple[str, str, str, str], ...]:
-    known = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
+def _scalars(recording: Recording) -> tuple[str, ...]:
+    """Topics of the first force and the first pressure."""
     found = {s.unit: topic for topic, s in reversed(list(recording.signals.items()))}
-    return tuple((found[u], *known[u], u) for u in known if u in found)
+    return tuple(found[unit] for unit in ("N", "Pa") if unit in found)
 
 
 def _beside(source: Path, path: Path) -> str:

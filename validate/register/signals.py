@@ -122,6 +122,12 @@ def holds_at(
     return tuple(holds)
 
 
+def instant(hold: Selection) -> float:
+    """The time s of a hold."""
+    assert hold.t is not None
+    return float(hold.t[0])
+
+
 def windows_of(
     drive: SignalObservation, windows: dict[str, tuple[float, float]]
 ) -> tuple[Selection, ...]:

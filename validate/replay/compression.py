@@ -1,0 +1,232 @@
+"""Bodies pressed between two plates, from a log of displacement and force: what a file of one's own
+declares, and the experiment that follows.
+
+The body is a cylinder or a mesh file. Displacement counts from contact less the toe (where the
+fitted line reaches zero force), force from the cell's own offset; the first window of strain fits
+the modulus where none is given, the second predicts.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from validate.compare.verdict import Accept
+from validate.identify.modulus import Cylinder, fit_modulus, identify_modulus
+from validate.parameters import quantity, require_ranges
+from validate.recording.mcap_read import read_recording
+from validate.recording.types import Recording
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, windows_of
+from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+from validate.replay.method import Method
+from validate.scene.cylinder import quarter_cylinder
+from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh_file import read_mesh
+from validate.scene.plates import Contact
+from validate.scene.scene import Drive, LawName, Material, Pin, Scene, Support
+from validate.solve.fluid import NoFluid
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
+
+_LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A cylinder; or the body of a mesh file of linear tetrahedra, axis z, with the facet sets
+    "lower_plate" and "upper_plate", whose equivalent diameter is then that of equal area."""
+
+    diameter: float = quantity(0.0, "m", "diameter")
+    height: float = quantity(0.0, "m", "height between the plates")
+    mesh: str | None = quantity(None, "1", "mesh file (npz); none: a cylinder")
+
+
+@dataclass(frozen=True)
+class Gel:
+    E: float | None = quantity(None, "Pa", "Young's modulus; none: identified, slipping plates")
+    nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
+
+
+@dataclass(frozen=True)
+class CylinderGrid:
+    radial: int = quantity(4, "1", "elements from axis to rim")
+    axial: int = quantity(4, "1", "elements along the axis")
+    finer: int = quantity(6, "1", "both, on the second mesh, for u_num")
+
+
+@dataclass(frozen=True)
+class CompressionRanges:
+    """Standard uncertainties of the inputs, declared before the comparison."""
+
+    E: float = quantity(0.05, "1", "relative, of the modulus")
+    diameter: float = quantity(0.005, "1", "relative, of the diameter")
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
+
+@dataclass(frozen=True)
+class Compression:
+    """Everything a user decides of a compression test; `recording` lies beside the file."""
+
+    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
+    specimen: Specimen = Specimen()
+    material: Gel = Gel()
+    mesh: CylinderGrid = CylinderGrid()
+    ranges: CompressionRanges = CompressionRanges()
+    fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
+    fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
+    limit: float = quantity(0.10, "1", "strain to which the models are shown; linear: about 0.1")
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What a method's scene is built with."""
+
+    plates: Contact = quantity("slip", "1", "contact of both plates")
+    law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
+    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
+
+
+def pressed(
+    label: str, plates: Contact = "slip", law: LawName = "linear", order: Literal[1, 2] = 2
+) -> Method:
+    """A static model of the body between plates that slip or hold it, in a law."""
+    linear = law == "linear"
+    settings = NoFluid() if linear else Tabulated(StaticNewton("none"), 1.0)
+    return Method(label, settings, Pressed(plates, law, order))
+
+
+def compression(
+    name: str,
+    title: str,
+    source: str,
+    parameters: Compression,
+    methods: Mapping[str, Method],
+    accepted: tuple[str, ...],
+    accept: tuple[Accept, ...],
+) -> Experiment:
+    """The experiment: `force` is judged in the windows "fit" and "beyond"."""
+    return Experiment(
+        name, title, source, parameters, methods, accepted, accept, _load, _build, _place,
+        sets=_sets, identify=_identify, frames=2,
+        uncertainty=Uncertainty(
+            finer=_finer,
+            refinement=lambda p: float((p.mesh.finer / p.mesh.radial) ** 2 - 1),
+            inputs=(
+                Input("modulus", _stiffer, lambda p: 1.0, "E within its declared uncertainty"),
+                Input("diameter", _wider, lambda p: 1.0, "diameter within its declared range"),
+            ),
+            surrogate=accepted[0],
+        ),
+    )  # fmt: skip
+
+
+def _load(p: Compression, folder: Path) -> tuple[Recording, ...]:
+    return (read_recording(folder / p.recording),)
+
+
+def _size(p: Compression) -> Cylinder:
+    return Cylinder(p.specimen.diameter, p.specimen.height)
+
+
+def _identify(recordings: Sequence[Recording], p: Compression) -> Identified:
+    if p.material.E is not None:
+        return Identified(p, (), ())
+    E = identify_modulus(recordings, _size(p), (p.fit_from, p.fit_to)).mean
+    note = f"E = {E:.0f} Pa was identified from the recording in the window 'fit', slipping plates."
+    return Identified(replace(p, material=replace(p.material, E=E)), (), (note,))
+
+
+# --- the scene ------------------------------------------------------------------------------------
+
+
+def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
+    linear = _body(p)
+    material = Material(p.material.E or 1.0, p.material.nu, model.law)
+    whole = p.specimen.mesh is not None
+    return Scene(
+        quadratic(linear) if model.order == 2 else linear,
+        material,
+        (*_plates(model.plates), *(() if whole else _symmetry())),
+        pins=_pins(linear) if whole and model.plates == "slip" else (),
+        drives=(Drive("stage", "upper_plate", (0.0, 0.0, -1.0)),),
+        dilatation="nodal_mean" if model.order == 1 else "pointwise",
+        copies=1 if whole else 4,
+    )
+
+
+def _body(p: Compression) -> Mesh:
+    """The body of the mesh file, or a quarter of the cylinder."""
+    if p.specimen.mesh is not None:
+        return read_mesh(Path(p.specimen.mesh))
+    size, grid = _size(p), p.mesh
+    return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
+
+
+def _plates(contact: Contact) -> tuple[Support, ...]:
+    if contact == "slip":
+        return (Support("lower_plate", (2,)),)
+    return (Support("lower_plate", (0, 1, 2)), Support("upper_plate", (0, 1)))
+
+
+def _symmetry() -> tuple[Support, ...]:
+    return (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))
+
+
+def _pins(mesh: Mesh) -> tuple[Pin, ...]:
+    """Two nodes of the lower plate that keep a slipping body from sliding and turning."""
+    x = mesh.nodes[mesh.facet_nodes("lower_plate")]
+    centre = x[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()]
+    rim = x[(x - centre)[:, 0].argmax()]
+    return (Pin(tuple(centre), (0, 1)), Pin(tuple(rim), (1,)))
+
+
+# --- the recording in it --------------------------------------------------------------------------
+
+
+def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
+    """Displacement less contact and toe, force less the cell's offset, to the strain limit."""
+    height, fitted = p.specimen.height, (p.fit_from, p.fit_to)
+    fit = fit_modulus(recording, _size(p), fitted)
+    d, force = recording.signal("displacement", "m"), recording.signal("force", "N")
+    moved = d.y - fit.contact - fit.toe * height
+    last = int(np.argmax(moved[:, 0] > p.limit * height)) or len(moved)
+    stage = SignalObservation("displacement", "drives", d.t[:last], moved[:last], "m", d.sd)
+    cell = SignalObservation(
+        "force", "validates", d.t[:last], force.y[:last] - fit.offset, "N",
+        max(fit.noise, force.sd), "force", "stage.force",
+    )  # fmt: skip
+    windows = {
+        "fit": (p.fit_from * height, p.fit_to * height),
+        "beyond": (p.fit_to * height, p.limit * height),
+    }
+    return Registered((stage, cell), windows_of(stage, windows), outside=len(d.t) - last)
+
+
+def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
+    """Large strain is solved on a grid of loads to the limit."""
+    return {"step": p.limit * p.specimen.height / _LOAD_STEPS}
+
+
+# --- what is uncertain ----------------------------------------------------------------------------
+
+
+def _finer(p: Compression) -> Compression:
+    return replace(p, mesh=replace(p.mesh, radial=p.mesh.finer, axial=p.mesh.finer))
+
+
+def _scaled(p: Compression, by: float) -> Compression:
+    return replace(p, material=replace(p.material, E=by * (p.material.E or 0.0)))
+
+
+def _stiffer(p: Compression) -> Compression:
+    return _scaled(p, 1 + p.ranges.E)
+
+
+def _wider(p: Compression) -> Compression:
+    """A wider specimen is as much stiffer as its area is larger."""
+    return _scaled(p, (1 + p.ranges.diameter) ** 2)

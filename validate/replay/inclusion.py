@@ -1,0 +1,186 @@
+"""A block with a fluid-filled inclusion between two plates, from outlines, markers and a stage:
+what a file of one's own declares, and the experiment that follows.
+
+Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from validate.compare.verdict import Accept
+from validate.parameters import quantity, require_ranges
+from validate.recording.mcap_read import read_recording
+from validate.recording.types import Recording
+from validate.register.inclusion import outlined_capsule
+from validate.register.markers import Together, placed_markers
+from validate.register.outlines import observe_outlines
+from validate.register.plane import cavity_sampler
+from validate.register.registered import Registered
+from validate.register.signals import driving, holds_at, instant, validating
+from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.method import Method
+from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.mesh import quadratic
+from validate.scene.plates import Contact, between_plates
+from validate.scene.scene import Material, Scene
+from validate.solve.fluid import ExactPressure, NoFluid
+
+_WITHIN = 0.1e-3  # m: the stage stood at a load
+_TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
+_PLANE = (
+    Together("marker.inplane", (0, 2), "position along the stage and sideways"),
+    Together("marker.vertical", (1,), "position along the vertical"),
+)
+
+
+@dataclass(frozen=True)
+class BlockCard:
+    x: float = quantity(0.0, "m", "from the fixed plate to the moving one")
+    y: float = quantity(0.0, "m", "height")
+    z: float = quantity(0.0, "m", "lateral size")
+
+
+@dataclass(frozen=True)
+class GelCard:
+    E: float = quantity(15_000.0, "Pa", "Young's modulus; moves forces and pressures only")
+    nu: float = quantity(0.485, "1", "Poisson ratio")
+
+
+@dataclass(frozen=True)
+class BlockGrid:
+    nodes_x: int = quantity(9, "1", "nodes along x")
+    nodes_y: int = quantity(10, "1", "nodes along y")
+    nodes_z: int = quantity(15, "1", "nodes along z")
+    finer: float = quantity(1.27, "1", "how many times finer the second mesh is, for u_num")
+
+
+@dataclass(frozen=True)
+class InclusionRanges:
+    """Standard uncertainties of the inputs, declared before the comparison."""
+
+    E: float = quantity(0.05, "1", "relative, of the modulus")
+    nu: float = quantity(0.005, "1", "of the Poisson ratio")
+    friction: float = quantity(0.03, "1", "share of the way from slipping to bonded plates")
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
+
+@dataclass(frozen=True)
+class Streams:
+    """Topics of the recording. `signals` are a force in N or a pressure in Pa."""
+
+    stage: str = quantity("stage", "1", "displacement of the moving plate, m")
+    outline: str = quantity("outline", "1", "outlines of the inclusion")
+    markers: str = quantity("markers", "1", "markers")
+    signals: tuple[str, ...] = quantity((), "1", "force and pressure, where recorded")
+    tracker: str = quantity("pen", "1", "record that says which way is up for the markers")
+
+
+@dataclass(frozen=True)
+class InclusionTest:
+    """Everything a user decides; `recording` lies beside the file."""
+
+    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
+    block: BlockCard = BlockCard()
+    material: GelCard = GelCard()
+    mesh: BlockGrid = BlockGrid()
+    ranges: InclusionRanges = InclusionRanges()
+    streams: Streams = Streams()
+    plates: Contact = quantity("slip", "1", "contact of both plates")
+    loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
+
+
+@dataclass(frozen=True)
+class Filled:
+    """What a method's scene is built with."""
+
+    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
+
+
+def filled(label: str, *, order: Literal[1, 2] = 2, fluid: bool = True) -> Method:
+    """A linear model with fluid of constant volume in the inclusion, or with an empty one."""
+    return Method(label, ExactPressure() if fluid else NoFluid(), Filled(order))
+
+
+def inclusion_test(
+    name: str,
+    title: str,
+    source: str,
+    parameters: InclusionTest,
+    methods: Mapping[str, Method],
+    accepted: tuple[str, ...],
+    accept: tuple[Accept, ...],
+) -> Experiment:
+    """The experiment; the last method, the cheapest, is the one that inputs are varied with."""
+    return Experiment(
+        name, title, source, parameters, methods, accepted, accept, _load, _build, _place,
+        uncertainty=Uncertainty(
+            finer=_finer,
+            refinement=lambda p: float(p.mesh.finer**2 - 1),
+            inputs=(
+                Input("modulus", lambda p: _gel(p, E=p.material.E * (1 + p.ranges.E)),
+                      lambda p: 1.0, "E within its declared uncertainty"),
+                Input("Poisson ratio", lambda p: _gel(p, nu=p.material.nu - p.ranges.nu),
+                      lambda p: 1.0, "nu within its declared uncertainty"),
+                Input("plate friction", lambda p: replace(p, plates="bonded"),
+                      lambda p: p.ranges.friction, "between slipping and bonded plates"),
+            ),
+            surrogate=next(n for n, m in methods.items() if m.scene == Filled(1)),
+        ),
+    )  # fmt: skip
+
+
+def _load(p: InclusionTest, folder: Path) -> tuple[Recording, ...]:
+    return (read_recording(folder / p.recording),)
+
+
+def _inclusion(recording: Recording, p: InclusionTest) -> Capsule:
+    """Centre x, z and radius of the rest outline; height and length from record 'inclusion'."""
+    contours = recording.contour(p.streams.outline)
+    stage = driving(recording, p.streams.stage, "m")
+    rest = holds_at(stage, contours.t, (), within=_WITHIN)[0]
+    index = int(abs(contours.t - instant(rest)).argmin())
+    return outlined_capsule(contours, index, recording.record("inclusion"))
+
+
+def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
+    nodes = (p.mesh.nodes_x, p.mesh.nodes_y, p.mesh.nodes_z)
+    block = Block(p.block.x, p.block.y, p.block.z)
+    mesh = block_with_inclusion(block, nodes, _inclusion(recording, p))
+    return between_plates(
+        mesh if model.order == 1 else quadratic(mesh),
+        Material(p.material.E, p.material.nu),
+        p.plates,
+        "pointwise" if model.order == 2 else "nodal_mean",
+    )
+
+
+def _place(recording: Recording, p: InclusionTest, scene: Scene) -> Registered:
+    names = p.streams
+    stage, contours = driving(recording, names.stage, "m"), recording.contour(names.outline)
+    rest, *holds = holds_at(stage, contours.t, p.loads, within=_WITHIN)
+    wall = cavity_sampler(scene.mesh, "cavity", _inclusion(recording, p))
+    markers = placed_markers(
+        recording, scene.mesh, topic=names.markers, together=_PLANE, tracker=names.tracker,
+        up=(0.0, 1.0, 0.0),
+    )  # fmt: skip
+    outline = observe_outlines(contours, wall, rest=instant(rest), name=names.outline)
+    signals = []
+    for topic in names.signals:
+        unit = recording.signals[topic].unit
+        quantity_name, trace = _TRACES[unit]
+        signals.append(validating(recording, topic, unit, quantity=quantity_name, trace=trace))
+    return Registered((stage, outline, markers, *signals), tuple(holds), rest)
+
+
+def _finer(p: InclusionTest) -> InclusionTest:
+    g = p.mesh
+    nodes = [round((n - 1) * g.finer) + 1 for n in (g.nodes_x, g.nodes_y, g.nodes_z)]
+    return replace(p, mesh=replace(g, nodes_x=nodes[0], nodes_y=nodes[1], nodes_z=nodes[2]))
+
+
+def _gel(p: InclusionTest, **values: float) -> InclusionTest:
+    return replace(p, material=replace(p.material, **values))
