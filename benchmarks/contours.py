@@ -11,8 +11,8 @@ from validate.compare.outline import normal_distances
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.contour import extract_outline
-from validate.recording.raster import coverage
+from validate.recording.images.outline import extract_outline
+from validate.recording.images.raster import coverage
 from validate.twin.cysts import LEVELS, SHADOWS, CystFrame, cyst_frame
 from validate.twin.ultrasound import Scanner, Target, b_mode
 

@@ -32,7 +32,7 @@ from validate.identify.modulus import (
     identify_modulus,
 )
 from validate.parameters import quantity, require_ranges
-from validate.recording.instron import read_instron
+from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of

@@ -17,7 +17,7 @@ from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.parameters import quantity, require_ranges
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation, placed_markers
 from validate.register.registered import Registered

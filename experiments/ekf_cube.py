@@ -18,7 +18,7 @@ from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered

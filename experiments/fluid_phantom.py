@@ -20,8 +20,8 @@ from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.identify.interval import profile_interval
 from validate.parameters import quantity, require_ranges
-from validate.recording.contour import outlines_of
-from validate.recording.mcap_read import read_recording
+from validate.recording.images.outline import outlines_of
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Sampling, Together, placed_markers

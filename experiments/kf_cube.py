@@ -21,7 +21,7 @@ from validate.estimate.modal_kf import ModalKf
 from validate.estimate.steady import ReducedKf
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered

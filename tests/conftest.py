@@ -6,12 +6,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from validate.replay.road import compare
 
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
+from validate.replay.road import compare
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -9,7 +9,7 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh
 
 # Grows while one file is read and never leaves its reader.
-ACCUMULATORS = {"mcap_streams.py:Collected"}
+ACCUMULATORS = {"streams.py:Collected"}
 
 
 def modules(root: Path) -> list[Path]:

@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 from validate.cli.main import cli, run
 from validate.cli.new import written
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import compare
 from validate.replay.find import load_file

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from validate.cli.main import run
-from validate.recording.image import encode_png
-from validate.recording.mcap_read import read_recording
+from validate.recording.images.image import encode_png
+from validate.recording.mcap.read import read_recording
 from validate.recording.merge import merge
 from validate.recording.types import Recording, Signal, Source
 

@@ -22,7 +22,7 @@ from validate.identify.modulus import (
     load_noise,
     summarise,
 )
-from validate.recording.instron import read_instron
+from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording, Signal, Source
 
 DISC = Cylinder(0.05, 0.03)

@@ -17,9 +17,9 @@ from validate.recording.alignment import (
     shift,
 )
 from validate.recording.events import event_time, offset_by_event
-from validate.recording.inspect import inspect_recording
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.preflight import inspect_recording
 from validate.recording.types import Signal
 
 SEEDS = 60

@@ -11,9 +11,9 @@ import scipy.io
 from validate.compare.outline import normal_distances
 
 from validate.errors import RecordingError
-from validate.recording.contour import Outline, extract_outline, outlines_of
-from validate.recording.contour_path import closed_path
-from validate.recording.contour_shapes import circle_points, ellipse_points
+from validate.recording.images.closed_path import closed_path
+from validate.recording.images.outline import Outline, extract_outline, outlines_of
+from validate.recording.images.shapes import circle_points, ellipse_points
 from validate.recording.types import Frames
 from validate.twin.cysts import cyst_frame, cyst_outline
 from validate.twin.ultrasound import Scanner, Target, b_mode

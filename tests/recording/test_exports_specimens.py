@@ -7,8 +7,8 @@ import pytest
 from exports import D, F, T, assert_test, comma, read, rows
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.instron import read_instron_all
-from validate.recording.specimens import column_groups
+from validate.recording.exports.instron import read_instron_all
+from validate.recording.exports.specimens import column_groups
 
 NAMES = "Time (s),Extension (mm),Load (N)\n"
 LINES = rows().splitlines(keepends=True)

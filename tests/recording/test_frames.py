@@ -14,13 +14,13 @@ import pytest
 from mcap_samples import ABSENT, T0, signal_json, walk, write_foreign
 
 from validate.errors import RecordingError
-from validate.recording.image import MAX_SIDE, decode_png, encode_png
-from validate.recording.inspect import inspect_recording
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
-from validate.recording.png_stack import read_png_stack
-from validate.recording.raster import coverage
-from validate.recording.schemas import IMAGE, SCHEMAS
+from validate.recording.images.image import MAX_SIDE, decode_png, encode_png
+from validate.recording.images.png_stack import read_png_stack
+from validate.recording.images.raster import coverage
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.schemas import IMAGE, SCHEMAS
+from validate.recording.mcap.write import write_recording
+from validate.recording.preflight import inspect_recording
 from validate.recording.types import Frames, Recording
 
 RNG = np.random.default_rng(3)
@@ -174,7 +174,7 @@ def test_images_count_against_the_memory_of_a_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_recording(RECORDING, tmp_path / "a.mcap")
-    monkeypatch.setattr("validate.recording.mcap_streams.MAX_NUMBERS", 3 * 49 - 1)
+    monkeypatch.setattr("validate.recording.mcap.streams.MAX_NUMBERS", 3 * 49 - 1)
     with pytest.raises(RecordingError, match="more than 146 numbers"):
         read_recording(tmp_path / "a.mcap")
 

@@ -9,8 +9,8 @@ import pytest
 from mcap.writer import IndexType
 from mcap_samples import T0, markers_json, sample_recording, signal_json, write_foreign
 
-from validate.recording.inspect import inspect_recording
-from validate.recording.mcap_write import write_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.preflight import inspect_recording
 
 MS = 1_000_000
 
@@ -93,7 +93,7 @@ def test_a_broken_topic_does_not_hide_the_others(tmp_path: Path) -> None:
 
 
 def test_a_limit_reached_is_a_defect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.recording.mcap_streams.MAX_NUMBERS", 2)
+    monkeypatch.setattr("validate.recording.mcap.streams.MAX_NUMBERS", 2)
     assert _defects(tmp_path, _stamped(0, 10, 20, 30)) == [
         "more than 2 numbers, the limit; split the file"
     ]
@@ -102,8 +102,8 @@ def test_a_limit_reached_is_a_defect(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_contradictions_of_the_summary_are_defects(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validate.recording.integrity.statistics_messages", lambda _: 3)
-    monkeypatch.setattr("validate.recording.integrity.chunk_index_place", lambda _: (1, 2))
+    monkeypatch.setattr("validate.recording.mcap.integrity.statistics_messages", lambda _: 3)
+    monkeypatch.setattr("validate.recording.mcap.integrity.chunk_index_place", lambda _: (1, 2))
     assert _defects(tmp_path, _stamped(0, 10)) == [
         "statistics claim 3 messages, 2 found",
         "2 chunks are indexed wrongly or not at all",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.instron import read_instron
+from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
 
 T = np.arange(60) * 0.1

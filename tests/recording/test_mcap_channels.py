@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from validate.errors import RecordingError
-from validate.recording.inspect import inspect_recording
-from validate.recording.mcap_channels import LAST_NS, JsonChannel, JsonMessage, write_channels
+from validate.recording.mcap.channels import LAST_NS, JsonChannel, JsonMessage, write_channels
+from validate.recording.preflight import inspect_recording
 
 NUMBER = JsonChannel("/a", "own.Number", {"type": "object"}, {"unit": "N"})
 TEXT = JsonChannel("/b", "own.Text", {"type": "object"})

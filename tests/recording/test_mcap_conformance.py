@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.inspect import Inspection, inspect_recording
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.preflight import Inspection, inspect_recording
 
 ROS2 = {
     "talker": 20,

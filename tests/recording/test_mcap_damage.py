@@ -13,10 +13,10 @@ from mcap.writer import CompressionType
 from mcap_samples import T0, markers_json, same_values, sample_recording, signal_json, write_foreign
 
 from validate.errors import RecordingError
-from validate.recording.inspect import inspect_recording
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_records import MAX_RECORD, unpack
-from validate.recording.mcap_write import write_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.records import MAX_RECORD, unpack
+from validate.recording.mcap.write import write_recording
+from validate.recording.preflight import inspect_recording
 from validate.recording.types import Recording
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -271,7 +271,7 @@ def test_attachments_with_the_right_crc_pass(tmp_path: Path) -> None:
     assert inspect_recording(path).attachments == 1
 
 
-@pytest.mark.parametrize("limit", ["mcap_streams.MAX_NUMBERS", "integrity.MAX_MESSAGES"])
+@pytest.mark.parametrize("limit", ["mcap.streams.MAX_NUMBERS", "mcap.integrity.MAX_MESSAGES"])
 def test_totals_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
     monkeypatch.setattr(f"validate.recording.{limit}", 2)
     messages = [("/s", "validate.Signal", T0 + i, signal_json(T0 + i)) for i in range(4)]
@@ -283,7 +283,7 @@ def test_totals_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lim
 def test_a_record_over_the_limit_is_refused(
     whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validate.recording.integrity.MAX_RECORD", 100)
+    monkeypatch.setattr("validate.recording.mcap.integrity.MAX_RECORD", 100)
     got = _read(whole, tmp_path / "a.mcap")
     assert isinstance(got, str)
     assert "bytes, the limit is 100" in got

@@ -9,8 +9,8 @@ from mcap.writer import CompressionType, IndexType
 from mcap_samples import T0, markers_json, sample_recording, signal_json, write_foreign
 
 from validate.errors import RecordingError
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
 
 M, S, C = "validate.Markers", "validate.Signal", "validate.Contour"
 STEP = 10_000_000  # ns
@@ -210,7 +210,7 @@ def test_our_schema_in_another_encoding_is_refused(tmp_path: Path) -> None:
 
 
 def test_one_message_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.recording.schemas.MAX_MESSAGE", 50)
+    monkeypatch.setattr("validate.recording.mcap.schemas.MAX_MESSAGE", 50)
     path = write_foreign(tmp_path / "f.mcap", _signal())
     with pytest.raises(RecordingError, match=r"a JSON message of \d+ bytes, the limit is 50"):
         read_recording(path)
@@ -259,6 +259,6 @@ def test_statistics_that_claim_more_are_refused(
 ) -> None:
     path = tmp_path / "a.mcap"
     write_recording(sample_recording(), path)
-    monkeypatch.setattr("validate.recording.integrity.statistics_messages", lambda _: 99)
+    monkeypatch.setattr("validate.recording.mcap.integrity.statistics_messages", lambda _: 99)
     with pytest.raises(RecordingError, match="claim 99 messages, it holds 27; see `validate insp"):
         read_recording(path)

@@ -17,9 +17,9 @@ from mcap.reader import make_reader
 from mcap_samples import ABSENT, T0, same_values, sample_recording, text_at, walk
 
 from validate.errors import RecordingError
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
-from validate.recording.schemas import SCHEMAS
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.schemas import SCHEMAS
+from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal
 
 
@@ -142,7 +142,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     def full(self: object, *_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("validate.recording.mcap_write.Writer.add_message", full)
+    monkeypatch.setattr("validate.recording.mcap.write.Writer.add_message", full)
     with pytest.raises(RecordingError, match=r"a\.mcap: cannot be written .No space left"):
         write_recording(sample_recording(), path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.mcap"]

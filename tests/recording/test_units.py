@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from validate.errors import RecordingError
-from validate.recording.units import is_unit, si_factor, to_si
+from validate.units import is_unit, si_factor, to_si
 
 EXACT = [
     ("N", "force", 1.0),
@@ -81,6 +81,6 @@ def test_numbers_and_arrays_scale_alike(value: float, known: tuple[str, str, flo
 
 
 def test_pint_is_imported_only_when_a_unit_is_read() -> None:
-    code = "import sys, validate.recording.instron; print('pint' in sys.modules)"
+    code = "import sys, validate.recording.exports.instron; print('pint' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"

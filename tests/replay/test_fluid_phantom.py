@@ -10,7 +10,7 @@ from validate.replay.run import compare
 
 from validate.compare.result import Result
 from validate.errors import RecordingError, RegistrationError, ValidateError
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options

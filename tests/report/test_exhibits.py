@@ -16,7 +16,7 @@ from tracking_samples import AT, STEPS, WHY, T, failed_result, shown, swing, tra
 from validate.compare.exhibit import Chart, NodeMap, NumberTable, Series
 from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.report import charts, gl
 from validate.report.exhibits import exhibits, require_distinct
 from validate.report.html import SECTIONS, page

@@ -21,8 +21,8 @@ from validate.compare.outline import normal_distances
 
 from validate.arrays import Floats
 from validate.compare.result import Result
-from validate.recording.inspect import inspect_recording
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.preflight import inspect_recording
 from validate.recording.types import Frames
 from validate.register.plane import from_image
 from validate.report import replay_mcap, replay_signals

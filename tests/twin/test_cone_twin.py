@@ -12,9 +12,9 @@ from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build, responses
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
-from validate.recording.summary import summary
+from validate.recording.digest import summary
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.scene.cone import quarter_cone
 from validate.scene.mesh_file import read_mesh

@@ -10,8 +10,8 @@ from validate.register.placed import placed
 from validate.arrays import Floats
 from validate.errors import RecordingError, RegistrationError
 from validate.fem.system import build
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.scene.box import box
 from validate.scene.scene import Drive, Material, Probe, Scene, Support

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
-from validate.recording.summary import summary
+from validate.recording.digest import summary
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.scene.inclusion import Block
 from validate.scene.scene import Material

@@ -15,7 +15,7 @@ import numpy as np
 
 from validate.cli.display import console
 from validate.errors import UsageError
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
 
 TEMPLATES = {"force": "new_force.py.txt", "inclusion": "new_inclusion.py.txt"}

@@ -10,13 +10,13 @@ from validate.cli.main import pairs
 from validate.errors import UsageError
 from validate.parameters import nearest_names, with_values
 from validate.recording.alignment import declared_offset, shift
-from validate.recording.inspect import Inspection, Topic, inspect_recording
-from validate.recording.instron import KINDS, read_instron
-from validate.recording.mcap_read import read_recording
-from validate.recording.mcap_write import write_recording
+from validate.recording.digest import summary
+from validate.recording.exports.instron import KINDS, read_instron
+from validate.recording.images.png_stack import read_png_stack
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
-from validate.recording.png_stack import read_png_stack
-from validate.recording.summary import summary
+from validate.recording.preflight import Inspection, Topic, inspect_recording
 from validate.recording.types import Recording, Source
 from validate.replay.find import find
 from validate.replay.remade import stamped

@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.score import Score
 from validate.compare.track import TRACK_METRICS, TrackError, rmse
 from validate.errors import ComparisonError, RecordingError
-from validate.recording.correlate import coarse_lag, met, refined_lag, step_of
+from validate.recording.lag import coarse_lag, met, refined_lag, step_of
 from validate.recording.types import Signal
 
 MIN_MATCHED = 10  # samples of the reference met by the run

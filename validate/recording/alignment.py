@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from validate.errors import RecordingError
-from validate.recording.correlate import MIN_MATCHED, coarse_lag, met, refined_lag, step_of
+from validate.recording.lag import MIN_MATCHED, coarse_lag, met, refined_lag, step_of
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal
 
 RECORD = "clock_offset/"  # metadata record RECORD + topic of every stream that was moved

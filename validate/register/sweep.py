@@ -14,7 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import RecordingError, RegistrationError
-from validate.recording.contour import Outline, extract_outline
+from validate.recording.images.outline import Outline, extract_outline
 from validate.recording.types import Frames
 from validate.register.plane import require_rigid
 from validate.scene.inclusion_shape import SlicedShape

@@ -16,7 +16,7 @@ import numpy as np
 from validate.compare.verdict import Accept
 from validate.identify.modulus import Cylinder, fit_modulus, identify_modulus
 from validate.parameters import quantity, require_ranges
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of

@@ -11,7 +11,7 @@ from typing import Literal
 
 from validate.compare.verdict import Accept
 from validate.parameters import quantity, require_ranges
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Together, placed_markers

@@ -15,7 +15,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.recording.mcap_read import read_recording
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints
-from validate.recording.schemas import Json, stamp
+from validate.recording.mcap.schemas import Json, stamp
 
 _UNTURNED: Json = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 _AT_ORIGIN: Json = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": _UNTURNED}

@@ -7,7 +7,7 @@ readable by those that do not.
 
 from collections.abc import Mapping
 
-from validate.recording.schemas import Json
+from validate.recording.mcap.schemas import Json
 
 SCENE, TRANSFORMS, IMAGE = (
     "foxglove.SceneUpdate",

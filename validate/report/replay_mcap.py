@@ -25,8 +25,8 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.result import MethodResult, Result
-from validate.recording.mcap_channels import JsonChannel, JsonMessage, write_channels
-from validate.recording.schemas import CONTOUR, MARKERS, SCHEMAS, SIGNAL
+from validate.recording.mcap.channels import JsonChannel, JsonMessage, write_channels
+from validate.recording.mcap.schemas import CONTOUR, MARKERS, SCHEMAS, SIGNAL
 from validate.report.environment import file_name
 from validate.report.foxglove_schemas import DEFINITIONS
 from validate.report.loads import HOW

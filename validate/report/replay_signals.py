@@ -3,10 +3,10 @@
 import numpy as np
 
 from validate.arrays import Floats
-from validate.recording.image import encode_png
-from validate.recording.mcap_streams import CALIBRATION
-from validate.recording.mcap_write import CALIBRATION_KEYS
-from validate.recording.schemas import IMAGE, SIGNAL, Json, image_message, signal_message
+from validate.recording.images.image import encode_png
+from validate.recording.mcap.schemas import IMAGE, SIGNAL, Json, image_message, signal_message
+from validate.recording.mcap.streams import CALIBRATION
+from validate.recording.mcap.write import CALIBRATION_KEYS
 from validate.recording.types import Frames
 from validate.report.replay_view import Track, View, pose_records
 

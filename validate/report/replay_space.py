@@ -12,7 +12,7 @@ import matplotlib as mpl
 import numpy as np
 
 from validate.arrays import Floats
-from validate.recording.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
+from validate.recording.mcap.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
 from validate.recording.types import Markers
 from validate.register.observe import MarkerObservation
 from validate.report import foxglove

@@ -17,13 +17,13 @@ from validate.errors import UsageError
 from validate.fem.assemble import shape_gradients
 from validate.fem.modes import modes_of
 from validate.fem.system import build
-from validate.recording.units import si_factor
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.fluid import ExactPressure
 from validate.solve.quasi_static import QuasiStatic
 from validate.study.trade import Row, Trade
 from validate.study.trade_scene import RUNGS, Rung, TradeScene
+from validate.units import si_factor
 
 _WATER = 1000.0  # kg/m3, of a soft tissue whose density nobody declared
 _SLOW = 10.0  # periods of the lowest mode within which a load that rises is nearly static

@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity
-from validate.recording.raster import coverage
+from validate.recording.images.raster import coverage
 
 SPECKLE_RATIO = float(np.sqrt(np.pi / (4 - np.pi)))  # mean / sd of a Rayleigh envelope
 

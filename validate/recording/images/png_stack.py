@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.image import Pixels, decode_png
+from validate.recording.images.image import Pixels, decode_png
 from validate.recording.types import Frames
 
 MAX_STACK = 400 * 2**20  # bytes of all images of one stack

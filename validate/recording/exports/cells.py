@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from validate.errors import RecordingError
-from validate.recording.numerals import looks_numeric
-from validate.recording.units import is_unit
-from validate.recording.vocabulary import UNIT_LABELS, holds
+from validate.recording.exports.numerals import looks_numeric
+from validate.recording.exports.vocabulary import UNIT_LABELS, holds
+from validate.units import is_unit
 
 Line = tuple[int, list[str]]  # line number in the file, cells
 SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more

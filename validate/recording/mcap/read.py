@@ -3,8 +3,8 @@
 Topics with schemas of others, mirrors among them, are not read; `validate inspect` lists them.
 So are images without a record of their calibration (`calibration/<topic>`: m_per_px_x, m_per_px_y).
 Nothing in the file is used as a path, and sizes are bounded before memory is taken
-(`mcap_records.MAX_RECORD`, `integrity.MAX_MESSAGES`, `schemas.MAX_MESSAGE`,
-`mcap_streams.MAX_NUMBERS`).
+(`records.MAX_RECORD`, `integrity.MAX_MESSAGES`, `schemas.MAX_MESSAGE`,
+`streams.MAX_NUMBERS`).
 """
 
 from collections import Counter
@@ -16,9 +16,9 @@ import numpy as np
 from validate.arrays import Floats, checked
 from validate.errors import RecordingError
 from validate.recording.clocks import clock_of
-from validate.recording.integrity import verify
-from validate.recording.mcap_file import Verified, messages_of, opened
-from validate.recording.mcap_streams import (
+from validate.recording.mcap.integrity import verify
+from validate.recording.mcap.schemas import IMAGE, MARKERS, SIGNAL
+from validate.recording.mcap.streams import (
     CALIBRATION,
     Collected,
     contours,
@@ -28,8 +28,8 @@ from validate.recording.mcap_streams import (
     ours,
     signal,
 )
-from validate.recording.mcap_write import CALIBRATION_KEYS, FORMAT, POSE, POSE_KEY, RECORD
-from validate.recording.schemas import IMAGE, MARKERS, SIGNAL
+from validate.recording.mcap.verified import Verified, messages_of, opened
+from validate.recording.mcap.write import CALIBRATION_KEYS, FORMAT, POSE, POSE_KEY, RECORD
 from validate.recording.types import Clock, Contours, Frames, Markers, Record, Recording, Signal
 
 

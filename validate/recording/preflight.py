@@ -15,12 +15,12 @@ from validate.arrays import Ints
 from validate.errors import RecordingError
 from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks import GAP_FACTOR, clock_of
-from validate.recording.integrity import verify
-from validate.recording.mcap_file import Verified, messages_of, opened
-from validate.recording.mcap_read import metadata_records, stream_of
-from validate.recording.mcap_records import Channel
-from validate.recording.mcap_streams import CALIBRATION, Collected, fill, ours
-from validate.recording.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
+from validate.recording.mcap.integrity import verify
+from validate.recording.mcap.read import metadata_records, stream_of
+from validate.recording.mcap.records import Channel
+from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
+from validate.recording.mcap.streams import CALIBRATION, Collected, fill, ours
+from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.types import Clock, Source
 
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects

@@ -21,8 +21,7 @@ import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError
-from validate.recording.mcap_file import Span, Verified
-from validate.recording.mcap_records import (
+from validate.recording.mcap.records import (
     HEAD,
     MAGIC,
     MAX_RECORD,
@@ -39,6 +38,7 @@ from validate.recording.mcap_records import (
     records_in,
     statistics_messages,
 )
+from validate.recording.mcap.verified import Span, Verified
 from validate.recording.types import Source
 
 MAX_MESSAGES = 10_000_000

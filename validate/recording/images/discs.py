@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.recording.image import correlated, shrunk
+from validate.recording.images.image import correlated, shrunk
 
 _SIDE = 88  # px of the longer side while searching
 _SECTORS = 8

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from validate.arrays import Floats
-from validate.recording.contour_path import closed_path
-from validate.recording.image import blurred, sampled
+from validate.recording.images.closed_path import closed_path
+from validate.recording.images.image import blurred, sampled
 
 RAYS = 120
 ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)

@@ -13,9 +13,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
-from validate.recording.mcap_file import Verified
-from validate.recording.mcap_records import Channel, Message
-from validate.recording.schemas import (
+from validate.recording.mcap.records import Channel, Message
+from validate.recording.mcap.schemas import (
     CONTOUR,
     IMAGE,
     MARKERS,
@@ -25,6 +24,7 @@ from validate.recording.schemas import (
     Sample,
     decode,
 )
+from validate.recording.mcap.verified import Verified
 from validate.recording.types import Contours, Frames, Markers, Signal
 
 OURS = (MARKERS, SIGNAL, CONTOUR)

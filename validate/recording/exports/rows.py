@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from validate.errors import RecordingError
-from validate.recording.cells import NOTHING, Line, is_remark
-from validate.recording.numerals import decimals, looks_numeric
+from validate.recording.exports.cells import NOTHING, Line, is_remark
+from validate.recording.exports.numerals import decimals, looks_numeric
 
 MIN_SPARSE = 0.05  # a column empty in a larger part of the rows is sparse, in a smaller one damaged
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.blocks import specimen_label
-from validate.recording.force_columns import role_of
-from validate.recording.numerals import looks_numeric, number
-from validate.recording.table import Column, Table
-from validate.recording.vocabulary import SPECIMEN, holds, plain
+from validate.recording.exports.blocks import specimen_label
+from validate.recording.exports.columns import role_of
+from validate.recording.exports.numerals import looks_numeric, number
+from validate.recording.exports.table import Column, Table
+from validate.recording.exports.vocabulary import SPECIMEN, holds, plain
 
 _NUMBERS = re.compile(r"[\s_#.:-]*\(?[0-9]+\)?[\s_:-]*")
 _LISTED = 8  # specimens named in an error

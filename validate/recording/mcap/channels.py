@@ -1,7 +1,7 @@
 """JSON channels of any schema as one MCAP file: whole or not at all, both CRCs, chunks zstd.
 
 For files that are made to be looked at, such as a report's replay; recordings are written by
-`mcap_write`. Equal channels, messages and metadata give equal bytes.
+`mcap.write`. Equal channels, messages and metadata give equal bytes.
 """
 
 import os
@@ -14,7 +14,7 @@ from typing import BinaryIO
 from mcap.writer import CompressionType, Writer
 
 from validate.errors import RecordingError
-from validate.recording.schemas import MESSAGE_ENCODING, SCHEMA_ENCODING, Json, to_bytes
+from validate.recording.mcap.schemas import MESSAGE_ENCODING, SCHEMA_ENCODING, Json, to_bytes
 
 LIBRARY = "validate"  # without a version: two versions write the same bytes
 LAST_NS = 2**63 - 1

@@ -13,9 +13,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.table import Column, Table
-from validate.recording.units import si_factor
-from validate.recording.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
+from validate.recording.exports.table import Column, Table
+from validate.recording.exports.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
+from validate.units import si_factor
 
 NEEDED = ("time", "displacement", "force")
 QUANTITY = {

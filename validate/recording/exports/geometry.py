@@ -5,10 +5,10 @@ import re
 from collections.abc import Mapping
 
 from validate.errors import RecordingError
-from validate.recording.numerals import number
-from validate.recording.table import split_unit
-from validate.recording.units import is_unit, si_factor
-from validate.recording.vocabulary import OTHER_PARTS, SIZES, holds
+from validate.recording.exports.numerals import number
+from validate.recording.exports.table import split_unit
+from validate.recording.exports.vocabulary import OTHER_PARTS, SIZES, holds
+from validate.units import is_unit, si_factor
 
 # (name in the record, quantity, words of the header's key, words that make it something else)
 _NO_TEST_SPEED = OTHER_PARTS + " jog return preload vorkraft data datenrate abtastrate"

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from validate.arrays import Floats
-from validate.recording.contour_polar import (
+from validate.recording.images.polar import (
     DIRECTIONS,
     HALF_POWER,
     LOG_SPECKLE_SD,

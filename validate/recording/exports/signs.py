@@ -7,8 +7,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.force_columns import Pick
-from validate.recording.vocabulary import COMPRESSION, TENSION, holds
+from validate.recording.exports.columns import Pick
+from validate.recording.exports.vocabulary import COMPRESSION, TENSION, holds
 
 
 @dataclass(frozen=True)

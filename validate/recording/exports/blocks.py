@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.cells import (
+from validate.recording.exports.cells import (
     Line,
     is_data,
     is_names,
@@ -17,11 +17,11 @@ from validate.recording.cells import (
     is_unit_row,
     split_lines,
 )
-from validate.recording.encoding import Text, decode
-from validate.recording.numerals import decimal_sign
-from validate.recording.rows import fitted, is_sparse, refuse_cut, refuse_emptied
-from validate.recording.table import Table, columns_of, header_of, split_unit
-from validate.recording.vocabulary import SPECIMEN, holds
+from validate.recording.exports.encoding import Text, decode
+from validate.recording.exports.numerals import decimal_sign
+from validate.recording.exports.rows import fitted, is_sparse, refuse_cut, refuse_emptied
+from validate.recording.exports.table import Table, columns_of, header_of, split_unit
+from validate.recording.exports.vocabulary import SPECIMEN, holds
 
 MIN_ROWS = 10  # a shorter table beside longer ones is one of results, not of samples
 _NUMBERED = re.compile(r"[^0-9]{2,24}?[\s:#№._-]*(?P<label>[A-Za-z]{0,2}[0-9][\w.-]{0,8})")

@@ -13,9 +13,9 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import RecordingError
-from validate.recording.cells import Line
-from validate.recording.numerals import looks_numeric, number
-from validate.recording.units import is_unit
+from validate.recording.exports.cells import Line
+from validate.recording.exports.numerals import looks_numeric, number
+from validate.units import is_unit
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[(\[<{](?P<unit>[^()\[\]]*)[)\]>}]")
 _SLASHED = re.compile(r"(?P<name>[^/]*[^/\s])\s*[/,]\s*(?P<unit>\S.*)")

@@ -18,9 +18,9 @@ from mcap.writer import CompressionType, Writer
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
-from validate.recording import schemas
-from validate.recording.mcap_streams import CALIBRATION
-from validate.recording.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL, Json
+from validate.recording.mcap import schemas
+from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL, Json
+from validate.recording.mcap.streams import CALIBRATION
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal
 
 RECORD = "validate.recording"  # metadata record with the recording's name and format

@@ -9,9 +9,11 @@ from functools import cache
 from typing import Any, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from validate.arrays import Floats
 from validate.errors import RecordingError
+
+Floats = NDArray[np.float64]
 
 QUANTITIES: tuple[tuple[str, str], ...] = (
     ("force", "newton"),

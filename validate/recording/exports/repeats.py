@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from validate.errors import UsageError
-from validate.recording.force_columns import Said, role_of
-from validate.recording.numerals import number
-from validate.recording.table import Table
+from validate.recording.exports.columns import Said, role_of
+from validate.recording.exports.numerals import number
+from validate.recording.exports.table import Table
 
 
 def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:

@@ -2,9 +2,9 @@
 there is none.
 
 No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
-(`contour_find`), unless a centre and radius are given; the wall is the closed path in polar
-coordinates that best parts two kinds of speckle (`contour_polar`); it is then moved to where half
-of the power is left (`contour_wall`) and judged (`contour_quality`). Refusals rest on numbers that
+(`discs`), unless a centre and radius are given; the wall is the closed path in polar
+coordinates that best parts two kinds of speckle (`polar`); it is then moved to where half
+of the power is left (`wall`) and judged (`quality`). Refusals rest on numbers that
 do not depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall
 that is closed or lies outside the image.
 
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats, checked
 from validate.errors import RecordingError
-from validate.recording.contour_find import candidates
-from validate.recording.contour_polar import Grey, Wall, speckle_area, trace
-from validate.recording.contour_quality import Quality, quality, wall_sd
-from validate.recording.contour_shapes import circle_points, ellipse_points
-from validate.recording.contour_wall import placed
+from validate.recording.images.discs import candidates
+from validate.recording.images.polar import Grey, Wall, speckle_area, trace
+from validate.recording.images.quality import Quality, quality, wall_sd
+from validate.recording.images.shapes import circle_points, ellipse_points
+from validate.recording.images.wall import placed
 from validate.recording.types import Contours, Frames
 
 Shape = Literal["free", "ellipse", "circle"]

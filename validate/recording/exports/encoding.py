@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.vocabulary import evidence, is_ideographic, plain
+from validate.recording.exports.vocabulary import evidence, is_ideographic, plain
 
 MAX_BYTES = 256 * 1024 * 1024
 # In order of preference where nothing decides.

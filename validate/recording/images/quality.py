@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from validate.arrays import Floats
-from validate.recording.contour_polar import DIRECTIONS, RAYS, Grey, Wall
+from validate.recording.images.polar import DIRECTIONS, RAYS, Grey, Wall
 
 SD_NOISE = 1.2  # wall error / (speckle size / contrast), measured on twins
 SD_BIAS = 0.2  # what is left of the wall error where contrast is high / speckle size

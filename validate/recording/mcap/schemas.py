@@ -25,7 +25,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.image import Pixels, decode_png, encode_png
+from validate.recording.images.image import Pixels, decode_png, encode_png
 
 MARKERS, SIGNAL, CONTOUR = "validate.Markers", "validate.Signal", "validate.Contour"
 IMAGE = "foxglove.CompressedImage"

@@ -9,18 +9,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.blocks import parse_tables
 from validate.recording.clocks import clock_of
-from validate.recording.encoding import MAX_BYTES
-from validate.recording.force_checks import (
-    MIN_SAMPLES,
-    check_derived,
-    check_height,
-    check_speed,
-    check_swapped,
-    check_time,
-)
-from validate.recording.force_columns import (
+from validate.recording.exports.blocks import parse_tables
+from validate.recording.exports.columns import (
     NEEDED,
     Pick,
     Said,
@@ -28,13 +19,22 @@ from validate.recording.force_columns import (
     needed_pick,
     parse_mapping,
 )
-from validate.recording.force_repeats import without_repeats
-from validate.recording.force_signs import Signs, kind_of_test, signs
-from validate.recording.specimen import loaded_area, specimen_of
-from validate.recording.specimens import chosen, specimen_tables
-from validate.recording.table import Column, Table
+from validate.recording.exports.consistency import (
+    MIN_SAMPLES,
+    check_derived,
+    check_height,
+    check_speed,
+    check_swapped,
+    check_time,
+)
+from validate.recording.exports.encoding import MAX_BYTES
+from validate.recording.exports.geometry import loaded_area, specimen_of
+from validate.recording.exports.repeats import without_repeats
+from validate.recording.exports.signs import Signs, kind_of_test, signs
+from validate.recording.exports.specimens import chosen, specimen_tables
+from validate.recording.exports.table import Column, Table
 from validate.recording.types import Record, Recording, Signal, Source
-from validate.recording.units import si_factor
+from validate.units import si_factor
 
 KINDS = ("instron",)
 _SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space"}

@@ -11,8 +11,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.force_columns import Pick
-from validate.recording.numerals import decimals
+from validate.recording.exports.columns import Pick
+from validate.recording.exports.numerals import decimals
 
 MIN_SAMPLES = 10
 SCALE = 0.02  # a derived column further off its definition than this contradicts it

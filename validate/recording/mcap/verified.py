@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 from validate.arrays import Ints
 from validate.errors import RecordingError
-from validate.recording.mcap_records import (
+from validate.recording.mcap.records import (
     Channel,
     Chunk,
     Header,

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from validate.arrays import Floats
-from validate.recording.contour_polar import ANGLES, DIRECTIONS
-from validate.recording.image import ellipse_through
+from validate.recording.images.image import ellipse_through
+from validate.recording.images.polar import ANGLES, DIRECTIONS
 
 
 def ellipse_points(points: Floats) -> Floats:
