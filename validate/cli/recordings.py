@@ -10,7 +10,7 @@ from validate.cli.main import pairs
 from validate.errors import UsageError
 from validate.parameters import nearest_names, with_values
 from validate.recording.alignment import declared_offset, shift
-from validate.recording.digest import summary
+from validate.recording.digest import digest, to_text
 from validate.recording.exports.instron import KINDS, read_instron
 from validate.recording.images.png_stack import read_png_stack
 from validate.recording.mcap.read import read_recording
@@ -103,8 +103,7 @@ def record(name: str, out: Path, values: tuple[str, ...]) -> None:
         made = stamped(made, parameters)
     write_recording(made, out)
     written = read_recording(out)
-    beside = out.with_suffix(".json")
-    beside.write_text(json.dumps(summary(written), indent=1, allow_nan=False) + "\n", "utf-8")
+    out.with_suffix(".json").write_text(to_text(digest(written)), "utf-8")
     _report(written, out)
 
 

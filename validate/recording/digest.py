@@ -1,35 +1,84 @@
-"""What must be read from a recording, as numbers: the JSON that lies beside a twin's file."""
+"""What must be read from a recording, in short: the JSON that lies beside a twin's file.
+
+Every array is held by shape, first and last row, sum and a SHA-256 of its little-endian bytes. The
+hash is what must be equal; the rest tells a reader of a failed comparison what has changed.
+"""
 
 import hashlib
+import json
+import math
+from collections.abc import Mapping
 from typing import Any
 
-from validate.recording.types import Recording
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats
+from validate.recording.types import Contours, Frames, Markers, Recording, Signal
+
+Json = dict[str, Any]
 
 
-def summary(recording: Recording) -> dict[str, Any]:
-    """Every number of every stream, in SI, nested by topic; NaN (not seen) as null."""
+def digest(recording: Recording) -> Json:
+    """Streams by kind and topic, in SI, with their arrays in short; metadata as they are."""
     return {
         "name": recording.name,
         "t0_ns": recording.t0_ns,
-        "signals": {
-            k: {"unit": s.unit, "sd": s.sd, "t": s.t.tolist(), "y": s.y.tolist()}
-            for k, s in recording.signals.items()
-        },
-        "markers": {
-            k: {"frame": m.frame, "names": list(m.names), "sd": m.sd, "t": m.t.tolist(),
-                "x": [[None if p[0] != p[0] else p for p in x] for x in m.x.tolist()]}
-            for k, m in recording.markers.items()
-        },
-        "contours": {
-            k: {"frame": c.frame, "sd": c.sd, "t": c.t.tolist(), "pose": c.pose.tolist(),
-                "outlines": [o.tolist() for o in c.outlines]}
-            for k, c in recording.contours.items()
-        },
-        "frames": {
-            k: {"frame": f.frame, "t": f.t.tolist(), "m_per_px": list(f.m_per_px),
-                "pose": f.pose.tolist(), "shape": list(f.images[0].shape),
-                "sha256": [hashlib.sha256(i.tobytes()).hexdigest() for i in f.images]}
-            for k, f in recording.frames.items()
-        },
+        "signals": {k: _signal(s) for k, s in recording.signals.items()},
+        "markers": {k: _markers(m) for k, m in recording.markers.items()},
+        "contours": {k: _contours(c) for k, c in recording.contours.items()},
+        "frames": {k: _frames(f) for k, f in recording.frames.items()},
         "metadata": {k: dict(v) for k, v in recording.metadata.items()},
-    }  # fmt: skip
+    }
+
+
+def to_text(found: Json) -> str:
+    """The digest as JSON, a line for each array and each metadata record."""
+    return "\n".join(_lines(found, 0)) + "\n"
+
+
+def _lines(value: Mapping[str, Any], depth: int) -> list[str]:
+    lines = ["{"]
+    for i, (key, part) in enumerate(value.items()):
+        nested = isinstance(part, dict) and any(isinstance(v, dict) for v in part.values())
+        text = _lines(part, depth + 1) if nested else [json.dumps(part, allow_nan=False)]
+        text[0] = f"{' ' * (depth + 1)}{json.dumps(key)}: {text[0]}"
+        text[-1] += "," if i + 1 < len(value) else ""
+        lines += text
+    return [*lines, " " * depth + "}"]
+
+
+def _signal(s: Signal) -> Json:
+    return {"unit": s.unit, "sd": s.sd, "frame": s.frame, "t": _array(s.t), "y": _array(s.y)}
+
+
+def _markers(m: Markers) -> Json:
+    own = {"frame": m.frame, "names": list(m.names), "sd": m.sd}
+    return {**own, "t": _array(m.t), "x": _array(m.x)}
+
+
+def _contours(c: Contours) -> Json:
+    own = {"frame": c.frame, "sd": c.sd, "pose": c.pose.tolist(), "t": _array(c.t)}
+    lengths = np.array([len(o) for o in c.outlines], dtype=np.float64)
+    return {**own, "counts": _array(lengths), "outlines": _array(np.concatenate(c.outlines))}
+
+
+def _frames(f: Frames) -> Json:
+    images = np.stack(f.images)
+    own = {"frame": f.frame, "m_per_px": list(f.m_per_px), "pose": f.pose.tolist()}
+    grey = {"shape": list(images.shape), "sum": int(images.sum(dtype=np.int64))}
+    return {**own, "t": _array(f.t), "images": {**grey, "sha256": _sha256(images)}}
+
+
+def _array(x: Floats) -> Json:
+    """An array (n, ...) in short; NaN (not seen) is null in rows, 0 in the sum, one NaN hashed."""
+    rows = x.reshape(-1, x.shape[-1]) if x.ndim > 1 else x
+    first, last = (np.where(np.isnan(r), None, r).tolist() for r in (rows[0], rows[-1]))
+    total = math.fsum(x[~np.isnan(x)].tolist())
+    plain = np.where(np.isnan(x), np.nan, x).astype("<f8")
+    shape = list(x.shape)
+    return {"shape": shape, "first": first, "last": last, "sum": total, "sha256": _sha256(plain)}
+
+
+def _sha256(x: NDArray[Any]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(x).tobytes()).hexdigest()
