@@ -69,7 +69,7 @@ def test_any_times_in_order(tmp_path_factory: pytest.TempPathFactory, times: lis
 @pytest.mark.parametrize(
     ("channels", "messages", "words"),
     [
-        ([NUMBER, NUMBER], [], "declared twice: ['/a']"),
+        ([NUMBER, NUMBER], [], "used twice: ['/a']"),
         ([NUMBER, JsonChannel("/c", "own.Number", {})], [], "'/c' differs"),
         ([TEXT], MESSAGES, "message of '/a', declared are ['/b']"),
         ([NUMBER, TEXT], MESSAGES[::-1], "'/b' at 5 ns, expected 7"),

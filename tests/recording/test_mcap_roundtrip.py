@@ -142,7 +142,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     def full(self: object, *_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("validate.recording.mcap.write.Writer.add_message", full)
+    monkeypatch.setattr("validate.recording.mcap.channels.Writer.add_message", full)
     with pytest.raises(RecordingError, match=r"a\.mcap: cannot be written .No space left"):
         write_recording(sample_recording(), path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.mcap"]
@@ -190,9 +190,10 @@ _FRAMES = Frames(_T, (np.zeros((2, 2), np.uint8),) * 2, (1e-4, 1e-4), np.eye(4),
     ],
 )
 def test_what_cannot_be_written_is_refused(tmp_path: Path, parts: dict, message: str) -> None:
-    whole = Recording(**({"name": "r", "source": ABSENT, "t0_ns": T0} | parts))
     with pytest.raises(RecordingError, match=message):
-        write_recording(whole, tmp_path / "a.mcap")
+        write_recording(
+            Recording(**({"name": "r", "source": ABSENT, "t0_ns": T0} | parts)), tmp_path / "a.mcap"
+        )
     assert list(tmp_path.iterdir()) == []
 
 

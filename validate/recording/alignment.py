@@ -10,17 +10,15 @@ samples. Its curvature there and the residual noise give the standard uncertaint
 """
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
 from validate.errors import RecordingError
 from validate.recording.lag import MIN_MATCHED, coarse_lag, met, refined_lag, step_of
-from validate.recording.types import Contours, Frames, Markers, Recording, Signal
+from validate.recording.types import Recording, Signal, Stream, by_kind
 
 RECORD = "clock_offset/"  # metadata record RECORD + topic of every stream that was moved
 MIN_COVERAGE = 0.5  # share of the stream's samples that must meet the reference
-S = TypeVar("S", Markers, Signal, Contours, Frames)
 
 
 @dataclass(frozen=True)
@@ -63,12 +61,7 @@ def declared_offset(recording: Recording, topic: str, seconds: float, sd: float)
 
     Raises `RecordingError` for an unknown topic, a lone stream, and too small a coverage.
     """
-    times = {
-        **{k: s.t for k, s in recording.markers.items()},
-        **{k: s.t for k, s in recording.signals.items()},
-        **{k: s.t for k, s in recording.contours.items()},
-        **{k: s.t for k, s in recording.frames.items()},
-    }
+    times = {k: s.t for k, s in recording.streams.items()}
     others = [t for k, t in times.items() if k != topic and len(np.unique(t)) > 1]
     if topic not in times or not others:
         raise RecordingError(f"'{topic}' has no other stream to meet; there are {sorted(times)}")
@@ -79,7 +72,7 @@ def declared_offset(recording: Recording, topic: str, seconds: float, sd: float)
 
 
 def matched(
-    reference: Signal, stream: S, offset: Offset, min_coverage: float = MIN_COVERAGE
+    reference: Signal, stream: Stream, offset: Offset, min_coverage: float = MIN_COVERAGE
 ) -> Offset:
     """The offset with its samples counted: those that fall within the reference, not in its gaps.
 
@@ -112,9 +105,9 @@ def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
             f"'{topic}' was moved by {recording.metadata[name].get('seconds')} s before; "
             "shift the stream of the first recording instead"
         )
-    topics = [*recording.markers, *recording.signals, *recording.contours, *recording.frames]
-    if topic not in topics:
-        raise RecordingError(f"no stream '{topic}' to shift; the recording has {sorted(topics)}")
+    if topic not in recording.streams:
+        known = sorted(recording.streams)
+        raise RecordingError(f"no stream '{topic}' to shift; the recording has {known}")
     record = {
         "seconds": repr(offset.seconds),
         "sd": repr(offset.sd),
@@ -123,7 +116,7 @@ def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
         "coverage": repr(offset.coverage),
     }
     metadata = {**recording.metadata, name: record}
-    return rebased(replace(_moved(recording, offset.seconds, {topic}), metadata=metadata))
+    return rebased(replace(moved(recording, offset.seconds, topic), metadata=metadata))
 
 
 def rebased(recording: Recording) -> Recording:
@@ -132,30 +125,18 @@ def rebased(recording: Recording) -> Recording:
     Where that moment would lie before the clock's own zero (an export without date), the clock
     begins at the earliest sample.
     """
-    starts = [
-        *(m.t[0] for m in recording.markers.values()),
-        *(s.t[0] for s in recording.signals.values()),
-        *(c.t[0] for c in recording.contours.values()),
-        *(f.t[0] for f in recording.frames.values()),
-    ]
-    start_ns = round(1e9 * float(min(starts)))
+    start_ns = round(1e9 * float(min(s.t[0] for s in recording.streams.values())))
     t0_ns = max(0, recording.t0_ns + start_ns)
-    return replace(_moved(recording, -start_ns / 1e9, None), t0_ns=t0_ns)
+    return replace(moved(recording, -start_ns / 1e9), t0_ns=t0_ns)
 
 
-def _moved(recording: Recording, seconds: float, topics: set[str] | None) -> Recording:
-    """`seconds` added to the times of these streams; None: of all."""
-
-    def by(topic: str) -> float:
-        return seconds if topics is None or topic in topics else 0.0
-
-    return replace(
-        recording,
-        markers={k: replace(s, t=s.t + by(k)) for k, s in recording.markers.items()},
-        signals={k: replace(s, t=s.t + by(k)) for k, s in recording.signals.items()},
-        contours={k: replace(s, t=s.t + by(k)) for k, s in recording.contours.items()},
-        frames={k: replace(s, t=s.t + by(k)) for k, s in recording.frames.items()},
-    )
+def moved(recording: Recording, seconds: float, topic: str | None = None) -> Recording:
+    """`seconds` added to the times of one stream, of all where no topic is given."""
+    streams = {
+        k: replace(s, t=s.t + seconds) if topic in (None, k) else s
+        for k, s in recording.streams.items()
+    }
+    return replace(recording, **by_kind(streams))
 
 
 def _require_motion(signal: Signal, name: str) -> None:

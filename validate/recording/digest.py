@@ -72,8 +72,8 @@ def _frames(f: Frames) -> Json:
 
 def _array(x: Floats) -> Json:
     """An array (n, ...) in short; NaN (not seen) is null in rows, 0 in the sum, one NaN hashed."""
-    rows = x.reshape(-1, x.shape[-1]) if x.ndim > 1 else x
-    first, last = (np.where(np.isnan(r), None, r).tolist() for r in (rows[0], rows[-1]))
+    rows = x.reshape(-1, x.shape[-1] if x.ndim > 1 else 1).tolist()
+    first, last = ([None if v != v else v for v in row] for row in (rows[0], rows[-1]))
     total = math.fsum(x[~np.isnan(x)].tolist())
     plain = np.where(np.isnan(x), np.nan, x).astype("<f8")
     shape = list(x.shape)

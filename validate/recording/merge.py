@@ -2,10 +2,10 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from validate.errors import RecordingError
-from validate.recording.types import Record, Recording, Source
+from validate.recording.alignment import moved
+from validate.recording.types import Record, Recording, Source, by_kind
 
 PROVENANCE = "provenance"
 
@@ -19,37 +19,19 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
     """
     if len(recordings) < 2:
         raise RecordingError(f"{len(recordings)} recordings to merge, at least 2 are needed")
-    counts = Counter(topic for r in recordings for topic in _topics(r))
+    counts = Counter(topic for r in recordings for topic in r.streams)
     twice = sorted(topic for topic, n in counts.items() if n > 1)
     if twice:
         raise RecordingError(f"topics {twice} occur in several recordings; rename them first")
     start = min(r.t0_ns for r in recordings)
-    parts = [_later(r, (r.t0_ns - start) / 1e9) for r in recordings]
+    parts = [moved(r, (r.t0_ns - start) / 1e9) for r in recordings]
     return Recording(
         name=name,
         source=Source(" + ".join(r.source.path for r in recordings), "", 0, "merged"),
         t0_ns=start,
-        markers={k: s for r in parts for k, s in r.markers.items()},
-        signals={k: s for r in parts for k, s in r.signals.items()},
-        contours={k: s for r in parts for k, s in r.contours.items()},
-        frames={k: s for r in parts for k, s in r.frames.items()},
+        **by_kind({k: s for r in parts for k, s in r.streams.items()}),
         clock={k: c for r in parts for k, c in r.clock.items()},
         metadata={**_records(recordings), "merged": _origins(recordings)},
-    )
-
-
-def _topics(recording: Recording) -> list[str]:
-    kinds = (recording.markers, recording.signals, recording.contours, recording.frames)
-    return [topic for kind in kinds for topic in kind]
-
-
-def _later(r: Recording, seconds: float) -> Recording:
-    return replace(
-        r,
-        markers={k: replace(s, t=s.t + seconds) for k, s in r.markers.items()},
-        signals={k: replace(s, t=s.t + seconds) for k, s in r.signals.items()},
-        contours={k: replace(s, t=s.t + seconds) for k, s in r.contours.items()},
-        frames={k: replace(s, t=s.t + seconds) for k, s in r.frames.items()},
     )
 
 
@@ -70,6 +52,6 @@ def _records(recordings: Sequence[Recording]) -> dict[str, Record]:
 
 def _origins(recordings: Sequence[Recording]) -> Mapping[str, str]:
     return {
-        f"{i + 1}": f"{r.name}: {', '.join(_topics(r))}; {r.source.path} sha256 {r.source.sha256}"
+        f"{i + 1}": f"{r.name}: {', '.join(r.streams)}; {r.source.path} sha256 {r.source.sha256}"
         for i, r in enumerate(recordings)
     }

@@ -16,10 +16,10 @@ from validate.errors import RecordingError
 from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks import GAP_FACTOR, clock_of
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.read import metadata_records, stream_of
+from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.records import Channel
 from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
-from validate.recording.mcap.streams import CALIBRATION, Collected, fill, ours
+from validate.recording.mcap.streams import Collected, fill, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.types import Clock, Source
 
@@ -162,7 +162,7 @@ def _content(verified: Verified, raw: Collected | None) -> tuple[Ints | None, li
         stamps = raw.stamps_ns
         if len(raw.samples) != len(raw.publish_ns):
             return None, []  # stopped at a limit, which the file's defects name
-        stream_of(raw, int(raw.times_ns.min()), metadata_records(verified))
+        stream_of(raw, int(raw.times_ns.min()), by_name(verified.metadata))
     except RecordingError as error:
         return stamps, [str(error)]
     return stamps, []

@@ -4,10 +4,11 @@ Times are float seconds from the recording's first message; the int64 nanosecond
 are kept in `Recording.t0_ns`. Positions are metres, one named frame per stream.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,6 +153,18 @@ class Frames:
         _set(self, "pose", checked(self.pose, "frames pose", (4, 4), error=RecordingError))
 
 
+Stream = Markers | Signal | Contours | Frames
+_KINDS = {"markers": Markers, "signals": Signal, "contours": Contours, "frames": Frames}
+
+
+def by_kind(streams: Mapping[str, Stream]) -> dict[str, Any]:
+    """Streams by topic as the arguments of `Recording` that take them."""
+    return {
+        name: {topic: s for topic, s in streams.items() if isinstance(s, kind)}
+        for name, kind in _KINDS.items()
+    }
+
+
 @dataclass(frozen=True)
 class Clock:
     """What a stream's times look like, s; `gaps` counts steps over 3 x the median step."""
@@ -164,10 +177,8 @@ class Clock:
     longest_gap: float
     duplicates: int
     backward: int
-    stamp_minus_publish: (
-        float | None
-    )  # largest absolute difference, s; None: messages have no stamp
-    publish_minus_log: float  # largest absolute difference, s
+    stamp_minus_publish: float | None  # largest difference, s; None: messages have no stamp
+    publish_minus_log: float  # largest difference, s
 
 
 @dataclass(frozen=True)
@@ -182,7 +193,10 @@ class Source:
 
 @dataclass(frozen=True)
 class Recording:
-    """All streams of one experiment by topic, with metadata records (calibration, provenance)."""
+    """All streams of one experiment by topic, with metadata records (calibration, provenance).
+
+    Raises `RecordingError` for a topic in two kinds of streams.
+    """
 
     name: str
     source: Source
@@ -195,8 +209,17 @@ class Recording:
     metadata: Mapping[str, Record] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("markers", "signals", "contours", "frames", "clock", "metadata"):
+        for name in (*_KINDS, "clock", "metadata"):
             _set(self, name, MappingProxyType(dict(getattr(self, name))))
+        topics = Counter(topic for name in _KINDS for topic in getattr(self, name))
+        twice = sorted(topic for topic, count in topics.items() if count > 1)
+        if twice:
+            raise RecordingError(f"{self.name}: topics used twice: {twice}; rename one")
+
+    @property
+    def streams(self) -> Mapping[str, Stream]:
+        """The streams of all kinds by topic."""
+        return {**self.markers, **self.signals, **self.contours, **self.frames}
 
     def signal(self, topic: str, unit: str) -> Signal:
         """The signal of that topic; raises `RecordingError` when absent or in another unit."""

@@ -4,9 +4,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.recording.images.image import encode_png
+from validate.recording.mcap.metadata import CALIBRATION, CALIBRATION_KEYS
 from validate.recording.mcap.schemas import IMAGE, SIGNAL, Json, image_message, signal_message
-from validate.recording.mcap.streams import CALIBRATION
-from validate.recording.mcap.write import CALIBRATION_KEYS
 from validate.recording.types import Frames
 from validate.report.replay_view import Track, View, pose_records
 

@@ -7,8 +7,9 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult
+from validate.recording.mcap.metadata import POSE, POSE_KEY
 from validate.recording.mcap.schemas import Json
-from validate.recording.mcap.write import POSE, POSE_KEY, stamps_ns
+from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.observe import Registered
 from validate.report.loads import HOW, Instant, at_holds, at_times, held

@@ -1,7 +1,8 @@
 """JSON channels of any schema as one MCAP file: whole or not at all, both CRCs, chunks zstd.
 
-For files that are made to be looked at, such as a report's replay; recordings are written by
-`mcap.write`. Equal channels, messages and metadata give equal bytes.
+The only writer: of recordings and of files that are made to be looked at, such as a report's
+replay. `enable_data_crcs` is off by default in the `mcap` package. Equal channels, messages and
+metadata give equal bytes.
 """
 
 import os
@@ -56,9 +57,13 @@ def write_channels(
     try:
         with part.open("xb") as stream:
             _write(stream, path.name, channels, messages, metadata)
+            stream.flush()
+            os.fsync(stream.fileno())
         part.replace(path)
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be written ({error.strerror})") from error
+    except UnicodeEncodeError as error:
+        raise RecordingError(f"{path.name}: text that is no UTF-8 ({error.reason})") from error
     finally:
         with suppress(OSError):  # no folder, no leftover
             part.unlink(missing_ok=True)
@@ -68,7 +73,7 @@ def _check(path: Path, channels: Sequence[JsonChannel]) -> None:
     topics = [c.topic for c in channels]
     twice = sorted({t for t in topics if topics.count(t) > 1})
     if twice:
-        raise RecordingError(f"{path.name}: topics declared twice: {twice}; rename one")
+        raise RecordingError(f"{path.name}: topics used twice: {twice}; rename one")
     known: dict[str, Json] = {}
     for channel in channels:
         if known.setdefault(channel.schema, channel.definition) != channel.definition:

@@ -5,14 +5,15 @@ samples out of order, a unit, frame, spread or set of names that changes on the 
 messages only. Markers whose names are the same in another order are put in the first message's.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
+from validate.recording.mcap.metadata import CALIBRATION, pose_of, scale_of
 from validate.recording.mcap.records import Channel, Message
 from validate.recording.mcap.schemas import (
     CONTOUR,
@@ -25,13 +26,10 @@ from validate.recording.mcap.schemas import (
     decode,
 )
 from validate.recording.mcap.verified import Verified
-from validate.recording.types import Contours, Frames, Markers, Signal
+from validate.recording.types import Contours, Frames, Markers, Record, Signal, Stream
 
 OURS = (MARKERS, SIGNAL, CONTOUR)
-CALIBRATION = "calibration/"  # metadata record CALIBRATION + topic of every stream of frames
 MAX_NUMBERS = 50_000_000  # decoded numbers of one file: 400 MB
-
-T = TypeVar("T")
 
 
 @dataclass
@@ -114,42 +112,34 @@ def fill(collected: dict[int, Collected], messages: Iterable[Message]) -> None:
             raise RecordingError(f"more than {MAX_NUMBERS} numbers, the limit; split the file")
 
 
-def markers(raw: Collected, t0_ns: int) -> Markers:
-    """The stream of a `validate.Markers` channel, times from `t0_ns`."""
-    t, first = _times(raw, t0_ns), raw.samples[0]
-    x = np.stack([_in_order(raw, i, first) for i in range(len(raw.samples))])
-    sd, frame = _sd(raw), _frame(raw)
-    return _named(raw, lambda: Markers(t=t, names=first.names, x=x, sd=sd, frame=frame))
+def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stream:
+    """The stream of one channel of ours, times from `t0_ns`; `records` hold poses and scales.
 
-
-def signal(raw: Collected, t0_ns: int) -> Signal:
-    """The stream of a `validate.Signal` channel, times from `t0_ns`."""
-    t, unit = _times(raw, t0_ns), _constant(raw, "unit", [s.unit for s in raw.samples])
-    sd, frame = _sd(raw), _frame(raw)
-    y = np.stack([_like_first(raw, i) for i in range(len(raw.samples))])
-    return _named(raw, lambda: Signal(t=t, y=y, unit=unit, sd=sd, frame=frame))
-
-
-def contours(raw: Collected, t0_ns: int, pose: Floats) -> Contours:
-    """The stream of a `validate.Contour` channel, times from `t0_ns`."""
-    t, outlines = _times(raw, t0_ns), tuple(s.values for s in raw.samples)
-    sd, frame = _sd(raw), _frame(raw)
-    return _named(raw, lambda: Contours(t=t, outlines=outlines, sd=sd, pose=pose, frame=frame))
-
-
-def frames(raw: Collected, t0_ns: int, m_per_px: Floats, pose: Floats) -> Frames:
-    """The stream of a calibrated `foxglove.CompressedImage` channel, times from `t0_ns`."""
-    t, frame = _times(raw, t0_ns), _frame(raw)
+    Raises `RecordingError`, with the topic, for samples that do not make one stream.
+    """
+    topic, first = raw.channel.topic, raw.samples[0]
+    t, frame, sd = _times(raw, t0_ns), _constant(raw, "frame"), _constant(raw, "sd")
+    if raw.schema == MARKERS:
+        x = np.stack([_in_order(raw, i, first) for i in range(len(raw.samples))])
+        return _named(topic, lambda: Markers(t, first.names, x, sd, frame))
+    if raw.schema == SIGNAL:
+        unit = _constant(raw, "unit")
+        y = np.stack([_like_first(raw, i) for i in range(len(raw.samples))])
+        return _named(topic, lambda: Signal(t, y, unit, sd, frame))
+    pose = pose_of(records, topic)
+    if raw.schema == CONTOUR:
+        outlines = tuple(s.values for s in raw.samples)
+        return _named(topic, lambda: Contours(t, outlines, sd, pose, frame))
     images = tuple(s.image for s in raw.samples if s.image is not None)
-    scale = float(m_per_px[0]), float(m_per_px[1])
-    return _named(raw, lambda: Frames(t, images, scale, pose, frame))
+    scale = scale_of(records, topic)
+    return _named(topic, lambda: Frames(t, images, scale, pose, frame))
 
 
-def _named(raw: Collected, make: Callable[[], T]) -> T:
+def _named(topic: str, make: Callable[[], Stream]) -> Stream:
     try:
         return make()
     except RecordingError as error:
-        raise RecordingError(f"{raw.channel.topic!r}: {error}") from None
+        raise RecordingError(f"{topic!r}: {error}") from None
 
 
 def _times(raw: Collected, t0_ns: int) -> Floats:
@@ -166,15 +156,9 @@ def _times(raw: Collected, t0_ns: int) -> Floats:
     return t
 
 
-def _sd(raw: Collected) -> float:
-    return _constant(raw, "sd", [s.sd for s in raw.samples])
-
-
-def _frame(raw: Collected) -> str:
-    return _constant(raw, "frame", [s.frame for s in raw.samples])
-
-
-def _constant(raw: Collected, what: str, values: list[T]) -> T:
+def _constant(raw: Collected, what: str) -> Any:
+    """The value that the field `what` has in every sample."""
+    values = [getattr(sample, what) for sample in raw.samples]
     for i, value in enumerate(values):
         if value != values[0]:
             raise RecordingError(
