@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mcap_samples import ABSENT, T0, signal_json, walk, write_foreign
 
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.recording.images.image import MAX_SIDE, decode_png, encode_png
 from validate.recording.images.png_stack import read_png_stack
 from validate.recording.images.raster import coverage
@@ -204,34 +204,39 @@ def test_images_of_frames_are_read_only_copies() -> None:
         frames.images[0][0, 0] = 1
 
 
+SCALE = {"m_per_px": "1e-4"}
+
+
 def test_png_stack_is_sorted_by_number(tmp_path: Path) -> None:
     for name, image in (("f2.png", IMAGES[0]), ("f10.png", IMAGES[1]), ("f1.PNG", IMAGES[2])):
         (tmp_path / name).write_bytes(encode_png(image))
     (tmp_path / "notes.txt").write_text("x")
-    got = read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=25)
+    got = read_png_stack(tmp_path, {**SCALE, "rate": "25", "topic": "us"}).frame("us")
     assert got.t.tolist() == [0.0, 0.04, 0.08]
+    assert got.m_per_px == (1e-4, 1e-4)
     for a, b in zip(got.images, (IMAGES[2], IMAGES[0], IMAGES[1]), strict=True):
         assert np.array_equal(a, b)
-    assert read_png_stack(tmp_path, (1e-4, 1e-4), times=[1, 2, 4]).t.tolist() == [1.0, 2.0, 4.0]
 
 
 def test_png_stacks_that_cannot_be_ordered_or_timed_are_refused(tmp_path: Path) -> None:
+    options = {**SCALE, "rate": "1"}
     with pytest.raises(RecordingError, match=r"no \*.png files"):
-        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=1)
-    with pytest.raises(RecordingError, match="cannot be read"):
-        read_png_stack(tmp_path / "absent", (1e-4, 1e-4), rate_hz=1)
+        read_png_stack(tmp_path, options)
+    with pytest.raises(UsageError, match="no folder of PNG images"):
+        read_png_stack(tmp_path / "absent", options)
     (tmp_path / "a1.png").write_bytes(encode_png(IMAGES[0]))
-    with pytest.raises(RecordingError, match="either the times of its 1 images or their rate"):
-        read_png_stack(tmp_path, (1e-4, 1e-4))
-    with pytest.raises(RecordingError, match="rate -1 Hz"):
-        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=-1)
+    with pytest.raises(UsageError, match="needs --m-per-px and --rate"):
+        read_png_stack(tmp_path, SCALE)
+    for rate in ("-1", "inf", "soon"):
+        with pytest.raises(UsageError, match=f"rate={rate}: expected a number above 0"):
+            read_png_stack(tmp_path, {**SCALE, "rate": rate})
     (tmp_path / "a01.png").write_bytes(encode_png(IMAGES[0]))
     with pytest.raises(RecordingError, match="have the same number"):
-        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=1)
+        read_png_stack(tmp_path, options)
     (tmp_path / "a01.png").write_bytes(b"")
     (tmp_path / "a1.png").unlink()
     with pytest.raises(RecordingError, match=r"a01.png: no PNG"):
-        read_png_stack(tmp_path, (1e-4, 1e-4), rate_hz=1)
+        read_png_stack(tmp_path, options)
 
 
 def test_coverage_of_a_box_and_a_disc() -> None:

@@ -190,7 +190,7 @@ def inspect(file: Path, as_json: bool) -> None:
 
 @cli.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--as", "kind", required=True, metavar="KIND", help="instron or png-stack.")
+@click.option("--as", "kind", metavar="KIND", help="instron, png-stack or mcap; else as it shows.")
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option(
     "--map",
@@ -201,12 +201,14 @@ def inspect(file: Path, as_json: bool) -> None:
 )
 @click.option("--m-per-px", type=float, help="png-stack: size of a pixel, m.")
 @click.option("--rate", type=float, help="png-stack: images a second, Hz.")
-@click.option("--topic", default="images", show_default=True, help="png-stack: its topic.")
-def import_(file: Path, kind: str, out: Path, mapping: tuple[str, ...], **stack: Any) -> None:
+@click.option("--topic", help="png-stack: its topic (default: images).")
+def import_(
+    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
+) -> None:
     """Turn a testing machine's export, or a folder of PNG images, into a recording."""
     from validate.cli import recordings
 
-    recordings.import_file(file, kind, out, mapping, recordings.Stack(**stack))
+    recordings.import_file(file, kind, out, mapping, given)
 
 
 @cli.command()

@@ -1,27 +1,25 @@
 """`validate inspect`, `import`, `merge` and `record`."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from validate.cli.display import console, progress, table
 from validate.cli.main import pairs
 from validate.errors import UsageError
-from validate.parameters import nearest_names, with_values
+from validate.parameters import with_values
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.digest import digest, to_text
-from validate.recording.exports.instron import KINDS, read_instron
-from validate.recording.images.png_stack import read_png_stack
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
 from validate.recording.preflight import Inspection, Topic, inspect_recording
-from validate.recording.types import Recording, Source
+from validate.recording.readers import named, recognised
+from validate.recording.types import Recording
 from validate.replay.find import find
 from validate.replay.remade import stamped
-
-PNG_STACK = "png-stack"
 
 
 def inspect(file: Path, as_json: bool) -> None:
@@ -33,43 +31,15 @@ def inspect(file: Path, as_json: bool) -> None:
         _print(found)
 
 
-@dataclass(frozen=True)
-class Stack:
-    """What a folder of images does not say itself: m per pixel, images a second, the topic."""
-
-    m_per_px: float | None
-    rate: float | None
-    topic: str
-
-
-def import_file(file: Path, kind: str, out: Path, mapping: tuple[str, ...], stack: Stack) -> None:
-    """Reads a foreign file and writes it as a recording."""
-    known = {*KINDS, PNG_STACK}
-    if kind not in known:
-        raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, known)}")
-    said = pairs(mapping, "--map")
-    recording = _images(file, stack) if kind == PNG_STACK else read_instron(file, said)
+def import_file(
+    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], given: Mapping[str, Any]
+) -> None:
+    """Reads a foreign file, of the `kind` that it shows where none is said, as a recording."""
+    reader = named(kind) if kind else recognised(file)
+    said = {key: str(value) for key, value in given.items() if value is not None}
+    recording = reader.read(file, pairs(mapping, "--map") | said)
     write_recording(recording, out)
     _report(recording, out)
-
-
-def _images(folder: Path, stack: Stack) -> Recording:
-    """A recording of one stream of frames, in the image's own frame (metres, x right, y down)."""
-    if stack.m_per_px is None or stack.rate is None:
-        raise UsageError(f"--as {PNG_STACK} needs --m-per-px and --rate, e.g. 1e-4 and 10")
-    if not folder.is_dir():
-        raise UsageError(f"{folder} is no folder of PNG images")
-    scale = (stack.m_per_px, stack.m_per_px)
-    frames = read_png_stack(folder, scale, rate_hz=stack.rate)
-    name = folder.resolve().name
-    made = {"kind": "folder of PNG images", "images": str(len(frames.images))}
-    return Recording(
-        name=name,
-        source=Source(name, "", 0, "folder of images: integrity not provable"),
-        t0_ns=0,
-        frames={stack.topic: frames},
-        metadata={"provenance": {**made, "rate_hz": repr(stack.rate)}},
-    )
 
 
 def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
@@ -108,11 +78,8 @@ def record(name: str, out: Path, values: tuple[str, ...]) -> None:
 
 
 def _report(recording: Recording, out: Path) -> None:
-    streams = [
-        *recording.signals, *recording.markers, *recording.contours, *recording.frames,
-    ]  # fmt: skip
     size = out.stat().st_size / 1e3
-    console().print(f"{out}: {', '.join(streams)}; {size:.0f} kB", soft_wrap=True)
+    console().print(f"{out}: {', '.join(recording.streams)}; {size:.0f} kB", soft_wrap=True)
 
 
 def _print(found: Inspection) -> None:

@@ -7,7 +7,7 @@ a file that cannot be read to its end is a `RecordingError`.
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -17,10 +17,12 @@ from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks import GAP_FACTOR, clock_of
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
+from validate.recording.mcap.read import MCAP
 from validate.recording.mcap.records import Channel
 from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
 from validate.recording.mcap.streams import Collected, fill, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
+from validate.recording.readers import READERS
 from validate.recording.types import Clock, Source
 
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
@@ -79,7 +81,7 @@ def inspect_recording(path: Path) -> Inspection:
     The error counts the chunks and messages that can be read before the damage.
     """
     with opened(path) as stream:
-        verified = verify(stream, path)
+        verified = _verified(stream, path)
         collected = ours(verified)
         defects = _file_defects(verified)
         try:
@@ -104,6 +106,15 @@ def inspect_recording(path: Path) -> Inspection:
         defects=tuple(defects),
         clock_offsets=tuple(_offset_lines(verified)),
     )
+
+
+def _verified(stream: BinaryIO, path: Path) -> Verified:
+    try:
+        return verify(stream, path)
+    except RecordingError as error:
+        other = next((r.name for r in READERS if r is not MCAP and r.recognises(path)), None)
+        hint = f"; or first `validate import {path.name} --as {other} -o X.mcap`" if other else ""
+        raise RecordingError(f"{error}{hint}") from None
 
 
 def _offset_lines(verified: Verified) -> list[str]:

@@ -25,7 +25,7 @@ QUANTITY = {
     "strain": "strain",
     "stress": "stress",
 }
-SETTINGS = ("specimen", "encoding", "decimal", "repeated")  # of the file, not of a column
+KEYS = (*NEEDED, "specimen", "encoding", "decimal", "repeated")  # of columns, then of the file
 _SIGNS = {":-": -1, ":+": 1}
 
 
@@ -56,12 +56,6 @@ class Pick:
 
 def parse_mapping(mapping: Mapping[str, str], table: Table) -> dict[str, Said]:
     """The mapping's entries by role, see `read_instron`; raises `UsageError` naming the nearest."""
-    known = (*NEEDED, *SETTINGS)
-    for key in mapping:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
-            hint = f"did you mean '{near[0]}'? " if near else ""
-            raise UsageError(f"--map {key}=...: no such key; {hint}known: {', '.join(known)}")
     return {key: _said(key, text, table) for key, text in mapping.items() if key in NEEDED}
 
 

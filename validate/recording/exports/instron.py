@@ -1,8 +1,9 @@
-"""Instron / Bluehill force-displacement exports (CSV text) into a `Recording`."""
+"""Force-displacement tests exported as text (Instron / Bluehill and others) as recordings."""
 
+import codecs
 import hashlib
+import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.exports.blocks import parse_tables
 from validate.recording.exports.columns import (
+    KEYS,
     NEEDED,
     Pick,
     Said,
@@ -33,10 +35,10 @@ from validate.recording.exports.repeats import without_repeats
 from validate.recording.exports.signs import Signs, kind_of_test, signs
 from validate.recording.exports.specimens import chosen, specimen_tables
 from validate.recording.exports.table import Column, Table
+from validate.recording.reader import Reader, head, require_known
 from validate.recording.types import Record, Recording, Signal, Source
 from validate.units import si_factor
 
-KINDS = ("instron",)
 _SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space"}
 
 
@@ -65,43 +67,14 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
     named; nothing is ever returned in part.
     """
     said = dict(mapping or {})
+    require_known(said, KEYS)
     data = _bytes(path)
     try:
-        label, table = chosen(_tables(data, said), said.get("specimen"))
+        tables = specimen_tables(parse_tables(data, said.get("encoding"), said.get("decimal")))
+        label, table = chosen(tables, said.get("specimen"))
         return _recording(path, data, table, said, label)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
-
-
-def read_instron_all(path: Path, mapping: Mapping[str, str] | None = None) -> tuple[Recording, ...]:
-    """Every specimen of an export, in the order of the file, each as `read_instron` gives it.
-
-    The recordings are called after file and specimen. Raises as `read_instron` does; one damaged
-    specimen refuses the file, with its label.
-    """
-    said = dict(mapping or {})
-    if "specimen" in said:
-        raise UsageError(f"--map specimen={said['specimen']} chooses one; leave it out to read all")
-    data = _bytes(path)
-    found = []
-    try:
-        tables = _tables(data, said)
-    except RecordingError as error:
-        raise RecordingError(f"{path.name}: {error}") from error
-    for label, table in tables.items():
-        try:
-            found.append(_recording(path, data, table, said, label))
-        except RecordingError as error:
-            raise RecordingError(f"{path.name}, specimen '{label}': {error}") from error
-    many = len(found) > 1
-    return tuple(
-        replace(r, name=f"{r.name}_{label}") if many else r
-        for r, label in zip(found, tables, strict=True)
-    )
-
-
-def _tables(data: bytes, said: Mapping[str, str]) -> dict[str, Table]:
-    return specimen_tables(parse_tables(data, said.get("encoding"), said.get("decimal")))
 
 
 def _bytes(path: Path) -> bytes:
@@ -227,3 +200,13 @@ def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: li
         f"{_SEPARATOR_NAMES[table.separator]} separated, decimal sign {table.decimal}, "
         f"{len(table.lines)} rows",
     }
+
+
+def _is_text(path: Path) -> bool:
+    """Whether the file begins with text: with a UTF-16 mark, or without control characters."""
+    start = head(path)
+    wide = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return wide or (bool(start) and not re.search(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]", start))
+
+
+INSTRON = Reader("instron", "a testing machine's export, text", _is_text, read_instron)

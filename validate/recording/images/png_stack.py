@@ -1,50 +1,76 @@
-"""A folder of PNG images as frames."""
+"""A folder of PNG images as a recording."""
 
 import re
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
+from validate.recording.clocks import clock_of
 from validate.recording.images.image import Pixels, decode_png
-from validate.recording.types import Frames
+from validate.recording.reader import Options, Reader, require_known
+from validate.recording.types import Frames, Recording, Source
 
 MAX_STACK = 400 * 2**20  # bytes of all images of one stack
 MAX_FILE = 64 * 2**20  # bytes of one PNG
+_OPTIONS = ("m_per_px", "rate", "topic")
 
 
-def read_png_stack(
-    folder: Path,
-    m_per_px: tuple[float, float],
-    *,
-    times: Sequence[float] | None = None,
-    rate_hz: float | None = None,
-    pose: Floats | None = None,
-    frame: str = "image",
-) -> Frames:
-    """All *.png of a folder as frames, in the order of the numbers in their names.
+def read_png_stack(folder: Path, options: Options) -> Recording:
+    """All *.png of a folder as one stream of frames, in the order of the numbers in their names.
 
-    Give either `times` (one a file, s) or `rate_hz`. `pose` is T_frame_from_image (4, 4), default
-    identity. Raises `RecordingError`: no files, equal numbers, sizes that differ, over `MAX_STACK`.
+    Options are `m_per_px` (m), `rate` (Hz) and `topic` (default images). Frames are in the image's
+    own metres, x right, y down. Raises `UsageError` without size or rate and for what is no folder,
+    `RecordingError`: no files, equal numbers, damaged images, sizes that differ, over `MAX_STACK`.
     """
-    files = _numbered(folder)
+    require_known(options, _OPTIONS)
+    if not {"m_per_px", "rate"} <= options.keys():
+        raise UsageError("png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10")
+    side, rate = (_above_zero(options, key) for key in ("m_per_px", "rate"))
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is no folder of PNG images")
+    images = _images(folder)
+    t = np.arange(len(images)) / rate
+    ns = np.rint(1e9 * t).astype(np.int64)
+    topic, name = options.get("topic", "images"), folder.resolve().name
+    made = {"kind": "folder of PNG images", "images": str(len(images)), "rate_hz": repr(rate)}
+    return Recording(
+        name=name,
+        source=Source(name, "", 0, "folder of images: integrity not provable"),
+        t0_ns=0,
+        frames={topic: Frames(t, images, (side, side), np.eye(4), "image")},
+        clock={topic: clock_of(topic, None, ns, ns)},
+        metadata={"provenance": made},
+    )
+
+
+def _above_zero(options: Options, key: str) -> float:
+    try:
+        value = float(options[key])
+    except ValueError:
+        value = 0.0
+    if not 0 < value < np.inf:
+        raise UsageError(f"{key}={options[key]}: expected a number above 0")
+    return value
+
+
+def _images(folder: Path) -> tuple[Pixels, ...]:
     images: list[Pixels] = []
-    total = 0
-    for file in files:
+    for file in _numbered(folder):
         images.append(_read(file))
-        total += images[-1].size
-        if total > MAX_STACK:
+        if sum(image.size for image in images) > MAX_STACK:
             raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
-    t = _stack_times(len(files), times, rate_hz, folder.name)
-    return Frames(t, tuple(images), m_per_px, np.eye(4) if pose is None else pose, frame)
+    return tuple(images)
+
+
+def _pictures(folder: Path) -> list[Path]:
+    return [f for f in folder.iterdir() if f.suffix.lower() == ".png"]
 
 
 def _numbered(folder: Path) -> list[Path]:
     try:
-        files = [f for f in folder.iterdir() if f.suffix.lower() == ".png"]
+        files = _pictures(folder)
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be read ({error.strerror})") from error
     if not files:
@@ -71,13 +97,11 @@ def _read(file: Path) -> Pixels:
         raise RecordingError(f"{file.name}: {error}") from None
 
 
-def _stack_times(
-    count: int, times: Sequence[float] | None, rate_hz: float | None, name: str
-) -> Floats:
-    if (times is None) == (rate_hz is None):
-        raise RecordingError(f"{name}: give either the times of its {count} images or their rate")
-    if times is not None:
-        return np.asarray(times, dtype=np.float64)
-    if rate_hz is None or not 0 < rate_hz < np.inf:
-        raise RecordingError(f"{name}: rate {rate_hz} Hz is not a positive number")
-    return np.arange(count) / rate_hz
+def _recognises(path: Path) -> bool:
+    try:
+        return path.is_dir() and bool(_pictures(path))
+    except OSError:
+        return False
+
+
+PNG_STACK = Reader("png-stack", "a folder of PNG images", _recognises, read_png_stack)

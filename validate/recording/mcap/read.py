@@ -15,8 +15,10 @@ from validate.errors import RecordingError
 from validate.recording.clocks import clock_of
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import by_name, name_of, own_records
+from validate.recording.mcap.records import MAGIC
 from validate.recording.mcap.streams import Collected, fill, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
+from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.types import Clock, Recording, by_kind
 
 
@@ -71,3 +73,11 @@ def _recording(path: Path, verified: Verified, collected: list[Collected]) -> Re
 
 def _clock(raw: Collected) -> Clock:
     return clock_of(raw.channel.topic, raw.stamps_ns, raw.publish_ns, raw.log_ns)
+
+
+def _read(path: Path, options: Options) -> Recording:
+    require_known(options, ())
+    return read_recording(path)
+
+
+MCAP = Reader("mcap", "an MCAP file", lambda path: head(path, len(MAGIC)) == MAGIC, _read)

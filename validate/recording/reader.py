@@ -1,0 +1,49 @@
+"""What a reader of one format is, and what all of them need.
+
+A new format is one file with its `Reader`, and a line in `readers.READERS`.
+"""
+
+import difflib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from validate.errors import UsageError
+from validate.recording.types import Recording
+
+Options = Mapping[str, str]  # what a file does not say itself: `--map KEY=VALUE`
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One format; `name` is the KIND of `validate import --as KIND`.
+
+    `recognises` looks at a path and its first bytes and raises nothing. `read` gives a `Recording`
+    or raises one `ValidateError` of one line: for a path that cannot be read, a file that is empty,
+    cut or of another kind, and an option that it does not know.
+    """
+
+    name: str
+    doc: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path, Options], Recording]
+
+
+def head(path: Path, count: int = 4096) -> bytes:
+    """The first bytes of a file; none of what is no readable file."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(count)
+    except OSError:
+        return b""
+
+
+def require_known(options: Options, known: Collection[str]) -> None:
+    """Raises `UsageError` naming the nearest known key for an option that is not `known`."""
+    for key in options:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
+            hint = f"did you mean '{near[0]}'? " if near else ""
+            raise UsageError(
+                f"--map {key}=...: no such key; {hint}known: {', '.join(known) or 'none'}"
+            )

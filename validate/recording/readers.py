@@ -1,0 +1,30 @@
+"""Every format that becomes a recording."""
+
+from pathlib import Path
+
+from validate.errors import UsageError
+from validate.parameters import nearest_names
+from validate.recording.exports.instron import INSTRON
+from validate.recording.images.png_stack import PNG_STACK
+from validate.recording.mcap.read import MCAP
+from validate.recording.reader import Reader
+
+READERS: tuple[Reader, ...] = (MCAP, INSTRON, PNG_STACK)
+
+
+def named(kind: str) -> Reader:
+    """The reader of that name; raises `UsageError` naming the nearest."""
+    found = {r.name: r for r in READERS}
+    if kind not in found:
+        raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, set(found))}")
+    return found[kind]
+
+
+def recognised(path: Path) -> Reader:
+    """The first reader that recognises the path; raises `UsageError` where none does."""
+    for reader in READERS:
+        if reader.recognises(path):
+            return reader
+    kinds = ", ".join(f"{r.name} ({r.doc})" for r in READERS)
+    missing = "" if path.exists() else "no such file or folder; "
+    raise UsageError(f"{path}: {missing}not recognised as any of {kinds}; say which with --as KIND")
