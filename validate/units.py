@@ -6,14 +6,9 @@ Pint is imported when the first unit is read: the import costs more than reading
 import re
 import unicodedata
 from functools import cache
-from typing import Any, overload
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from validate.errors import RecordingError
-
-Floats = NDArray[np.float64]
 
 QUANTITIES: tuple[tuple[str, str], ...] = (
     ("force", "newton"),
@@ -69,16 +64,6 @@ def si_factor(unit: str, quantity: str) -> float:
             f"unit '{unit}' is no unit of {quantity}: {meant}; examples: {_EXAMPLES[quantity]}"
         )
     return factor
-
-
-@overload
-def to_si(value: Floats, unit: str, quantity: str) -> Floats: ...
-@overload
-def to_si(value: float, unit: str, quantity: str) -> float: ...
-def to_si(value: Floats | float, unit: str, quantity: str) -> Floats | float:
-    """`value` in `unit` as SI numbers of the same shape; raises as `si_factor` does."""
-    factor = si_factor(unit, quantity)
-    return np.asarray(value) * factor if isinstance(value, np.ndarray) else float(value) * factor
 
 
 def is_unit(text: str) -> bool:

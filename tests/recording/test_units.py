@@ -3,13 +3,10 @@
 import subprocess
 import sys
 
-import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from validate.errors import RecordingError
-from validate.units import is_unit, si_factor, to_si
+from validate.units import is_unit, si_factor
 
 EXACT = [
     ("N", "force", 1.0),
@@ -69,15 +66,6 @@ def test_refusal_names_unit_and_quantity(unit: str, quantity: str, says: str) ->
         si_factor(unit, quantity)
     assert f"'{unit}'" in str(caught.value)
     assert quantity in str(caught.value)
-
-
-@given(st.floats(-1e6, 1e6), st.sampled_from(EXACT))
-@settings(max_examples=50, deadline=None)
-def test_numbers_and_arrays_scale_alike(value: float, known: tuple[str, str, float]) -> None:
-    unit, quantity, factor = known
-    assert to_si(value, unit, quantity) == pytest.approx(value * factor, rel=1e-12)
-    many = to_si(np.array([value, -value]), unit, quantity)
-    assert np.array_equal(many, [to_si(value, unit, quantity), -to_si(value, unit, quantity)])
 
 
 def test_pint_is_imported_only_when_a_unit_is_read() -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.errors import RecordingError
-from validate.recording.lag import MIN_MATCHED, coarse_lag, met, refined_lag, step_of
+from validate.recording.lag import MIN_MATCHED, coarse_lag, met, noise_of, refined_lag, step_of
 from validate.recording.types import Recording, Signal, Stream, by_kind
 
 RECORD = "clock_offset/"  # metadata record RECORD + topic of every stream that was moved
@@ -145,7 +145,7 @@ def _require_motion(signal: Signal, name: str) -> None:
     if len(np.unique(signal.t)) < MIN_MATCHED:
         raise RecordingError(f"{name}: {len(signal.t)} samples, at least {MIN_MATCHED} are needed")
     y = signal.y[:, 0]
-    noise = float(np.std(np.diff(y))) / np.sqrt(2)
+    noise = noise_of(y)
     spread = float(np.std(y))
     if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
         raise RecordingError(

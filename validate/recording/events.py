@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.alignment import MIN_COVERAGE, Offset, matched
+from validate.recording.lag import noise_of
 from validate.recording.types import Signal
 
 Kind = Literal["onset", "step"]
@@ -63,7 +64,7 @@ def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
     """Middle crossing; with samples on the flank by a line through them, else between two."""
     part = max(2, len(y) // 5)
     low, high = float(np.median(y[:part])), float(np.median(y[-part:]))
-    noise = _noise(np.concatenate([y[:part] - low, y[-part:] - high]))
+    noise = noise_of(np.concatenate([y[:part] - low, y[-part:] - high]))
     _require_height(high - low, noise, unit)
     level = (y - low) / (high - low)
     above = level > 0.5
@@ -105,7 +106,7 @@ def _on_line(t: Floats, y: Floats, noise: float) -> tuple[float, float]:
 
 def _onset(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
     """Corner of rest and climb: y = a + b max(0, t - t0) by least squares near where it leaves."""
-    noise = _noise(y[: max(4, len(y) // 10)])
+    noise = noise_of(y[: max(4, len(y) // 10)])
     base = float(np.median(y[: max(4, len(y) // 10)]))
     _require_height(float(np.abs(y - base).max()), noise, unit)
     out = np.abs(y - base) > max(_SIGMAS * noise, 1e-9 * float(np.abs(y - base).max()))
@@ -142,10 +143,6 @@ def _bent(t: Floats, y: Floats, t0: float) -> tuple[float, float]:
     across, up = climb - climb.mean(), y - y.mean()
     b = float(across @ up) / max(float(across @ across), 1e-300)
     return float(np.sum((up - b * across) ** 2)), b
-
-
-def _noise(y: Floats) -> float:
-    return float(np.std(np.diff(y)) / np.sqrt(2))
 
 
 def _require_height(height: float, noise: float, unit: str) -> None:

@@ -202,3 +202,8 @@ def _distinct(signal: Signal) -> tuple[Floats, Floats]:
 def step_of(t: Floats) -> float:
     steps = np.diff(t)
     return float(np.median(steps[steps > 0]))
+
+
+def noise_of(y: Floats) -> float:
+    """Standard deviation of white noise on a slow signal (n,): of its steps, over root 2."""
+    return float(np.std(np.diff(y)) / np.sqrt(2))

@@ -42,8 +42,11 @@ def require_known(options: Options, known: Collection[str]) -> None:
     """Raises `UsageError` naming the nearest known key for an option that is not `known`."""
     for key in options:
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
-            hint = f"did you mean '{near[0]}'? " if near else ""
-            raise UsageError(
-                f"--map {key}=...: no such key; {hint}known: {', '.join(known) or 'none'}"
-            )
+            listed = f"{did_you_mean(key, known)}known: {', '.join(known) or 'none'}"
+            raise UsageError(f"--map {key}=...: no such key; {listed}")
+
+
+def did_you_mean(text: str, known: Collection[str]) -> str:
+    """A question with the nearest of the known texts; empty where none is near."""
+    near = difflib.get_close_matches(text, known, n=1, cutoff=0.3)
+    return f"did you mean '{near[0]}'? " if near else ""

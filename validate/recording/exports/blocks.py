@@ -19,7 +19,13 @@ from validate.recording.exports.cells import (
 )
 from validate.recording.exports.encoding import Text, decode
 from validate.recording.exports.numerals import decimal_sign
-from validate.recording.exports.rows import fitted, is_sparse, refuse_cut, refuse_emptied
+from validate.recording.exports.rows import (
+    fitted,
+    is_sparse,
+    refuse_cut,
+    refuse_emptied,
+    refuse_text,
+)
 from validate.recording.exports.table import Table, columns_of, header_of, split_unit
 from validate.recording.exports.vocabulary import SPECIMEN, holds
 
@@ -178,10 +184,7 @@ def _refuse_pretender(
     alike = blocks and width == len(blocks[-1].names[1])
     bare = not units and not any(split_unit(cell)[1] for cell in names[1])
     if blocks and (sum(map(bool, names[1])) != width or (alike and bare)):
-        raise RecordingError(
-            f"line {names[0]}: text '{' '.join(names[1]).strip()[:60]}' amid the rows; "
-            "export one test per file and mend this line"
-        )
+        refuse_text(*names)
 
 
 def _shared(header: list[Line]) -> list[Line]:

@@ -4,7 +4,6 @@ Words are in `vocabulary`; where one word names a length on one machine and a st
 column's unit decides.
 """
 
-import difflib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.exports.table import Column, Table
 from validate.recording.exports.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
+from validate.recording.reader import did_you_mean
 from validate.units import si_factor
 
 NEEDED = ("time", "displacement", "force")
@@ -86,9 +86,7 @@ def _named(text: str, table: Table) -> list[Column]:
 
 def _nearest(text: str, table: Table) -> str:
     labels = [c.label for c in table.columns]
-    near = difflib.get_close_matches(text, labels, n=1, cutoff=0.3)
-    hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"{hint}the file has {', '.join(repr(label) for label in labels)}"
+    return f"{did_you_mean(text, labels)}the file has {', '.join(map(repr, labels))}"
 
 
 def role_of(column: Column) -> str | None:
@@ -97,6 +95,12 @@ def role_of(column: Column) -> str | None:
     if role not in ("displacement", "strain") or not holds(column.name, LENGTH_OR_STRAIN):
         return "displacement" if role == "strain" and _measures(column, "length") else role
     return "strain" if _measures(column, "strain") else role
+
+
+def time_column(table: Table) -> Column | None:
+    """The one column of time; None where there is none or several."""
+    found = [column for column in table.columns if role_of(column) == "time"]
+    return found[0] if len(found) == 1 else None
 
 
 def _measures(column: Column, quantity: str) -> bool:

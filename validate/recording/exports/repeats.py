@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from validate.errors import UsageError
-from validate.recording.exports.columns import Said, role_of
+from validate.recording.exports.columns import Said, time_column
 from validate.recording.exports.numerals import number
 from validate.recording.exports.table import Table
 
@@ -31,8 +31,8 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
 
 
 def _times(table: Table) -> list[float | None] | None:
-    found = [c for c in table.columns if role_of(c) == "time"]
-    return [number(c, table.decimal) for c in found[0].cells] if len(found) == 1 else None
+    column = time_column(table)
+    return [number(cell, table.decimal) for cell in column.cells] if column else None
 
 
 def _repeated(rows: Sequence[tuple[str, ...]]) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 from validate.errors import RecordingError
 from validate.recording.exports.cells import NOTHING, Line, is_remark
@@ -58,12 +59,17 @@ def _rows(lines: Sequence[Line], count: int) -> tuple[list[Line], list[Line]]:
             footer.append((line, cells))
             continue
         if footer:
-            raise RecordingError(
-                f"line {footer[0][0]}: text '{' '.join(footer[0][1]).strip()[:60]}' amid the rows; "
-                "export one test per file and mend this line"
-            )
+            refuse_text(*footer[0])
         rows.append((line, cells))
     return rows, footer
+
+
+def refuse_text(line: int, words: Sequence[str]) -> NoReturn:
+    """Raises `RecordingError` for words that stand amid samples."""
+    raise RecordingError(
+        f"line {line}: text '{' '.join(words).strip()[:60]}' amid the rows; "
+        "export one test per file and mend this line"
+    )
 
 
 def _is_text(cells: Sequence[str], count: int) -> bool:

@@ -7,8 +7,9 @@ from itertools import pairwise
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.exports.blocks import specimen_label
-from validate.recording.exports.columns import role_of
+from validate.recording.exports.columns import role_of, time_column
 from validate.recording.exports.numerals import looks_numeric, number
+from validate.recording.exports.rows import refuse_text
 from validate.recording.exports.table import Column, Table
 from validate.recording.exports.vocabulary import SPECIMEN, holds, plain
 
@@ -59,11 +60,7 @@ def _refuse_nameless(other: Table, useful: Sequence[Table]) -> None:
     """Rows as wide as the others below words that name no quantity are a test with text in it."""
     before = [t for t in useful if t.names_line < other.names_line]
     if before and not _roles(other) and len(before[-1].columns) == len(other.columns):
-        words = " ".join(c.label for c in other.columns)[:60]
-        raise RecordingError(
-            f"line {other.names_line}: text '{words}' amid the rows; export one test per file and "
-            "mend this line"
-        )
+        refuse_text(other.names_line, [c.label for c in other.columns])
 
 
 def _listed(found: Mapping[str, Table]) -> str:
@@ -207,5 +204,5 @@ def _appended(a: Table, b: Table) -> Table:
 
 
 def _time(table: Table) -> Column | None:
-    found = [c for c in table.columns if role_of(c) == "time"]
-    return found[0] if len(found) == 1 and looks_numeric(found[0].cells[0]) else None
+    column = time_column(table)
+    return column if column and looks_numeric(column.cells[0]) else None

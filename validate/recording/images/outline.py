@@ -183,9 +183,9 @@ def _refusal(wall: Wall, judged: Quality) -> str:
     """Why a wall is none; empty when it is."""
     radius = 1e3 * float(np.sqrt((wall.radius**2).mean()))
     place = f"at ({1e3 * wall.centre[0]:.1f}, {1e3 * wall.centre[1]:.1f}) mm, radius {radius:.1f}"
-    if judged.missing > MAX_MISSING:
+    if wall.missing > MAX_MISSING:
         return (
-            f"the one {place} mm is cut by the border, {100 * judged.missing:.0f} % of its wall "
+            f"the one {place} mm is cut by the border, {100 * wall.missing:.0f} % of its wall "
             "lie outside; take an image with all of it"
         )
     if judged.gcnr < MIN_GCNR or wall.evidence < MIN_EVIDENCE:

@@ -15,11 +15,10 @@ _SECTOR = 20.0  # deg of the wall that are judged together
 
 @dataclass(frozen=True)
 class Quality:
-    """gcnr 0..1 of inside against surroundings, closed and missing shares of the wall 0..1."""
+    """gcnr 0..1 of inside against surroundings, closed share of the wall 0..1."""
 
     gcnr: float
     closed: float
-    missing: float
 
 
 def quality(grey: Grey, wall: Wall) -> Quality:
@@ -31,7 +30,7 @@ def quality(grey: Grey, wall: Wall) -> Quality:
     at least a third of the outline's median contrast.
     """
     within, beside = (_band(grey, wall, *span) for span in ((0.1, 0.85), (1.1, 1.5)))
-    return Quality(_gcnr(within[0], beside[0]), _closed(within, beside), wall.missing)
+    return Quality(_gcnr(within[0], beside[0]), _closed(within, beside))
 
 
 def _band(grey: Grey, wall: Wall, low: float, high: float) -> tuple[Floats, Floats]:

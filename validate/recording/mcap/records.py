@@ -148,13 +148,13 @@ class Metadata:
 @dataclass(frozen=True)
 class Footer:
     summary_start: int
-    summary_offset_start: int
     summary_crc: int
 
     @staticmethod
     def read(content: bytes) -> "Footer":
         fields = Cursor(content)
-        return Footer(fields.integer(8), fields.integer(8), fields.integer(4))
+        start, _ = fields.integer(8), fields.integer(8)
+        return Footer(start, fields.integer(4))
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,6 @@ class Chunk:
     """A chunk unpacked: its compression's name and its records' bytes, length and CRC checked."""
 
     compression: str
-    has_crc: bool
     data: bytes
 
     @staticmethod
@@ -173,7 +172,7 @@ class Chunk:
         data = unpack(compression, fields.take(fields.integer(8)), size)
         if crc and zlib.crc32(data) != crc:
             raise RecordingError(f"chunk CRC {zlib.crc32(data):#010x}, declared {crc:#010x}")
-        return Chunk(compression, bool(crc), data)
+        return Chunk(compression, data)
 
 
 def check_attachment(content: bytes) -> None:

@@ -58,9 +58,10 @@ class Sample:
         return self.values.size + (0 if self.image is None else -(-self.image.size // 8))
 
 
-def _object(title: str, required: str, **properties: Json) -> Json:
-    names = required.split()
-    return {"title": title, "type": "object", "properties": properties, "required": names}
+def _object(title: str, **properties: Json) -> Json:
+    """An object of these fields, all required."""
+    fields = {"properties": properties, "required": list(properties)}
+    return {"title": title, "type": "object", **fields}
 
 
 def _list(items: Json) -> Json:
@@ -68,60 +69,29 @@ def _list(items: Json) -> Json:
 
 
 _NUMBER: Json = {"type": "number"}
+_NUMBERS = _list(_NUMBER)
 _TEXT: Json = {"type": "string"}
 _SEEN: Json = _list({"type": ["number", "null"]})
 _COUNT: Json = {"type": "integer", "minimum": 0}
-_STAMP = _object("time", "sec nsec", sec=_COUNT, nsec=_COUNT | {"maximum": 999_999_999})
+_STAMP = _object("time", sec=_COUNT, nsec=_COUNT | {"maximum": 999_999_999})
 _SPREAD: Json = {"type": "number", "minimum": 0}
-_POINT = _object("foxglove.Vector3", "x y z", x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_TURN = _object("foxglove.Quaternion", "x y z w", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _object("foxglove.Pose", "position orientation", position=_POINT, orientation=_TURN)
+_POINT = _object("foxglove.Vector3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_TURN = _object("foxglove.Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE = _object("foxglove.Pose", position=_POINT, orientation=_TURN)
+_OURS = {"stamp": _STAMP, "frame": _TEXT}
+_FOXGLOVE = {"timestamp": _STAMP, "frame_id": _TEXT}
+_MAYBE_FLAT = _SEEN | {"type": ["array", "null"]}
+_BASE64 = _TEXT | {"contentEncoding": "base64"}
 
 SCHEMAS: Mapping[str, Json] = {
-    MARKERS: _object(
-        MARKERS,
-        "stamp frame names x y z sd",
-        stamp=_STAMP,
-        frame=_TEXT,
-        names=_list(_TEXT),
-        x=_SEEN,
-        y=_SEEN,
-        z=_SEEN | {"type": ["array", "null"]},
-        sd=_SPREAD,
-    ),
-    SIGNAL: _object(
-        SIGNAL,
-        "stamp frame unit values sd",
-        stamp=_STAMP,
-        frame=_TEXT,
-        unit=_TEXT,
-        values=_list(_NUMBER),
-        sd=_SPREAD,
-    ),
-    CONTOUR: _object(
-        CONTOUR,
-        "stamp frame x y sd",
-        stamp=_STAMP,
-        frame=_TEXT,
-        x=_list(_NUMBER),
-        y=_list(_NUMBER),
-        sd=_SPREAD,
-    ),
-    IMAGE: _object(
-        IMAGE,
-        "timestamp frame_id data format",
-        timestamp=_STAMP,
-        frame_id=_TEXT,
-        data=_TEXT | {"contentEncoding": "base64"},
-        format=_TEXT,
-    ),
-    MIRROR: _object(
-        MIRROR,
-        "timestamp frame_id poses",
-        timestamp=_STAMP,
-        frame_id=_TEXT,
-        poses=_list(_POSE),
-    ),
+    schema["title"]: schema
+    for schema in (
+        _object(MARKERS, **_OURS, names=_list(_TEXT), x=_SEEN, y=_SEEN, z=_MAYBE_FLAT, sd=_SPREAD),
+        _object(SIGNAL, **_OURS, unit=_TEXT, values=_NUMBERS, sd=_SPREAD),
+        _object(CONTOUR, **_OURS, x=_NUMBERS, y=_NUMBERS, sd=_SPREAD),
+        _object(IMAGE, **_FOXGLOVE, data=_BASE64, format=_TEXT),
+        _object(MIRROR, **_FOXGLOVE, poses=_list(_POSE)),
+    )
 }
 
 
@@ -139,18 +109,15 @@ def _nullable(column: Floats) -> list[float | None]:
     return [None if v != v else v for v in column.tolist()]
 
 
+def _ours(ns: int, frame: str) -> Json:
+    return {"stamp": stamp(ns), "frame": frame}
+
+
 def markers_message(ns: int, frame: str, names: Sequence[str], x: Floats, sd: float) -> Json:
     """The message of one instant; x (k, 2 or 3) m, NaN becomes null."""
     axes = [_nullable(x[:, axis]) for axis in range(x.shape[1])]
-    return {
-        "stamp": stamp(ns),
-        "frame": frame,
-        "names": list(names),
-        "x": axes[0],
-        "y": axes[1],
-        "z": axes[2] if len(axes) == 3 else None,
-        "sd": sd,
-    }
+    places = dict(zip("xyz", [*axes, None], strict=False))
+    return {**_ours(ns, frame), "names": list(names), **places, "sd": sd}
 
 
 def mirror_message(ns: int, frame: str, x: Floats) -> Json:
@@ -166,19 +133,13 @@ def mirror_message(ns: int, frame: str, x: Floats) -> Json:
 
 def signal_message(ns: int, frame: str, unit: str, values: Floats, sd: float) -> Json:
     """The message of one instant; values (c,) in `unit`."""
-    return {
-        "stamp": stamp(ns),
-        "frame": frame,
-        "unit": unit,
-        "values": values.tolist(),
-        "sd": sd,
-    }
+    return {**_ours(ns, frame), "unit": unit, "values": values.tolist(), "sd": sd}
 
 
 def contour_message(ns: int, frame: str, outline: Floats, sd: float) -> Json:
     """The message of one instant; outline (k, 2) m in the image plane."""
     x, y = outline.T.tolist()
-    return {"stamp": stamp(ns), "frame": frame, "x": x, "y": y, "sd": sd}
+    return {**_ours(ns, frame), "x": x, "y": y, "sd": sd}
 
 
 def image_message(ns: int, frame: str, image: Pixels) -> Json:
@@ -210,19 +171,19 @@ def decode(schema: str, data: bytes) -> Sample:
         unit, values = _text(message, "unit"), _numbers(message, "values")
     else:
         values = _columns([_numbers(message, "x"), _numbers(message, "y")])
-    ns = _stamp_ns(message, "stamp") if "stamp" in message else None
-    return Sample(ns, _text(message, "frame"), _sd(message), names, unit, values)
+    sd = float(_array("sd", [_field(message, "sd")], {int, float})[0])
+    return Sample(_stamp_ns(message, "stamp"), _text(message, "frame"), sd, names, unit, values)
 
 
 def _image(message: Json) -> Sample:
-    ns = _stamp_ns(message, "timestamp") if "timestamp" in message else None
     if _text(message, "format") != "png":
         raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
     try:
         data = base64.b64decode(_text(message, "data"), validate=True)
     except (binascii.Error, ValueError) as error:
         raise RecordingError(f"field 'data' is no base64 ({error})") from None
-    return Sample(ns, _text(message, "frame_id"), 0.0, (), "", np.empty(0), decode_png(data))
+    ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
+    return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(data))
 
 
 def _parse(data: bytes) -> Json:
@@ -270,18 +231,15 @@ def _names(message: Json) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _stamp_ns(message: Json, name: str) -> int:
+def _stamp_ns(message: Json, name: str) -> int | None:
+    if name not in message:
+        return None
     value = message[name]
     parts = (value.get("sec"), value.get("nsec")) if isinstance(value, dict) else (None, None)
     sec, nsec = (p if type(p) is int else -1 for p in parts)
     if not (0 <= sec < 2**63 // 10**9 and 0 <= nsec < 10**9):
         raise RecordingError(f"stamp sec {parts[0]}, nsec {parts[1]}: no int64 nanoseconds")
     return sec * 10**9 + nsec
-
-
-def _sd(message: Json) -> float:
-    value = _field(message, "sd")
-    return float(_array("sd", [value], {int, float})[0])
 
 
 def _numbers(message: Json, name: str, *, null: bool = False) -> Floats:
