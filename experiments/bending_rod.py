@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
-from validate.replay.paper_002 import rod_published
+from validate.replay.paper_002 import ROD_FIGURES
 from validate.replay.paper_002_rod import tell
 from validate.replay.solver_benchmark import (
     FIVE,
@@ -85,7 +85,7 @@ EXPERIMENT = Experiment(
     reference="implicit",
     cases=CASES,
     exhibits=tell,
-    published=rod_published,
+    published=ROD_FIGURES,
     frames=FRAMES,
     twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "

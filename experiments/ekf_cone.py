@@ -25,7 +25,7 @@ from validate.register.signals import SignalObservation, driving
 from validate.replay.experiment import Case, Experiment, Input, Progress, Twin, Uncertainty
 from validate.replay.followed import Truth
 from validate.replay.method import Method
-from validate.replay.paper_003_cone import published_cone, tell_cone
+from validate.replay.paper_003_cone import CONE_FIGURES, tell_cone
 from validate.scene.cone import quarter_cone
 from validate.scene.mesh import quadratic
 from validate.scene.mesh_file import read_mesh
@@ -288,7 +288,7 @@ EXPERIMENT = Experiment(
     cases=(Case("small", "the printed 0.15 N instead of 15 N", _small, shipped=True),),
     uncertainty=UNCERTAINTY,
     exhibits=tell_cone,
-    published=published_cone,
+    published=CONE_FIGURES,
     twin=Twin(
         record,
         truth,

@@ -25,7 +25,7 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.replay.paper_003 import published_cube, tell_cube
+from validate.replay.paper_003 import CUBE_FIGURES, tell_cube
 from validate.scene.box import box
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import read_mesh
@@ -258,7 +258,7 @@ EXPERIMENT = Experiment(
     reference="nfem",
     cases=CASES,
     exhibits=tell_cube,
-    published=published_cube,
+    published=CUBE_FIGURES,
     twin=Twin(
         record,
         truth,

@@ -41,7 +41,7 @@ from validate.replay.experiment import (
     Variant,
 )
 from validate.replay.method import Method
-from validate.replay.paper_000 import figures
+from validate.replay.paper_000 import FIGURES
 from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
@@ -479,7 +479,7 @@ EXPERIMENT = Experiment(
     ),
     effects=EFFECTS,
     sensors=ADDED_SENSORS,
-    published=figures,
+    published=FIGURES,
     identify=identify,
     quick=_quick,
     twin=Twin(

@@ -63,7 +63,7 @@ EXPERIMENT = replace(
                    Variant("p2_neo_hooke"), Variant("md_neo_hooke")),
     ),
     identify=None,
-    published=None,
+    published=(),
     twin=replace(_twin, seed=PARAMETERS.twin.seed, notice=(
         "The outlines are extracted from synthetic B-mode images. The recording is a twin: it and "
         "the accepted model share the law (neo-Hookean), not the mesh. u_num of the accepted model "

@@ -28,7 +28,7 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.replay.paper_001 import published, tell
+from validate.replay.paper_001 import FIGURES, tell
 from validate.scene.box import box, centroids
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
@@ -320,7 +320,7 @@ EXPERIMENT = Experiment(
     reference="fem",
     cases=CASES,
     exhibits=tell,
-    published=published,
+    published=FIGURES,
     captions={
         "displacement_node_A": "As Figs. 3 and 4 of paper 001: what was measured, FEM and KF-FEM.",
         "displacement_node_B": "As Fig. 5 of paper 001: a node 2 mm below, given to no filter.",

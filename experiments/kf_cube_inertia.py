@@ -68,7 +68,7 @@ EXPERIMENT = replace(
     reference="average",
     cases=tuple(_named(name) for name in ("stiff_model", "layer", "sparse")),
     exhibits=None,
-    published=None,
+    published=(),
     twin=replace(
         _twin,
         seed=PARAMETERS.twin.seed,

@@ -12,7 +12,7 @@ from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
-from validate.replay.paper_002 import needle_published
+from validate.replay.paper_002 import NEEDLE_FIGURES
 from validate.replay.paper_002_needle import tell
 from validate.replay.solver_benchmark import (
     FIVE,
@@ -88,7 +88,7 @@ EXPERIMENT = Experiment(
     reference="implicit",
     cases=CASES,
     exhibits=tell,
-    published=needle_published,
+    published=NEEDLE_FIGURES,
     frames=FRAMES,
     twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "

@@ -21,7 +21,7 @@ def check(names: tuple[str, ...], as_json: bool) -> int:
         experiment = find(name, start)
         with progress(f"check {name}") as report:
             result = compare(experiment, Options({}), report)
-        found.append((result, _holds(result, declared=experiment.published is not None)))
+        found.append((result, _holds(result, declared=bool(experiment.published))))
     if as_json:
         print(json.dumps([_document(*pair) for pair in found], indent=1, allow_nan=False))
     else:

@@ -54,12 +54,13 @@ class Figure:
     """A printed figure as an experiment declares it; the fields of `Published` with the same name.
 
     `of` is the score that stands beside it, "owner:score" (a method's, or "told:" for what the
-    experiment's own exhibits computed, "identified:"), or a function of all values; None where
-    nothing of ours can stand there. `reason` may be a function of the values too.
+    experiment's own exhibits computed, "identified:"), or a function of all values, which may find
+    that there is none; None where nothing of ours can stand there. `reason` may be a function of
+    the values too.
     """
 
     name: str
-    of: str | Callable[[Values], float] | None
+    of: str | Callable[[Values], float | None] | None
     theirs: float | None
     tolerance: float | None
     unit: str

@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.compare.published import Published
+from validate.compare.published import Figure
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
-from validate.replay.paper_003 import locking_table, readings_table, steps_table
+from validate.replay.paper_003 import held_errors, locking_table, readings_table, steps_table
 from validate.replay.standard_exhibits import error_at
-
-Values = Mapping[str, Mapping[str, float]]
 
 _MM = 1e3
 _PRINTED_FORCE, _PRINTED_STEP = 0.15, 1e-4  # N, s
@@ -195,41 +193,23 @@ _TABLE_3 = {
     ),
 }  # fmt: skip
 
-
-def published_cone(values: Values) -> tuple[Published, ...]:
-    """Every printed figure of section 3.4; those whose method was not run are left out."""
-    found, told = values.get("ekf_held", {}), values.get("told", {})
-    table = tuple(
-        Published(
-            f"ekf_held: {node}.{name}",
-            found[f"{node}.{name}@small"],
-            theirs,
-            None,
-            "m",
-            "not reproducible as printed",
-            "a total of 0.15 N moves this cone by less than the printed error: only a force on "
-            "every node, or some 15 N, gives motions of that size",
-            "Table 3",
-            ours,
-            0.02 * ours,
-        )
-        for node, triple in _TABLE_3.items()
-        for name, (theirs, ours) in zip(("mae", "rmse", "sd"), triple, strict=True)
-        if f"{node}.{name}@small" in found
-    )
-    return (*table, *_mesh(told))
-
-
-def _mesh(told: Mapping[str, float]) -> tuple[Published, ...]:
-    if "nodes" not in told:
-        return ()
-    return (
-        Published("nodes of the cone's mesh", told["nodes"], 559.0, 6.0, "1", "reproduced",
-                  "a mesh of our own making, as near as it came", "section 3.4",
-                  555.0, 0.0),
-        Published("tetrahedra of the cone's mesh", told["cells"], 2349.0, 24.0, "1", "reproduced",
-                  "a mesh of our own making, as near as it came", "section 3.4",
-                  2357.0, 0.0),
-        Published("Poisson ratio", None, 0.5, None, "1", "not reproducible as printed",
-                  "lambda = E nu / ((1 + nu)(1 - 2 nu)) is infinite at 0.5", "section 3.4, eq 8"),
-    )  # fmt: skip
+CONE_FIGURES = (
+    *held_errors(
+        _TABLE_3, "@small",
+        "a total of 0.15 N moves this cone by less than the printed error: only a force on every "
+        "node, or some 15 N, gives motions of that size",
+        "Table 3",
+    ),
+    Figure(
+        "nodes of the cone's mesh", "told:nodes", 559.0, 6.0, "1", "reproduced",
+        "a mesh of our own making, as near as it came", "section 3.4", 555.0, 0.0,
+    ),
+    Figure(
+        "tetrahedra of the cone's mesh", "told:cells", 2349.0, 24.0, "1", "reproduced",
+        "a mesh of our own making, as near as it came", "section 3.4", 2357.0, 0.0,
+    ),
+    Figure(
+        "Poisson ratio", None, 0.5, None, "1", "not reproducible as printed",
+        "lambda = E nu / ((1 + nu)(1 - 2 nu)) is infinite at 0.5", "section 3.4, eq 8",
+    ),
+)  # fmt: skip
