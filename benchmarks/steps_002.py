@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 
 from validate.errors import SceneError
 from validate.fem.system import System, build
-from validate.scene.rod import GRAVITY, bending_rod
+from validate.papers.accuracy.rod import GRAVITY, bending_rod
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.types import Scheme

@@ -8,11 +8,7 @@ from pathlib import Path
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Case, Experiment
-from validate.replay.method import Method
-from validate.replay.paper_002 import ROD_FIGURES
-from validate.replay.paper_002_rod import tell
-from validate.replay.solver_benchmark import (
+from validate.papers.accuracy.benchmark import (
     FIVE,
     FRAMES,
     SWITCHES,
@@ -25,8 +21,12 @@ from validate.replay.solver_benchmark import (
     changed,
     solvers,
 )
-from validate.scene.needle import STEP
-from validate.scene.rod import MP3, SIZE, bending_rod, gravity_inputs
+from validate.papers.accuracy.figures import ROD_FIGURES
+from validate.papers.accuracy.needle import STEP
+from validate.papers.accuracy.rod import MP3, SIZE, bending_rod, gravity_inputs
+from validate.papers.accuracy.rod_exhibits import tell
+from validate.replay.experiment import Case, Experiment
+from validate.replay.method import Method
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 

@@ -16,6 +16,17 @@ import numpy as np
 from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
+from validate.papers.ekf_nfem.cone_exhibits import tell_cone
+from validate.papers.ekf_nfem.cone_mesh import quarter_cone
+from validate.papers.ekf_nfem.cone_twin import (
+    LoadTable,
+    TwinSettings,
+    cone_scene,
+    load_table,
+    marker_places,
+    record_cone,
+)
+from validate.papers.ekf_nfem.figures import CONE_FIGURES
 from validate.parameters import quantity, require_ranges
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
@@ -25,22 +36,12 @@ from validate.register.signals import SignalObservation, driving
 from validate.replay.experiment import Case, Experiment, Input, Progress, Twin, Uncertainty
 from validate.replay.followed import Truth
 from validate.replay.method import Method
-from validate.replay.paper_003_cone import CONE_FIGURES, tell_cone
-from validate.scene.cone import quarter_cone
 from validate.scene.mesh import quadratic
 from validate.scene.mesh_file import read_mesh
 from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
-from validate.twin.cone import (
-    LoadTable,
-    TwinSettings,
-    cone_scene,
-    load_table,
-    marker_places,
-    record_cone,
-)
 
 HERE = Path(__file__).parent
 RECORDING = HERE.parent / "recordings" / "ekf_cone.mcap"

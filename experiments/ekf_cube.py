@@ -17,6 +17,8 @@ from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.system import build as build_system
+from validate.papers.ekf_nfem.cube_exhibits import tell_cube
+from validate.papers.ekf_nfem.figures import CUBE_FIGURES
 from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
@@ -25,7 +27,6 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.replay.paper_003 import CUBE_FIGURES, tell_cube
 from validate.scene.box import box
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import read_mesh

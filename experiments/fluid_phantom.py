@@ -19,6 +19,8 @@ from validate.compare.effects import Sensor
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.identify.interval import profile_interval
+from validate.papers.fluid_inclusion.figures import FIGURES
+from validate.papers.fluid_inclusion.twin import PLATES, TwinSettings, record_phantom
 from validate.parameters import quantity, require_ranges
 from validate.recording.images.outline import outlines_of
 from validate.recording.mcap.read import read_recording
@@ -41,14 +43,12 @@ from validate.replay.experiment import (
     Variant,
 )
 from validate.replay.method import Method
-from validate.replay.paper_000 import FIGURES
 from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact, between_plates
 from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
-from validate.twin.phantom import TwinSettings, record_phantom
 
 
 @dataclass(frozen=True)
@@ -205,6 +205,7 @@ def build(recording: Recording, parameters: Parameters, model: Model) -> Scene:
     contact = model.plates if p.plates == "as_method" else p.plates
     return between_plates(
         mesh if order == 1 else quadratic(mesh),
+        PLATES,
         Material(p.material.E, p.material.nu, model.law),
         contact,
         "pointwise" if order == 2 else model.dilatation,

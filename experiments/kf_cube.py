@@ -20,6 +20,8 @@ from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.steady import ReducedKf
 from validate.fem.system import build as build_system
+from validate.papers.kf_fem.figures import FIGURES
+from validate.papers.kf_fem.seeds import tell
 from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
@@ -28,7 +30,6 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.replay.paper_001 import FIGURES, tell
 from validate.scene.box import box, centroids
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support

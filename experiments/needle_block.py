@@ -10,11 +10,7 @@ from pathlib import Path
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Case, Experiment
-from validate.replay.method import Method
-from validate.replay.paper_002 import NEEDLE_FIGURES
-from validate.replay.paper_002_needle import tell
-from validate.replay.solver_benchmark import (
+from validate.papers.accuracy.benchmark import (
     FIVE,
     FRAMES,
     SWITCHES,
@@ -27,7 +23,11 @@ from validate.replay.solver_benchmark import (
     changed,
     solvers,
 )
-from validate.scene.needle import MP1, MP2, STEP, needle_block, needle_depth
+from validate.papers.accuracy.figures import NEEDLE_FIGURES
+from validate.papers.accuracy.needle import MP1, MP2, STEP, needle_block, needle_depth
+from validate.papers.accuracy.needle_exhibits import tell
+from validate.replay.experiment import Case, Experiment
+from validate.replay.method import Method
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 

@@ -21,9 +21,9 @@ from validate.compare.solid import symmetric_difference
 from validate.compare.surface_distance import distances
 from validate.compare.two_fields import compare_fields, compared
 from validate.errors import ComparisonError
+from validate.papers.fluid_inclusion.square import square_with_hole
 from validate.scene.box import box, grid
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
-from validate.scene.square import square_with_hole
 
 PLANE, SOLID = ((1.0, 0.8), (6, 5)), ((1.0, 0.8, 0.6), (4, 3, 3))
 MESHES = {

@@ -23,10 +23,10 @@ from validate.fem.assemble import mass, shape_gradients, stiffness, stiffness_da
 from validate.fem.loads import facet_sizes
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import build
+from validate.papers.accuracy.needle import needle_block
+from validate.papers.accuracy.rod import GRAVITY, bending_rod
 from validate.scene.box import grid
 from validate.scene.mesh import Mesh
-from validate.scene.needle import needle_block
-from validate.scene.rod import GRAVITY, bending_rod
 from validate.scene.scene import Load, Material, Pin, PlaneState, Region, Scene, Support, Weight
 
 E, NU, RHO = 200.0, 0.3, 50.0

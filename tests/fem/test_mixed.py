@@ -9,10 +9,10 @@ from validate.errors import SceneError
 from validate.fem.locking import locking_warning
 from validate.fem.mixed import mixed_static
 from validate.fem.system import build
+from validate.papers.accuracy.needle import MP2, needle_block
+from validate.papers.accuracy.rod import GRAVITY, bending_rod
 from validate.scene.box import box, grid
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.needle import MP2, needle_block
-from validate.scene.rod import GRAVITY, bending_rod
 from validate.scene.scene import Load, Material, Pin, Scene, Support
 
 

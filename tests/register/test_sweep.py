@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from sweeps import LeaningCapsule, sweep_frames
 
 from validate.errors import RegistrationError
 from validate.fem.cavity import cavity_surface, volume_of
 from validate.register.sweep import Stack, surface_of, sweep_stack
 from validate.scene.inclusion import Block, block_with_inclusion
 from validate.scene.mesh import cell_volumes
-from validate.twin.sweep import LeaningCapsule, sweep_frames
 from validate.twin.ultrasound import Scanner
 
 # Image x is the block's z, image y its x, the sweep goes along its y.

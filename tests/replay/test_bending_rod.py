@@ -5,8 +5,8 @@ import pytest
 from validate.replay.tracking import Tracking
 
 from validate.compare.result import Result
+from validate.papers.accuracy.rod_exhibits import beam, first_crossing
 from validate.replay import compare, load
-from validate.replay.paper_002_rod import beam, first_crossing
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,10 @@ from validate.replay.tracking import Tracking, Truth
 
 from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
+from validate.papers.ekf_nfem import cone_exhibits
+from validate.papers.ekf_nfem.cone_twin import record_cone
 from validate.recording.types import Recording
-from validate.replay import compare, load, paper_003_cone
-from validate.twin.cone import record_cone
+from validate.replay import compare, load
 
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
 COARSE = {"twin.radial": "3", "twin.axial": "3", "mesh.radial": "3", "mesh.axial": "3"}
@@ -43,8 +44,8 @@ def coarse(cone: Tracking) -> Iterator[Tracking]:
         return (record_cone(parameters.twin, lambda step: None),)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_003_cone, "locking_table", dear)
-        patch.setattr(paper_003_cone, "readings_table", dear)
+        patch.setattr(cone_exhibits, "locking_table", dear)
+        patch.setattr(cone_exhibits, "readings_table", dear)
         yield replace(
             cone,
             load=made,

@@ -15,8 +15,8 @@ from validate.replay.tracking import Tracking
 from validate.compare.result import MethodResult, Result
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
+from validate.papers.ekf_nfem.cube_exhibits import published_cube, readings_table
 from validate.replay import compare, load
-from validate.replay.paper_003 import published_cube, readings_table
 from validate.scene.scene import Scene
 
 STEP = (

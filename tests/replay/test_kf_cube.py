@@ -16,7 +16,8 @@ from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import UsageError
-from validate.replay import compare, load, paper_001
+from validate.papers.kf_fem import seeds
+from validate.replay import compare, load
 from validate.replay.options import Options
 
 SOME = ("fem", "kf_printed", "kf_load", "load_scale")
@@ -38,7 +39,7 @@ def some(cube: Tracking) -> Iterator[Result]:
         cube, methods=methods, accepted=("fem",), cases=cube.cases[:1], frames=10
     )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_001, "VARIANCES", (paper_001.PRINTED,))
+        patch.setattr(seeds, "VARIANCES", (seeds.PRINTED,))
         yield compare(reduced)
 
 

@@ -6,7 +6,7 @@ import pytest
 from validate.estimate.node_ekf import NodeEKF
 from validate.fem.critical import critical_step
 from validate.fem.system import build
-from validate.replay.rates import Integrator, Rate, cells_at, measured_rates, rates_exhibit
+from validate.papers.ekf_nfem.rates import Integrator, Rate, cells_at, measured_rates, rates_exhibit
 from validate.scene.box import box
 from validate.scene.scene import Material, Scene, Support
 from validate.solve.central import CentralDifference

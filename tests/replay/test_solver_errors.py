@@ -8,11 +8,11 @@ import pytest
 from validate.compare.exhibit import NodeMap
 from validate.compare.pair import Common
 from validate.fem.system import build
-from validate.replay.paper_002 import needle_published, rod_published
-from validate.replay.paper_002_rules import limit_of, rules_exhibit
-from validate.replay.solver_errors import Errors, errors_of, ordered_share, stable_of, sum_ratio
+from validate.papers.accuracy.errors import Errors, errors_of, ordered_share, stable_of, sum_ratio
+from validate.papers.accuracy.figures import needle_published, rod_published
+from validate.papers.accuracy.needle import MP1, needle_block, needle_depth, needle_from_above
+from validate.papers.accuracy.rules import limit_of, rules_exhibit
 from validate.report.maps import ranges, words
-from validate.scene.needle import MP1, needle_block, needle_depth, needle_from_above
 from validate.solve.march import march
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import Run

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from validate.papers.accuracy.rod import bending_rod
 from validate.report.body import Body
 from validate.report.cut import _cut_polygons
 from validate.report.skin import skins
-from validate.scene.rod import bending_rod
 
 ROD = bending_rod(3)
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
+from validate.papers.accuracy.needle import needle_block
+from validate.papers.accuracy.rod import bending_rod
 from validate.scene.box import box, grid
 from validate.scene.bricks import CORNERS, gauss_points, shapes, slopes
 from validate.scene.mesh import (
@@ -15,8 +17,6 @@ from validate.scene.mesh import (
     quadratic,
     require_positive_cells,
 )
-from validate.scene.needle import needle_block
-from validate.scene.rod import bending_rod
 from validate.scene.scene import Cavity, Drive, Foundation, Material, Scene, Weight
 
 BLOCKS = [((3.0, 2.0, 1.0), (2, 3, 4)), ((3.0, 2.0), (2, 3)), ((1.0, 1.0), (1, 1))]

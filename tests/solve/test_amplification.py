@@ -8,8 +8,8 @@ from inertial_scenes import driven, small
 
 from validate.errors import SceneError
 from validate.fem.system import System, build
-from validate.scene.needle import needle_block
-from validate.scene.rod import bending_rod
+from validate.papers.accuracy.needle import needle_block
+from validate.papers.accuracy.rod import bending_rod
 from validate.scene.scene import Region
 from validate.solve.amplification import (
     amplification,

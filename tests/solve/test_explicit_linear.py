@@ -10,7 +10,7 @@ from validate.errors import SceneError
 from validate.fem.critical import critical_step
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System, build
-from validate.scene.needle import MP2, needle_block
+from validate.papers.accuracy.needle import MP2, needle_block
 from validate.solve.explicit_linear import ExplicitLinear, highest_frequency, stable_step
 from validate.solve.march import march
 from validate.solve.newmark import Newmark

@@ -9,8 +9,8 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.gauss_seidel import sweeps, sweeps_loops
 from validate.fem.system import System, build
-from validate.scene.needle import MP2, SPEED, STEP, needle_block, needle_depth
-from validate.scene.rod import bending_rod, gravity_inputs
+from validate.papers.accuracy.needle import MP2, SPEED, STEP, needle_block, needle_depth
+from validate.papers.accuracy.rod import bending_rod, gravity_inputs
 from validate.scene.scene import Drive, PlaneState, Support
 from validate.solve.dynamic import elastic_forces
 from validate.solve.explicit_linear import ExplicitLinear

@@ -11,14 +11,8 @@ from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build, responses
-from validate.recording.digest import digest
-from validate.recording.mcap.read import read_recording
-from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording
-from validate.scene.cone import quarter_cone
-from validate.scene.mesh_file import read_mesh
-from validate.solve.newton import StaticNewton
-from validate.twin.cone import (
+from validate.papers.ekf_nfem.cone_mesh import quarter_cone
+from validate.papers.ekf_nfem.cone_twin import (
     LoadTable,
     TwinSettings,
     cone_scene,
@@ -27,6 +21,12 @@ from validate.twin.cone import (
     marker_places,
     record_cone,
 )
+from validate.recording.digest import digest
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Recording
+from validate.scene.mesh_file import read_mesh
+from validate.solve.newton import StaticNewton
 
 MESH = read_mesh(Path(__file__).resolve().parents[2] / "experiments" / "meshes" / "cone.npz")
 COARSE = TwinSettings(radial=2, axial=4, loads=4)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
+from validate.papers.fluid_inclusion.twin import IMAGE_POSE, TwinSettings, record_phantom
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.scene.inclusion import Block
 from validate.scene.scene import Material
-from validate.twin.phantom import IMAGE_POSE, TwinSettings, record_phantom
 from validate.twin.sensors import StageProfile, streams
 
 COARSE = TwinSettings(nodes_x=7, nodes_y=8, nodes_z=11)

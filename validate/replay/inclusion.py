@@ -23,12 +23,13 @@ from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
-from validate.scene.plates import Contact, between_plates
+from validate.scene.plates import Contact, Plates, between_plates
 from validate.scene.scene import Material, Scene
 from validate.solve.fluid import ExactPressure, NoFluid
 
 _WITHIN = 0.1e-3  # m: the stage stood at a load
 _TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
+_PLATES = Plates("x0", "x1", floor="y0")
 _PLANE = (
     Together("marker.inplane", (0, 2), "position along the stage and sideways"),
     Together("marker.vertical", (1,), "position along the vertical"),
@@ -152,6 +153,7 @@ def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
     mesh = block_with_inclusion(block, nodes, _inclusion(recording, p))
     return between_plates(
         mesh if model.order == 1 else quadratic(mesh),
+        _PLATES,
         Material(p.material.E, p.material.nu),
         p.plates,
         "pointwise" if model.order == 2 else "nodal_mean",

@@ -25,12 +25,12 @@ from validate.scene.mesh import (
 _MOST_NODES = 100_000  # before memory is taken: P2 has 8 times as many
 _ROUNDS = 6  # of removing flattened cells and projecting again
 _FLAT = 1e-3  # a cell smaller than this share of the median one counts as flattened
-FACES = ("probe_plate", "stage_plate", "bottom", "top", "side_low", "side_high")
+FACES = ("x0", "x1", "y0", "y1", "z0", "z1")
 
 
 @dataclass(frozen=True)
 class Block:
-    """x compression (probe plate at 0, stage at size_x), y vertical, z lateral; sizes in m."""
+    """Sizes m along x, y and z, from the origin."""
 
     size_x: float
     size_y: float

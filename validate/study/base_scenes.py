@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.errors import SceneError, UsageError
+from validate.papers.accuracy.needle import MP1, MP2, needle_block
+from validate.papers.accuracy.needle import STEP as PAPER_002_STEP
+from validate.papers.accuracy.rod import MP3, bending_rod
 from validate.parameters import nearest_names
 from validate.scene.box import box
 from validate.scene.mesh import Mesh
-from validate.scene.needle import MP1, MP2, needle_block
-from validate.scene.needle import STEP as PAPER_002_STEP
-from validate.scene.rod import MP3, bending_rod
 from validate.scene.scene import Load, Material, Scene, Support
 
 LARGEST = 1000  # unknowns of the mesh: all modes of a body are taken many times

@@ -14,6 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import UsageError
+from validate.papers.accuracy.rod import GRAVITY, SIZE, bending_rod
 from validate.parameters import nearest_names
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
@@ -21,7 +22,6 @@ from validate.replay.find import find
 from validate.replay.options import folder_of
 from validate.scene.box import box, grid
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.rod import GRAVITY, SIZE, bending_rod
 from validate.scene.scene import LawName, Scene
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear

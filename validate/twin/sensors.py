@@ -41,11 +41,12 @@ class StageProfile:
 
 @dataclass(frozen=True)
 class OutlineSensor:
-    """Segmented outlines: points per outline, sd m along the normal, pose of the image."""
+    """Segmented outlines: points per outline, sd m along the normal, the image's pose in `frame`."""
 
     pose: Floats
     points: int
     sd: float
+    frame: str
 
     def measure(
         self, t: Floats, u: Floats, wall: SurfaceSampler, rng: np.random.Generator
@@ -54,7 +55,7 @@ class OutlineSensor:
         outlines = tuple(
             self._segmented(section(wall.deformed(ui), wall.triangles, self.pose), rng) for ui in u
         )
-        return Contours(t, outlines, self.sd, self.pose, "phantom")
+        return Contours(t, outlines, self.sd, self.pose, self.frame)
 
     def _segmented(self, outline: Floats, rng: np.random.Generator) -> Floats:
         closed = np.vstack([outline, outline[:1]])

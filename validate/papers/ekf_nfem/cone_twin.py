@@ -20,9 +20,9 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import build
+from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.parameters import quantity
 from validate.recording.types import Record, Recording
-from validate.scene.cone import quarter_cone
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Drive, Material, Scene, Support
 from validate.solve.newton import StaticNewton

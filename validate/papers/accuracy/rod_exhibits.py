@@ -9,10 +9,8 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import Cases
-from validate.replay.solver_benchmark import FIVE, IMPLICIT, Parameters
-from validate.replay.solver_errors import (
+from validate.papers.accuracy.benchmark import FIVE, IMPLICIT, Parameters
+from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
     RIVALS,
     TABLED,
@@ -30,7 +28,9 @@ from validate.replay.solver_errors import (
     switches_exhibit,
     units_in,
 )
-from validate.scene.rod import GRAVITY, MP3, SIZE, bending_rod, gravity_inputs
+from validate.papers.accuracy.rod import GRAVITY, MP3, SIZE, bending_rod, gravity_inputs
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import Cases
 from validate.solve.march import march
 
 _FIGURES = {

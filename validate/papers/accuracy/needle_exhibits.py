@@ -12,11 +12,8 @@ from validate.compare.pair import Common
 from validate.fem.mixed import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import Cases, Followed
-from validate.replay.paper_002_rules import rules_exhibit
-from validate.replay.solver_benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES, Parameters
-from validate.replay.solver_errors import (
+from validate.papers.accuracy.benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES, Parameters
+from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
     RIVALS,
     TABLED,
@@ -36,8 +33,11 @@ from validate.replay.solver_errors import (
     switches_exhibit,
     units_in,
 )
+from validate.papers.accuracy.needle import MP1, MP2, needle_block, needle_depth, needle_from_above
+from validate.papers.accuracy.rules import rules_exhibit
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import Cases, Followed
 from validate.scene.mesh import Mesh
-from validate.scene.needle import MP1, MP2, needle_block, needle_depth, needle_from_above
 from validate.scene.scene import Load, Material, PlaneState, Scene
 from validate.solve.dynamic import elastic_forces
 from validate.solve.march import march, output_frames

@@ -17,7 +17,7 @@ from validate.recording.types import Frames, Recording, Source
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
-from validate.scene.plates import between_plates
+from validate.scene.plates import Plates, between_plates
 from validate.scene.scene import LawName, Material
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
@@ -27,6 +27,8 @@ from validate.solve.types import Scheme
 from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
+PLATES = Plates("x0", "x1", floor="y0")  # the probe, the stage and the table
+FRAME = "phantom"  # x from the probe to the stage, y up, z lateral
 _LAWS = {
     "linear": "linear elasticity, small strain",
     "svk": "St. Venant-Kirchhoff",
@@ -72,7 +74,7 @@ def record_phantom(
     progress("mesh")
     grid = (twin.nodes_x, twin.nodes_y, twin.nodes_z)
     mesh = quadratic(block_with_inclusion(size, grid, capsule))
-    scene = between_plates(mesh, material, "slip")
+    scene = between_plates(mesh, PLATES, material, "slip")
     progress(f"factorise {mesh.nodes.size} unknowns")
     stepper = _scheme(material).prepare(build(scene))
     t, stage, middles = PROFILE.positions()
@@ -82,7 +84,7 @@ def record_phantom(
     rng = streams(twin.seed, SENSORS)
     layout = marker_layout(size, rng["layout"])
     pen = Pen(twin.sd_tip, twin.sd_hand, PEN_TURN, PEN_SHIFT)
-    outline = OutlineSensor(IMAGE_POSE, points=72, sd=twin.sd_outline)
+    outline = OutlineSensor(IMAGE_POSE, points=72, sd=twin.sd_outline, frame=FRAME)
     wall = cavity_sampler(mesh, "cavity", capsule)
     force, pressure = (run.traces[n].y for n in ("stage.force", "inclusion.pressure"))
     return Recording(
@@ -91,9 +93,9 @@ def record_phantom(
         1_080_345_600_000_000_000,
         markers={"markers": pen.measure(middles, run.u, mesh, layout, rng["markers"])},
         signals={
-            "stage": signal(t, stage, "m", twin.sd_stage, "phantom", rng["stage"]),
-            "load_cell": signal(t, force, "N", twin.sd_force, "phantom", rng["load_cell"]),
-            "pressure": signal(t, pressure, "Pa", twin.sd_pressure, "phantom", rng["pressure"]),
+            "stage": signal(t, stage, "m", twin.sd_stage, FRAME, rng["stage"]),
+            "load_cell": signal(t, force, "N", twin.sd_force, FRAME, rng["load_cell"]),
+            "pressure": signal(t, pressure, "Pa", twin.sd_pressure, FRAME, rng["pressure"]),
         },
         frames={"b_mode": _b_mode(middles, run.u, wall, size, rng["b_mode"])}
         if twin.frames
@@ -118,7 +120,7 @@ def _b_mode(
         target = Target(outline, shadow=4.0, enhancement=3.0, texture=1.0, plate=size.size_x - load)
         images.append(b_mode(SCANNER, target, rng))
     pixel = SCANNER.m_per_px
-    return Frames(t, tuple(images), (pixel, pixel), IMAGE_POSE, "phantom")
+    return Frames(t, tuple(images), (pixel, pixel), IMAGE_POSE, FRAME)
 
 
 def _scheme(material: Material) -> Scheme:

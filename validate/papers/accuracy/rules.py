@@ -8,9 +8,9 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import build as build_system
-from validate.replay.solver_benchmark import IMPLICIT
-from validate.scene.needle import MP1, MP2, needle_block
-from validate.scene.rod import bending_rod
+from validate.papers.accuracy.benchmark import IMPLICIT
+from validate.papers.accuracy.needle import MP1, MP2, needle_block
+from validate.papers.accuracy.rod import bending_rod
 from validate.solve.amplification import amplification, newmark_maps, spectral_radii
 from validate.solve.newmark_rule import Rule, rule_of
 

@@ -1,4 +1,4 @@
-"""The cone of paper 003 beside ours: what its 0.15 N can show, elements, and printed figures."""
+"""The cone of paper 003 beside ours: what its 0.15 N can show, and elements."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.compare.published import Figure
+from validate.papers.ekf_nfem.tables import locking_table, readings_table, steps_table
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
-from validate.replay.paper_003 import held_errors, locking_table, readings_table, steps_table
 from validate.replay.standard_exhibits import error_at
 
 _MM = 1e3
@@ -179,37 +178,3 @@ def _cards(parameters: Any, main: Mapping[str, Followed]) -> NumberTable:
         rows,
         "Choose one with --set material.card=NAME.",
     )
-
-
-# --- printed figures ------------------------------------------------------------------------------
-
-# MAE, RMSE, SD m: theirs, and ours when the verdicts were written.
-_TABLE_3 = {
-    "node_A": (
-        (0.060494e-3, 0.017057e-3), (0.086648e-3, 0.021244e-3), (0.062242e-3, 0.012705e-3),
-    ),
-    "node_B": (
-        (0.007254e-3, 0.015196e-3), (0.009434e-3, 0.020183e-3), (0.006051e-3, 0.013326e-3),
-    ),
-}  # fmt: skip
-
-CONE_FIGURES = (
-    *held_errors(
-        _TABLE_3, "@small",
-        "a total of 0.15 N moves this cone by less than the printed error: only a force on every "
-        "node, or some 15 N, gives motions of that size",
-        "Table 3",
-    ),
-    Figure(
-        "nodes of the cone's mesh", "told:nodes", 559.0, 6.0, "1", "reproduced",
-        "a mesh of our own making, as near as it came", "section 3.4", 555.0, 0.0,
-    ),
-    Figure(
-        "tetrahedra of the cone's mesh", "told:cells", 2349.0, 24.0, "1", "reproduced",
-        "a mesh of our own making, as near as it came", "section 3.4", 2357.0, 0.0,
-    ),
-    Figure(
-        "Poisson ratio", None, 0.5, None, "1", "not reproducible as printed",
-        "lambda = E nu / ((1 + nu)(1 - 2 nu)) is infinite at 0.5", "section 3.4, eq 8",
-    ),
-)  # fmt: skip

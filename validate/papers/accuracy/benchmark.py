@@ -14,6 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.fem.system import build as build_system
+from validate.papers.accuracy.needle import STEP
 from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
@@ -22,7 +23,6 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Change, Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.scene.needle import STEP
 from validate.scene.scene import Material, PlaneState, Scene
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.march import march, output_frames

@@ -1,0 +1,1 @@
+"""Paper 002: what explicit steps, lumping and quasi-statics cost in accuracy."""
