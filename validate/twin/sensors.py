@@ -41,7 +41,7 @@ class StageProfile:
 
 @dataclass(frozen=True)
 class OutlineSensor:
-    """Segmented outlines: points per outline, sd m along the normal, the image's pose in `frame`."""
+    """Segmented outlines: points per outline, sd m along the normal, its pose in `frame`."""
 
     pose: Floats
     points: int
