@@ -13,28 +13,27 @@ from validate.papers.accuracy.benchmark import (
     FRAMES,
     SWITCHES,
     Benchmark,
-    Body,
-    Clock,
-    Parameters,
-    TwinCard,
+    Cells,
+    RefinedTwin,
+    SolverTest,
     card,
-    changed,
     solvers,
 )
 from validate.papers.accuracy.figures import ROD_FIGURES
 from validate.papers.accuracy.needle import STEP
 from validate.papers.accuracy.rod import MP3, SIZE, bending_rod, gravity_inputs
 from validate.papers.accuracy.rod_exhibits import tell
+from validate.replay.cards import Clock, changed, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "bending_rod.mcap"
-PARAMETERS = Parameters(card(MP3), Body(3), Clock(), TwinCard(), str(RECORDING))
+PARAMETERS = SolverTest(card(MP3), Cells(3), Clock(STEP, 300), RefinedTwin(), str(RECORDING))
 
 
-def scene(material: Material, body: Body) -> Scene:
+def scene(material: Material, body: Cells) -> Scene:
     return bending_rod(body.cells, material)
 
 
@@ -77,7 +76,7 @@ EXPERIMENT = Experiment(
     methods=METHODS,
     accepted=("explicit",),
     accept=(Accept("tip", 2e-3, "two percent of the largest displacement there (ours)"),),
-    load=BENCHMARK.load,
+    load=shipped,
     build=BENCHMARK.build,
     place=BENCHMARK.place,
     sets=BENCHMARK.sets,

@@ -5,7 +5,6 @@ implicit run with consistent mass on the same mesh; beside it stand truths that 
 know: the prostate's material, a finer mesh, smaller steps, plane stress.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 from validate.arrays import Floats
@@ -15,27 +14,26 @@ from validate.papers.accuracy.benchmark import (
     FRAMES,
     SWITCHES,
     Benchmark,
-    Body,
-    Clock,
-    Parameters,
-    TwinCard,
+    Cells,
+    RefinedTwin,
+    SolverTest,
     card,
-    changed,
     solvers,
 )
 from validate.papers.accuracy.figures import NEEDLE_FIGURES
 from validate.papers.accuracy.needle import MP1, MP2, STEP, needle_block, needle_depth
 from validate.papers.accuracy.needle_exhibits import tell
+from validate.replay.cards import Clock, changed, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "needle_block.mcap"
-PARAMETERS = Parameters(card(MP1), Body(20), Clock(), TwinCard(), str(RECORDING))
+PARAMETERS = SolverTest(card(MP1), Cells(20), Clock(STEP, 300), RefinedTwin(), str(RECORDING))
 
 
-def scene(material: Material, body: Body) -> Scene:
+def scene(material: Material, body: Cells) -> Scene:
     return needle_block(body.cells, material, body.plane)
 
 
@@ -60,7 +58,7 @@ METHODS = {
 }
 CASES = (
     Case("prostate", "the truth is MP2, the models are MP1",
-         lambda p: replace(p, material=card(MP2)), methods=tuple(FIVE)),
+         changed(material=card(MP2)), methods=tuple(FIVE)),
     Case("finer_mesh", "the truth has twice as many cells a side",
          changed("twin", refined=2), methods=tuple(FIVE)),
     Case("small_steps", "the truth takes 20 steps in one of the models'",
@@ -80,7 +78,7 @@ EXPERIMENT = Experiment(
         Accept("side", 1e-3, "some percent of the largest displacement there (ours)"),
         Accept("inside", 1e-3, "some percent of the largest displacement there (ours)"),
     ),
-    load=BENCHMARK.load,
+    load=shipped,
     build=BENCHMARK.build,
     place=BENCHMARK.place,
     sets=BENCHMARK.sets,

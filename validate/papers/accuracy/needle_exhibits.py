@@ -12,7 +12,7 @@ from validate.compare.pair import Common
 from validate.fem.mixed import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.papers.accuracy.benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES, Parameters
+from validate.papers.accuracy.benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES, SolverTest
 from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
     RIVALS,
@@ -59,7 +59,7 @@ _SWEPT = (10, 20, 30)  # cells a side
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """All exhibits of the needle's block, and the numbers of its printed figures."""
-    p, main = cast(Parameters, parameters), cases[""]
+    p, main = cast(SolverTest, parameters), cases[""]
     progress("errors over time")
     errors = errors_on(main, TABLED, RIVALS)
     shown = errors_exhibit(errors, 2, _FIGURES, _words(errors))
@@ -150,7 +150,7 @@ def _side(main: Mapping[str, Followed], t: float) -> Chart:
 # --- materials: figure 11 ------------------------------------------------------------------------
 
 
-def _materials(p: Parameters, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
+def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     """MP1's answers and MP2's own quasi-statics against the implicit run with MP2."""
     case = cases["prostate"]
     errors = errors_on(case, ("E_n", "E_s", "E_i"), ("implicit", *RIVALS))
@@ -187,7 +187,7 @@ def _materials(p: Parameters, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     )
 
 
-def _by_scene(p: Parameters) -> NumberTable:
+def _by_scene(p: SolverTest) -> NumberTable:
     """E_n of the rivals for both materials in both plane states, each against its own truth."""
     rows: list[tuple[Entry, ...]] = []
     for material, properties in MATERIALS.items():
@@ -213,13 +213,13 @@ def _e_n(run: Run, truth: Run, k: int) -> float:
     return float(np.linalg.norm(run.u[k] - truth.u[k]) / np.linalg.norm(truth.u[k]))
 
 
-def _refusals(p: Parameters) -> str:
+def _refusals(p: SolverTest) -> str:
     scene = needle_block(p.body.cells, MP2, p.body.plane)
     run = _run(scene, FIVE["explicit"].settings, p)
     return f"The explicit method with MP2 is {run.outcome.state}: {run.outcome.why}."
 
 
-def _run(scene: Scene, settings: Any, p: Parameters) -> Run:
+def _run(scene: Scene, settings: Any, p: SolverTest) -> Run:
     steps = p.clock.steps
     t: Floats = p.clock.dt * np.arange(1, steps + 1, dtype=np.float64)
     stepper = replace(settings, **({"dt": p.clock.dt} if hasattr(settings, "dt") else {}))

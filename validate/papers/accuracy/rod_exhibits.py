@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.papers.accuracy.benchmark import FIVE, IMPLICIT, Parameters
+from validate.papers.accuracy.benchmark import FIVE, IMPLICIT, SolverTest
 from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
     RIVALS,
@@ -47,7 +47,7 @@ _MOVING = 4.0  # s: until here the rod falls
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """All exhibits of the rod, and the numbers of its printed figures."""
-    p, main = cast(Parameters, parameters), cases[""]
+    p, main = cast(SolverTest, parameters), cases[""]
     progress("errors over time")
     errors = errors_on(main, TABLED, RIVALS)
     shown = errors_exhibit(errors, 3, _FIGURES, _words(errors))
@@ -157,7 +157,7 @@ def beam(*, shear: bool) -> float:
     return bending + (q * length**2 / (2 * kappa * MP3.shear_modulus * b * h) if shear else 0.0)
 
 
-def _limits(p: Parameters) -> Exhibit:
+def _limits(p: SolverTest) -> Exhibit:
     rows = [limit_row(f"n = {n}", build_system(bending_rod(n)), p.clock.dt) for n in _MESHES[:-1]]
     table = NumberTable(
         "limits", "Critical steps of the explicit schemes with full C, exact.", LIMIT_HEADS,

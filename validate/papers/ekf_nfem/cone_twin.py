@@ -35,7 +35,7 @@ _SIDES = {"node_B": (1, 0), "node_C": (0, 1), "node_D": (-1, 0), "node_E": (0, -
 
 
 @dataclass(frozen=True)
-class TwinSettings:
+class ConeTwin:
     """Specimen, mesh, loading, machine and sensors of the cone's recording."""
 
     bottom: float = quantity(0.068, "m", "diameter of the held face")
@@ -84,7 +84,7 @@ class LoadTable:
         return np.asarray(q), np.asarray(u)
 
 
-def record_cone(settings: TwinSettings, progress: Callable[[str], None]) -> Recording:
+def record_cone(settings: ConeTwin, progress: Callable[[str], None]) -> Recording:
     """The recording: "markers", "stage" m (crosshead), "load_cell" N; records beside the tracker's:
     "specimen" and "machine". Its displacements stand in a camera's frame: `register.placed`.
 
@@ -111,7 +111,7 @@ def record_cone(settings: TwinSettings, progress: Callable[[str], None]) -> Reco
     return replace(recording, metadata={**recording.metadata, **_records(settings)})
 
 
-def cone_scene(settings: TwinSettings) -> Scene:
+def cone_scene(settings: ConeTwin) -> Scene:
     """The quarter between bonded plates, driven from its top."""
     s = settings
     mesh = quadratic(quarter_cone(s.bottom, s.top, s.height, s.radial, s.axial, s.grading))
@@ -129,14 +129,14 @@ def cone_scene(settings: TwinSettings) -> Scene:
     )
 
 
-def marker_places(settings: TwinSettings) -> dict[str, Floats]:
+def marker_places(settings: ConeTwin) -> dict[str, Floats]:
     """node_A at the top's centre, on the plate; others around the side at half height (3,) m."""
     r, z = (settings.bottom + settings.top) / 4, settings.height / 2
     sides = {name: np.array([r * x, r * y, z]) for name, (x, y) in _SIDES.items()}
     return {"node_A": np.array([0.0, 0.0, settings.height]), **sides}
 
 
-def fiducial_places(settings: TwinSettings) -> dict[str, Floats]:
+def fiducial_places(settings: ConeTwin) -> dict[str, Floats]:
     """Three marks at the foot of the cone, where it is held (3,) m; a fourth would make the set
     symmetric, and labels turned by a quarter would pass."""
     r = settings.bottom / 2
@@ -177,13 +177,13 @@ def _compression(stepper: Stepper, force: float) -> float:
     return probe * force / state.numbers["stage.force"]
 
 
-def crosshead(settings: TwinSettings, compression: Floats, force: Floats) -> Floats:
+def crosshead(settings: ConeTwin, compression: Floats, force: Floats) -> Floats:
     """What the machine shows (nt,) m: compression, its own compliance, and the plate's seating."""
     seating = settings.toe * (1 - np.exp(-force / settings.toe_force))
     return np.asarray(compression + force / settings.machine + seating)
 
 
-def _declared(settings: TwinSettings, mesh: Mesh) -> Record:
+def _declared(settings: ConeTwin, mesh: Mesh) -> Record:
     material = settings.material
     return {
         "law": "compressible neo-Hookean",
@@ -196,7 +196,7 @@ def _declared(settings: TwinSettings, mesh: Mesh) -> Record:
     }
 
 
-def _records(settings: TwinSettings) -> dict[str, Record]:
+def _records(settings: ConeTwin) -> dict[str, Record]:
     s = settings
     return {
         "specimen": {

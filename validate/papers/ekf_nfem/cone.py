@@ -1,0 +1,200 @@
+"""The cone of paper 003 on its testing machine: parameters, scenes, truth and registration."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from validate.papers.ekf_nfem.cone_mesh import quarter_cone
+from validate.papers.ekf_nfem.cone_twin import (
+    ConeTwin,
+    LoadTable,
+    cone_scene,
+    load_table,
+    marker_places,
+    record_cone,
+)
+from validate.parameters import quantity, require_ranges
+from validate.recording.types import Recording
+from validate.register.markers import MarkerObservation, placed_markers
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, driving
+from validate.replay.cards import changed, finer_quarter
+from validate.replay.experiment import Input, Progress, Uncertainty
+from validate.replay.followed import Truth
+from validate.scene.mesh import quadratic
+from validate.scene.mesh_file import read_mesh
+from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
+
+REACH = ConeTwin().force
+SHEAR = {"paper": 22_081.0, "cylinders_slip": 31_200.0, "cylinders_bonded": 18_500.0}  # Pa
+
+
+@dataclass(frozen=True)
+class ShearCard:
+    card: Literal["paper", "cylinders_slip", "cylinders_bonded"] = quantity(
+        "paper", "1", "shear modulus: 22.081 kPa printed, or real cylinders' 31.2 / 18.5 kPa"
+    )
+    scale: float = quantity(1.0, "1", "modulus over the card's")
+    nu: float = quantity(0.4995, "1", "Poisson ratio of bodies moved by the plate; printed .5")
+    nu_explicit: float = quantity(0.49, "1", "Poisson ratio of explicit runs: linear cells lock")
+    rho: float = quantity(1060.0, "kg/m3", "density")
+    mass_damping: float = quantity(60.0, "1/s", "of explicit runs in scaled time")
+
+
+@dataclass(frozen=True)
+class ConeMesh:
+    file: str = quantity("", "1", "mesh of the explicit runs")
+    radial: int = quantity(4, "1", "cells from axis to side of the quarter")
+    axial: int = quantity(5, "1", "cells along its axis")
+    finer_radial: int = quantity(6, "1", "the second mesh, for u_num")
+    finer_axial: int = quantity(7, "1", "the second mesh, for u_num")
+    grading: float = quantity(2.0, "1", "above 1: smaller cells towards side and plates")
+    load_step: float = quantity(0.4e-3, "m", "grid of loads that the quarter is solved at")
+
+
+@dataclass(frozen=True)
+class ScaledTime:
+    scale: float = quantity(30.0, "1", "recorded over simulated time of the explicit runs")
+    substeps: int = quantity(60, "1", "explicit steps between two samples")
+
+
+@dataclass(frozen=True)
+class ConeRanges:
+    """Standard uncertainties of the inputs, declared before the comparison."""
+
+    modulus: float = quantity(0.02, "1", "relative, of the shear modulus")
+    nu: float = quantity(0.0002, "1", "of the Poisson ratio")
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
+
+@dataclass(frozen=True)
+class PressedCone:
+    """Parameters; `recording` is a path."""
+
+    material: ShearCard = ShearCard()
+    mesh: ConeMesh = ConeMesh()
+    clock: ScaledTime = ScaledTime()
+    ranges: ConeRanges = ConeRanges()
+    twin: ConeTwin = ConeTwin()
+    recording: str = quantity("", "1", "the recording")
+
+
+@dataclass(frozen=True)
+class ConeModel:
+    """`plate`: moved by the tracked plate; else pushed by the force, lateral motion held on top."""
+
+    plate: bool = quantity(False, "1", "moved by the plate, not pushed by the force")
+    element: Literal["p1", "p1_mean", "p2"] = quantity("p1", "1", "p1_mean: nodal mean dilatation")
+    law: Literal["svk", "neo_hooke"] = quantity("svk", "1", "law of the material")
+
+
+def build(recording: Recording, parameters: PressedCone, model: ConeModel) -> Scene:
+    return _quarter(parameters, model) if model.plate else _whole(parameters, model)
+
+
+def _material(p: PressedCone, model: ConeModel, nu: float, damping: float) -> Material:
+    mu = p.material.scale * SHEAR[p.material.card]
+    return Material(2 * mu * (1 + nu), nu, model.law, p.material.rho, damping)
+
+
+def _quarter(p: PressedCone, model: ConeModel) -> Scene:
+    """A quarter between bonded plates, the upper one driven down."""
+    s, grid = p.twin, p.mesh
+    mesh = quarter_cone(s.bottom, s.top, s.height, grid.radial, grid.axial, grid.grading)
+    scene = cone_scene(s)
+    inside = {n: at for n, at in marker_places(s).items() if (at >= 0).all()}
+    return replace(
+        scene,
+        mesh=quadratic(mesh) if model.element == "p2" else mesh,
+        material=_material(p, model, p.material.nu, 0.0),
+        dilatation="nodal_mean" if model.element == "p1_mean" else "pointwise",
+        drives=(Drive("plate", "top", (0.0, 0.0, -1.0)),),
+        probes=tuple(Probe(n, tuple(at)) for n, at in inside.items()),
+    )
+
+
+def _whole(p: PressedCone, model: ConeModel) -> Scene:
+    """The shipped mesh, bonded below, pushed from above without lateral motion there."""
+    return Scene(
+        read_mesh(Path(p.mesh.file)),
+        _material(p, model, p.material.nu_explicit, p.material.mass_damping),
+        (Support("bottom", (0, 1, 2)), Support("top", (0, 1))),
+        loads=(Load("press", "top", (0.0, 0.0, -1.0)),),
+        probes=tuple(Probe(n, tuple(at)) for n, at in marker_places(p.twin).items()),
+    )
+
+
+def record(parameters: PressedCone, progress: Progress) -> Recording:
+    return record_cone(parameters.twin, progress)
+
+
+def truth(parameters: PressedCone, seen: Registered) -> Truth:
+    """The twin's own displacements at the samples after rest."""
+    s = parameters.twin
+    n = round(s.duration * s.rate)
+    _, u = _table(replace(s, force=max(s.force, REACH))).at(s.force * np.arange(1, n + 1) / n)
+    return Truth({name: u[:, j] for j, name in enumerate(marker_places(s))})
+
+
+@cache
+def _table(s: ConeTwin) -> LoadTable:
+    """One table for both recordings: it is by far the dearest part of a run."""
+    places = np.array(list(marker_places(s).values()))
+    return load_table(cone_scene(s), places, s.force, s.loads)
+
+
+def place(recording: Recording, parameters: PressedCone, scene: Scene) -> Registered:
+    """The plate's path, or the load cell's ramp, each fitted by least squares; explicit runs in
+    scaled time."""
+    whole = placed_markers(recording, read_mesh(Path(parameters.mesh.file)))
+    markers = whole.within(scene.mesh)
+    cell = driving(recording, "load_cell", "N", after_rest=True)
+    if scene.drives:
+        return _plate(markers, cell)
+    return _pushed(markers, cell, parameters.clock.scale)
+
+
+def _plate(markers: MarkerObservation, cell: SignalObservation) -> Registered:
+    """Compression by a cubic through the plate's marker, from rest; the cell's force validates."""
+    j = markers.names.index("node_A")
+    down = markers.rest[j, 2] - markers.x[:, j, 2]
+    seen = np.isfinite(down)
+    powers = markers.t[:, None] ** np.arange(1, 4)
+    path = powers @ np.linalg.lstsq(powers[seen], down[seen], rcond=None)[0]
+    y = np.interp(cell.t, markers.t, path)[:, None]
+    plate = SignalObservation("plate", "drives", cell.t, y, "m", markers.sd)
+    force = replace(cell, role="validates", quantity="force", trace="plate.force")
+    return Registered((plate, markers, force))
+
+
+def _pushed(markers: MarkerObservation, cell: SignalObservation, scale: float) -> Registered:
+    """A straight ramp through the load cell's samples, in time divided by `scale`."""
+    t = cell.t
+    slope = float(t @ cell.y[:, 0] / (t @ t))
+    press = replace(cell, t=t / scale, y=(slope * t)[:, None])
+    return Registered((press, replace(markers, t=markers.t / scale)), time_scale=scale)
+
+
+def sets(parameters: PressedCone, seen: Registered) -> Mapping[str, Any]:
+    p = parameters
+    return {"dt": float(seen.t[0]), "substeps": p.clock.substeps, "step": p.mesh.load_step}
+
+
+# Corners of bonded plates limit the order of quadratic elements to 2.
+UNCERTAINTY = Uncertainty(
+    finer=finer_quarter,
+    refinement=lambda p: float((p.mesh.finer_axial / p.mesh.axial) ** 2 - 1),
+    inputs=(
+        Input("modulus", changed("material", scale=lambda p: 1.02 * p.material.scale),
+              lambda p: p.ranges.modulus / 0.02, "shear modulus"),
+        Input("nu", changed("material", nu=lambda p: p.material.nu - 0.0005),
+              lambda p: p.ranges.nu / 0.0005, "Poisson ratio"),
+    ),
+    surrogate="plate_p2",
+)  # fmt: skip

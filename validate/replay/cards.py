@@ -1,0 +1,88 @@
+"""What the parameters of several experiments have in common: cards, and changes of them."""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+from validate.parameters import quantity
+from validate.recording.mcap.read import read_recording
+from validate.recording.types import Recording
+from validate.replay.experiment import Change
+from validate.scene.scene import Material
+from validate.twin.tracked import Camera, require_noise
+
+
+@dataclass(frozen=True)
+class DampedTissue:
+    """A linear material with Rayleigh damping, of the models."""
+
+    E: float = quantity(10e3, "Pa", "Young's modulus")
+    nu: float = quantity(0.47, "1", "Poisson ratio")
+    rho: float = quantity(1000.0, "kg/m3", "density")
+    mass_damping: float = quantity(0.0, "1/s", "Rayleigh alpha")
+    stiffness_damping: float = quantity(0.0, "s", "Rayleigh beta")
+
+    @property
+    def material(self) -> Material:
+        return Material(
+            self.E, self.nu, "linear", self.rho, self.mass_damping, self.stiffness_damping
+        )
+
+
+@dataclass(frozen=True)
+class Clock:
+    dt: float = quantity(1e-3, "s", "time step")
+    steps: int = quantity(1000, "1", "steps")
+
+
+@dataclass(frozen=True)
+class TrackedTwin:
+    """What made a tracked recording; the models do not know it."""
+
+    seed: int = quantity(1, "1", "seed of the noise")
+    noise: float = quantity(1e-9, "m2", "variance of the white noise per component (.001 mm2)")
+    stiffness: float = quantity(1.0, "1", "its modulus over that of the models")
+    nu: float | None = quantity(None, "1", "its Poisson ratio; none: that of the models")
+    every: int = quantity(1, "1", "steps between two looks of the tracker")
+    missing: float = quantity(0.0, "1", "share of the looks at which a marker is not seen")
+
+    def __post_init__(self) -> None:
+        require_noise(self.noise)
+
+    @property
+    def camera(self) -> Camera:
+        """The tracker; its registration rests on 10 000 looks at rest."""
+        return Camera(sqrt(self.noise), self.every, self.missing, still=10_000)
+
+    def true(self, material: Material) -> Material:
+        """The models' material as the twin has it."""
+        nu = material.nu if self.nu is None else self.nu
+        return replace(material, E=self.stiffness * material.E, nu=nu)
+
+
+def shipped(parameters: Any, folder: Path) -> tuple[Recording, ...]:
+    """The one recording that the parameters name."""
+    return (read_recording(Path(parameters.recording)),)
+
+
+def changed(part: str = "", **values: Any) -> Change:
+    """A change of one part of the parameters ("": of themselves); a value that is a function is one
+    of all parameters."""
+
+    def change(p: Any) -> Any:
+        new = {k: v(p) if callable(v) else v for k, v in values.items()}
+        return replace(p, **{part: replace(getattr(p, part), **new)} if part else new)
+
+    return change
+
+
+def one(parameters: Any) -> float:
+    """The scale of an input whose change is one standard uncertainty."""
+    return 1.0
+
+
+#: The second mesh of a quarter of a round body, for u_num.
+finer_quarter = changed(
+    "mesh", radial=lambda p: p.mesh.finer_radial, axial=lambda p: p.mesh.finer_axial
+)
