@@ -14,7 +14,6 @@ from validate.estimate.reduced_ekf import ReducedEKF
 from validate.papers.ekf_nfem.cone import (
     UNCERTAINTY,
     ConeMesh,
-    ConeModel,
     PressedCone,
     build,
     place,
@@ -22,6 +21,7 @@ from validate.papers.ekf_nfem.cone import (
     sets,
     truth,
 )
+from validate.papers.ekf_nfem.cone import ConeModel as Model
 from validate.papers.ekf_nfem.cone_exhibits import tell_cone
 from validate.papers.ekf_nfem.figures import CONE_FIGURES
 from validate.replay.cards import shipped
@@ -39,23 +39,21 @@ PARAMETERS = PressedCone(
 QUASI_STATIC = Tabulated(StaticNewton("none"), 0.4e-3)
 A = ("node_A",)
 METHODS = {
-    "plate_p2": Method(
-        "plate moved, P2 neo-Hooke", QUASI_STATIC, ConeModel(True, "p2", "neo_hooke")
-    ),
+    "plate_p2": Method("plate moved, P2 neo-Hooke", QUASI_STATIC, Model(True, "p2", "neo_hooke")),
     "plate_mean": Method(
         "plate moved, P1 mean dilatation, neo-Hooke",
         QUASI_STATIC,
-        ConeModel(True, "p1_mean", "neo_hooke"),
+        Model(True, "p1_mean", "neo_hooke"),
     ),
-    "plate_p1": Method("plate moved, P1 (locks)", QUASI_STATIC, ConeModel(True, "p1", "neo_hooke")),
-    "nfem": Method("NFEM, force, explicit", CentralDifference(watch=1), ConeModel()),
-    "ekf_held": Method("node-level EKF as printed, held", NodeEKF(overflow="hold"), ConeModel(), A),
+    "plate_p1": Method("plate moved, P1 (locks)", QUASI_STATIC, Model(True, "p1", "neo_hooke")),
+    "nfem": Method("NFEM, force, explicit", CentralDifference(watch=1), Model()),
+    "ekf_held": Method("node-level EKF as printed, held", NodeEKF(overflow="hold"), Model(), A),
     "ekf_companion": Method(
-        "node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), ConeModel(), A
+        "node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), Model(), A
     ),
-    "reduced_modes": Method("reduced EKF, 20 modes and load bias", ReducedEKF(), ConeModel(), A),
+    "reduced_modes": Method("reduced EKF, 20 modes and load bias", ReducedEKF(), Model(), A),
     "reduced_pod": Method(
-        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", shapes=5), ConeModel(), A
+        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", shapes=5), Model(), A
     ),
 }
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.papers.fluid_inclusion.twin import IMAGE_POSE, TwinSettings, record_phantom
+from validate.papers.fluid_inclusion.twin import IMAGE_POSE, PhantomTwin, record_phantom
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
@@ -16,11 +16,11 @@ from validate.scene.inclusion import Block
 from validate.scene.scene import Material
 from validate.twin.sensors import StageProfile, streams
 
-COARSE = TwinSettings(nodes_x=7, nodes_y=8, nodes_z=11)
+COARSE = PhantomTwin(nodes_x=7, nodes_y=8, nodes_z=11)
 SIZE, GELATIN = Block(0.060, 0.045, 0.070), Material(15_200.0, 0.485)
 
 
-def made(settings: TwinSettings = COARSE) -> Recording:
+def made(settings: PhantomTwin = COARSE) -> Recording:
     return record_phantom(settings, SIZE, GELATIN, lambda _: None)
 
 
@@ -95,7 +95,7 @@ def test_every_sensor_has_a_stream_of_its_own() -> None:
 @pytest.mark.slow
 def test_the_shipped_recording_is_made_again_to_1e_9(project_root: Path) -> None:
     shipped = read_recording(project_root / "recordings" / "fluid_phantom.mcap")
-    again = made(TwinSettings())
+    again = made(PhantomTwin())
     scale = {"stage": 1e-2, "load_cell": 7.0, "pressure": 1e3}
     for topic, size in scale.items():
         one, other = again.signals[topic], shipped.signals[topic]

@@ -62,8 +62,13 @@ class TrackedTwin:
 
 
 def shipped(parameters: Any, folder: Path) -> tuple[Recording, ...]:
-    """The one recording that the parameters name."""
+    """The one recording whose path the parameters give."""
     return (read_recording(Path(parameters.recording)),)
+
+
+def beside(parameters: Any, folder: Path) -> tuple[Recording, ...]:
+    """The one recording that lies beside the experiment's own file, under the name it gives."""
+    return (read_recording(folder / parameters.recording),)
 
 
 def changed(part: str = "", **values: Any) -> Change:

@@ -14,12 +14,12 @@ from typing import Any, Literal
 import numpy as np
 
 from validate.compare.verdict import Accept
-from validate.identify.modulus import Cylinder, fit_modulus, identify_modulus
+from validate.identify.modulus import Cylinder, ModulusFit, fit_modulus, identify_modulus
 from validate.parameters import quantity, require_ranges
-from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
+from validate.replay.cards import beside, changed, one
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.cylinder import quarter_cylinder
@@ -31,6 +31,8 @@ from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 
+STAGE = Drive("stage", "upper_plate", (0.0, 0.0, -1.0))
+SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))  # of a quarter
 _LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
 
 
@@ -111,22 +113,20 @@ def compression(
 ) -> Experiment:
     """The experiment: `force` is judged in the windows "fit" and "beyond"."""
     return Experiment(
-        name, title, source, parameters, methods, accepted, accept, _load, _build, _place,
+        name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
         sets=_sets, identify=_identify, frames=2,
         uncertainty=Uncertainty(
-            finer=_finer,
+            finer=changed("mesh", radial=_finer, axial=_finer),
             refinement=lambda p: float((p.mesh.finer / p.mesh.radial) ** 2 - 1),
             inputs=(
-                Input("modulus", _stiffer, lambda p: 1.0, "E within its declared uncertainty"),
-                Input("diameter", _wider, lambda p: 1.0, "diameter within its declared range"),
+                Input("modulus", changed("material", E=_stiffer), one,
+                      "E within its declared uncertainty"),
+                Input("diameter", changed("material", E=_wider), one,
+                      "diameter within its declared range"),
             ),
             surrogate=accepted[0],
         ),
     )  # fmt: skip
-
-
-def _load(p: Compression, folder: Path) -> tuple[Recording, ...]:
-    return (read_recording(folder / p.recording),)
 
 
 def _size(p: Compression) -> Cylinder:
@@ -151,9 +151,9 @@ def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
     return Scene(
         quadratic(linear) if model.order == 2 else linear,
         material,
-        (*_plates(model.plates), *(() if whole else _symmetry())),
+        (*between(model.plates), *(() if whole else SYMMETRY)),
         pins=_pins(linear) if whole and model.plates == "slip" else (),
-        drives=(Drive("stage", "upper_plate", (0.0, 0.0, -1.0)),),
+        drives=(STAGE,),
         dilatation="nodal_mean" if model.order == 1 else "pointwise",
         copies=1 if whole else 4,
     )
@@ -167,14 +167,11 @@ def _body(p: Compression) -> Mesh:
     return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
 
 
-def _plates(contact: Contact) -> tuple[Support, ...]:
+def between(contact: Contact) -> tuple[Support, ...]:
+    """The fixed plate below, and what the moving one above holds sideways."""
     if contact == "slip":
         return (Support("lower_plate", (2,)),)
     return (Support("lower_plate", (0, 1, 2)), Support("upper_plate", (0, 1)))
-
-
-def _symmetry() -> tuple[Support, ...]:
-    return (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))
 
 
 def _pins(mesh: Mesh) -> tuple[Pin, ...]:
@@ -189,21 +186,33 @@ def _pins(mesh: Mesh) -> tuple[Pin, ...]:
 
 
 def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
-    """Displacement less contact and toe, force less the cell's offset, to the strain limit."""
-    height, fitted = p.specimen.height, (p.fit_from, p.fit_to)
-    fit = fit_modulus(recording, _size(p), fitted)
+    fit = fit_modulus(recording, _size(p), (p.fit_from, p.fit_to))
+    noise = max(fit.noise, recording.signal("force", "N").sd)
+    strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
+    return pressed_log(recording, fit, p.specimen.height, p.limit, strains, noise)
+
+
+def pressed_log(
+    recording: Recording,
+    fit: ModulusFit,
+    height: float,
+    limit: float,
+    strains: Mapping[str, tuple[float, float]],
+    noise: float,
+) -> Registered:
+    """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
+
+    The force, of sd `noise` N, is compared in the windows of strain.
+    """
     d, force = recording.signal("displacement", "m"), recording.signal("force", "N")
     moved = d.y - fit.contact - fit.toe * height
-    last = int(np.argmax(moved[:, 0] > p.limit * height)) or len(moved)
+    last = int(np.argmax(moved[:, 0] > limit * height)) or len(moved)
     stage = SignalObservation("displacement", "drives", d.t[:last], moved[:last], "m", d.sd)
     cell = SignalObservation(
-        "force", "validates", d.t[:last], force.y[:last] - fit.offset, "N",
-        max(fit.noise, force.sd), "force", "stage.force",
+        "force", "validates", d.t[:last], force.y[:last] - fit.offset, "N", noise, "force",
+        "stage.force",
     )  # fmt: skip
-    windows = {
-        "fit": (p.fit_from * height, p.fit_to * height),
-        "beyond": (p.fit_to * height, p.limit * height),
-    }
+    windows = {label: (a * height, b * height) for label, (a, b) in strains.items()}
     return Registered((stage, cell), windows_of(stage, windows), outside=len(d.t) - last)
 
 
@@ -215,18 +224,14 @@ def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
 # --- what is uncertain ----------------------------------------------------------------------------
 
 
-def _finer(p: Compression) -> Compression:
-    return replace(p, mesh=replace(p.mesh, radial=p.mesh.finer, axial=p.mesh.finer))
+def _finer(p: Compression) -> int:
+    return p.mesh.finer
 
 
-def _scaled(p: Compression, by: float) -> Compression:
-    return replace(p, material=replace(p.material, E=by * (p.material.E or 0.0)))
+def _stiffer(p: Compression) -> float:
+    return (p.material.E or 0.0) * (1 + p.ranges.E)
 
 
-def _stiffer(p: Compression) -> Compression:
-    return _scaled(p, 1 + p.ranges.E)
-
-
-def _wider(p: Compression) -> Compression:
+def _wider(p: Compression) -> float:
     """A wider specimen is as much stiffer as its area is larger."""
-    return _scaled(p, (1 + p.ranges.diameter) ** 2)
+    return (p.material.E or 0.0) * (1 + p.ranges.diameter) ** 2

@@ -6,12 +6,10 @@ Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 from validate.compare.verdict import Accept
 from validate.parameters import quantity, require_ranges
-from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Together, placed_markers
@@ -19,6 +17,7 @@ from validate.register.outlines import observe_outlines
 from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, instant, validating
+from validate.replay.cards import beside, changed, one
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
@@ -117,25 +116,21 @@ def inclusion_test(
 ) -> Experiment:
     """The experiment; the last method, the cheapest, is the one that inputs are varied with."""
     return Experiment(
-        name, title, source, parameters, methods, accepted, accept, _load, _build, _place,
+        name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
         uncertainty=Uncertainty(
             finer=_finer,
             refinement=lambda p: float(p.mesh.finer**2 - 1),
             inputs=(
-                Input("modulus", lambda p: _gel(p, E=p.material.E * (1 + p.ranges.E)),
-                      lambda p: 1.0, "E within its declared uncertainty"),
-                Input("Poisson ratio", lambda p: _gel(p, nu=p.material.nu - p.ranges.nu),
-                      lambda p: 1.0, "nu within its declared uncertainty"),
-                Input("plate friction", lambda p: replace(p, plates="bonded"),
+                Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)),
+                      one, "E within its declared uncertainty"),
+                Input("Poisson ratio", changed("material", nu=lambda p: p.material.nu - p.ranges.nu),
+                      one, "nu within its declared uncertainty"),
+                Input("plate friction", changed(plates="bonded"),
                       lambda p: p.ranges.friction, "between slipping and bonded plates"),
             ),
             surrogate=next(n for n, m in methods.items() if m.scene == Filled(1)),
         ),
     )  # fmt: skip
-
-
-def _load(p: InclusionTest, folder: Path) -> tuple[Recording, ...]:
-    return (read_recording(folder / p.recording),)
 
 
 def _inclusion(recording: Recording, p: InclusionTest) -> Capsule:
@@ -182,7 +177,3 @@ def _finer(p: InclusionTest) -> InclusionTest:
     g = p.mesh
     nodes = [round((n - 1) * g.finer) + 1 for n in (g.nodes_x, g.nodes_y, g.nodes_z)]
     return replace(p, mesh=replace(g, nodes_x=nodes[0], nodes_y=nodes[1], nodes_z=nodes[2]))
-
-
-def _gel(p: InclusionTest, **values: float) -> InclusionTest:
-    return replace(p, material=replace(p.material, **values))

@@ -44,7 +44,7 @@ SCANNER = Scanner(width=320, height=496, m_per_px=1.25e-4)
 
 
 @dataclass(frozen=True)
-class TwinSettings:
+class PhantomTwin:
     """What `validate record` makes: mesh, true inclusion, seed and the noise of every sensor."""
 
     nodes_x: int = quantity(13, "1", "nodes along x of the twin's quadratic mesh (by vertices)")
@@ -67,7 +67,7 @@ class TwinSettings:
 
 
 def record_phantom(
-    twin: TwinSettings, size: Block, material: Material, progress: Callable[[str], None]
+    twin: PhantomTwin, size: Block, material: Material, progress: Callable[[str], None]
 ) -> Recording:
     """The twin's recording: seeded, the same on every machine to 1e-9."""
     capsule = Capsule((twin.centre_x, twin.centre_y, twin.centre_z), twin.radius, twin.length)
@@ -149,7 +149,7 @@ def _declared(capsule: Capsule) -> dict[str, str]:
     }
 
 
-def _provenance(twin: TwinSettings, material: Material, unknowns: int) -> dict[str, str]:
+def _provenance(twin: PhantomTwin, material: Material, unknowns: int) -> dict[str, str]:
     return {
         "kind": "twin",
         "law": _LAWS[material.law],

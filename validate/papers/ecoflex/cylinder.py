@@ -1,0 +1,175 @@
+"""The cylinders of Dawood et al. (2026): parameters, logs, scene and registration."""
+
+import os
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from validate.errors import RecordingError
+from validate.fem.system import build as build_system
+from validate.fem.system import responses
+from validate.identify.modulus import cylinder_of, fit_modulus
+from validate.parameters import quantity, require_ranges
+from validate.recording.exports.instron import read_instron
+from validate.recording.types import Recording
+from validate.register.registered import Registered
+from validate.replay.compression import STAGE, SYMMETRY, between, pressed_log
+from validate.scene.cylinder import quarter_cylinder
+from validate.scene.mesh import quadratic
+from validate.scene.plates import Contact
+from validate.scene.scene import LawName, Material, Scene
+
+DATA_SET = "abubakardawood/tissue-phantom-material-database (CC BY 4.0)"
+FOLDER = "force/ecoflex-compression"
+
+
+@dataclass(frozen=True)
+class SiliconeCard:
+    E_slip: float | None = quantity(None, "Pa", "modulus if plates slip; none: identified")
+    E_bonded: float | None = quantity(None, "Pa", "modulus if plates hold; none: identified")
+    E_svk_slip: float | None = quantity(None, "Pa", "St. Venant-Kirchhoff, slipping plates")
+    E_neo_slip: float | None = quantity(None, "Pa", "neo-Hooke, slipping plates")
+    E_neo_bonded: float | None = quantity(None, "Pa", "neo-Hooke, bonded plates")
+    nu: float = quantity(0.4995, "1", "Poisson ratio, nearly incompressible silicone")
+
+
+@dataclass(frozen=True)
+class LoggedSpecimen:
+    diameter: float | None = quantity(None, "m", "diameter; none: from the logs' header")
+    height: float | None = quantity(None, "m", "height; none: from the logs' header")
+
+
+@dataclass(frozen=True)
+class QuarterGrid:
+    radial: int = quantity(6, "1", "quadratic elements from axis to rim")
+    axial: int = quantity(8, "1", "quadratic elements along the axis")
+    grading: float = quantity(2.0, "1", "above 1: smaller cells towards rim and plates")
+    finer_radial: int = quantity(8, "1", "the second mesh, for u_num")
+    finer_axial: int = quantity(10, "1", "the second mesh, for u_num")
+
+
+@dataclass(frozen=True)
+class SiliconeRanges:
+    """Standard uncertainties of the inputs, declared before the comparison."""
+
+    specimen: float = quantity(0.043, "1", "relative scatter of E between specimens (4.5 of 104)")
+    nu: float = quantity(0.0004, "1", "of the Poisson ratio")
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
+
+@dataclass(frozen=True)
+class LoggedCylinder:
+    material: SiliconeCard = SiliconeCard()
+    specimen: LoggedSpecimen = LoggedSpecimen()
+    mesh: QuarterGrid = QuarterGrid()
+    ranges: SiliconeRanges = SiliconeRanges()
+    fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
+    fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
+    limit_linear: float = quantity(0.10, "1", "strain to which the linear law is shown")
+    limit_svk: float = quantity(0.25, "1", "strain to which St. Venant-Kirchhoff is shown")
+    limit_neo_hooke: float = quantity(0.50, "1", "strain to which neo-Hooke is shown")
+    data: str | None = quantity(None, "1", "folder of the logs; none: VALIDATE_SHARED_DATA")
+    logs: str = quantity("EF30_0T_A*.csv", "1", "file name pattern of the logs")
+
+
+@dataclass(frozen=True)
+class CylinderModel:
+    """What a method's scene is built with."""
+
+    plates: Contact = quantity("slip", "1", "contact of both plates")
+    modulus: Literal["slip", "bonded", "svk_slip", "neo_slip", "neo_bonded"] = quantity(
+        "slip", "1", "modulus identified for"
+    )
+    law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
+    radial: int | None = quantity(None, "1", "elements from axis to rim; none: the mesh's")
+    axial: int | None = quantity(None, "1", "elements along the axis; none: the mesh's")
+    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
+
+
+WINDOWS = ("5pct", "10pct", "25pct", "50pct")
+
+
+def _limits(p: LoggedCylinder) -> tuple[float, float, float]:
+    """Strains to which the three laws are shown."""
+    return (p.limit_linear, p.limit_svk, p.limit_neo_hooke)
+
+
+def load(parameters: LoggedCylinder, folder: Path) -> tuple[Recording, ...]:
+    where = _data_folder(parameters, folder)
+    files = sorted(where.glob(parameters.logs))
+    if not files:
+        raise RecordingError(
+            f"no logs {parameters.logs} in {where}: get {DATA_SET} and pass --set data=FOLDER or "
+            "set VALIDATE_SHARED_DATA to the folder above force/"
+        )
+    return tuple(read_instron(f) for f in files)
+
+
+def _data_folder(parameters: LoggedCylinder, folder: Path) -> Path:
+    if parameters.data:
+        return Path(parameters.data)
+    shared = os.environ.get("VALIDATE_SHARED_DATA")
+    return (Path(shared) if shared else folder.parents[1] / "shared" / "data") / FOLDER
+
+
+def build(recording: Recording, parameters: LoggedCylinder, model: CylinderModel) -> Scene:
+    p = parameters
+    E: float | None = getattr(p.material, f"E_{model.modulus}")
+    if E is None:
+        raise RecordingError(f"no modulus identified; set material.E_{model.modulus}")
+    return model_scene(specimen_size(recording, p), p, model, E)
+
+
+def model_scene(
+    size: tuple[float, float], p: LoggedCylinder, model: CylinderModel, E: float
+) -> Scene:
+    grid = replace(p.mesh, radial=model.radial or p.mesh.radial, axial=model.axial or p.mesh.axial)
+    material = Material(E, p.material.nu, model.law)
+    scene = cylinder_scene(*size, grid, material, model.plates)
+    if model.order == 2:
+        return scene
+    linear = quarter_cylinder(*size, grid.radial, grid.axial, grid.grading)
+    return replace(scene, mesh=linear, dilatation="nodal_mean")
+
+
+def cylinder_scene(
+    diameter: float, height: float, grid: QuarterGrid, material: Material, contact: Contact
+) -> Scene:
+    """A quarter of the cylinder with its two planes of symmetry, the upper plate driven down."""
+    mesh = quadratic(quarter_cylinder(diameter, height, grid.radial, grid.axial, grid.grading))
+    supports = (*between(contact), *SYMMETRY)
+    return Scene(mesh, material, supports, drives=(STAGE,), copies=4)
+
+
+def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Registered:
+    """To the law's limit, in windows that end where one of the laws does."""
+    p = parameters
+    limit: float = getattr(p, f"limit_{scene.material.law}")
+    fit = fit_modulus(recording, window=(p.fit_from, p.fit_to))
+    strains = zip(WINDOWS, pairwise((p.fit_from, p.fit_to, *_limits(p))), strict=True)
+    shown = {label: (a, b) for label, (a, b) in strains if b <= limit}
+    return pressed_log(recording, fit, specimen_size(recording, p)[1], limit, shown, fit.noise)
+
+
+def specimen_size(recording: Recording, p: LoggedCylinder) -> tuple[float, float]:
+    """Diameter and height m: what the user set, else the header's."""
+    stated = cylinder_of(recording)
+    own = p.specimen
+    return (
+        stated.diameter if own.diameter is None else own.diameter,
+        stated.height if own.height is None else own.height,
+    )
+
+
+def stiffening(
+    diameter: float, height: float, grid: QuarterGrid, nu: float, contact: Contact
+) -> float:
+    """Apparent over true modulus of the meshed cylinder: E_app = F h / (A d) at E = 1 Pa."""
+    scene = cylinder_scene(diameter, height, grid, Material(1.0, nu), contact)
+    force = responses(build_system(scene)).reactions[0, 0]
+    return float(force * height / (np.pi * diameter**2 / 4))

@@ -1,0 +1,73 @@
+"""What is uncertain of paper 000's phantom, and what each choice of a model moves."""
+
+from validate.replay.cards import changed, one
+from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
+
+finer = changed(
+    "mesh",
+    nodes_x=lambda p: p.mesh.finer_x,
+    nodes_y=lambda p: p.mesh.finer_y,
+    nodes_z=lambda p: p.mesh.finer_z,
+)
+INPUTS = (
+    Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)), one,
+          "E within its declared relative uncertainty"),
+    Input("Poisson ratio", changed("material", nu=lambda p: p.material.nu - p.ranges.nu), one,
+          "nu within its declared uncertainty"),
+    Input("plate friction", changed(plates="bonded"), lambda p: p.ranges.friction,
+          "a share of the way from slipping to bonded plates"),
+    Input("image pose x", changed("registration", image_shift_x=lambda p: p.ranges.pose), one,
+          "image plane along the stage; the meshed inclusion follows"),
+    Input("image pose z", changed("registration", image_shift_z=lambda p: p.ranges.pose), one,
+          "image plane sideways; the meshed inclusion follows"),
+    Input("inclusion radius",
+          changed("inclusion", wider=lambda p: p.inclusion.wider + p.ranges.radius), one,
+          "radius of the meshed inclusion"),
+    Input("inclusion length",
+          changed("inclusion", longer=lambda p: p.inclusion.longer + p.ranges.length), one,
+          "length of the meshed inclusion"),
+)  # fmt: skip
+UNCERTAINTY = Uncertainty(finer, lambda p: float(p.mesh.ratio**2 - 1), INPUTS, surrogate="md_fluid")
+
+BASE = Variant("md_fluid")
+
+
+def _base(change: Change) -> Variant:
+    return Variant("md_fluid", change)
+
+
+EFFECTS = (
+    EffectSpec("fluid", "no fluid instead of constant volume (P1)",
+               Variant("p1_fluid"), Variant("p1_dry")),
+    EffectSpec("plate contact", "bonded instead of slipping plates",
+               BASE, _base(changed(plates="bonded")),
+               itself="plate friction"),
+    EffectSpec("partial friction", "plates with 1e5 N/m3 of tangential stiffness instead of slip",
+               BASE, _base(changed(plates="partial", friction=1e5)),
+               itself="plate friction"),
+    EffectSpec("membrane", "a taut latex membrane of 0.1 mm on the cavity wall",
+               BASE, _base(changed("membrane", thickness=1e-4))),
+    EffectSpec("locking", "P1 instead of P2 on the same mesh",
+               Variant("p2_fluid"), Variant("p1_fluid")),
+    EffectSpec("element", "P1 mean dilatation instead of P2 on the same mesh",
+               Variant("p2_fluid"), BASE),
+    EffectSpec("mesh", "the second, finer mesh", BASE, _base(finer)),
+    EffectSpec("loop", "the paper's loop at 1 % instead of the exact pressure",
+               Variant("p1_fluid"), Variant("p1_loop")),
+    EffectSpec("nearest node", "nearest node instead of interpolation",
+               BASE, _base(changed("registration", sampling="nearest_node", wall="nearest_node"))),
+    EffectSpec("modulus", "E 10 % higher",
+               BASE, _base(changed("material", E=lambda p: 1.1 * p.material.E)),
+               itself="modulus"),
+    EffectSpec("Poisson ratio", "nu 0.45",
+               BASE, _base(changed("material", nu=0.45)),
+               itself="Poisson ratio"),
+    EffectSpec("radius", "inclusion radius 0.5 mm smaller",
+               BASE, _base(changed("inclusion", wider=-0.5e-3)),
+               itself="inclusion radius"),
+    EffectSpec("centre", "image pose 1 mm along the stage, the inclusion follows",
+               BASE, _base(changed("registration", image_shift_x=1e-3)),
+               itself="image pose x"),
+    EffectSpec("registration", "similarity (scale fitted) instead of rigid",
+               BASE, _base(changed("registration", method="similarity"))),
+)  # fmt: skip

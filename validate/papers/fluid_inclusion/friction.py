@@ -1,0 +1,59 @@
+"""How much the plates of paper 000's phantom rub, from how far its markers rise."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from validate.compare.residual import Residual
+from validate.compare.score import Score
+from validate.identify.interval import Interval, profile_interval
+from validate.papers.fluid_inclusion.phantom import Phantom
+from validate.recording.types import Recording
+from validate.replay.experiment import Experiment, Identified
+from validate.replay.solved import solve
+
+SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
+HALF = 1e6  # N/m3: the tangential stiffness at a share of one half
+
+
+def _rubbing(p: Phantom, share: float) -> Phantom:
+    """Share 0 slips, 1 bonds, between them springs of HALF share/(1 - share)."""
+    p = replace(p, mesh=replace(p.mesh, order=None))
+    if share in (0.0, 1.0):
+        return replace(p, plates="slip" if share == 0 else "bonded")
+    return replace(p, plates="partial", friction=HALF * share / (1 - share))
+
+
+def friction_from_rise(
+    experiment: Experiment, method: str, recordings: Sequence[Recording], parameters: Phantom
+) -> Identified:
+    """Plate friction from the vertical rise of the markers, by one method of the experiment."""
+
+    def rise(share: float) -> list[Residual]:
+        rubbing, settings = _rubbing(parameters, share), experiment.methods[method]
+        found = solve(experiment, tuple(recordings), method, settings, rubbing).residuals
+        return [r for r in found.values() if r.quantity == "marker.vertical"]
+
+    risen = [rise(float(share)) for share in SHARES]
+    chi_square = [sum(float((r.values**2).sum()) / r.sd**2 for r in found) for found in risen]
+    fit = profile_interval(SHARES, np.array(chi_square), sum(r.count for r in risen[-1]))
+    return Identified(parameters, _scores(fit), (_said(fit),))
+
+
+def _scores(fit: Interval) -> tuple[Score, ...]:
+    words = "tangential plate stiffness k as k/(k + 1e6 N/m3): 0 slips, 1 bonds; from the rise"
+    rows = {"share": fit.best, "share.low": fit.low, "share.high": fit.high}
+    rows["chi_square"] = fit.chi_square
+    return tuple(
+        Score(f"friction.{name}", value, "1", fit.count, "measured markers", words)
+        for name, value in rows.items()
+    )
+
+
+def _said(fit: Interval) -> str:
+    return (
+        f"Plate friction from the markers' vertical rise ({fit.count} values): share "
+        f"{fit.best:.2f}, between {fit.low:.2f} and {fit.high:.2f} (two standard deviations), "
+        "where 0 is slipping, 1 bonded and 0.5 a tangential stiffness of 1e6 N/m3."
+    )

@@ -1,0 +1,268 @@
+"""The phantom of paper 000 as it is modelled: parameters, recording, scene and registration.
+
+Frame "phantom": x from the probe plate (0) to the stage plate, y up, z lateral; metres.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from validate.papers.fluid_inclusion.twin import PLATES, PhantomTwin, record_phantom
+from validate.parameters import quantity, require_ranges
+from validate.recording.images.outline import outlines_of
+from validate.recording.mcap.read import read_recording
+from validate.recording.types import Contours, Recording
+from validate.register.inclusion import outlined_capsule
+from validate.register.markers import Sampling, Together, placed_markers
+from validate.register.observation import nearest_sample
+from validate.register.outlines import Corner, observe_outlines
+from validate.register.plane import cavity_sampler
+from validate.register.registered import Registered
+from validate.register.signals import driving, holds_at, instant, require_rising, validating
+from validate.replay.experiment import Progress
+from validate.replay.inclusion import BlockCard, GelCard
+from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.mesh import quadratic
+from validate.scene.plates import Contact, between_plates
+from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
+
+
+@dataclass(frozen=True)
+class InclusionCard:
+    """None: centre x, z and radius from the rest outline, the rest from the declared sweep."""
+
+    centre_x: float | None = quantity(None, "m", "centre along the stage; none: from the outline")
+    centre_y: float | None = quantity(None, "m", "height of the centre; none: from the sweep")
+    centre_z: float | None = quantity(None, "m", "lateral centre; none: from the outline")
+    radius: float | None = quantity(None, "m", "radius; none: from the outline")
+    length: float | None = quantity(None, "m", "length along y; none: from the sweep")
+    wider: float = quantity(0.0, "m", "added to the radius that is meshed")
+    longer: float = quantity(0.0, "m", "added to the length that is meshed")
+
+
+@dataclass(frozen=True)
+class WallCard:
+    thickness: float = quantity(0.0, "m", "latex membrane on the wall of the cavity; 0: none")
+    E: float = quantity(1.2e6, "Pa", "modulus of latex, small strain")
+    nu: float = quantity(0.49, "1", "Poisson ratio of latex")
+
+
+@dataclass(frozen=True)
+class PhantomGrid:
+    nodes_x: int = quantity(9, "1", "nodes along x (9 x 10 x 15 gives the 1328-node mesh)")
+    nodes_y: int = quantity(10, "1", "nodes along y")
+    nodes_z: int = quantity(15, "1", "nodes along z")
+    finer_x: int = quantity(11, "1", "nodes along x of the second mesh, for u_num")
+    finer_y: int = quantity(13, "1", "nodes along y of the second mesh")
+    finer_z: int = quantity(19, "1", "nodes along z of the second mesh")
+    order: Literal[1, 2] | None = quantity(
+        None, "1", "1 or 2 for every method; none: each method's own"
+    )
+
+    @property
+    def nodes(self) -> tuple[int, int, int]:
+        return (self.nodes_x, self.nodes_y, self.nodes_z)
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of cell sizes of the two meshes."""
+        fine = (self.finer_x - 1) * (self.finer_y - 1) * (self.finer_z - 1)
+        coarse = (self.nodes_x - 1) * (self.nodes_y - 1) * (self.nodes_z - 1)
+        return float((fine / coarse) ** (1 / 3))
+
+
+@dataclass(frozen=True)
+class Placing:
+    method: Literal["rigid", "similarity", "two_step"] = quantity(
+        "rigid", "1", "marker registration, on the rest state only"
+    )
+    sampling: Sampling = quantity("barycentric", "1", "markers to nodes")
+    wall: Literal["measured", "facets", "nearest_node"] = quantity(
+        "measured", "1", "wall on the measured circle, on the mesh's facets, or by nearest node"
+    )
+    image_shift_x: float = quantity(0.0, "m", "correction of the image pose along x")
+    image_shift_z: float = quantity(0.0, "m", "correction of the image pose along z")
+
+
+@dataclass(frozen=True)
+class PhantomRanges:
+    """Standard uncertainties of the inputs, declared before the comparison."""
+
+    E: float = quantity(0.05, "1", "relative, of the modulus")
+    nu: float = quantity(0.005, "1", "of the Poisson ratio")
+    friction: float = quantity(0.03, "1", "share of the way from slipping to bonded plates")
+    pose: float = quantity(0.1e-3, "m", "of the image pose, per axis")
+    radius: float = quantity(0.05e-3, "m", "of the inclusion's radius")
+    length: float = quantity(0.5e-3, "m", "of the inclusion's length")
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
+
+@dataclass(frozen=True)
+class Phantom:
+    """Everything that can be set; `recording` is a path."""
+
+    material: GelCard = GelCard(15_200.0, 0.485)
+    block: BlockCard = BlockCard(0.060, 0.045, 0.070)
+    inclusion: InclusionCard = InclusionCard()
+    membrane: WallCard = WallCard()
+    mesh: PhantomGrid = PhantomGrid()
+    registration: Placing = Placing()
+    ranges: PhantomRanges = PhantomRanges()
+    twin: PhantomTwin = PhantomTwin()
+    plates: Literal["as_method", "slip", "partial", "bonded"] = quantity(
+        "as_method", "1", "contact of both plates, for every method"
+    )
+    friction: float = quantity(1e5, "N/m3", "tangential stiffness of the plates, if partial")
+    loads: tuple[float, ...] = quantity((0.003, 0.006, 0.009), "m", "stage positions compared")
+    outlines: Literal["recorded", "images"] = quantity(
+        "recorded", "1", "outlines as recorded, or extracted from the B-mode images"
+    )
+    recording: str | None = quantity(None, "1", "MCAP file; none: the shipped one")
+
+    @property
+    def size(self) -> Block:
+        return Block(self.block.x, self.block.y, self.block.z)
+
+
+@dataclass(frozen=True)
+class PhantomModel:
+    """What a method's scene is built with."""
+
+    order: Literal[1, 2] = quantity(1, "1", "element order")
+    dilatation: Dilatation = quantity("pointwise", "1", "volume strain per cell or nodal mean")
+    law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
+    plates: Contact = quantity("slip", "1", "contact of both plates")
+
+
+def record(parameters: Phantom, progress: Progress) -> Recording:
+    p = parameters
+    material = Material(p.material.E, p.material.nu, p.twin.law)
+    return record_phantom(p.twin, p.size, material, progress)
+
+
+def load(parameters: Phantom, folder: Path) -> tuple[Recording, ...]:
+    named = parameters.recording
+    path = Path(named) if named else folder.parent / "recordings" / "fluid_phantom.mcap"
+    recording = read_recording(path)
+    if parameters.outlines == "images":
+        outlines = outlines_of(recording.frame("b_mode"))
+        recording = replace(recording, contours={"outline": outlines})
+    return (recording,)
+
+
+def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Scene:
+    p = parameters
+    mesh = block_with_inclusion(p.size, p.mesh.nodes, inclusion(recording, p))
+    order = p.mesh.order or model.order
+    contact = model.plates if p.plates == "as_method" else p.plates
+    return between_plates(
+        mesh if order == 1 else quadratic(mesh),
+        PLATES,
+        Material(p.material.E, p.material.nu, model.law),
+        contact,
+        "pointwise" if order == 2 else model.dilatation,
+        friction=p.friction,
+        membrane=_membrane(p.membrane),
+    )
+
+
+def _membrane(wall: WallCard) -> tuple[Membrane, ...]:
+    if wall.thickness == 0:
+        return ()
+    return (Membrane("cavity", wall.thickness, Material(wall.E, wall.nu)),)
+
+
+def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered:
+    p = parameters
+    stage = driving(recording, "stage", "m")
+    contours = _shifted(recording.contour("outline"), p)
+    capsule = measured_inclusion(recording, p)
+    shape = None if p.registration.wall == "facets" else capsule
+    nearest = p.registration.wall == "nearest_node"
+    wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=nearest)
+    signals = tuple(validating(recording, *names, quantity=q, trace=t) for names, q, t in SIGNALS)
+    for signal in signals:
+        require_rising(stage, signal)
+    rest, *holds = holds_at(stage, contours.t, p.loads, within=0.1e-3)
+    outline = observe_outlines(contours, wall, rest=instant(rest), corners=(TOP_LEFT,))
+    markers = placed_markers(
+        recording,
+        scene.mesh,
+        method=p.registration.method,
+        sampling=p.registration.sampling,
+        together=TOP_FACE,
+        tracker="pen",
+        up=(0.0, 1.0, 0.0),
+    )
+    return Registered(
+        (stage, outline, markers, *signals),
+        tuple(holds),
+        rest,
+        findings=_misplaced(capsule, inclusion(recording, p)),
+    )
+
+
+SIGNALS = (
+    (("load_cell", "N"), "force.plate", "stage.force"),
+    (("pressure", "Pa"), "pressure", "inclusion.pressure"),
+)
+TOP_LEFT = Corner(
+    "contour.top_left",
+    np.deg2rad(225.0),
+    "displacement of the corner nearest the probe and lowest in image x (225 deg)",
+)
+TOP_FACE = (
+    Together(
+        "marker.inplane",
+        (0, 2),
+        "position in the plane of the top face (x along the stage, z lateral)",
+    ),
+    Together("marker.vertical", (1,), "position along the vertical y"),
+)
+
+
+def _misplaced(measured: Capsule, meshed: Capsule) -> tuple[str, ...]:
+    """A word where the meshed inclusion is not where the rest outline lies."""
+    off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
+    wide = meshed.radius - measured.radius
+    if off < 0.5e-3 and abs(wide) < 0.5e-3:
+        return ()
+    return (
+        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its radius "
+        f"{1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and cannot show that.",
+    )
+
+
+def inclusion(recording: Recording, parameters: Phantom) -> Capsule:
+    """The inclusion that is meshed: what the user set, else what was measured."""
+    measured, mine = measured_inclusion(recording, parameters), parameters.inclusion
+    centre = tuple(
+        m if own is None else own
+        for own, m in zip(
+            (mine.centre_x, mine.centre_y, mine.centre_z), measured.centre, strict=True
+        )
+    )
+    return Capsule(
+        (centre[0], centre[1], centre[2]),
+        (measured.radius if mine.radius is None else mine.radius) + mine.wider,
+        (measured.length if mine.length is None else mine.length) + mine.longer,
+    )
+
+
+def measured_inclusion(recording: Recording, parameters: Phantom) -> Capsule:
+    """Centre x, z and radius of the rest outline; height and length from the declared sweep."""
+    contours = _shifted(recording.contour("outline"), parameters)
+    rest = holds_at(driving(recording, "stage", "m"), contours.t, (), within=0.1e-3)[0]
+    moved = abs(parameters.registration.image_shift_x), abs(parameters.registration.image_shift_z)
+    index = nearest_sample(contours.t, instant(rest), "outlines")
+    return outlined_capsule(contours, index, recording.record("inclusion"), sum(moved))
+
+
+def _shifted(contours: Contours, parameters: Phantom) -> Contours:
+    pose = contours.pose.copy()
+    pose[[0, 2], 3] += parameters.registration.image_shift_x, parameters.registration.image_shift_z
+    return replace(contours, pose=pose)
