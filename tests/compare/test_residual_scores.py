@@ -13,13 +13,13 @@ from validate.register.observe import (
     SignalObservation,
 )
 
+from validate.arrays import rms
 from validate.compare.residual import Residual, rest_residuals, static_residuals
 from validate.compare.score import (
     METRICS,
     bias,
     max_length,
     mean_length,
-    rms,
     run_scores,
     scores_of,
 )

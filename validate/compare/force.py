@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.compare.score import Score
 from validate.compare.track import TRACK_METRICS, TrackError, rmse
 from validate.errors import ComparisonError, RecordingError
@@ -76,8 +76,7 @@ def rms_error(force: ForcePair) -> float:
 
 def relative_rms_error(force: ForcePair) -> float:
     """Root mean square error over the root mean square of the reference."""
-    scale = float(np.sqrt((force.y_reference**2).mean()))
-    return rms_error(force) / _positive(scale, force)
+    return rms_error(force) / _positive(rms(force.y_reference), force)
 
 
 def phase_error(force: ForcePair) -> float:
