@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.published import Published
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
@@ -297,7 +298,7 @@ def _law_scores(name: str, fit: LawFit, logs: int) -> tuple[Score, ...]:
 def _scores(found: ModulusSummary, bonded: float, gent: float) -> tuple[Score, ...]:
     logs, samples = len(found.fits), sum(f.count for f in found.fits)
     bracket = apparent_to_material(found, bonded)
-    noise = float(np.sqrt(np.mean([f.noise**2 for f in found.fits])))
+    noise = rms([f.noise for f in found.fits])
     rows = [
         ("modulus.E", found.mean, "Pa", samples, "apparent modulus, mean over the logs"),
         ("modulus.E.sd_repeats", found.sd_repeats or 0.0, "Pa", logs, "sd of one log's modulus"),

@@ -46,9 +46,9 @@ from validate.replay.solved import solve
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact, between_plates
-from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
+from validate.scene.scene import Cavity, Dilatation, LawName, Material, Membrane, Scene
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
-from validate.twin.phantom import TwinSettings, record_phantom
+from validate.twin.phantom import PLATES, TwinSettings, record_phantom
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,9 @@ def build(recording: Recording, parameters: Parameters, model: Model) -> Scene:
         mesh if order == 1 else quadratic(mesh),
         Material(p.material.E, p.material.nu, model.law),
         contact,
+        PLATES,
         "pointwise" if order == 2 else model.dilatation,
+        cavities=(Cavity("inclusion", "cavity"),),
         friction=p.friction,
         membrane=_membrane(p.membrane),
     )

@@ -31,16 +31,16 @@ def phantom_scene(
     dilatation: Dilatation = "pointwise",
 ) -> Scene:
     """The set-up of paper 000: stage driven along -x, rigid modes removed."""
-    supports = [Support("probe_plate", (0,)), Support("bottom", (1,))]
+    supports = [Support("x0", (0,)), Support("y0", (1,))]
     if bonded:
-        supports = [Support("probe_plate", (0, 1, 2)), Support("stage_plate", (1, 2))]
-        supports.append(Support("bottom", (1,)))
+        supports = [Support("x0", (0, 1, 2)), Support("x1", (1, 2))]
+        supports.append(Support("y0", (1,)))
     return Scene(
         mesh,
         Material(E, nu),
         tuple(supports),
         (Pin((0.0, 0.0, 0.035), (2,)),),
-        (Drive("stage", "stage_plate", (-1.0, 0.0, 0.0)),),
+        (Drive("stage", "x1", (-1.0, 0.0, 0.0)),),
         (Cavity("cyst", "cavity"),),
         dilatation,
     )

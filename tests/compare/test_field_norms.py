@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.compare.fields import relative_energy_norm, relative_l2_norm, relative_nodal_norm
-from validate.compare.interior import mean_distance, weighted_nodal_sum
+from validate.compare.field_norms import relative_energy_norm, relative_l2_norm, relative_nodal_norm
+from validate.compare.interior_error import mean_distance, weighted_nodal_sum
 from validate.compare.pair import Field, Pair, pair
 from validate.compare.two_fields import compare_fields
 from validate.errors import ComparisonError

@@ -13,13 +13,13 @@ from validate.register.observe import (
     SignalObservation,
 )
 
+from validate.arrays import rms
 from validate.compare.residual import Residual, rest_residuals, static_residuals
 from validate.compare.score import (
     METRICS,
     bias,
     max_length,
     mean_length,
-    rms,
     run_scores,
     scores_of,
 )
@@ -115,7 +115,7 @@ def registered(run: Run) -> Registered:
     mesh = phantom_mesh(COARSE_GRID)
     stage = Signal(T, np.array([[0.0], [4e-3], [9e-3]]), "m", 0.0, "phantom")
     holds = tuple(Hold(f"{d:g}mm", 1e-3 * d, t) for d, t in zip((0, 4, 9), T, strict=True))
-    top = mesh.facet_nodes("top")[[3, 20, 41]]
+    top = mesh.facet_nodes("y1")[[3, 20, 41]]
     rest = mesh.nodes[top]
     x = rest + run.u[:, top]
     rows = nearest_node_rows(mesh, rest)

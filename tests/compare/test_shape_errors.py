@@ -5,20 +5,19 @@ import pytest
 from phantoms import grid_mesh
 
 from validate.arrays import Floats
+from validate.compare.booleans import symmetric_difference
 from validate.compare.crossing import crossings
 from validate.compare.pair import Field, pair
-from validate.compare.sanity import inverted_cells
-from validate.compare.shape import (
+from validate.compare.shape_error import (
+    Boundaries,
     boundary_scores,
-    farthest,
     mean_absolute,
-    mean_gap,
     shell_error,
     surface_error,
 )
 from validate.compare.skin import Skin, enclosed, outline_skin, skin
-from validate.compare.solid import symmetric_difference
-from validate.compare.surface_distance import distances
+from validate.compare.soundness import inverted_cells
+from validate.compare.surface_distance import distances, hausdorff, mean_surface_distance
 from validate.compare.two_fields import compare_fields, compared
 from validate.errors import ComparisonError
 from validate.scene.box import box, grid
@@ -69,7 +68,7 @@ def test_a_stretch_by_hand(mesh: Mesh) -> None:
     between = pair(along_x(mesh, 0.1 * x), still(mesh))
     if mesh is not MESHES["hole"]:
         assert surface_error(between) == pytest.approx(0.1, rel=1e-12)
-        assert farthest(between) == pytest.approx(0.1, rel=1e-12)
+        assert hausdorff(between.one.skin, between.other.skin) == pytest.approx(0.1, rel=1e-12)
         assert shell_error(between) == pytest.approx(0.1, rel=1e-12)
     swapped = surface_error(between.swapped) * 1.1
     assert surface_error(between) == pytest.approx(swapped, rel=1e-12)
@@ -196,20 +195,22 @@ def test_the_mean_distance_by_hand() -> None:
     mesh, s = grid((1.0, 1.0), (200, 200)), 0.01
     between = pair(along_x(mesh, s * mesh.nodes[:, 0]), still(mesh))
     exact = ((s + s**2) / (4 + 2 * s) + (s - s**2) / 4) / 2
-    assert mean_gap(between) == pytest.approx(exact, rel=1e-3)
+    assert mean_surface_distance(between.one.skin, between.other.skin) == pytest.approx(
+        exact, rel=1e-3
+    )
 
 
 def test_an_outline_against_a_recorded_one() -> None:
     """Squares of 20 and 22 mm about one centre; the sense of an outline does not matter."""
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     run, seen = outline_skin(0.011 * square), outline_skin(0.010 * square[::-1])
-    found = {s.name: s for s in boundary_scores("cyst", run, seen, "recorded")}
+    found = {s.name: s for s in boundary_scores("cyst", Boundaries(run, seen, "recorded"))}
     assert found["cyst.E_s"].value == pytest.approx(0.21, rel=1e-12)
     assert found["cyst.hausdorff"].value == pytest.approx(1e-3 * np.sqrt(2), rel=1e-12)
     assert all(s.count == 8 and s.against == "recorded" for s in found.values())
     bow = outline_skin(0.01 * square[[0, 2, 1, 3]] * [1.0, 1.3] + [0, 1e-3])
     with pytest.raises(ComparisonError, match="crosses itself"):
-        boundary_scores("cyst", bow, seen, "recorded")
+        Boundaries(bow, seen, "recorded")
     with pytest.raises(ComparisonError, match="2 points encloses nothing"):
         outline_skin(square[:2])
 

@@ -68,7 +68,7 @@ def test_a_scheme_steps_and_says_what_its_states_mean(
     assert np.abs(stepper.field(rest)).max() == 0.0
     u = stepper.field(state)
     assert u.shape == mesh.nodes.shape
-    plate = mesh.facet_nodes("stage_plate")
+    plate = mesh.facet_nodes("x1")
     assert u[plate, 0] == pytest.approx(np.full(len(plate), -0.001))
     traces = stepper.traces([rest, state])
     force = next(t for name, t in traces.items() if name.endswith(".force"))

@@ -1,5 +1,6 @@
 """Two displacement fields side by side on one mesh: what every metric of two runs reads."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,8 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, checked
-from validate.compare.sanity import Soundness, require_upright, soundness
 from validate.compare.skin import Skin, skin
+from validate.compare.soundness import Soundness, require_upright, soundness
 from validate.errors import ComparisonError
 from validate.fem.assemble import stiffness
 from validate.fem.locate import barycentric_rows
@@ -112,6 +113,14 @@ class Pair:
     def swapped(self) -> "Pair":
         """The same pair with the other field as reference."""
         return Pair(self.other, self.one, self.common, self.u_other, self.u_one, self.outside)
+
+    @property
+    def against(self) -> str:
+        return self.other.name
+
+    @property
+    def units(self) -> Mapping[str, object]:
+        return {"dimension": self.on.dimension}
 
     @property
     def where(self) -> str:

@@ -10,7 +10,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
-from validate.scene.mesh import EDGES, Mesh, boundary_facets
+from validate.scene.mesh import Mesh, boundary_facets
+from validate.scene.shape_functions import EDGES
 
 _PIECES = {
     2: ((0, 1),),

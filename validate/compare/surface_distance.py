@@ -7,13 +7,9 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.compare.skin import Skin, normals
+from validate.scene.shape_functions import symmetric_points
 
-# Barycentric Gauss points of degree 3 (segments) and 2 (triangles).
-_G = (1 - 1 / np.sqrt(3)) / 2
-_SAMPLES = {
-    2: np.array([[1 - _G, _G], [_G, 1 - _G]]),
-    3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6,
-}
+_SAMPLES = {2: symmetric_points(1, 3)[0], 3: symmetric_points(2, 2)[0]}  # segment, triangle
 _CHUNK = 200_000  # point-piece pairs measured at once
 
 

@@ -23,11 +23,12 @@ from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
-from validate.scene.plates import Contact, between_plates
-from validate.scene.scene import Material, Scene
+from validate.scene.plates import Contact, Plates, between_plates
+from validate.scene.scene import Cavity, Drive, Material, Scene, Support
 from validate.solve.fluid import ExactPressure, NoFluid
 
 _WITHIN = 0.1e-3  # m: the stage stood at a load
+_PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
 _TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
 _PLANE = (
     Together("marker.inplane", (0, 2), "position along the stage and sideways"),
@@ -154,7 +155,9 @@ def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
         mesh if model.order == 1 else quadratic(mesh),
         Material(p.material.E, p.material.nu),
         p.plates,
+        _PLATES,
         "pointwise" if model.order == 2 else "nodal_mean",
+        cavities=(Cavity("inclusion", "cavity"),),
     )
 
 

@@ -16,6 +16,7 @@ from validate.scene.plates import between_plates
 from validate.scene.scene import Cavity, Material, Scene, Support
 from validate.scene.square import square_with_hole
 from validate.solve.fluid import PressureLoop, pressure_at_volume, tuned_gain
+from validate.twin.phantom import PLATES
 
 Values = Mapping[str, Mapping[str, float]]
 
@@ -70,7 +71,10 @@ def _fig_4(n: int) -> Responses:
 def _phantom() -> tuple[Published, ...]:
     block = Block(0.060, 0.045, 0.070)
     mesh = block_with_inclusion(block, (9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
-    r = responses(build(between_plates(mesh, Material(15.2e3, 0.485), "slip")))
+    scene = between_plates(
+        mesh, Material(15.2e3, 0.485), "slip", PLATES, cavities=(Cavity("inclusion", "cavity"),)
+    )
+    r = responses(build(scene))
     stepper = PressureLoop(warm_start=False).on(r)
     updates = max(stepper.step(stepper.rest(), 0.06 * s[None]).updates for s in _STRAINS)
     return (

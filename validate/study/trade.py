@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import ValidateError
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System, build
@@ -190,11 +190,6 @@ def trade(
         scene, tuple(rows), found, reference, gap, found[0].found.error, words,
         perf_counter() - start, quick,
     )  # fmt: skip
-
-
-def rms(u: Floats) -> float:
-    """Root mean square length of vectors (..., d)."""
-    return float(np.sqrt((np.asarray(u) ** 2).sum(axis=-1).mean()))
 
 
 class Bench:

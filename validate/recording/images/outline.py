@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError
 from validate.recording.images.discs import candidates
 from validate.recording.images.polar import Grey, Wall, speckle_area, trace
@@ -123,7 +123,7 @@ def outlines_of(
         raise RecordingError(
             f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
         )
-    sd = float(np.sqrt(np.mean([o.sd**2 for o in outlines])))
+    sd = rms([o.sd for o in outlines])
     return Contours(frames.t, tuple(o.points for o in outlines), sd, frames.pose, frames.frame)
 
 
@@ -181,7 +181,7 @@ def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats
 
 def _refusal(wall: Wall, judged: Quality) -> str:
     """Why a wall is none; empty when it is."""
-    radius = 1e3 * float(np.sqrt((wall.radius**2).mean()))
+    radius = 1e3 * rms(wall.radius)
     place = f"at ({1e3 * wall.centre[0]:.1f}, {1e3 * wall.centre[1]:.1f}) mm, radius {radius:.1f}"
     if wall.missing > MAX_MISSING:
         return (

@@ -11,7 +11,7 @@ for quadratic tetrahedra, whose vertex weights are negative.
 
 import numpy as np
 
-from validate.compare.metric import Metric
+from validate.compare.metric import Counted, Metric
 from validate.compare.pair import Pair
 from validate.errors import ComparisonError
 from validate.fem.cells import nodal_volumes, rule, values_at, volumes_at
@@ -44,11 +44,6 @@ def weighted_nodal_sum(pair: Pair) -> float:
     return float(weights @ np.linalg.norm(pair.difference, axis=1) / weights.sum())
 
 
-def count_points(pair: Pair) -> int:
-    """Quadrature points of the interior error."""
-    return len(pair.on.cells) * len(rule(pair.on, _POINTS).weights)
-
-
 def _integrals(pair: Pair) -> tuple[float, float]:
     points = rule(pair.on, _POINTS)
     dv = volumes_at(pair.on, points)
@@ -56,24 +51,26 @@ def _integrals(pair: Pair) -> tuple[float, float]:
     return float((dv * distance).sum()), float(dv.sum())
 
 
-INTERIOR_METRICS: tuple[Metric, ...] = (
+_POINTS_OF: Counted[Pair] = Counted(
+    "quadrature points", lambda p: len(p.on.cells) * len(rule(p.on, _POINTS).weights)
+)
+
+INTERIOR_METRICS: tuple[Metric[Pair], ...] = (
     Metric(
         "E_i",
         printed,
-        ("m^2", "m^3"),
-        count_points,
-        "quadrature points",
+        "m^{dimension}",
         "interior error as printed (paper 002, III C): integral of |u' - u| over the body at rest, "
         "over the square root of its area (cube root of its volume)",
+        _POINTS_OF,
         symmetric=True,
     ),
     Metric(
         "E_i.mean",
         mean_distance,
-        ("m", "m"),
-        count_points,
-        "quadrature points",
+        "m",
         "mean distance: integral of |u' - u| over the body at rest, over its area (volume)",
+        _POINTS_OF,
         symmetric=True,
     ),
 )

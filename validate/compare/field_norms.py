@@ -7,7 +7,7 @@ weighs by mass; the energy norm proper, root of e^T K e, is the strain energy of
 import numpy as np
 
 from validate.arrays import Floats
-from validate.compare.metric import Metric, count_nodes
+from validate.compare.metric import Counted, Metric
 from validate.compare.pair import Pair
 from validate.errors import ComparisonError
 from validate.fem.cells import rule, values_at, volumes_at
@@ -73,54 +73,48 @@ def _relative(top: float, bottom: float, pair: Pair, what: str) -> float:
     return top / bottom
 
 
-FIELD_METRICS: tuple[Metric, ...] = (
+_NODES: Counted[Pair] = Counted("nodes", lambda p: len(p.on.nodes))
+
+FIELD_METRICS: tuple[Metric[Pair], ...] = (
     Metric(
         "E_n",
         relative_nodal_norm,
-        ("1", "1"),
-        count_nodes,
-        "nodes",
+        "1",
         "relative norm of paper 002, eq 1: root of the sum over nodes of |u' - u|^2 over that of "
         "|u|^2, as printed; unweighted, so it depends on the mesh",
-        symmetric=False,
+        _NODES,
     ),
     Metric(
         "L2.relative",
         relative_l2_norm,
-        ("1", "1"),
-        count_nodes,
-        "nodes",
+        "1",
         "mass-weighted L2 norm of u' - u over that of u, by quadrature; equal densities cancel",
-        symmetric=False,
+        _NODES,
     ),
     Metric(
         "L2.rms",
         rms_difference,
-        ("m", "m"),
-        count_nodes,
-        "nodes",
+        "m",
         "root mean square of |u' - u| over the mass, by quadrature",
+        _NODES,
         symmetric=True,
     ),
 )
 
-ENERGY_METRICS: tuple[Metric, ...] = (
+ENERGY_METRICS: tuple[Metric[Pair], ...] = (
     Metric(
         "energy.relative",
         relative_energy_norm,
-        ("1", "1"),
-        count_nodes,
-        "nodes",
+        "1",
         "energy norm of u' - u over that of u: root of e^T K e over u^T K u, linear elasticity",
-        symmetric=False,
+        _NODES,
     ),
     Metric(
         "energy",
         energy_norm_of_difference,
-        ("J^(1/2)", "J^(1/2)"),
-        count_nodes,
-        "nodes",
+        "J^(1/2)",
         "energy norm of u' - u: root of e^T K e, twice the strain energy of the difference",
+        _NODES,
         symmetric=True,
     ),
 )
