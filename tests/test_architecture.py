@@ -82,3 +82,11 @@ def test_arrays_of_meshes_are_read_only() -> None:
         assert isinstance(array, np.ndarray)
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_the_recording_floor_knows_no_phantom(project_root: Path) -> None:
+    """Which face is loaded and which way is up are said by a recording or a scene."""
+    words = ("phantom", "top face", "bottom face", "probe plate", "gravity", "upward")
+    for path in (project_root / "validate" / "recording").rglob("*.py"):
+        text = path.read_text(encoding="utf-8").lower()
+        assert not [word for word in words if word in text], path.name
