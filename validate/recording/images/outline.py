@@ -13,6 +13,7 @@ Limits: the region must be star-shaped about its centroid; regions under about 2
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -103,20 +104,12 @@ def outlines_of(
     Options as in `extract_outline`. Raises `RecordingError` naming the first image without one and
     how many there are: none is left out silently.
     """
+    find = partial(extract_outline, centre=centre, radius=radius, shape=shape, bright=bright)
     outlines: list[Outline] = []
     refused: list[str] = []
     for i, image in enumerate(frames.images):
         try:
-            outlines.append(
-                extract_outline(
-                    image,
-                    frames.m_per_px,
-                    centre=centre,
-                    radius=radius,
-                    shape=shape,
-                    bright=bright,
-                )
-            )
+            outlines.append(find(image, frames.m_per_px))
         except RecordingError as error:
             refused.append(f"image {i} (t = {frames.t[i]:.3f} s): {error}")
     if refused:
