@@ -1,175 +1,46 @@
 """The road of experiments over time, on a cube of 27 boxes that is pulled for 30 steps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tiny import (
+    DT,
+    METHODS,
+    PROBES,
+    STEPS,
+    TINY,
+    A,
+    Card,
+    missed,
+    record,
+    stiffer,
+    true_run,
+    truth,
+)
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.compare.published import Figure
 from validate.compare.result import MethodResult, Result
-from validate.compare.score import rms
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.measured import Measurements
-from validate.estimate.steady import ReducedKf
-from validate.fem.system import System, build
+from validate.fem.system import System
 from validate.parameters import quantity
 from validate.recording.types import Recording
-from validate.register.follow import follow_signal
 from validate.register.registered import Registered
 from validate.replay.experiment import Case, Experiment, Input, Told, Twin, Uncertainty
 from validate.replay.followed import Cases, Truth, truth_of
 from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import compare
-from validate.scene.box import box
-from validate.scene.scene import Load, Material, Probe, Scene, Support
-from validate.solve.march import march, output_frames
 from validate.solve.newmark import Newmark
-from validate.solve.types import Ending, State, Stepper, Trace
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.solve.types import Stepper
 
-DT, STEPS, SIDE = 0.002, 30, 0.01
-PROBES = {"node_A": (SIDE, SIDE, SIDE), "node_B": (0.0, SIDE, 2 * SIDE / 3)}
-FIDUCIALS = {"f1": (0.0, 0.0, 0.0), "f2": (SIDE, 0.0, 0.0), "f3": (0.0, SIDE, 0.0)}
 METRICS = ("mae", "rmse", "sd", "max", "nrmse")
-
-
-@dataclass(frozen=True)
-class TwinCard:
-    stiffness: float = quantity(1.0, "1", "its modulus over the models'")
-    missing: float = quantity(0.0, "1", "share of looks without a marker")
-
-
-@dataclass(frozen=True)
-class Card:
-    E: float = quantity(10e3, "Pa", "modulus of the models")
-    cells: int = quantity(3, "1", "boxes along an edge")
-    sd: float = quantity(1e-5, "m", "noise")
-    twin: TwinCard = field(default_factory=TwinCard)
-
-
-def scene(E: float, cells: int = 3) -> Scene:
-    return Scene(
-        box((SIDE, SIDE, SIDE), (cells,) * 3),
-        Material(E, 0.3, "linear", 1000.0, 0.0, 0.05),
-        (Support("z0", (0, 1, 2)),),
-        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
-        probes=tuple(Probe(name, at) for name, at in PROBES.items()),
-    )
-
-
-def true_run(card: Card, frames: int = 200) -> tuple[Scene, Any]:
-    true = scene(card.twin.stiffness * card.E)
-    t = DT * np.arange(1, STEPS + 1)
-    force = 0.05 * np.minimum(t / 0.02, 1.0)[:, None]
-    stepper = Newmark(DT).prepare(build(true))
-    return true, march("twin", stepper, t, force, output_frames(STEPS, frames), 0.0)
-
-
-def record(card: Card, progress: Callable[[str], None]) -> Recording:
-    true, run = true_run(card)
-    return record_tracked(
-        Origin("tiny", 3, True),
-        points_of(run, true),
-        {k: np.array(v) for k, v in FIDUCIALS.items()},
-        Camera(card.sd, 1, card.twin.missing, still=10_000),
-        {"pull": Reading(run.traces["pull.force"].y, "N")},
-    )
-
-
-def truth(card: Card, seen: Registered) -> Truth:
-    true, run = true_run(card)
-    return truth_of(run, true)
-
-
-@dataclass(frozen=True)
-class Breaking:
-    """Steps as another stepper until one fails."""
-
-    inner: Stepper
-    at: int
-    failure: tuple[Ending, str]
-
-    @property
-    def scene(self) -> Scene:
-        return self.inner.scene
-
-    def rest(self) -> State:
-        return self.inner.rest()
-
-    def step(self, state: State, drives: Floats) -> State:
-        stepped = self.inner.step(state, drives)
-        return replace(stepped, failure=self.failure) if stepped.k == self.at else stepped
-
-    def field(self, state: State) -> Floats:
-        return self.inner.field(state)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        return self.inner.traces(states)
-
-
-@dataclass(frozen=True)
-class Breaks:
-    """A scheme whose step `at` fails."""
-
-    dt: float = quantity(DT, "s", "time step")
-    at: int = quantity(1, "1", "step that fails")
-    ending: str = quantity("refused", "1", "its ending")
-
-    def prepare(self, system: System) -> Stepper:
-        ending: Any = self.ending
-        return Breaking(Newmark(self.dt).prepare(system), self.at, (ending, "told so"))
-
-
-def sets(card: Card, seen: Registered) -> dict[str, Any]:
-    return {"dt": DT}
-
-
-A = ("node_A",)
-METHODS = {
-    "fem": Method("FEM", Newmark()),
-    "timed": Method("FEM, timed", Newmark(), steps=5),
-    "slow": Method("FEM, long steps", Newmark(), stride=3),
-    "kf": Method("filter", ReducedKf(modes=5, load_start=0.02, load_walk=0.05), markers=A),
-    "refused": Method("refused", Breaks()),
-    "diverged": Method("diverged", Breaks(at=8, ending="diverged")),
-}
-
-
-def stiffer(card: Card) -> Card:
-    return replace(card, twin=replace(card.twin, stiffness=1.25))
-
-
-def missed(card: Card) -> Card:
-    return replace(card, twin=replace(card.twin, missing=0.4))
-
-
-TINY = Experiment(
-    name="test_track",
-    title="tiny",
-    source="this test",
-    parameters=Card(),
-    methods=METHODS,
-    accepted=("fem",),
-    accept=(Accept("node_B", 1e-4, "ours"),),
-    load=lambda card, folder: (record(card, print),),
-    build=lambda recording, card, model: scene(card.E, card.cells),
-    place=lambda recording, card, its: follow_signal(recording, its.mesh, "pull", "N"),
-    sets=sets,
-    axis="z",
-    reference="fem",
-    cases=(
-        Case("stiff", "25 % stiffer", stiffer),
-        Case("missing", "looks are missing", missed, methods=("kf", "diverged")),
-    ),
-    twin=Twin(record, truth, same_model=True),
-    path=Path(__file__),
-)
 
 
 def run(experiment: Experiment, *methods: str, quick: bool = False, **values: str) -> Result:
