@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
-from validate.estimate.measured import measurements
+from validate.estimate.measurements import measurements
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.recording.types import Signal

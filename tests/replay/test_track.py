@@ -1,6 +1,6 @@
 """The road of experiments over time, on a cube of 27 boxes that is pulled for 30 steps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import rms
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.fem.system import System, build
 from validate.parameters import quantity
 from validate.recording.types import Recording
@@ -36,7 +36,7 @@ from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support
 from validate.solve.march import march, output_frames
 from validate.solve.newmark import Newmark
-from validate.solve.types import Ending, State, Stepper, Trace
+from validate.solve.types import Ending, State, Stepper
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
 
 DT, STEPS, SIDE = 0.002, 30, 0.01
@@ -115,8 +115,9 @@ class Breaking:
     def field(self, state: State) -> Floats:
         return self.inner.field(state)
 
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        return self.inner.traces(states)
+    @property
+    def units(self) -> Mapping[str, str]:
+        return self.inner.units
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from typing import Protocol
 from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.fem.system import System
 from validate.solve.types import Stepper
 

@@ -16,7 +16,7 @@ from validate.estimate.kf_fem import (
     shared_gains,
     stepper_of,
 )
-from validate.estimate.measured import Measurements, timetable
+from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic import require_linear

@@ -25,13 +25,20 @@ class QuasiStatic:
 
 @dataclass(frozen=True)
 class QuasiStaticStepper(InertialStepper):
-    """`columns` (N, k + l): displacements of a unit of every input."""
+    """States carry displacements (N,) m; `columns` (N, k + l) are those of a unit input each."""
 
     columns: Floats
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The static state under the inputs `drives`: drives in m, then loads in N."""
-        u = self.columns @ drives
+    def rest(self) -> State:
+        return State(0, np.zeros(len(self.columns)))
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """The static state under the inputs: drives in m, then loads in N."""
+        u = self.columns @ inputs
         still = np.zeros_like(u)
-        numbers = self.reactions.numbers(u, still, still, drives[self._drives :])
-        return self._state(drives, state.k + 1, u=u, v=still, a=still, numbers=numbers)
+        numbers = self.reactions.numbers(u, still, still, inputs[len(self.scene.drives) :])
+        return State(state.k + 1, u, numbers=numbers)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes."""
+        return np.reshape(state.inner, self.scene.mesh.nodes.shape)

@@ -2,7 +2,7 @@
 
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.fluid import LINEAR
+from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
@@ -10,6 +10,9 @@ from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
+
+# Linear schemes of drives and cavities.
+LINEAR: tuple[type[Scheme], ...] = (NoFluid, ExactPressure, PressureLoop)
 
 # Linear schemes of drives and loads, without cavities.
 INERTIAL: tuple[type[Scheme], ...] = (QuasiStatic, Newmark, Modal, ExplicitLinear)
