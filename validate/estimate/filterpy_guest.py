@@ -7,7 +7,7 @@ are refused here, before the first step and after every one.
 import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from validate.estimate.kalman import Innovation, best_gain, innovation, nothing
 from validate.estimate.linear_model import LinearModel, require_symmetric
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
-from validate.estimate.small_state import CoreStepper, require_loads
+from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import require_linear
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import Stepper
 
 Make = Callable[[LinearModel], Any]
@@ -122,6 +122,14 @@ class Guest:
     filters which draw from numpy's global generator.
     """
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",),
+        inertia=True,
+        cavities=False,
+        drives=False,
+        contact=GLUED,
+    )
+
     make: Make | str = quantity("KalmanFilter", "1", "name, or a function of the model")
     dt: float = quantity(0.002, "s", "time step")
     modes: int = quantity(5, "1", "lowest modes kept")
@@ -134,8 +142,7 @@ class Guest:
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
         shapes are not the model's."""
-        require_linear(system)
-        require_loads(system)
+        require_handled(system.scene, self)
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
         reduced = reduced_model(system, measurements, self.dt, self.modes, doubt, R)

@@ -11,7 +11,7 @@ not measured; `structure="load"` does.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -35,8 +35,9 @@ from validate.fem.modes import modes_of
 from validate.fem.once import once
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import reactions, require_linear
+from validate.solve.dynamic import reactions
 from validate.solve.excitation import Excitation, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.newmark_rule import Rule, RuleName, per_mode, propagation, rule_of
 from validate.solve.types import Stepper
 
@@ -51,6 +52,10 @@ class DisplacementNoise:
     `structure`: "white" gives every unknown Q and P0 on its own; "load" gives them to the static
     displacement of each load as a whole, Q where it moves a measured component most.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(0.002, "s", "time step")
     Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, read as mm2")
@@ -84,7 +89,7 @@ class KfFem(DisplacementNoise):
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
         load; `ComparisonError` for measurements that land on no step."""
-        require_linear(system)
+        require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt)
         nodal = Nodal(propagation(system, rule))
         if self.gains == "every_step":

@@ -8,6 +8,7 @@ where the shape would swing, `prepare` refuses.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,10 +17,10 @@ from validate.errors import SceneError
 from validate.estimate.displacement_filter import load_shapes
 from validate.estimate.kalman import Gaussian, Innovation, kf_predict, kf_update, nothing
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.small_state import CoreStepper, require_loads
+from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import require_linear
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import Stepper
 
 _OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
@@ -30,6 +31,14 @@ class LoadScale:
     """`scale_sd` is the doubt of the scale at the start (1 = none), `walk` its growth per sqrt(s);
     `Q` m^2 the variance that a step adds to the amplitude, R m^2 (None: the measurements' own)."""
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",),
+        inertia=True,
+        cavities=False,
+        drives=False,
+        contact=GLUED,
+    )
+
     dt: float = quantity(0.002, "s", "time step")
     scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")
     walk: float = quantity(0.0, "1/s^0.5", "random walk of the scale")
@@ -38,8 +47,7 @@ class LoadScale:
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
-        require_linear(system)
-        require_loads(system)
+        require_handled(system.scene, self)
         if len(system.scene.loads) != 1:
             raise SceneError(f"{len(system.scene.loads)} loads: one shape is for one load")
         H = measurements.free(system.free)

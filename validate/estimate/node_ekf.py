@@ -10,7 +10,7 @@ Departures: noise intensities are variances in m^2 (the paper's .001, .1, .001 r
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from validate.estimate.kalman import Innovation
 from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Ending, Stepper
 
 Block = Literal["component", "node", "companion"]
@@ -38,6 +39,8 @@ class NodeEKF:
     `correct_previous` shifts U_{t-dt} with U_t ("companion" estimates it anyway). `overflow`: at
     variances beyond 1e300 m^2 the run stops, or they are held there and counted.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
@@ -59,6 +62,7 @@ class NodeEKF:
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
         measurements that are no components of nodes or that land between the steps."""
+        require_handled(system.scene, self)
         explicit = explicit_step(system, self.dt, self.substeps)
         free = np.zeros(len(system.moves))
         free[system.free] = 1.0

@@ -14,7 +14,7 @@ Departures: paper 003 filters node by node (`NodeEKF`), where no measurement rea
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from validate.estimate.reduced_basis import Basis, modes, pod
 from validate.estimate.reduced_kf import steady
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Ending, Stepper
 
 _SETTLED = 1e-9  # change of a gain from one update to the next: with slow modes 1e-6 is too early
@@ -42,6 +43,8 @@ class ReducedEKF:
     static response to each load (rank 1). `gains`: the exact sequence, which needs no data and is
     found before the run, or the steady gain from the start.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
@@ -65,6 +68,7 @@ class ReducedEKF:
         """Raises `SceneError` for what the explicit step cannot do, `UsageError` for a basis that
         does not exist, `ComparisonError` for a steady gain that does not, or times off the steps.
         """
+        require_handled(system.scene, self)
         explicit = explicit_step(system, self.dt, self.substeps)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
         times = timetable(measurements, explicit.h)

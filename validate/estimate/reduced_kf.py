@@ -6,7 +6,7 @@ product. The steady gain comes from the discrete Riccati equation.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_are
@@ -19,10 +19,10 @@ from validate.estimate.kalman import Gain, Innovation, Seen, innovation, nothing
 from validate.estimate.linear_model import LinearModel
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
-from validate.estimate.small_state import CoreStepper, require_loads
+from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import require_linear
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import Stepper
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
@@ -37,6 +37,14 @@ class ReducedKf:
     at: sub-optimal at first, cheapest to prepare for long runs.
     """
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",),
+        inertia=True,
+        cavities=False,
+        drives=False,
+        contact=GLUED,
+    )
+
     dt: float = quantity(0.002, "s", "time step")
     modes: int = quantity(20, "1", "lowest modes kept")
     load_start: float = quantity(0.1, "N", "sd of every load's bias at the start")
@@ -49,8 +57,7 @@ class ReducedKf:
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for scenes with drives, large strain, or coupled damping, and
         `ComparisonError` for measurements off the steps, or a steady gain of irregular ones."""
-        require_linear(system)
-        require_loads(system)
+        require_handled(system.scene, self)
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
         model = reduced_model(system, measurements, self.dt, self.modes, doubt, R)

@@ -7,7 +7,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import SceneError
 from validate.estimate.kalman import Innovation, innovation_units
 from validate.estimate.measurements import Timetable
 from validate.fem.system import System
@@ -81,12 +80,3 @@ class CoreStepper:
 
     def _nodal(self, free: Floats) -> Floats:
         return spread(self.system, free, np.zeros(0)).reshape(self.scene.mesh.nodes.shape)
-
-
-def require_loads(system: System) -> None:
-    """Raises `SceneError` unless loads alone move the body: small states know no drives."""
-    if system.scene.drives or not system.scene.loads:
-        raise SceneError(
-            f"{len(system.scene.drives)} drives and {len(system.scene.loads)} loads: a filter with "
-            "a small state needs loads alone; use KfFem or ModalKf"
-        )

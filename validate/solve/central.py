@@ -10,7 +10,7 @@ is taken at the last half step ("lagged"), which costs no solve and lowers the l
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from validate.fem.explicit import ExplicitBody, Look, Motion, Rule
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
+from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -43,6 +44,8 @@ class CentralDifference:
     and, when the body has deformed further, the critical step are looked at; traces hold between.
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")
@@ -68,8 +71,7 @@ class CentralDifference:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for what has no explicit form, a missing density, cavities."""
-        if system.scene.cavities:
-            raise SceneError("explicit dynamics knows no fluid in cavities; drop them")
+        require_handled(system.scene, self)
         beta = self._beta(system.scene)
         still = np.zeros(len(system.moves))
         past = Past(Motion(np.zeros((6, len(still)))), still, np.zeros(len(system.scene.inputs)))

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import SceneError
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.scene.scene import Scene
@@ -48,18 +47,6 @@ def reactions(
     C = still if mass is None else rows @ damping_of(system, mass, terms)
     M = still if mass is None else rows @ mass_of(system, mass)
     return Reactions(names, system.scene.copies, rows @ system.K, C, M, rows @ system.loads)
-
-
-def require_linear(system: System) -> None:
-    """Raises `SceneError` for a law at large strain, or a cavity, whose fluid nobody would feel."""
-    law = system.scene.material.law
-    if law != "linear":
-        raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
-    if system.scene.cavities:
-        raise SceneError(
-            "linear schemes with loads know no fluid in cavities; drop them from the scene, or "
-            "use ExactPressure"
-        )
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ of its "mass lumping" error most is the second. Prescribed unknowns keep all the
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy import sparse
@@ -22,8 +22,9 @@ from validate.fem.factor import factorise
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import Moving, MovingStepper, reactions, require_linear
+from validate.solve.dynamic import Moving, MovingStepper, reactions
 from validate.solve.excitation import DriveRates, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear_solvers import Diagonal, Solver
 from validate.solve.newmark_rule import rule_of
 from validate.solve.types import Ending, State, Stepper
@@ -41,6 +42,10 @@ class ExplicitLinear:
     A dt above the critical step is refused at the first step, or with `beyond_limit` "run" goes on
     until displacements are 100 times the body's size.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(1e-4, "s", "time step")
     mass: MassName = quantity("lumped", "1", "mass matrix")
@@ -65,7 +70,7 @@ class ExplicitLinear:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
-        require_linear(system)
+        require_handled(system.scene, self)
         free, terms = system.free, self.damping_terms
         matrices = mass_of(system, self.mass), damping_of(system, self.mass, terms), system.K
         M, C, K = (sparse.csr_array(X[free][:, free]) for X in matrices)

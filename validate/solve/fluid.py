@@ -5,6 +5,7 @@ volume is a cubic polynomial in z (fixed normals: exact, not a series) and needs
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear import LinearStepper, condensed
 from validate.solve.types import Ending, State, Stepper
 
+_COLUMNS = Handles(("linear",), inertia=False, cavities=True, loads=False, contact=GLUED)
 _NEWTON_STEPS = 30
 _ROUNDING = 4e-15  # relative volume error that rounding alone leaves
 
@@ -24,7 +27,10 @@ _ROUNDING = 4e-15  # relative volume error that rounding alone leaves
 class NoFluid:
     """The cavity is empty: gauge pressure zero, its volume changes freely."""
 
+    handles: ClassVar[Handles] = _COLUMNS
+
     def prepare(self, system: System) -> Stepper:
+        require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
@@ -39,6 +45,8 @@ class ExactPressure:
     Departures from paper 000: eq 10 is replaced by the root it tends to; no tolerance, no gain.
     """
 
+    handles: ClassVar[Handles] = _COLUMNS
+
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
 
     def __post_init__(self) -> None:
@@ -46,6 +54,7 @@ class ExactPressure:
             raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
 
     def prepare(self, system: System) -> Stepper:
+        require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
@@ -61,12 +70,15 @@ class PressureLoop:
     `warm_start` begins each step at the last pressure, as the haptic loop does.
     """
 
+    handles: ClassVar[Handles] = _COLUMNS
+
     gain: float | None = quantity(None, "Pa", "Kp; none: tuned on the volume's response")
     tolerance: float = quantity(0.01, "1", "|1 - V/V0| at which it stops")
     max_updates: int = quantity(100, "1", "of the pressure in a step")
     warm_start: bool = quantity(True, "1", "begin at the last step's pressure")
 
     def prepare(self, system: System) -> Stepper:
+        require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:

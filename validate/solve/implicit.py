@@ -10,7 +10,7 @@ Departures: stiffness damping is that of the body at rest, not of K(U).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy import sparse
@@ -24,6 +24,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central import lumped_damping
+from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 RateRule = Literal["average", "backward_euler", "static"]
@@ -37,6 +38,8 @@ class NewtonDynamics:
 
     `cuts`: for load steps of statics; a dynamic step fails at once: take a smaller dt.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(0.01, "s", "time step")
     rule: RateRule = quantity("average", "1", "how v and a follow u; static: neither")
@@ -56,8 +59,7 @@ class NewtonDynamics:
         """Raises `SceneError` for a linear law, cavities, regions, or a missing density, and in
         statics for a body that can move rigidly."""
         scene = system.scene
-        if scene.cavities:
-            raise SceneError("Newton dynamics knows no fluid in cavities; use StaticNewton")
+        require_handled(scene, self)
         N = len(system.moves)
         M = C = sparse.csr_array((N, N))
         if self.rule != "static" and self.mass == "lumped":

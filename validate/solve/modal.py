@@ -11,7 +11,7 @@ asked for. The static correction has no rates: it gives no share of damping and 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -20,8 +20,9 @@ from validate.errors import SceneError
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import InertialStepper, Reactions, reactions, require_linear
+from validate.solve.dynamic import InertialStepper, Reactions, reactions
 from validate.solve.excitation import Excitation, Inputs, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.modal_walk import Walk, exact_walk, walk_by_rule
 from validate.solve.newmark_rule import RuleName, require_start, rule_of
 from validate.solve.types import State, Stepper
@@ -35,6 +36,10 @@ class Modal:
     its end value; the others are Newmark's rules per mode. `a0` as in `Newmark`: with
     "equilibrium" the loads of the first step already act at t = 0, with "zero" they rise there.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(0.002, "s", "time step")
     modes: int | None = quantity(None, "1", "lowest modes kept; none: all")
@@ -52,7 +57,7 @@ class Modal:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for laws at large strain, cavities, damping that couples modes."""
-        require_linear(system)
+        require_handled(system.scene, self)
         modes = modes_of(system, self.modes)
         exact = self.propagate in ("linear", "constant")
         name: RuleName = "average" if exact else self.propagate  # type: ignore[assignment]

@@ -11,7 +11,7 @@ ring for ever. Show none of them; take backward Euler or generalised alpha, or r
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -20,8 +20,9 @@ from validate.errors import SceneError
 from validate.fem.matrices import DampingTerms, MassName
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import Moving, MovingStepper, reactions, require_linear
+from validate.solve.dynamic import Moving, MovingStepper, reactions
 from validate.solve.excitation import DriveRates, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
 from validate.solve.newmark_rule import (
     Propagation,
@@ -46,6 +47,10 @@ class Newmark:
     which makes average acceleration ring with growing amplitude on a ramp.
     """
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
+
     dt: float = quantity(0.002, "s", "time step")
     rule: RuleName = quantity("average", "1", "how v and a follow u within a step")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
@@ -66,7 +71,7 @@ class Newmark:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
-        require_linear(system)
+        require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt, self.rho_inf)
         terms = self.damping_terms
         if self.a0 == "equilibrium" and system.scene.loads:

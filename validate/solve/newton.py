@@ -9,7 +9,7 @@ memory within the tolerance only.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
+from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 _VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
@@ -33,6 +34,8 @@ class StaticNewton:
     `contraction` 0 makes a new factorisation at every iteration. `watch`: negative pivots of the
     tangent are counted anew when drives have moved so far.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
     fluid: Literal["exact", "none"] = quantity("exact", "1", "keeps its volume, or is not there")
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
@@ -54,6 +57,7 @@ class StaticNewton:
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a linear law or a body that can move rigidly."""
         scene = system.scene
+        require_handled(scene, self)
         if not (scene.cavities or scene.drives):
             raise SceneError("scene without drive and cavity: nothing moves")
         problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))

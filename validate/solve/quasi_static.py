@@ -1,12 +1,14 @@
 """Statics at every step, K u = f: what a slow enough motion tends to. No mass is assembled."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import System
-from validate.solve.dynamic import InertialStepper, reactions, require_linear
+from validate.solve.dynamic import InertialStepper, reactions
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import State, Stepper
 
 
@@ -14,9 +16,13 @@ from validate.solve.types import State, Stepper
 class QuasiStatic:
     """Linear statics of drives and loads, by superposition of one solved column per input."""
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=False, cavities=False, loads=True, contact=GLUED
+    )
+
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""
-        require_linear(system)
+        require_handled(system.scene, self)
         columns = np.hstack([system.moves, np.zeros_like(system.loads)])
         forces = np.hstack([-(system.K @ system.moves), system.loads])
         columns[system.free] = system.factor().solve(forces[system.free])

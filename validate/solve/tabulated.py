@@ -7,6 +7,7 @@ of fourth order between. Its step time is that of the interpolation, not of a so
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.scene.scene import Scene
+from validate.solve.handles import LARGE, Handles
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _NODES = 4  # of the interpolation
@@ -23,6 +25,8 @@ _BEYOND = 0.01  # grid steps of extrapolation: the noise of a stage that stands 
 @dataclass(frozen=True)
 class Tabulated:
     """Settings: solves `inner` at whole multiples of `step` of the one drive."""
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
     inner: Scheme
     step: float = field(metadata={"unit": "m", "doc": "between the loads that are solved"})

@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from validate.arrays import Floats, Ints, checked
 from validate.fem.system import System
 from validate.scene.scene import Scene
+from validate.solve.handles import Handles
 
 Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]
 
@@ -65,7 +66,9 @@ class Uncertain(Protocol):
 
 
 class Scheme(Protocol):
-    """Settings of a scheme. `prepare` does all that is done once."""
+    """Settings of a scheme that steps. `prepare` does all that is done once."""
+
+    handles: ClassVar[Handles]
 
     def prepare(self, system: System) -> Stepper: ...
 
