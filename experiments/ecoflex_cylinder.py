@@ -279,7 +279,8 @@ def _law_fit(recordings: Sequence[Recording], p: Parameters, method: Method) -> 
         seen = place(recording, p, scene)
         states = [stepper.step(stepper.rest(), q) for q in seen.inputs]
         good = [s.failure is None for s in states]
-        curves.append(stepper.traces(states)["stage.force"].y[good])
+        found = [s.numbers["stage.force"] for s in states if s.failure is None]
+        curves.append(np.array(found))
         forces.append(seen.of(SignalObservation)[0].y[good, 0])
     return fit_scale(curves, forces)
 

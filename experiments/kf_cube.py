@@ -18,7 +18,7 @@ from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
@@ -32,7 +32,7 @@ from validate.replay.paper_001 import published, tell
 from validate.scene.box import box, centroids
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
-from validate.solve.dynamic import StartName
+from validate.solve.excitation import StartName
 from validate.solve.march import march, output_frames
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark

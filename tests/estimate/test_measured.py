@@ -8,8 +8,8 @@ import pytest
 from cubes import DT, PAPER, case, cube
 
 from validate.errors import ComparisonError
-from validate.estimate.innovation import innovation
-from validate.estimate.measured import measurements, timetable
+from validate.estimate.kalman import best_gain, innovation
+from validate.estimate.measurements import measurements, timetable
 from validate.fem.locate import barycentric_rows
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
@@ -108,7 +108,8 @@ def test_wrong_measurements_are_refused(change: dict, says: str) -> None:  # typ
 def test_an_innovation_by_hand() -> None:
     """y = (2, -, 3), S of the seen pair [[2, 1], [1, 2]]: y S^-1 y = (8 - 12 + 18) / 3."""
     S = np.array([[2.0, 9, 1], [9, 50, 9], [1, 9, 2]])
-    found = innovation(np.array([3.0, np.nan, 4.0]), np.ones(3), S)
+    gain = best_gain(np.eye(3), S, (True, False, True))
+    found = innovation(np.array([3.0, np.nan, 4.0]), np.ones(3), gain)
     assert found.y.tolist() == [2, 0, 3]
     assert found.nis == pytest.approx(14 / 3)
     assert found.dof == 2

@@ -27,7 +27,7 @@ from validate.compare.published import Figure
 from validate.compare.result import MethodResult, Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.recording.types import Recording

@@ -1,6 +1,6 @@
 """A block of 27 boxes that is pulled: over time by a force, or at three holds by its top."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.fem.system import System, build
 from validate.parameters import quantity
 from validate.recording.types import Recording
@@ -25,7 +25,7 @@ from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.newmark import Newmark
-from validate.solve.types import Ending, State, Stepper, Trace
+from validate.solve.types import Ending, State, Stepper
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
 
 DT, STEPS, SIDE = 0.002, 30, 0.01
@@ -103,8 +103,9 @@ class Breaking:
     def field(self, state: State) -> Floats:
         return self.inner.field(state)
 
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        return self.inner.traces(states)
+    @property
+    def units(self) -> Mapping[str, str]:
+        return self.inner.units
 
 
 @dataclass(frozen=True)

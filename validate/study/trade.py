@@ -334,9 +334,9 @@ def _body(cell: Cell) -> tuple[str, str, int]:
 
 
 def _field_seconds(stepper: Stepper, inputs: Floats) -> float:
-    """Median seconds of forming all displacements of a state; 0 where the state holds them."""
+    """Median seconds of forming all displacements of a state."""
     state = stepper.step(stepper.rest(), inputs)
-    if state.u is not None or state.failure:
+    if state.failure:
         return 0.0
     return float(np.median([_timed(lambda: stepper.field(state)) for _ in range(_FIELDS)]))
 
