@@ -6,7 +6,7 @@ import pytest
 from validate.arrays import Floats
 from validate.compare.field_norms import relative_energy_norm, relative_l2_norm, relative_nodal_norm
 from validate.compare.interior_error import mean_distance, weighted_nodal_sum
-from validate.compare.pair import Field, Pair, pair
+from validate.compare.pair import Field, FieldPair, pair
 from validate.compare.two_fields import compare_fields
 from validate.errors import ComparisonError
 from validate.fem.assemble import mass
@@ -69,7 +69,7 @@ def error(x: Floats) -> Floats:
     return 0.1 * np.stack([(1 - x[:, 0]) ** 3, 0 * x[:, 0]], axis=1)
 
 
-def graded(n: int, power: float) -> Pair:
+def graded(n: int, power: float) -> FieldPair:
     mesh = grid((1.0, 1.0), (n, n))
     nodes = mesh.nodes * [1.0, 1.0]
     nodes[:, 0] **= power

@@ -30,7 +30,7 @@ _LAWS = {"svk": SVK, "neo_hooke": NEO_HOOKE}
 
 
 @dataclass(frozen=True)
-class Look:
+class BodyLook:
     """A state of the body: stored energy J, least det F, cells of `cells` with det F <= 0."""
 
     energy: float
@@ -40,7 +40,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ExplicitMotion:
     """Rows (6, N): u m, last increment d m, forces r at u and `old` one step before N, v, a."""
 
     rows: Floats
@@ -51,7 +51,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Rule:
+class CentralRule:
     """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `explicit_kernels.advance`.
 
     `held` unknowns move by `moves` (held, k) times the drives, `loaded` take `loads` (loaded, l).
@@ -132,17 +132,17 @@ class ExplicitBody:
         kernels.add_products(self.law, self.geometry, self.cells, _own(u), _own(v), f, self.work)
         return f
 
-    def look(self, u: Floats) -> Look:
+    def look(self, u: Floats) -> BodyLook:
         """Stored energy and det F of all cells: not for every step."""
         count = len(self.scene.mesh.cells)
         energy, least, inverted = kernels.looked_at(
             self.law, count, self.geometry, self.cells, _own(u), self.work
         )
-        return Look(energy + float(u @ self._pull(u)) / 2, least, inverted, count)
+        return BodyLook(energy + float(u @ self._pull(u)) / 2, least, inverted, count)
 
     def advance(
-        self, motion: Motion, rule: Rule, begin: Floats, end: Floats, substeps: int
-    ) -> tuple[Motion, float, float, bool]:
+        self, motion: ExplicitMotion, rule: CentralRule, begin: Floats, end: Floats, substeps: int
+    ) -> tuple[ExplicitMotion, float, float, bool]:
         """Central-difference steps from inputs `begin` to `end` (k + l,), in one compiled call.
 
         Returns the new motion; work J of loads and prescribed motion and J taken by damping, both
@@ -157,7 +157,7 @@ class ExplicitBody:
             self._parts,
         )  # fmt: skip
         rows.setflags(write=False)
-        return Motion(rows), work, taken, math.isfinite(size)
+        return ExplicitMotion(rows), work, taken, math.isfinite(size)
 
     def _pull(self, u: Floats) -> Floats:
         """Forces (N,) N of the springs alone."""
