@@ -13,8 +13,7 @@ import numpy as np
 
 from validate.compare.metric import Counted, Metric
 from validate.compare.pair import FieldPair
-from validate.errors import ComparisonError
-from validate.fem.cells import nodal_volumes, rule, values_at, volumes_at
+from validate.fem.cells import rule, values_at, volumes_at
 
 _POINTS = 4  # Gauss points along an axis; the distance has a kink where the fields agree
 
@@ -29,19 +28,6 @@ def mean_distance(pair: FieldPair) -> float:
     """Integral of |u' - u| over the volume (area), m."""
     distance, volume = _integrals(pair)
     return distance / volume
-
-
-def weighted_nodal_sum(pair: FieldPair) -> float:
-    """sum_a w_a |u'_a - u_a| over the volume, m: at least the mean distance, for linear elements.
-
-    Raises `ComparisonError` for quadratic meshes, where it is no bound.
-    """
-    if pair.on.order != 1:
-        raise ComparisonError(
-            f"the weighted nodal sum has negative weights on {pair.on.kind}; use the quadrature"
-        )
-    weights = nodal_volumes(pair.on)
-    return float(weights @ np.linalg.norm(pair.difference, axis=1) / weights.sum())
 
 
 def _integrals(pair: FieldPair) -> tuple[float, float]:

@@ -53,11 +53,3 @@ def volumes_at(mesh: Mesh, rule: Quadrature) -> Floats:
 def values_at(mesh: Mesh, rule: Quadrature, nodal: Floats) -> Floats:
     """Nodal values (n, c) interpolated at the quadrature points (e, q, c)."""
     return rule.at(nodal[mesh.cells])
-
-
-def nodal_volumes(mesh: Mesh) -> Floats:
-    """w_a = integral of N_a (n,) m^d: their sum is the volume; negative at tet10 vertices."""
-    points = rule(mesh, 2)
-    share = volumes_at(mesh, points) @ points.N
-    sums = np.bincount(mesh.cells.ravel(), share.ravel(), minlength=len(mesh.nodes))
-    return np.asarray(sums, dtype=np.float64)

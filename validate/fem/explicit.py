@@ -103,20 +103,11 @@ class ExplicitBody:
         add(self.law, self.geometry, self.cells, _own(u), f, self._parts)
         return f
 
-    def tangent_diagonal(self, u: Floats) -> Floats:
-        """The diagonal (N,) N/m of K_t."""
-        return self.force_and_diagonal(u)[1]
-
     def force_and_diagonal(self, u: Floats) -> tuple[Floats, Floats]:
         """Internal forces (N,) N and the diagonal (N,) N/m of K_t, in one pass."""
         f, d = self._pull(u), self._own_springs.copy()
         self._blocks(u, f, d)
         return f, d
-
-    def tangent_blocks(self, u: Floats) -> Floats:
-        """The blocks (n, 3, 3) N/m of K_t that couple a node with itself."""
-        six = self.force_and_blocks(u)[1]
-        return six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
 
     def force_and_blocks(self, u: Floats) -> tuple[Floats, Floats]:
         """Internal forces (N,) N and the nodes' own blocks (n, 6): xx, yy, zz, xy, xz, yz N/m."""
