@@ -10,7 +10,7 @@ import pytest
 from validate.arrays import Floats
 from validate.compare.force_error import FORCE_METRICS
 from validate.compare.metric import Metric
-from validate.compare.pair import Common, Field, Pair, pair
+from validate.compare.pair import Common, Field, FieldPair, pair
 from validate.compare.shape_error import BOUNDARY_METRICS
 from validate.compare.two_fields import METRICS_OF_FIELDS, compare_fields, compared
 from validate.errors import ComparisonError
@@ -82,7 +82,7 @@ def test_symmetric_metrics_do_not_change_with_the_reference(mesh: Mesh) -> None:
 
 
 @pytest.mark.parametrize("metric", METRICS_OF_FIELDS, ids=lambda m: m.name)
-def test_every_score_says_what_it_is(metric: Metric[Pair]) -> None:
+def test_every_score_says_what_it_is(metric: Metric[FieldPair]) -> None:
     run, reference, scene = on(MESHES["tet4"])
     between = pair(run, reference, scene)
     score = metric.score(between)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from field_oracles import nodal_volumes
 
 from validate.fem.assemble import mass
 from validate.fem.cells import (
     jacobians,
     nodal_rule,
-    nodal_volumes,
     rule,
     values_at,
     volumes_at,

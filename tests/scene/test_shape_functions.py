@@ -9,7 +9,7 @@ import pytest
 from validate.arrays import Floats
 from validate.scene.shape_functions import (
     CORNERS,
-    Rule,
+    Quadrature,
     barycentric,
     brick_rule,
     brick_values,
@@ -21,7 +21,7 @@ from validate.scene.shape_functions import (
 )
 
 
-def at(order: int | None) -> Callable[[Floats], Rule]:
+def at(order: int | None) -> Callable[[Floats], Quadrature]:
     """The rule of simplices of an order, or of bricks, at points without weights."""
     if order is None:
         return lambda xi: brick_rule(xi, np.zeros(len(xi)))

@@ -11,11 +11,11 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.booleans import symmetric_difference
+from validate.compare.boundary import Boundary, deformed_boundary, enclosed, normals
 from validate.compare.crossing import crossings
 from validate.compare.metric import Counted, Metric
-from validate.compare.pair import Pair, same_mesh
+from validate.compare.pair import FieldPair, same_mesh
 from validate.compare.score import Score
-from validate.compare.skin import Skin, enclosed, normals, skin
 from validate.compare.soundness import require_comparable
 from validate.compare.surface_distance import hausdorff, mean_surface_distance
 from validate.errors import ComparisonError
@@ -25,7 +25,7 @@ from validate.errors import ComparisonError
 RESOLVED = 1e-9
 
 
-def surface_error(pair: Pair) -> float:
+def surface_error(pair: FieldPair) -> float:
     """E_s = |M xor M'| over |M| of the deformed bodies.
 
     By polygons in the plane, by a double-precision boolean in space. Raises `ComparisonError` for
@@ -35,18 +35,18 @@ def surface_error(pair: Pair) -> float:
     require_comparable(pair.other.soundness, pair.other.name)
     if _beyond_booleans(pair):
         return shell_error(pair)
-    return xor_share(pair.one.skin, pair.other.skin)
+    return xor_share(pair.one.boundary, pair.other.boundary)
 
 
-def xor_share(one: Skin, other: Skin) -> float:
+def xor_share(one: Boundary, other: Boundary) -> float:
     """|A xor B| over |B| of the bodies inside two boundaries."""
     return symmetric_difference(one, other) / enclosed(other)
 
 
-def shell_error(pair: Pair) -> float:
+def shell_error(pair: FieldPair) -> float:
     """Integral of |(u' - u) . n| over the deformed boundary of M, over |M|: E_s to first order."""
-    reference = skin(pair.on, pair.on.nodes + pair.u_other)
-    moved = skin(pair.on, pair.on.nodes + pair.u_one).points - reference.points
+    reference = deformed_boundary(pair.on, pair.on.nodes + pair.u_other)
+    moved = deformed_boundary(pair.on, pair.on.nodes + pair.u_one).points - reference.points
     volume = enclosed(reference)
     through = np.einsum("sad,sd->sa", moved[reference.pieces], normals(reference))
     return float(mean_absolute(through).sum() / volume)
@@ -69,13 +69,15 @@ def mean_absolute(values: Floats) -> Floats:
     return np.asarray(np.where(mixed, 2 * corner - total, np.abs(total)))
 
 
-def _beyond_booleans(pair: Pair) -> bool:
+def _beyond_booleans(pair: FieldPair) -> bool:
     """Whether two solids on one mesh differ by less than the boolean resolves."""
     if pair.on.dimension == 2 or not same_mesh(pair.one.mesh, pair.other.mesh):
         return False
     if not same_mesh(pair.on, pair.other.mesh):
         return False
-    return bool(np.abs(pair.one.skin.points - pair.other.skin.points).max() < RESOLVED * pair.size)
+    return bool(
+        np.abs(pair.one.boundary.points - pair.other.boundary.points).max() < RESOLVED * pair.size
+    )
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,8 @@ class Boundaries:
     Raises `ComparisonError` for a boundary that crosses itself.
     """
 
-    one: Skin
-    other: Skin
+    one: Boundary
+    other: Boundary
     against: str
 
     def __post_init__(self) -> None:
@@ -108,7 +110,7 @@ def boundary_scores(name: str, boundaries: Boundaries) -> tuple[Score, ...]:
     return tuple(metric.score(boundaries, f"{name}.") for metric in BOUNDARY_METRICS)
 
 
-def _pieces(boundary: Skin) -> int:
+def _pieces(boundary: Boundary) -> int:
     return len(boundary.pieces)
 
 
@@ -121,10 +123,12 @@ _MEAN = (
 )
 _PIECES = "boundary segments or triangles of both"
 _OF_BOUNDARIES: Counted[Boundaries] = Counted(_PIECES, lambda b: _pieces(b.one) + _pieces(b.other))
-OF_BODIES: Counted[Pair] = Counted(_PIECES, lambda p: _pieces(p.one.skin) + _pieces(p.other.skin))
-_OF_COMMON: Counted[Pair] = Counted(
+OF_BODIES: Counted[FieldPair] = Counted(
+    _PIECES, lambda p: _pieces(p.one.boundary) + _pieces(p.other.boundary)
+)
+_OF_COMMON: Counted[FieldPair] = Counted(
     "boundary segments or triangles of the common mesh",
-    lambda p: _pieces(skin(p.on, p.on.nodes)),
+    lambda p: _pieces(deformed_boundary(p.on, p.on.nodes)),
 )
 
 BOUNDARY_METRICS: tuple[Metric[Boundaries], ...] = (
@@ -153,7 +157,7 @@ BOUNDARY_METRICS: tuple[Metric[Boundaries], ...] = (
     ),
 )
 
-SHAPE_METRICS: tuple[Metric[Pair], ...] = (
+SHAPE_METRICS: tuple[Metric[FieldPair], ...] = (
     Metric(
         "E_s",
         surface_error,
@@ -173,7 +177,7 @@ SHAPE_METRICS: tuple[Metric[Pair], ...] = (
     ),
     Metric(
         "surface.hausdorff",
-        lambda p: hausdorff(p.one.skin, p.other.skin),
+        lambda p: hausdorff(p.one.boundary, p.other.boundary),
         "m",
         f"deformed bodies: {_FARTHEST}",
         OF_BODIES,
@@ -181,7 +185,7 @@ SHAPE_METRICS: tuple[Metric[Pair], ...] = (
     ),
     Metric(
         "surface.mean",
-        lambda p: mean_surface_distance(p.one.skin, p.other.skin),
+        lambda p: mean_surface_distance(p.one.boundary, p.other.boundary),
         "m",
         f"deformed bodies: {_MEAN}",
         OF_BODIES,

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from validate.compare.field_norms import ENERGY_METRICS, FIELD_METRICS
 from validate.compare.interior_error import INTERIOR_METRICS
 from validate.compare.metric import Counted, Metric
-from validate.compare.pair import Common, Field, Pair, count_outside, pair
+from validate.compare.pair import Common, Field, FieldPair, count_outside, pair
 from validate.compare.score import Score
 from validate.compare.shape_error import OF_BODIES, SHAPE_METRICS
 from validate.errors import ComparisonError
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
-_CARRIED: Counted[Pair] = Counted("nodes carried from another mesh", lambda p: len(p.outside))
+_CARRIED: Counted[FieldPair] = Counted("nodes carried from another mesh", lambda p: len(p.outside))
 
-CHECKS: tuple[Metric[Pair], ...] = (
+CHECKS: tuple[Metric[FieldPair], ...] = (
     Metric(
         "inverted",
         lambda p: float(len(p.one.soundness.inverted)),
@@ -56,7 +56,7 @@ CHECKS: tuple[Metric[Pair], ...] = (
     ),
 )
 
-METRICS_OF_FIELDS: tuple[Metric[Pair], ...] = (
+METRICS_OF_FIELDS: tuple[Metric[FieldPair], ...] = (
     *CHECKS,
     *FIELD_METRICS,
     *ENERGY_METRICS,
@@ -69,12 +69,12 @@ METRICS_OF_FIELDS: tuple[Metric[Pair], ...] = (
 class FieldScores:
     """Scores of a pair, and the metrics that do not exist there with the reason of each."""
 
-    pair: Pair
+    pair: FieldPair
     scores: tuple[Score, ...]
     refused: tuple[tuple[str, str], ...]
 
 
-def compared(between: Pair, metrics: Sequence[Metric[Pair]] | None = None) -> FieldScores:
+def compared(between: FieldPair, metrics: Sequence[Metric[FieldPair]] | None = None) -> FieldScores:
     """Every metric that exists for the pair; the rest (0/0 at rest, crossings) by reason.
 
     Without a scene on the common mesh the energy norms are left out, as they have no moduli.
@@ -92,7 +92,7 @@ def compare_fields(
     one: Field,
     other: Field,
     onto: Mesh | Scene | Common | None = None,
-    metrics: Sequence[Metric[Pair]] | None = None,
+    metrics: Sequence[Metric[FieldPair]] | None = None,
 ) -> tuple[Score, ...]:
     """Scores of the run `one` against the reference `other`, also on different meshes.
 
@@ -110,7 +110,7 @@ def compare_fields(
     return found.scores
 
 
-def _default(between: Pair) -> tuple[Metric[Pair], ...]:
+def _default(between: FieldPair) -> tuple[Metric[FieldPair], ...]:
     if between.common.scene is not None:
         return METRICS_OF_FIELDS
     return tuple(m for m in METRICS_OF_FIELDS if m not in ENERGY_METRICS)

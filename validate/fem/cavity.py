@@ -18,7 +18,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh
-from validate.scene.shape_functions import Rule, facet_rule
+from validate.scene.shape_functions import Quadrature, facet_rule
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _trilinear(surface: CavitySurface, a: Floats, b: Floats, c: Floats) -> Float
     return np.asarray(np.einsum("q,fqd,fqd->", rule.weights, rule.at(value[local]), normal) / d)
 
 
-def _into_solid(rule: Rule, b: Floats, c: Floats) -> Floats:
+def _into_solid(rule: Quadrature, b: Floats, c: Floats) -> Floats:
     """Normals (f, q, d) of facets with nodes b and c (f, m, d): bilinear, in the plane of c."""
     if c.shape[2] == 2:
         along = rule.jacobians(c)[..., 0]
@@ -113,5 +113,5 @@ def _into_solid(rule: Rule, b: Floats, c: Floats) -> Floats:
     return np.asarray(-np.cross(rule.jacobians(b)[..., 0], rule.jacobians(c)[..., 1]))
 
 
-def _rule(surface: CavitySurface, positions: Floats) -> Rule:
+def _rule(surface: CavitySurface, positions: Floats) -> Quadrature:
     return facet_rule(positions.shape[1], surface.facets.shape[1])

@@ -7,7 +7,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.shape_functions import (
     CORNERS,
     EDGES,
-    Rule,
+    Quadrature,
     barycentric,
     brick_rule,
     collapsed_points,
@@ -16,13 +16,13 @@ from validate.scene.shape_functions import (
 )
 
 
-def rule(mesh: Mesh, points: int) -> Rule:
+def rule(mesh: Mesh, points: int) -> Quadrature:
     """`points` Gauss points along each axis: exact to degree 2 points - 1."""
     inside = gauss_points if mesh.bricks else collapsed_points
     return _rule_at(mesh, *inside(mesh.dimension, points))
 
 
-def nodal_rule(mesh: Mesh) -> Rule:
+def nodal_rule(mesh: Mesh) -> Quadrature:
     """Shapes at the nodes of a cell, without weights: where slopes of linear fields peak."""
     if mesh.bricks:
         xi: Floats = CORNERS[mesh.dimension]
@@ -33,31 +33,23 @@ def nodal_rule(mesh: Mesh) -> Rule:
     return _rule_at(mesh, xi, np.zeros(len(xi)))
 
 
-def _rule_at(mesh: Mesh, xi: Floats, weights: Floats) -> Rule:
+def _rule_at(mesh: Mesh, xi: Floats, weights: Floats) -> Quadrature:
     if mesh.bricks:
         return brick_rule(xi, weights)
     return simplex_rule(mesh.order, barycentric(xi), weights)
 
 
-def jacobians(mesh: Mesh, rule: Rule, u: Floats | None = None) -> Floats:
+def jacobians(mesh: Mesh, rule: Quadrature, u: Floats | None = None) -> Floats:
     """det dx/dxi (e, q) of the mesh, moved by u (n, d) m when given; not positive = inverted."""
     x = mesh.nodes if u is None else mesh.nodes + u
     return np.asarray(np.linalg.det(rule.jacobians(x[mesh.cells])))
 
 
-def volumes_at(mesh: Mesh, rule: Rule) -> Floats:
+def volumes_at(mesh: Mesh, rule: Quadrature) -> Floats:
     """Weight times volume (e, q) m^d: an integral is the sum of these times the integrand."""
     return rule.weights * jacobians(mesh, rule)
 
 
-def values_at(mesh: Mesh, rule: Rule, nodal: Floats) -> Floats:
+def values_at(mesh: Mesh, rule: Quadrature, nodal: Floats) -> Floats:
     """Nodal values (n, c) interpolated at the quadrature points (e, q, c)."""
     return rule.at(nodal[mesh.cells])
-
-
-def nodal_volumes(mesh: Mesh) -> Floats:
-    """w_a = integral of N_a (n,) m^d: their sum is the volume; negative at tet10 vertices."""
-    points = rule(mesh, 2)
-    share = volumes_at(mesh, points) @ points.N
-    sums = np.bincount(mesh.cells.ravel(), share.ravel(), minlength=len(mesh.nodes))
-    return np.asarray(sums, dtype=np.float64)

@@ -28,7 +28,7 @@ def _nodal(mesh: Mesh, load: Load) -> Floats:
     shares = np.zeros(len(mesh.nodes))
     if load.spread == "consistent":
         facets = mesh.facets[load.facets]
-        parts = _parts(mesh, facets)
+        parts = facet_integrals(mesh, facets)
         np.add.at(shares, facets, parts / parts.sum())
         return shares
     nodes = mesh.facet_nodes(load.facets)
@@ -36,14 +36,9 @@ def _nodal(mesh: Mesh, load: Load) -> Floats:
     return shares
 
 
-def _parts(mesh: Mesh, facets: Ints) -> Floats:
+def facet_integrals(mesh: Mesh, facets: Ints) -> Floats:
     """Integral of every node's shape function (f, m) over its facet, m^(d - 1)."""
     rule = facet_rule(mesh.dimension, facets.shape[1])
     J = rule.jacobians(mesh.nodes[facets])
     normal = np.cross(J[..., 0], J[..., 1]) if mesh.dimension == 3 else J[..., 0]
     return np.asarray(rule.weights * np.linalg.norm(normal, axis=-1) @ rule.N)
-
-
-def facet_sizes(mesh: Mesh, facets: Ints) -> Floats:
-    """Areas (f,) m^2 of facets, lengths m of edges in 2-D."""
-    return np.asarray(_parts(mesh, facets).sum(axis=1))

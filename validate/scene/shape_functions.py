@@ -37,7 +37,7 @@ _SYMMETRIC: Mapping[tuple[int, int], tuple[tuple[float, float], ...]] = {
 
 
 @dataclass(frozen=True)
-class Rule:
+class Quadrature:
     """Quadrature: N (q, m), dN/dxi (q, m, j) and weights (q,) of the reference cell."""
 
     N: Floats
@@ -53,19 +53,19 @@ class Rule:
         return np.asarray(np.einsum("qmj,emi->eqij", self.dN, x))
 
 
-def simplex_rule(order: int, L: Floats, weights: Floats) -> Rule:
+def simplex_rule(order: int, L: Floats, weights: Floats) -> Quadrature:
     """Simplices of order 1 or 2 at the points L (q, d + 1)."""
     d = L.shape[1] - 1
     along = np.vstack([-np.ones(d), np.eye(d)])  # dL/dxi
-    return Rule(simplex_values(order, L), simplex_slopes(order, L) @ along, weights)
+    return Quadrature(simplex_values(order, L), simplex_slopes(order, L) @ along, weights)
 
 
-def brick_rule(xi: Floats, weights: Floats) -> Rule:
+def brick_rule(xi: Floats, weights: Floats) -> Quadrature:
     """Bricks at the points xi (q, d)."""
-    return Rule(brick_values(xi), brick_slopes(xi), weights)
+    return Quadrature(brick_values(xi), brick_slopes(xi), weights)
 
 
-def facet_rule(dimension: int, nodes: int) -> Rule:
+def facet_rule(dimension: int, nodes: int) -> Quadrature:
     """Facets with that many nodes of a mesh in `dimension` 2 or 3: edges exact to degree 5,
     triangles to 4, quadrilaterals to 3 along each side."""
     if dimension == 3 and nodes == 4:

@@ -18,7 +18,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assemble import lumped, mass
 from validate.fem.critical import lanczos_step
-from validate.fem.explicit import ExplicitBody, Look, Motion, Rule
+from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitMotion
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
@@ -74,7 +74,7 @@ class CentralDifference:
         require_handled(system.scene, self)
         beta = self._beta(system.scene)
         still = np.zeros(len(system.moves))
-        past = Past(Motion(np.zeros((6, len(still)))), still, np.zeros(len(system.scene.inputs)))
+        past = Past(ExplicitMotion(np.zeros((6, len(still)))), still, np.zeros(len(system.scene.inputs)))
         plates = system.moves[system.held]
         feels_loads = bool(system.loads[system.held].any())
         body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
@@ -98,14 +98,14 @@ class CentralDifference:
             raise SceneError(f"lagged damping is for one stiffness damping, got {sorted(betas)} s")
         return float(betas.pop())
 
-    def _rule(self, system: System, beta: float) -> Rule:
+    def _rule(self, system: System, beta: float) -> CentralRule:
         alpha = np.zeros(len(system.moves))
         if self.damping != "none":
             alpha = lumped_damping(system) / system.masses
         half, free = alpha * self.step / 2, np.zeros(len(alpha))
         free[system.free] = 1.0
         loaded = np.intersect1d(np.flatnonzero(system.loads.any(axis=1)), system.free)
-        return Rule(
+        return CentralRule(
             self.step,
             free * (1 - half) / (1 + half),
             free * self.step**2 / system.masses / (1 + half),
@@ -121,7 +121,7 @@ class CentralDifference:
 class Past:
     """Motion and inputs after a step; `limit` s was taken at the displacements `limit_u`."""
 
-    motion: Motion
+    motion: ExplicitMotion
     limit_u: Floats
     inputs: Floats
     limit: float = np.inf
@@ -137,7 +137,7 @@ class CentralStepper:
     settings: CentralDifference
     system: System
     body: ExplicitBody
-    rule: Rule
+    rule: CentralRule
     beta: float
     held: Ints
     plates: Floats
@@ -218,7 +218,7 @@ class CentralStepper:
             return past, seen, ("refused", f"step {k}: as deformed, {self._too_large(past.limit)}")
         return past, seen, None
 
-    def _increment_energy(self, motion: Motion, ratio: float, kinetic: float) -> float:
+    def _increment_energy(self, motion: ExplicitMotion, ratio: float, kinetic: float) -> float:
         """d K d/8 J of the last increment: what central difference holds beyond the work done.
 
         In a linear body strain + kinetic - work is exactly this at half steps, as long as the run
@@ -248,7 +248,7 @@ class CentralStepper:
         limit = float(np.hypot(undamped, self.beta)) - self.beta
         return replace(past, limit=limit, limit_u=u)
 
-    def _seen(self, past: Past, look: Look) -> dict[str, float]:
+    def _seen(self, past: Past, look: BodyLook) -> dict[str, float]:
         d = past.motion["d"][self.system.free]
         kinetic = float(self.masses @ (d * d)) / (2 * self.rule.dt**2)
         return {
