@@ -7,12 +7,12 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from validate.compare.outline import normal_distances
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.images.outline import extract_outline
 from validate.recording.images.raster import coverage
+from validate.register.outline_geometry import normal_distances
 from validate.twin.cysts import LEVELS, SHADOWS, CystFrame, cyst_frame
 from validate.twin.ultrasound import Scanner, Target, b_mode
 

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.estimate.filters import Filter
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step

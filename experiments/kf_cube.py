@@ -13,7 +13,7 @@ from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.papers.kf_fem.block import PulledBlock, build, place, record, sets, truth
 from validate.papers.kf_fem.figures import FIGURES
 from validate.papers.kf_fem.seeds import tell

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.replay.experiment import Case
 from validate.replay.find import load_file
 from validate.replay.method import Method

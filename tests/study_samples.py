@@ -6,20 +6,19 @@ TEXT = '''
 """A block of 27 nodes that is pulled; its top is measured."""
 import os
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
-from validate.estimate.measured import measurements
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.recording.types import Signal
-from validate.register.observe import Hold, Registered
-from validate.register.placed import placed
-from validate.replay.tracking import Tracking, Truth
+from validate.register.follow import follow_signal
+from validate.replay.experiment import Experiment, Twin
+from validate.replay.followed import Truth
+from validate.replay.method import Method
 from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support
 from validate.solve.march import march
@@ -32,7 +31,7 @@ FIXED = {n: np.array(x) for n, x in
 
 
 @dataclass(frozen=True)
-class Twin:
+class TwinCard:
     seed: int = quantity(5, "1", "seed of the noise")
     noise: float = quantity(1e-10, "m2", "variance")
     stiffness: float = quantity(1.0, "1", "its modulus over the models'")
@@ -41,21 +40,26 @@ class Twin:
 
 @dataclass(frozen=True)
 class Parameters:
-    twin: Twin = Twin()
+    twin: TwinCard = TwinCard()
 
 
 @dataclass(frozen=True)
 class Filter:
-    label: str = "filter"
     Q: float = quantity(1e-11, "m2", "process noise")
     R: float | None = quantity(None, "m2", "measurement noise")
     gains: str = quantity("shared", "1", "shared or every_step")
     trap: str = quantity("", "1", "raise, or wait for a file")
 
-
-@dataclass(frozen=True)
-class Solver:
-    label: str = "solver"
+    def prepare(self, system, looks):
+        if self.trap == "die" and self.Q > 1e-10:
+            os._exit(1)
+        if self.trap == "raise":
+            raise ZeroDivisionError("a trap")
+        if self.trap.startswith("count:"):
+            with (Path(self.trap[6:]) / "runs").open("a") as out:
+                out.write(f"{self.Q}\\n")
+            time.sleep(float(os.environ.get("TRAP_SECONDS", "0")))
+        return KfFem(DT, self.Q, self.R, 1e-11, gains=self.gains).prepare(system, looks)
 
 
 def scene(E):
@@ -86,34 +90,16 @@ def truth(p, seen):
                   for q in made.probes})
 
 
-def place(recording, p, made):
-    pull = recording.signal("pull", "N")
-    stage = Signal(pull.t[1:], pull.y[1:], "N", pull.sd, pull.frame)
-    return Registered(stage, (Hold("start", 0.0, DT),), placed(recording, made.mesh), None, ())
-
-
-def stepper(method, p, system, seen):
-    if isinstance(method, Solver):
-        return Newmark(DT).prepare(system)
-    if method.trap == "die" and method.Q > 1e-10:
-        os._exit(1)
-    if method.trap == "raise":
-        raise ZeroDivisionError("a trap")
-    if method.trap.startswith("count:"):
-        with (Path(method.trap[6:]) / "runs").open("a") as out:
-            out.write(f"{method.Q}\\n")
-        time.sleep(float(os.environ.get("TRAP_SECONDS", "0")))
-    given = measurements(seen, system.scene.mesh).of("top")
-    return KfFem(DT, method.Q, method.R, 1e-11, gains=method.gains).prepare(system, given)
-
-
-EXPERIMENT = Tracking(
+EXPERIMENT = Experiment(
     name="pulled", title="A pulled block", source="made for tests", parameters=Parameters(),
-    methods={"kf": Filter(), "plain": Solver()}, accepted=("kf",),
-    accept=(Accept("top", 1e-3, "made for tests"),), same_model=True,
-    load=lambda p, folder: (record(p, lambda _: None),), record=record, truth=truth,
-    build=lambda recording, p, method: scene(1e4), place=place, stepper=stepper, axis="z",
-    reference="plain", seed=5,
+    methods={"kf": Method("filter", Filter(), markers=("top",)),
+             "plain": Method("solver", Newmark())},
+    accepted=("kf",), accept=(Accept("top", 1e-3, "made for tests"),),
+    load=lambda p, folder: (record(p, lambda _: None),),
+    build=lambda recording, p, model: scene(1e4),
+    place=lambda recording, p, made: follow_signal(recording, made.mesh, "pull", "N"),
+    sets=lambda p, seen: {"dt": DT}, axis="z", reference="plain",
+    twin=Twin(record, truth, same_model=True, seed=5),
 )
 '''
 

@@ -10,6 +10,11 @@ from phantoms import COARSE_GRID, phantom_mesh
 
 # Grows while one file is read and never leaves its reader.
 ACCUMULATORS = {"streams.py:Collected"}
+# Names that still stand for two things; none may come to them.
+TWICE = {
+    "Bench", "Block", "Body", "Cell", "Clock", "Interval", "Modal", "ReducedModel", "Row", "Sensor",
+    "Solver", "Table", "TwinSettings", "Update", "Variant", "Walk", "_Drawn", "_Walk",
+}  # fmt: skip
 
 
 def modules(root: Path) -> list[Path]:
@@ -35,6 +40,14 @@ def test_names_of_test_modules_are_unique(project_root: Path) -> None:
     """pytest imports them by bare name: two of one name are one module."""
     names = [p.name for p in (project_root / "tests").rglob("*.py") if p.name != "conftest.py"]
     assert sorted(names) == sorted(set(names))
+
+
+def test_class_names_stand_once(project_root: Path) -> None:
+    """Two classes of one name are two meanings of one word."""
+    names = [
+        node.name for path in (project_root / "validate").rglob("*.py") for node in classes(path)
+    ]
+    assert {name for name in names if names.count(name) > 1} <= TWICE
 
 
 def test_every_dataclass_is_frozen(project_root: Path) -> None:
@@ -82,3 +95,11 @@ def test_arrays_of_meshes_are_read_only() -> None:
         assert isinstance(array, np.ndarray)
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_the_recording_floor_knows_no_phantom(project_root: Path) -> None:
+    """Which face is loaded and which way is up are said by a recording or a scene."""
+    words = ("phantom", "top face", "bottom face", "probe plate", "gravity", "upward")
+    for path in (project_root / "validate" / "recording").rglob("*.py"):
+        text = path.read_text(encoding="utf-8").lower()
+        assert not [word for word in words if word in text], path.name

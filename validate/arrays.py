@@ -1,4 +1,4 @@
-"""The door through which arrays enter: shape, type and finiteness are checked here, once."""
+"""The door through which arrays enter, checked once for shape and finiteness; and their rms."""
 
 from collections.abc import Sequence
 
@@ -59,3 +59,13 @@ def _check_shape(
     if not fits:
         pattern = ", ".join("any" if w is None else str(w) for w in want)
         raise error(f"{name}: shape {got}, expected ({pattern})")
+
+
+def rms(values: ArrayLike, weights: Floats | None = None) -> float:
+    """Root mean square of numbers (k,) or of the lengths of vectors (..., c), in their unit.
+
+    `weights` (...), one a number or vector, need not add up to 1.
+    """
+    squares = np.asarray(values, dtype=np.float64) ** 2
+    lengths = squares.sum(axis=-1) if squares.ndim > 1 else squares
+    return float(np.sqrt(lengths.mean() if weights is None else np.average(lengths, None, weights)))

@@ -8,11 +8,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 from study_samples import experiment_file
-from validate.replay.run import compare
 
 from validate.cli.main import BAD_INPUT, run
 from validate.replay.find import load_file
 from validate.replay.options import Options
+from validate.replay.road import compare
 from validate.report.store import schema
 
 SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11,-1", "--sweep", "twin.noise=1e-11,1e-10")

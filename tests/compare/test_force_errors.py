@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.compare.force import FORCE_METRICS, force_pair, force_scores
+from validate.compare.force_error import force_pair, force_scores
 from validate.errors import ComparisonError
 from validate.recording.types import Signal
 
@@ -21,8 +21,7 @@ def signal(y: Floats, t: Floats = T, unit: str = "N") -> Signal:
 
 def scores(run: Signal, reference: Signal) -> dict[str, float]:
     return {
-        s.name: s.value
-        for s in force_scores(force_pair("F", run, reference, lag_within=0.5), "reference")
+        s.name: s.value for s in force_scores(force_pair("F", run, reference, 0.5, "reference"))
     }
 
 
@@ -55,32 +54,30 @@ def test_a_late_force_has_a_positive_phase_error(late: float) -> None:
 def test_only_times_that_the_run_meets_are_counted() -> None:
     """The run stops at 3 s and has a gap of 1 s, which also takes the sample it begins with."""
     t = T[(T <= 3.0) & ~((T > 0.5) & (T < 1.5))]
-    force = force_pair("F", signal(pulse(t), t), signal(pulse(T)), 0.5)
+    force = force_pair("F", signal(pulse(t), t), signal(pulse(T)), 0.5, "reference")
     assert len(force.t) == len(t) - 1
     assert np.array_equal(force.y, force.y_reference)
-    found = force_scores(force, "reference")
+    found = force_scores(force)
     assert all(s.count == len(t) - 1 for s in found)
 
 
 def test_every_score_has_its_unit_and_definition() -> None:
-    found = force_scores(
-        force_pair("F", signal(pulse(T)), signal(1.1 * pulse(T)), 0.5), "reference"
-    )
+    forces = signal(pulse(T)), signal(1.1 * pulse(T))
+    found = force_scores(force_pair("F", *forces, 0.5, "reference"))
     units = {s.name: s.unit for s in found}
     assert units == {
         "F.peak": "N", "F.peak.relative": "1", "F.rms": "N", "F.rms.relative": "1",
         "F.phase": "s", "F.mae": "N", "F.rmse": "N", "F.sd": "N", "F.max": "N", "F.nrmse": "1",
     }  # fmt: skip
-    assert len({name for name, *_ in FORCE_METRICS}) == len(FORCE_METRICS)
     assert all(s.definition and s.against == "reference" for s in found)
 
 
 def test_what_cannot_be_compared_is_refused() -> None:
     y = pulse(T)
     with pytest.raises(ComparisonError, match="in N against 1 in mN"):
-        force_pair("F", signal(y), signal(y, unit="mN"), 0.5)
+        force_pair("F", signal(y), signal(y, unit="mN"), 0.5, "reference")
     with pytest.raises(ComparisonError, match="0 of 600 reference samples meet the run"):
-        force_pair("F", signal(y, T + 100), signal(y), 0.5)
+        force_pair("F", signal(y, T + 100), signal(y), 0.5, "reference")
     with pytest.raises(ComparisonError, match="F: no phase error: "):
         scores(signal(np.sin(10 * np.pi * (T - 0.05))), signal(np.sin(10 * np.pi * T)))
     with pytest.raises(ComparisonError, match=r"F: no phase error: the streams correlate by 0\."):
@@ -88,4 +85,4 @@ def test_what_cannot_be_compared_is_refused() -> None:
     with pytest.raises(ComparisonError, match="the reference force is 0 throughout"):
         scores(signal(y), signal(0 * y))
     with pytest.raises(ComparisonError, match="give a positive time"):
-        force_pair("F", signal(y), signal(y), 0.0)
+        force_pair("F", signal(y), signal(y), 0.0, "reference")

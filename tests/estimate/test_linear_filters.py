@@ -11,18 +11,18 @@ from scipy.linalg import expm
 from validate.errors import ComparisonError, SceneError
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
-from validate.estimate.covariance import Modal
-from validate.estimate.displacement_filter import DisplacementStepper, Inner
+from validate.estimate.covariance import Decoupled
+from validate.estimate.displacement_filter import DisplacementStepper, Estimate
 from validate.estimate.gains import Claims, gain_sequence, schedule
+from validate.estimate.kalman import Gaussian, kf_predict, kf_update
 from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
 from validate.estimate.load_scale import LoadScale
-from validate.estimate.measured import Measurements, timetable
+from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.modal_kernel import advance, advance_reference, mirrored
 from validate.estimate.modal_kf import ModalKf
-from validate.estimate.observed import Observed, observed
+from validate.estimate.observable import Observed, observed
+from validate.estimate.reduced_kf import ReducedKf, dense_covariance, steady
 from validate.estimate.reduced_linear import LoadDoubt, reduced_model
-from validate.estimate.small import Gaussian, kf_predict, kf_update
-from validate.estimate.steady import ReducedKf, dense_covariance, steady_claim
 from validate.fem.system import build
 from validate.scene.scene import Drive, Region
 from validate.solve.march import march
@@ -133,7 +133,7 @@ def test_gains_of_what_is_observed_are_those_of_the_whole() -> None:
     seen = with_gaps(big, 1)
     modes = in_modes(big.system, rule_of("average", DT))
     whole = modal_covariance(KfFem(), big.system, seen, modes)
-    assert isinstance(whole, Modal)
+    assert isinstance(whole, Decoupled)
     narrow, when = observed(whole, 40), schedule(timetable(seen, DT))
     assert isinstance(narrow, Observed)
     assert narrow.V.shape[1] <= 24
@@ -149,7 +149,7 @@ def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: Cas
     system = build(replace(scene, material=replace(scene.material, stiffness_damping=1e-4)))
     modes = in_modes(system, rule_of("average", DT))
     whole = modal_covariance(KfFem(), system, pulled.measured(1), modes)
-    assert isinstance(whole, Modal)
+    assert isinstance(whole, Decoupled)
     assert observed(whole, 60) is whole
 
 
@@ -255,8 +255,8 @@ def test_tiny_noise_keeps_the_claim_positive_and_nis_flags_it(pulled: Case) -> N
         state = stepper.rest()
         for row in pulled.inputs:
             state = stepper.step(state, row)
-        inner = state.extra
-        assert isinstance(inner, Inner)
+        inner = state.inner
+        assert isinstance(inner, Estimate)
         assert inner.claim is not None
         P = stepper.covariance.matrix(inner.claim)
         assert np.abs(P - P.T).max() <= 1e-14 * np.abs(P).max()
@@ -306,8 +306,8 @@ def test_the_steady_claim_is_where_the_sequence_settles(pulled: Case) -> None:
             g = kf_predict(g, m.F, m.Q)
             if k % every == 0:
                 before, g = g, kf_update(g, np.zeros(3), m.H, m.R).posterior
-        steady = steady_claim(m, every)
-        assert pytest.approx(m.H @ before.P @ m.H.T, rel=1e-5) == m.H @ steady.P @ m.H.T
+        P = steady(dense_covariance(m), schedule(timetable(seen, DT))).prior.P
+        assert pytest.approx(m.H @ before.P @ m.H.T, rel=1e-5) == m.H @ P @ m.H.T
 
 
 def test_a_steady_filter_knows_how_often_it_measures(pulled: Case) -> None:

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 from cubes import DT, PAPER, case, cube
-from validate.register.observe import MarkerObservation, Registered
 
 from validate.errors import ComparisonError
-from validate.estimate.innovation import innovation
-from validate.estimate.measured import measurements, timetable
+from validate.estimate.kalman import best_gain, innovation
+from validate.estimate.measurements import measurements, timetable
 from validate.fem.locate import barycentric_rows
-from validate.recording.types import Signal
+from validate.register.markers import MarkerObservation
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
 
 
 def test_measurements_land_on_the_nearest_step() -> None:
@@ -62,9 +63,13 @@ def observed(names: tuple[str, ...], points: np.ndarray, x: np.ndarray) -> Regis
     t = 0.1 * np.arange(len(x))
     rows = barycentric_rows(mesh, points)
     fit: Any = None
-    markers = MarkerObservation(t, names, x, points, rows, 2e-5, np.zeros(len(names)), fit)
-    stage = Signal(t, np.zeros((len(t), 1)), "m", 1e-6, "scene")
-    return Registered(stage, (), markers, None, ())
+    tre = np.zeros(len(names))
+    markers = MarkerObservation("seen", "validates", t, names, x, points, rows, 2e-5, tre, fit)
+    return Registered((stage(t), markers))
+
+
+def stage(t: np.ndarray) -> SignalObservation:  # type: ignore[type-arg]
+    return SignalObservation("stage", "drives", t, np.zeros((len(t), 1)), "m", 1e-6)
 
 
 def test_markers_become_measurements_of_displacements() -> None:
@@ -82,7 +87,7 @@ def test_markers_become_measurements_of_displacements() -> None:
     with pytest.raises(ComparisonError, match="rows of 27 nodes on a mesh of 200"):
         measurements(observed(("a", "b"), points, x), cube(shape=PAPER).scene.mesh)
     with pytest.raises(ComparisonError, match="no markers"):
-        measurements(replace(observed(("a", "b"), points, x), markers=None), mesh)
+        measurements(Registered((stage(np.arange(3.0)),)), mesh)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +108,8 @@ def test_wrong_measurements_are_refused(change: dict, says: str) -> None:  # typ
 def test_an_innovation_by_hand() -> None:
     """y = (2, -, 3), S of the seen pair [[2, 1], [1, 2]]: y S^-1 y = (8 - 12 + 18) / 3."""
     S = np.array([[2.0, 9, 1], [9, 50, 9], [1, 9, 2]])
-    found = innovation(np.array([3.0, np.nan, 4.0]), np.ones(3), S)
+    gain = best_gain(np.eye(3), S, (True, False, True))
+    found = innovation(np.array([3.0, np.nan, 4.0]), np.ones(3), gain)
     assert found.y.tolist() == [2, 0, 3]
     assert found.nis == pytest.approx(14 / 3)
     assert found.dof == 2

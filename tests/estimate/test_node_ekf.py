@@ -10,7 +10,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, SceneError, UsageError
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.node_ekf_kernel import HUGE, clip
 from validate.fem.hyperelastic import Body

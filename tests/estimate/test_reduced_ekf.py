@@ -11,10 +11,10 @@ from scipy.stats import chi2
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.explicit_walk import explicit_model, walk
-from validate.estimate.measured import Measurements
+from validate.estimate.explicit_step import explicit_step
+from validate.estimate.measurements import Measurements
 from validate.estimate.reduced_basis import modes, pod
-from validate.estimate.reduced_ekf import ReducedEKF, reduced_model
+from validate.estimate.reduced_ekf import ReducedEKF, shapes_covariance
 from validate.fem.system import System
 
 H = 2e-4  # s
@@ -36,7 +36,7 @@ def every(system: System, node: int, h: float, gap: int, z: Floats, sd: float) -
 @pytest.mark.parametrize("basis", ["modes", "pod"])
 def test_shapes_are_orthonormal_and_uncouple_the_stiffness(basis: str) -> None:
     system = cube()
-    steps = walk(system, explicit_model(system), H, 1)
+    steps = explicit_step(system, H, 1)
     found = modes(system, 6) if basis == "modes" else pod(steps, 6, 5.0)
     Phi = found.Phi
     assert Phi.T @ (system.masses[:, None] * Phi) == pytest.approx(np.eye(6), abs=1e-10)
@@ -92,8 +92,8 @@ def _by_filterpy(
     free = system.free
     n, over = len(free), H * H / system.masses[free]
     K, f = system.K[free][:, free].toarray(), system.loads[free, 0]
-    steps = walk(system, explicit_model(system), H, 1)
-    Q = reduced_model(settings, steps, modes(system, n), measured).one.Q
+    steps = explicit_step(system, H, 1)
+    Q = shapes_covariance(settings, steps, modes(system, n), measured).Q
     Phi = modes(system, n).Phi[free]
     kf = KalmanFilter(2 * n + 1, 3)
     kf.F = np.eye(2 * n + 1)
@@ -141,15 +141,16 @@ def _drawn(
 ) -> tuple[Floats, Floats]:
     """A truth of the reduced model: the last field (n, 3) m, measurements (30, 3) m."""
     blank = every(system, node, H, 5, np.zeros((30, 3)), 1e-9)
-    steps = walk(system, explicit_model(system), H, 1)
-    model = reduced_model(settings, steps, modes(system, 12), blank)
-    root = np.linalg.cholesky(model.one.Q + 1e-40 * np.eye(25))
+    steps = explicit_step(system, H, 1)
+    basis = modes(system, 12)
+    model = shapes_covariance(settings, steps, basis, blank)
+    root = np.linalg.cholesky(model.Q + 1e-40 * np.eye(25))
     x, z = np.sqrt(np.diag(model.P0)) * rng.normal(size=25), []
     for k in range(150):
-        x = model.one.A @ x + root @ rng.normal(size=25)
+        x = model.A @ x + root @ rng.normal(size=25)
         if (k + 1) % 5 == 0:
             z.append(model.H @ x + 1e-9 * rng.normal(size=3))
-    return (model.Phi @ x[:12]).reshape(-1, 3), np.array(z)
+    return (basis.Phi @ x[:12]).reshape(-1, 3), np.array(z)
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,9 @@ from scipy.sparse.linalg import spsolve
 
 from validate.errors import SceneError
 from validate.fem.assemble import divergence, shape_gradients, stiffness
-from validate.scene.mesh import EDGES, Mesh, cell_volumes, kuhn_cells, quadratic
+from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
 from validate.scene.scene import Dilatation, Material, Scene
+from validate.scene.shape_functions import EDGES
 
 KINDS = [("linear", 1, "pointwise"), ("nodal_mean", 1, "nodal_mean"), ("quadratic", 2, "pointwise")]
 each_kind = pytest.mark.parametrize(

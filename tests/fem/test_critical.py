@@ -5,13 +5,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from field_oracles import frequency_range
 
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.critical import (
     critical_step,
     element_frequencies,
-    frequency_range,
     lanczos_step,
 )
 from validate.fem.hyperelastic import Body

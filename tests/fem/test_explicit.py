@@ -58,9 +58,10 @@ def test_tangents_are_those_of_the_numpy_body(law: LawName) -> None:
     f, d = fast.force_and_diagonal(u)
     assert apart(f, fast.force(u)) < 1e-14
     assert apart(d, K.diagonal()) < 1e-13
-    assert apart(fast.tangent_diagonal(u), K.diagonal()) < 1e-13
+    six = fast.force_and_blocks(u)[1]  # xx, yy, zz, xy, xz, yz
+    blocks = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
     own = K.toarray().reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n)]
-    assert apart(fast.tangent_blocks(u), own) < 1e-13
+    assert apart(blocks, own) < 1e-13
     v = np.random.default_rng(5).standard_normal(len(u))
     assert apart(fast.tangent_product(u, v), K @ v) < 1e-13
 
@@ -144,7 +145,7 @@ def test_foundations_are_springs() -> None:
     u, reference = deformed(body.mesh), Body(body)
     fast = ExplicitBody(body)
     assert apart(fast.force(u), reference.force(u)) < 1e-13
-    assert apart(fast.tangent_diagonal(u), reference.tangent(u).diagonal()) < 1e-13
+    assert apart(fast.force_and_diagonal(u)[1], reference.tangent(u).diagonal()) < 1e-13
     assert apart(fast.tangent_product(u, u), reference.tangent(u) @ u) < 1e-13
     assert fast.look(u).energy == pytest.approx(reference.energy(u), rel=1e-13)
 

@@ -232,7 +232,7 @@ def test_principal_stretch_of_a_known_deformation() -> None:
 
 def test_foundation_acts_as_a_linear_spring() -> None:
     scene = phantom(1, "pointwise", "neo_hooke")
-    held = replace(scene, foundations=(Foundation("bottom", (0, 2), 1e5),))
+    held = replace(scene, foundations=(Foundation("y0", (0, 2), 1e5),))
     free, b = body(1, "pointwise", "neo_hooke"), Body(held)
     u = deformed(b.mesh)
     added = b.force(u) - free.force(u)

@@ -10,8 +10,9 @@ from validate.arrays import Floats
 from validate.fem.factor import elimination_order, factorise_indefinite
 from validate.fem.hyperelastic import Body
 from validate.fem.laws import Law, law_of
-from validate.scene.mesh import EDGES, Mesh, cell_volumes
+from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.scene import Dilatation, LawName, Material, Scene
+from validate.scene.shape_functions import EDGES
 
 # Gauss-Legendre points on [0, 1] folded onto the tetrahedron (Duffy): exact to degree 5.
 _X, _W = np.polynomial.legendre.leggauss(4)

@@ -9,7 +9,7 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assemble import stiffness
-from validate.fem.loads import facet_sizes
+from validate.fem.loads import facet_integrals
 from validate.fem.locking import locking_warning
 from validate.fem.system import System, build
 from validate.scene.box import box, centroids
@@ -192,10 +192,10 @@ def test_a_consistent_load_does_the_work_of_its_traction(order: int, d: int) -> 
         assert share @ x**2 == pytest.approx(SIZE[0] ** 2 / 3)
 
 
-def test_facet_sizes_are_areas_and_lengths() -> None:
-    assert facet_sizes(block(), block().facets["z1"]).sum() == pytest.approx(SIZE[0] * SIZE[1])
+def test_integrals_over_facets_sum_to_areas_and_lengths() -> None:
+    assert facet_integrals(block(), block().facets["z1"]).sum() == pytest.approx(SIZE[0] * SIZE[1])
     flat = block(2, 2)
-    assert facet_sizes(flat, flat.facets["y1"]).sum() == pytest.approx(SIZE[0])
+    assert facet_integrals(flat, flat.facets["y1"]).sum() == pytest.approx(SIZE[0])
 
 
 def test_a_direction_that_is_no_unit_vector_is_refused() -> None:

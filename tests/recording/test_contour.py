@@ -8,13 +8,13 @@ from types import ModuleType
 import numpy as np
 import pytest
 import scipy.io
-from validate.compare.outline import normal_distances
 
 from validate.errors import RecordingError
 from validate.recording.images.closed_path import closed_path
 from validate.recording.images.outline import Outline, extract_outline, outlines_of
 from validate.recording.images.shapes import circle_points, ellipse_points
 from validate.recording.types import Frames
+from validate.register.outline_geometry import normal_distances
 from validate.twin.cysts import cyst_frame, cyst_outline
 from validate.twin.ultrasound import Scanner, Target, b_mode
 

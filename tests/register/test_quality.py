@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from validate.arrays import rms
 from validate.errors import RegistrationError
 from validate.register import Similarity, fit_rigid, fit_similarity, register_points
 from validate.register.measures import (
@@ -17,7 +18,6 @@ from validate.register.measures import (
     localisation_error,
     looks_mirrored,
     reflection,
-    rms,
     robust_noise,
     target_covariance,
 )

@@ -2,20 +2,20 @@
 
 import numpy as np
 import pytest
-from validate.replay.tracking import Tracking
 
 from validate.compare.result import Result
 from validate.papers.accuracy.rod_exhibits import beam, first_crossing
 from validate.replay import compare, load
+from validate.replay.experiment import Experiment
 
 
 @pytest.fixture(scope="module")
-def experiment(project_root) -> Tracking:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "bending_rod.py"))  # type: ignore[return-value]
+def experiment(project_root) -> Experiment:  # type: ignore[no-untyped-def]
+    return load(str(project_root / "experiments" / "bending_rod.py"))
 
 
 @pytest.fixture(scope="module")
-def quick(experiment: Tracking) -> Result:
+def quick(experiment: Experiment) -> Result:
     return compare(experiment, {}, ("implicit", "explicit", "quasi_static"), quick=True)
 
 
@@ -32,7 +32,7 @@ def test_quasi_statics_is_off_by_the_whole_way_at_first(quick: Result) -> None:
     assert tip["implicit"][-1] == pytest.approx(tip["quasi_static"][-1], rel=1e-4)
 
 
-def test_dropped_damping_is_seen(experiment: Tracking) -> None:
+def test_dropped_damping_is_seen(experiment: Experiment) -> None:
     values = {"methods.explicit.settings.damping_terms": "mass"}
     result = compare(experiment, values, ("explicit",), quick=True)
     assert {c.verdict for c in result.checks} == {"differs"}
@@ -52,7 +52,7 @@ def test_the_first_crossing_lies_between_two_steps() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_all_claims_stand(experiment: Tracking) -> None:
+def test_all_claims_stand(experiment: Experiment) -> None:
     result = compare(experiment)
     assert result.passed
     assert [(p.name, p.fault) for p in result.published if p.fault] == []

@@ -11,24 +11,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validate.replay.tracking import Tracking, Truth
 
 from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
-from validate.papers.ekf_nfem import cone_exhibits
 from validate.papers.ekf_nfem.cone_twin import record_cone
 from validate.recording.types import Recording
-from validate.replay import compare, load
+from validate.register.markers import MarkerObservation
+from validate.register.signals import SignalObservation
+from validate.replay import compare, load, paper_003_cone
+from validate.replay.experiment import Experiment
 
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
 COARSE = {"twin.radial": "3", "twin.axial": "3", "mesh.radial": "3", "mesh.axial": "3"}
 
 
 @pytest.fixture(scope="module")
-def cone(project_root) -> Tracking:  # type: ignore[no-untyped-def]
-    found = load(str(project_root / "experiments" / "ekf_cone.py"))
-    assert isinstance(found, Tracking)
-    return found
+def cone(project_root) -> Experiment:  # type: ignore[no-untyped-def]
+    return load(str(project_root / "experiments" / "ekf_cone.py"))
 
 
 def dear(scene: Any, *arguments: Any) -> NumberTable:
@@ -37,31 +36,32 @@ def dear(scene: Any, *arguments: Any) -> NumberTable:
 
 
 @pytest.fixture(scope="module")
-def coarse(cone: Tracking) -> Iterator[Tracking]:
+def coarse(cone: Experiment) -> Iterator[Experiment]:
     """Recordings made in memory by a coarse twin that is its models' equal; five methods."""
 
     def made(parameters: Any, folder: Path) -> tuple[Recording, ...]:
         return (record_cone(parameters.twin, lambda step: None),)
 
+    assert cone.twin is not None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cone_exhibits, "locking_table", dear)
-        patch.setattr(cone_exhibits, "readings_table", dear)
+        patch.setattr(paper_003_cone, "locking_table", dear)
+        patch.setattr(paper_003_cone, "readings_table", dear)
         yield replace(
             cone,
             load=made,
             methods={name: cone.methods[name] for name in SOME},
             uncertainty=None,
-            same_model=True,
+            twin=replace(cone.twin, same_model=True),
         )
 
 
 @pytest.fixture(scope="module")
-def result(coarse: Tracking) -> Result:
+def result(coarse: Experiment) -> Result:
     return compare(coarse, COARSE)
 
 
 @pytest.fixture(scope="module")
-def two(coarse: Tracking) -> Tracking:
+def two(coarse: Experiment) -> Experiment:
     """One body moved by the plate and the explicit one, on the recorded case only."""
     methods = {name: coarse.methods[name] for name in ("plate_p2", "nfem")}
     return replace(coarse, methods=methods, cases=())
@@ -100,7 +100,7 @@ def test_methods_are_ranked_at_15_N_by_a_node_that_no_filter_sees(result: Result
     assert [row[0] for row in table.rows] == [1, 2, 3, 4, 5]
 
 
-def test_nothing_is_ranked_where_the_recording_itself_is_below_noise(two: Tracking) -> None:
+def test_nothing_is_ranked_where_the_recording_itself_is_below_noise(two: Experiment) -> None:
     found = compare(two, {**COARSE, "twin.force": "0.15"})
     assert "ranking" not in tables(found)
     assert words(found, "signal")[0].endswith("no method is ranked there.")
@@ -116,14 +116,14 @@ def test_inertia_of_the_explicit_run_is_below_the_declared_limit(result: Result)
     assert f"at most {share:.2f} % of strain energy: within the declared 1 %" in told
 
 
-def test_a_faster_ramp_is_told_to_be_beyond_the_limit(two: Tracking) -> None:
+def test_a_faster_ramp_is_told_to_be_beyond_the_limit(two: Experiment) -> None:
     """300 times instead of 30, so ten times the speed: a hundred times the kinetic energy."""
     found = compare(two, {**COARSE, "clock.scale": "300"})
     (told,) = words(found, "elements")
     assert "beyond the declared 1 %" in told
 
 
-def test_an_explicit_run_that_is_refused_leaves_the_rest_standing(two: Tracking) -> None:
+def test_an_explicit_run_that_is_refused_leaves_the_rest_standing(two: Experiment) -> None:
     found = compare(two, {**COARSE, "clock.substeps": "5"})
     nfem = next(m for m in found.methods if m.name == "nfem")
     assert nfem.run.outcome.state == "refused"
@@ -133,42 +133,43 @@ def test_an_explicit_run_that_is_refused_leaves_the_rest_standing(two: Tracking)
     assert "plate moved, P2 neo-Hooke" in labels
 
 
-def test_linear_elements_lock_where_a_mean_dilatation_does_not(cone: Tracking) -> None:
+def test_linear_elements_lock_where_a_mean_dilatation_does_not(cone: Experiment) -> None:
     """nu .4995, bonded: ours 52.6 N and 16.5 N against 15 N measured (3.5 times, and 10 %)."""
-    blind = replace(cone, truth=lambda parameters, seen: Truth({}))
+    assert cone.twin is not None
+    blind = replace(cone, twin=replace(cone.twin, truth=None))
     found = compare(blind, {}, ("plate_p1", "plate_mean"), quick=True)
     ends = {m.name: m.run.traces["plate.force"].y[-1] / 15 for m in found.methods}
     assert ends["plate_p1"] == pytest.approx(3.51, abs=0.05)
     assert ends["plate_mean"] == pytest.approx(1.10, abs=0.02)
 
 
-def test_a_path_and_a_ramp_are_fitted_through_the_recorded_samples(cone: Tracking) -> None:
+def test_a_path_and_a_ramp_are_fitted_through_the_recorded_samples(cone: Experiment) -> None:
     """The plate's path within the noise of its fit; the force's slope 1 N/s, 30 times as fast."""
     p = cone.parameters
     recording = cone.load(p, Path())[0]
     plate, pushed = cone.methods["plate_p1"], cone.methods["nfem"]
-    scene = cone.build(recording, p, plate)
+    scene = cone.build(recording, p, plate.scene)
     seen = cone.place(recording, p, scene)
-    markers = seen.markers
-    assert markers is not None
+    (markers,), (stage,) = seen.of(MarkerObservation), seen.drives
     assert set(markers.names) >= {"node_A", "node_B", "node_C"}
     assert not {"node_D", "node_E"} & set(markers.names)  # outside the quarter
     j = markers.names.index("node_A")
-    down = (markers.rest[j, 2] - markers.x[1:, j, 2])[: len(seen.stage.t)]
-    off = (down - seen.stage.y[:, 0])[np.isfinite(down)]
+    down = (markers.rest[j, 2] - markers.x[1:, j, 2])[: len(stage.t)]
+    off = (down - stage.y[:, 0])[np.isfinite(down)]
     assert np.sqrt((off**2).mean()) == pytest.approx(0.02e-3, rel=0.15)
-    assert [s.trace for s in seen.signals] == ["plate.force"]
-    ramp = cone.place(recording, p, cone.build(recording, p, pushed)).stage
+    assert [s.trace for s in seen.of(SignalObservation)] == ["plate.force"]
+    ramp = cone.place(recording, p, cone.build(recording, p, pushed.scene))
     assert ramp.t[-1] == pytest.approx(15 / 30)
-    assert ramp.y[:, 0] == pytest.approx(30 * ramp.t, rel=2e-3)
+    assert ramp.inputs[:, 0] == pytest.approx(30 * ramp.t, rel=2e-3)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_the_recordings_are_what_the_twin_records(cone: Tracking) -> None:
+def test_the_recordings_are_what_the_twin_records(cone: Experiment) -> None:
+    assert cone.twin is not None
     for parameters in (cone.parameters, cone.cases[0].change(cone.parameters)):
         shipped = cone.load(parameters, Path())[0]
-        anew = cone.record(parameters, print)
+        anew = cone.twin.record(parameters, print)
         one, two = shipped.marker("markers"), anew.marker("markers")
         assert one.names == two.names
         assert np.array_equal(np.isnan(one.x), np.isnan(two.x))

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.papers.ekf_nfem.cube_exhibits import published_cube, readings_table
 from validate.replay import compare, load
+from validate.replay.experiment import Experiment
 from validate.scene.scene import Scene
 
 STEP = (
@@ -25,27 +25,25 @@ STEP = (
 
 
 @pytest.fixture(scope="module")
-def cube(project_root) -> Tracking:  # type: ignore[no-untyped-def]
-    found = load(str(project_root / "experiments" / "ekf_cube.py"))
-    assert isinstance(found, Tracking)
-    return found
+def cube(project_root) -> Experiment:  # type: ignore[no-untyped-def]
+    return load(str(project_root / "experiments" / "ekf_cube.py"))
 
 
 @pytest.fixture(scope="module")
-def scene(cube: Tracking) -> Scene:
+def scene(cube: Experiment) -> Scene:
     recording = cube.load(cube.parameters, cube.path.parent)[0]  # type: ignore[union-attr]
-    return cube.build(recording, cube.parameters, cube.methods["nfem"])
+    return cube.build(recording, cube.parameters, cube.methods["nfem"].scene)
 
 
 @pytest.fixture(scope="module")
-def printed(cube: Tracking) -> Result:
+def printed(cube: Experiment) -> Result:
     """The paper's step and filter on the recorded case."""
     names = ("nfem", "nfem_printed", "nfem_printed_run", "ekf_printed", "ekf_held")
     return compare(cube, {}, names, quick=True)
 
 
 @pytest.fixture(scope="module")
-def stiff(cube: Tracking) -> Result:
+def stiff(cube: Experiment) -> Result:
     """Models 25 % stiffer than the truth, node A seen at 200 Hz."""
     case = next(c for c in cube.cases if c.name == "stiff_model_200Hz")
     names = ("nfem", "ekf_companion", "reduced_modes")
@@ -60,10 +58,11 @@ def scores(result: Result, name: str) -> dict[str, float]:
     return {s.name: s.value for s in of(result, name).scores}
 
 
-def test_the_recording_is_what_the_twin_records(cube: Tracking) -> None:
+def test_the_recording_is_what_the_twin_records(cube: Experiment) -> None:
     folder: Any = None
     shipped = cube.load(cube.parameters, folder)[0]
-    anew = cube.record(cube.parameters, print)
+    assert cube.twin is not None
+    anew = cube.twin.record(cube.parameters, print)
     one, two = shipped.marker("markers"), anew.marker("markers")
     assert one.names == two.names
     assert np.abs(one.x - two.x).max() < 1e-9
@@ -145,12 +144,12 @@ def test_the_accepted_filter_decides_and_does_not_claim_too_much(stiff: Result) 
     assert 0.05 < found["node_B.nees.per_dof@stiff_model_200Hz"] < 1
 
 
-def test_readings_of_the_force_are_totals_or_per_node(cube: Tracking, scene: Scene) -> None:
+def test_readings_of_the_force_are_totals_or_per_node(cube: Experiment, scene: Scene) -> None:
     """On a coarse cube: a total is a total however it is spread, per node it is one for each."""
     changed = replace(cube.parameters.mesh, cells=2)
     coarse = cube.build(
         cube.load(cube.parameters, cube.path.parent)[0],  # type: ignore[union-attr]
-        replace(cube.parameters, mesh=changed), cube.methods["nfem"],
+        replace(cube.parameters, mesh=changed), cube.methods["nfem"].scene,
     )  # fmt: skip
     rows = {row[0]: row[1:] for row in readings_table(coarse, 0.05, "x").rows}
     assert rows["consistent"][0] == pytest.approx(0.05, rel=1e-9)

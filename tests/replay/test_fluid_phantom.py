@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validate.replay.run import compare
 
 from validate.compare.result import Result
 from validate.errors import RecordingError, RegistrationError, ValidateError
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Markers, Recording, Signal
+from validate.register.markers import MarkerObservation
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options
+from validate.replay.road import compare
 
 PH_1328 = {
     "inclusion.centre_x": "0.03", "inclusion.centre_y": "0.0225", "inclusion.centre_z": "0.035",
@@ -212,7 +213,7 @@ SPOILED: tuple[tuple[str, Spoil, type[ValidateError], str], ...] = (
         "force of the wrong sign",
         lambda r: with_signal(r, "load_cell", lambda s: replace(s, y=-s.y)),
         RegistrationError,
-        "'force.plate' falls by .* N as the stage closes by 9",
+        "'force.plate' falls by .* N as 'stage' closes by 9",
     ),
     (
         "pressure of the wrong sign",
@@ -305,8 +306,7 @@ def test_lost_markers_are_left_out_and_counted(phantom: Experiment, good: Record
     result = judged(phantom, with_markers(good, lost))
     counts = {r.name: r.count for r in result.methods[0].residuals.values()}
     assert (counts["marker.inplane@3mm"], counts["marker.inplane@6mm"]) == (42, 41)
-    markers = result.registered[0].markers
-    assert markers is not None
+    (markers,) = result.registered[0].of(MarkerObservation)
     assert markers.registration.missing == ("m08",)
 
 

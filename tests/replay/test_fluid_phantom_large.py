@@ -2,8 +2,9 @@
 
 import pytest
 
+from validate.arrays import rms
 from validate.compare.result import Result
-from validate.compare.score import max_length, rms
+from validate.compare.score import max_length
 from validate.replay import compare, load
 from validate.replay.experiment import Experiment
 

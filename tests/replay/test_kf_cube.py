@@ -11,35 +11,32 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validate.replay.run import compare as compare_with
-from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import UsageError
-from validate.papers.kf_fem import seeds
-from validate.replay import compare, load
+from validate.replay import compare, load, paper_001
+from validate.replay.experiment import Experiment
 from validate.replay.options import Options
+from validate.replay.road import compare as compare_with
 
 SOME = ("fem", "kf_printed", "kf_load", "load_scale")
 PROBES = ("node_A", "node_B", "corner")
 
 
 @pytest.fixture(scope="module")
-def cube(project_root) -> Tracking:  # type: ignore[no-untyped-def]
-    found = load(str(project_root / "experiments" / "kf_cube.py"))
-    assert isinstance(found, Tracking)
-    return found
+def cube(project_root) -> Experiment:  # type: ignore[no-untyped-def]
+    return load(str(project_root / "experiments" / "kf_cube.py"))
 
 
 @pytest.fixture(scope="module")
-def some(cube: Tracking) -> Iterator[Result]:
+def some(cube: Experiment) -> Iterator[Result]:
     """Four methods, one wrong model, few output frames, and 50 seeds for the printed Q only."""
     methods = {name: cube.methods[name] for name in SOME}
     reduced = replace(
         cube, methods=methods, accepted=("fem",), cases=cube.cases[:1], frames=10
     )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(seeds, "VARIANCES", (seeds.PRINTED,))
+        patch.setattr(paper_001, "VARIANCES", (paper_001.PRINTED,))
         yield compare(reduced)
 
 
@@ -56,10 +53,11 @@ def figures(result: Result) -> dict[str, Any]:
     return {p.name: p for p in result.published}
 
 
-def test_the_recording_is_what_the_twin_records(cube: Tracking) -> None:
+def test_the_recording_is_what_the_twin_records(cube: Experiment) -> None:
     folder: Any = None
     shipped = cube.load(cube.parameters, folder)[0]
-    anew = cube.record(cube.parameters, print)
+    assert cube.twin is not None
+    anew = cube.twin.record(cube.parameters, print)
     one, two = shipped.marker("markers"), anew.marker("markers")
     assert one.names == two.names
     assert one.x.shape == (501, 7, 3)
@@ -144,7 +142,7 @@ def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
 
 
 def test_a_changed_model_leaves_the_truth_and_a_changed_twin_is_recorded_anew(
-    cube: Tracking,
+    cube: Experiment,
 ) -> None:
     """A recording keeps what made it: the truth follows that, and not the user's settings."""
     small = ("fem",)
@@ -158,7 +156,7 @@ def test_a_changed_model_leaves_the_truth_and_a_changed_twin_is_recorded_anew(
     assert any("twin.stiffness = 0.8" in note for note in other.notes)
 
 
-def test_a_setting_that_the_experiment_itself_sets_is_refused(cube: Tracking) -> None:
+def test_a_setting_that_the_experiment_itself_sets_is_refused(cube: Experiment) -> None:
     options = Options({"methods.fem.settings.dt": "0.001"}, ("fem",), True)
     with pytest.raises(UsageError, match=r"settings.dt = 0.001 .* sets 0.002"):
         compare_with(cube, options)

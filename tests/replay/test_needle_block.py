@@ -2,23 +2,23 @@
 
 import numpy as np
 import pytest
-from validate.register.observe import observe_markers
-from validate.replay.tracking import Tracking
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import RegistrationError
 from validate.recording.types import Markers
+from validate.register.markers import MarkerObservation, observe_markers
 from validate.replay import compare, load
+from validate.replay.experiment import Experiment
 from validate.scene.box import grid
 
 
 @pytest.fixture(scope="module")
-def experiment(project_root) -> Tracking:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "needle_block.py"))  # type: ignore[return-value]
+def experiment(project_root) -> Experiment:  # type: ignore[no-untyped-def]
+    return load(str(project_root / "experiments" / "needle_block.py"))
 
 
 @pytest.fixture(scope="module")
-def quick(experiment: Tracking) -> Result:
+def quick(experiment: Experiment) -> Result:
     return compare(experiment, {}, ("implicit", "explicit", "explicit_lagged"), quick=True)
 
 
@@ -33,8 +33,7 @@ def test_the_explicit_run_agrees_with_markers_of_the_implicit_one(quick: Result)
 
 
 def test_markers_of_a_plane_body_have_two_coordinates(quick: Result) -> None:
-    seen = method(quick, "implicit").registered[0].markers
-    assert seen is not None
+    (seen,) = method(quick, "implicit").registered[0].of(MarkerObservation)
     assert seen.x.shape == (301, 6, 2)
     assert seen.rest[seen.names.index("inside")] == pytest.approx([0.75, 0.5])
     off = method(quick, "implicit").residuals["inside@all"].values
@@ -42,7 +41,7 @@ def test_markers_of_a_plane_body_have_two_coordinates(quick: Result) -> None:
     assert off.std() == pytest.approx(1e-4, rel=0.1)  # the markers' noise and nothing else
 
 
-def test_damping_that_is_dropped_is_seen(experiment: Tracking) -> None:
+def test_damping_that_is_dropped_is_seen(experiment: Experiment) -> None:
     values = {"methods.explicit.settings.damping_terms": "mass"}
     result = compare(experiment, values, ("explicit",), quick=True)
     assert not result.passed
@@ -71,7 +70,7 @@ def test_a_marker_outside_a_plane_mesh_is_refused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_all_claims_stand(experiment: Tracking) -> None:
+def test_all_claims_stand(experiment: Experiment) -> None:
     """The numbers of an independent reconstruction of paper 002, by way of the report's tables."""
     result = compare(experiment)
     assert result.passed

@@ -1,186 +1,49 @@
 """The road of experiments over time, on a cube of 27 boxes that is pulled for 30 steps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from validate.register.observe import Registered
-from validate.replay.run import compare
-from validate.replay.tracking import (
-    Case,
-    Cases,
-    Follower,
-    Told,
-    Tracking,
-    Truth,
-    followed_load,
-    truth_of,
+from tiny import (
+    DT,
+    METHODS,
+    PROBES,
+    STEPS,
+    TINY,
+    A,
+    Card,
+    missed,
+    record,
+    stiffer,
+    true_run,
+    truth,
 )
 
-from validate.arrays import Floats
-from validate.compare.published import Published
+from validate.arrays import Floats, rms
+from validate.compare.published import Figure
 from validate.compare.result import MethodResult, Result
-from validate.compare.score import rms
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.steady import ReducedKf
-from validate.fem.system import System, build
+from validate.estimate.measurements import Measurements
+from validate.fem.system import System
 from validate.parameters import quantity
 from validate.recording.types import Recording
-from validate.replay.experiment import Input, Uncertainty
+from validate.register.registered import Registered
+from validate.replay.experiment import Case, Experiment, Input, Told, Twin, Uncertainty
+from validate.replay.followed import Cases, Truth, truth_of
+from validate.replay.method import Method
 from validate.replay.options import Options
-from validate.scene.box import box
-from validate.scene.scene import Load, Material, Probe, Scene, Support
-from validate.solve.march import march, output_frames
+from validate.replay.road import compare
 from validate.solve.newmark import Newmark
-from validate.solve.types import Ending, State, Stepper, Trace
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.solve.types import Stepper
 
-DT, STEPS, SIDE = 0.002, 30, 0.01
-PROBES = {"node_A": (SIDE, SIDE, SIDE), "node_B": (0.0, SIDE, 2 * SIDE / 3)}
-FIDUCIALS = {"f1": (0.0, 0.0, 0.0), "f2": (SIDE, 0.0, 0.0), "f3": (0.0, SIDE, 0.0)}
 METRICS = ("mae", "rmse", "sd", "max", "nrmse")
 
 
-@dataclass(frozen=True)
-class TwinCard:
-    stiffness: float = quantity(1.0, "1", "its modulus over the models'")
-    missing: float = quantity(0.0, "1", "share of looks without a marker")
-
-
-@dataclass(frozen=True)
-class Card:
-    E: float = quantity(10e3, "Pa", "modulus of the models")
-    cells: int = quantity(3, "1", "boxes along an edge")
-    sd: float = quantity(1e-5, "m", "noise")
-    twin: TwinCard = field(default_factory=TwinCard)
-
-
-def scene(E: float, cells: int = 3) -> Scene:
-    return Scene(
-        box((SIDE, SIDE, SIDE), (cells,) * 3),
-        Material(E, 0.3, "linear", 1000.0, 0.0, 0.05),
-        (Support("z0", (0, 1, 2)),),
-        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
-        probes=tuple(Probe(name, at) for name, at in PROBES.items()),
-    )
-
-
-def true_run(card: Card, frames: int = 200) -> tuple[Scene, Any]:
-    true = scene(card.twin.stiffness * card.E)
-    t = DT * np.arange(1, STEPS + 1)
-    force = 0.05 * np.minimum(t / 0.02, 1.0)[:, None]
-    stepper = Newmark(DT).prepare(build(true))
-    return true, march("twin", stepper, t, force, output_frames(STEPS, frames), 0.0)
-
-
-def record(card: Card, progress: Callable[[str], None]) -> Recording:
-    true, run = true_run(card)
-    return record_tracked(
-        Origin("tiny", 3, True),
-        points_of(run, true),
-        {k: np.array(v) for k, v in FIDUCIALS.items()},
-        Camera(card.sd, 1, card.twin.missing, still=10_000),
-        {"pull": Reading(run.traces["pull.force"].y, "N")},
-    )
-
-
-def truth(card: Card, seen: Registered) -> Truth:
-    true, run = true_run(card)
-    return truth_of(run, true)
-
-
-@dataclass(frozen=True)
-class Breaking:
-    """Steps as another stepper until one fails."""
-
-    inner: Stepper
-    at: int
-    failure: tuple[Ending, str]
-
-    @property
-    def scene(self) -> Scene:
-        return self.inner.scene
-
-    def rest(self) -> State:
-        return self.inner.rest()
-
-    def step(self, state: State, drives: Floats) -> State:
-        stepped = self.inner.step(state, drives)
-        return replace(stepped, failure=self.failure) if stepped.k == self.at else stepped
-
-    def field(self, state: State) -> Floats:
-        return self.inner.field(state)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        return self.inner.traces(states)
-
-
-@dataclass(frozen=True)
-class Breaks:
-    """A scheme whose step `at` fails."""
-
-    dt: float = quantity(DT, "s", "time step")
-    at: int = quantity(1, "1", "step that fails")
-    ending: str = quantity("refused", "1", "its ending")
-
-    def prepare(self, system: System) -> Stepper:
-        ending: Any = self.ending
-        return Breaking(Newmark(self.dt).prepare(system), self.at, (ending, "told so"))
-
-
-def stepper(method: Follower, card: Card, system: System, seen: Registered) -> Stepper:
-    return method.prepare(system, seen, dt=DT * method.stride)
-
-
-A = ("node_A",)
-METHODS = {
-    "fem": Follower("FEM", Newmark()),
-    "timed": Follower("FEM, timed", Newmark(), steps=5),
-    "slow": Follower("FEM, long steps", Newmark(), stride=3),
-    "kf": Follower("filter", ReducedKf(modes=5, load_start=0.02, load_walk=0.05), A),
-    "refused": Follower("refused", Breaks()),
-    "diverged": Follower("diverged", Breaks(at=8, ending="diverged")),
-}
-
-
-def stiffer(card: Card) -> Card:
-    return replace(card, twin=replace(card.twin, stiffness=1.25))
-
-
-def missed(card: Card) -> Card:
-    return replace(card, twin=replace(card.twin, missing=0.4))
-
-
-TINY = Tracking(
-    name="test_track",
-    title="tiny",
-    source="this test",
-    parameters=Card(),
-    methods=METHODS,
-    accepted=("fem",),
-    accept=(Accept("node_B", 1e-4, "ours"),),
-    load=lambda card, folder: (record(card, print),),
-    record=record,
-    truth=truth,
-    build=lambda recording, card, method: scene(card.E, card.cells),
-    place=lambda recording, card, its: followed_load(recording, its, "pull", "N"),
-    stepper=stepper,
-    axis="z",
-    reference="fem",
-    cases=(
-        Case("stiff", "25 % stiffer", stiffer),
-        Case("missing", "looks are missing", missed, methods=("kf", "diverged")),
-    ),
-    same_model=True,
-    path=Path(__file__),
-)
-
-
-def run(experiment: Tracking, *methods: str, quick: bool = False, **values: str) -> Result:
+def run(experiment: Experiment, *methods: str, quick: bool = False, **values: str) -> Result:
     return compare(experiment, Options(values, methods, quick))
 
 
@@ -237,7 +100,7 @@ def test_no_method_sees_the_truth(whole: Result) -> None:
     def shifted(card: Card, seen: Registered) -> Truth:
         return Truth({name: u + 1.0 for name, u in truth(card, seen).probes.items()})
 
-    other = run(replace(TINY, truth=shifted, cases=()))
+    other = run(replace(TINY, twin=Twin(record, shifted, same_model=True), cases=()))
     for name in ("fem", "kf", "slow"):
         one, two = of(whole, name).run, of(other, name).run
         assert np.array_equal(one.u, two.u)
@@ -245,24 +108,39 @@ def test_no_method_sees_the_truth(whole: Result) -> None:
         assert scores(other, name)["node_B.rmse"] > 0.9
 
 
-def test_a_stepper_gets_the_models_parameters_and_what_was_registered() -> None:
+@dataclass(frozen=True)
+class Spied:
+    """A scheme that notes what it is prepared with."""
+
+    notes: list[tuple[Any, ...]] = field(compare=False)
+    dt: float = quantity(DT, "s", "time step")
+
+    def prepare(self, system: System, looks: Measurements | None = None) -> Stepper:
+        self.notes.append((system, looks))
+        return Newmark(self.dt).prepare(system)
+
+
+def test_a_method_gets_the_models_system_and_its_own_markers_and_no_truth() -> None:
     given: list[tuple[Any, ...]] = []
+    placed: list[tuple[Any, ...]] = []
 
-    def spy(*arguments: Any) -> Stepper:
-        given.append(arguments)
-        return stepper(*arguments)
+    def spy(*arguments: Any) -> dict[str, Any]:
+        placed.append(arguments)
+        return {"dt": DT}
 
-    run(replace(TINY, stepper=spy), "fem", "kf")
-    assert len(given) == 5  # two recorded, two on 'stiff', one on 'missing'
-    for settings, card, system, seen in given:
-        assert isinstance(settings, Follower)
+    spied = Spied(given)
+    methods = {"fem": Method("FEM", spied), "kf": Method("filter", spied, markers=A)}
+    run(replace(TINY, methods=methods, sets=spy))
+    assert len(placed) == len(given) == 5  # two recorded, two on 'stiff', one on 'missing'
+    for card, seen in placed:
         assert card == Card()  # never the truth's own
-        assert system.scene.material.E == Card().E
-        assert type(seen) is Registered
         assert {f.name for f in fields(seen)} == {
-            "stage", "holds", "markers", "outline", "signals", "windows", "outside", "findings",
-            "time_scale",
+            "observations", "selections", "rest", "outside", "findings", "time_scale",
         }  # fmt: skip
+    assert all(system.scene.material.E == Card().E for system, _ in given)
+    names = [looks.names if looks else None for _, looks in given]
+    own = ("node_A.x", "node_A.y", "node_A.z")
+    assert names == [None, own, None, own, own]
 
 
 def test_a_method_that_fails_is_a_row_and_the_others_go_on(whole: Result) -> None:
@@ -297,7 +175,7 @@ def test_a_marker_that_is_not_there_is_compared_with_nothing_and_fails() -> None
     one, two = result.checks
     assert one.holds
     assert one.count == STEPS
-    assert two.why == "compared nothing: no such marker in the recording"
+    assert two.why == "compared nothing: no such quantity in the recording"
     assert not two.holds
     assert not result.passed
 
@@ -374,7 +252,8 @@ def test_a_case_is_loaded_where_it_ships_and_made_anew_where_not() -> None:
         return record(card, progress)
 
     cases = (Case("a", "", stiffer, shipped=True), Case("b", "", stiffer))
-    result = run(replace(TINY, load=loads, record=records, cases=cases), "fem")
+    twin = Twin(records, truth, same_model=True)
+    result = run(replace(TINY, load=loads, twin=twin, cases=cases), "fem")
     assert loaded == [Card(), stiffer(Card())]
     assert made == [stiffer(Card())]
     found = scores(result, "fem")
@@ -417,20 +296,18 @@ def test_mesh_and_inputs_enter_u_val_by_the_surrogate() -> None:
 
 def test_another_model_without_declared_uncertainty_is_refused() -> None:
     with pytest.raises(ComparisonError, match="no uncertainty is declared; u_val unknown"):
-        run(replace(TINY, same_model=False, cases=()), "fem")
+        run(replace(TINY, twin=Twin(record, truth), cases=()), "fem")
 
 
 def told(card: Card, cases: Cases, progress: Callable[[str], None]) -> Told:
     return Told((), {"cases": float(len(cases))})
 
 
-def published(values: Any) -> tuple[Published, ...]:
-    ours = values["told"].get("cases")
-    return (Published("cases", ours, 3.0, 0.0, "1", "reproduced", "", "here"),)
+PUBLISHED = (Figure("cases", "told:cases", 3.0, 0.0, "1", "reproduced", "", "here"),)
 
 
 def test_quick_skips_cases_own_exhibits_and_printed_figures() -> None:
-    experiment = replace(TINY, tell=told, published=published)
+    experiment = replace(TINY, exhibits=told, published=PUBLISHED)
     result = run(experiment, quick=True)
     assert result.quick
     assert not result.published
@@ -439,13 +316,17 @@ def test_quick_skips_cases_own_exhibits_and_printed_figures() -> None:
 
 
 def test_what_an_experiment_tells_reaches_its_printed_figures_when_all_was_run() -> None:
-    experiment = replace(TINY, tell=told, published=published)
+    experiment = replace(TINY, exhibits=told, published=PUBLISHED)
     (figure,) = run(experiment).published
     assert figure.ours == 3.0  # the recorded case and two others
     assert not figure.fault
-    (alone,) = run(experiment, "fem").published
-    assert alone.ours is None
-    assert alone.fault == "marked reproduced, and compared nothing"
+    assert run(experiment, "fem").published == ()  # of a part of the methods it says nothing
+
+
+def test_a_printed_figure_that_nothing_computes_fails_with_what_it_lacks() -> None:
+    (figure,) = run(replace(TINY, published=PUBLISHED, cases=())).published
+    assert figure.ours is None
+    assert figure.fault == "not computed: no score 'cases'"
 
 
 def test_unknown_methods_name_the_nearest() -> None:
@@ -456,7 +337,7 @@ def test_unknown_methods_name_the_nearest() -> None:
 def test_progress_counts_every_run_once() -> None:
     calls: list[tuple[int, int]] = []
     compare(TINY, Options({}, ("fem", "kf", "timed")), lambda d, n, _: calls.append((d, n)))
-    assert {n for _, n in calls} == {3 + 2 + 1 + 1}
+    assert {n for _, n in calls} == {3 + 2 + 1}
     done = [d for d, _ in calls]
     assert done == sorted(done)
     assert set(done) == {0, 1, 2, 3, 4, 5}  # before each of the six runs
@@ -470,7 +351,8 @@ def test_maps_compare_equal_times_only() -> None:
         true, run = true_run(card, 10)
         return truth_of(run, true)
 
-    result = run(replace(TINY, truth=few, frames=10, cases=()), "fem", "kf", "slow")
+    twin = Twin(record, few, same_model=True)
+    result = run(replace(TINY, twin=twin, frames=10, cases=()), "fem", "kf", "slow")
     maps = {m.name: m for e in result.exhibits for m in e.maps}
     assert set(maps) == {"error_kf"}
     true = true_run(Card(), 10)[1]

@@ -9,7 +9,6 @@ from validate.errors import SceneError
 from validate.papers.accuracy.needle import needle_block
 from validate.papers.accuracy.rod import bending_rod
 from validate.scene.box import box, grid
-from validate.scene.bricks import CORNERS, gauss_points, shapes, slopes
 from validate.scene.mesh import (
     Mesh,
     boundary_facets,
@@ -18,25 +17,9 @@ from validate.scene.mesh import (
     require_positive_cells,
 )
 from validate.scene.scene import Cavity, Drive, Foundation, Material, Scene, Weight
+from validate.scene.shape_functions import CORNERS
 
 BLOCKS = [((3.0, 2.0, 1.0), (2, 3, 4)), ((3.0, 2.0), (2, 3)), ((1.0, 1.0), (1, 1))]
-
-
-@pytest.mark.parametrize("d", [1, 2, 3])
-def test_shape_functions_are_one_at_their_corner_and_their_slopes_are_differences(d: int) -> None:
-    assert np.array_equal(shapes(CORNERS[d]), np.eye(2**d))
-    xi = np.random.default_rng(0).random((5, d))
-    assert shapes(xi).sum(axis=-1) == pytest.approx(np.ones(5))
-    for c in range(d):
-        step = np.zeros(d)
-        step[c] = 1e-6
-        difference = (shapes(xi + step) - shapes(xi - step)) / 2e-6
-        assert slopes(xi)[..., c] == pytest.approx(difference, abs=1e-9)
-
-
-def test_gauss_points_integrate_cubes_along_every_axis() -> None:
-    points, weight = gauss_points(2)
-    assert weight * (points[:, 0] ** 3 * points[:, 1] ** 3).sum() == pytest.approx(1 / 16)
 
 
 @pytest.mark.parametrize(("size", "cells"), BLOCKS)

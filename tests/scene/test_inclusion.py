@@ -8,7 +8,7 @@ from phantoms import BLOCK, CAPSULE, COARSE_GRID, PAPER_GRID, phantom_mesh
 
 from validate.errors import SceneError
 from validate.fem.cavity import cavity_surface, volume_of
-from validate.scene.inclusion import FACES, Block, Capsule, block_with_inclusion
+from validate.scene.inclusion import SIDES, Block, Capsule, block_with_inclusion
 from validate.scene.mesh import cell_volumes, require_positive_cells
 
 
@@ -35,7 +35,7 @@ def test_wall_nodes_lie_on_the_capsule_and_faces_on_the_block() -> None:
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
     assert np.abs(CAPSULE.distance(wall)).max() < 1e-16
     for name, (axis, end) in zip(
-        FACES, [(0, 0), (0, 0.060), (1, 0), (1, 0.045), (2, 0), (2, 0.070)], strict=True
+        SIDES, [(0, 0), (0, 0.060), (1, 0), (1, 0.045), (2, 0), (2, 0.070)], strict=True
     ):
         assert mesh.nodes[mesh.facet_nodes(name), axis] == pytest.approx(end, abs=1e-16)
 
@@ -52,6 +52,14 @@ def test_capsule_distances_and_volume() -> None:
     assert capsule.distance(np.array([[2.0, 3.5, 3.0]]))[0] == pytest.approx(np.sqrt(2) - 0.5)
     assert capsule.volume == pytest.approx(np.pi * 0.25 * 1.0 + np.pi / 6, rel=1e-14)
     assert Capsule((0, 0, 0), 1.0, 2.0).volume == pytest.approx(4 * np.pi / 3)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_capsule_may_lie_along_any_axis(axis: int) -> None:
+    capsule = Capsule((0.0, 0.0, 0.0), 0.5, 3.0, axis)
+    ends = 1.5 * np.eye(3)
+    assert np.isclose(capsule.distance(ends), 0).tolist() == (np.arange(3) == axis).tolist()
+    assert capsule.reach[axis] == 1.5
 
 
 def test_projection_moves_radially() -> None:

@@ -1,34 +1,52 @@
-"""Plates press along the axis that is declared: the same block turned gives the same force."""
+"""A block between plates: what is held follows the faces and directions that are declared."""
 
+import numpy as np
 import pytest
 
-from validate.errors import SceneError
-from validate.fem.system import build, responses
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.fem.system import build
+from validate.scene.box import box
 from validate.scene.plates import Contact, Plates, between_plates
-from validate.scene.scene import Material
+from validate.scene.scene import Drive, Material, Scene, Support
 
-SPHERE = Capsule((0.02, 0.02, 0.02), 0.006, 0.012)
-CUBE = block_with_inclusion(Block(0.04, 0.04, 0.04), (7, 7, 7), SPHERE)
+ALONG_X = Plates(Drive("press", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
+ALONG_Z = Plates(Drive("press", "z0", (0.0, 0.0, 1.0)), "z1", Support("x1", (0,)))
 
 
-def force(plates: Plates, contact: Contact) -> float:
-    scene = between_plates(CUBE, plates, Material(15e3, 0.45), contact, friction=1e5)
-    return float(responses(build(scene)).reactions[0, 0])
+def scene(plates: Plates, contact: Contact, size: tuple[float, float, float]) -> Scene:
+    return between_plates(box(size, (2, 2, 2)), Material(1e4, 0.3), contact, plates, friction=1e5)
 
 
 @pytest.mark.parametrize("contact", ["slip", "partial", "bonded"])
-def test_a_cube_with_a_sphere_is_as_stiff_along_every_axis(contact: Contact) -> None:
-    """Kuhn's cells are the same along x, y and z; the plates may press from either side."""
-    along_x = force(Plates("x0", "x1", floor="y0"), contact)
-    assert along_x > 0
-    for other in (Plates("z0", "z1", floor="y0"), Plates("y0", "y1", floor="z0")):
-        assert force(other, contact) == pytest.approx(along_x, rel=1e-9)
-    turned = force(Plates("x1", "x0", floor="y0"), contact)
-    assert turned == pytest.approx(along_x, rel=0.02)
+def test_every_contact_leaves_a_definite_body(contact: Contact) -> None:
+    for plates in (ALONG_X, ALONG_Z):
+        build(scene(plates, contact, (1.0, 0.8, 0.6))).factor()
 
 
-@pytest.mark.parametrize("plates", [("x0", "y1", "z0"), ("x0", "x1", "x0")])
-def test_plates_that_do_not_face_each_other_are_refused(plates: tuple[str, str, str]) -> None:
-    with pytest.raises(SceneError, match="two opposite faces and one beside them"):
-        Plates(*plates)
+def test_slipping_plates_hold_their_own_direction_alone() -> None:
+    found = scene(ALONG_Z, "slip", (1.0, 0.8, 0.6))
+    assert found.supports == (Support("z1", (2,)), Support("x1", (0,)))
+    assert found.pins[0].components == (1,)
+    assert found.pins[0].point == (0.0, 0.4, 0.0)
+
+
+def test_bonded_plates_hold_everything_and_partial_ones_by_springs() -> None:
+    bonded = scene(ALONG_X, "bonded", (1.0, 0.8, 0.6))
+    assert Support("x0", (0, 1, 2)) in bonded.supports
+    assert Support("x1", (1, 2)) in bonded.supports
+    rubbing = scene(ALONG_X, "partial", (1.0, 0.8, 0.6)).foundations
+    assert [(f.facets, f.components, f.stiffness) for f in rubbing] == [
+        ("x0", (1, 2), 1e5),
+        ("x1", (1, 2), 1e5),
+    ]
+
+
+def test_the_axes_may_be_named_anew() -> None:
+    """The same block turned, x y z to z x y with both faces exchanged: the same force."""
+    forces = []
+    for plates, size in ((ALONG_X, (0.6, 1.0, 0.8)), (ALONG_Z, (1.0, 0.8, 0.6))):
+        system = build(scene(plates, "slip", size))
+        u = system.moves[:, 0].copy()
+        u[system.free] = system.factor().solve(-(system.K @ u)[system.free])
+        forces.append(float(system.moves[:, 0] @ (system.K @ u)))
+    assert forces[0] == pytest.approx(forces[1], rel=1e-9)
+    assert np.isclose(forces[0], 1e4 * 0.8 / 0.6)

@@ -5,11 +5,11 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from field_oracles import frequency_range
 from inertial_scenes import TOTAL, cube, driven, exact, small
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.critical import frequency_range
 from validate.fem.modes import modes_of
 from validate.fem.system import System, build
 from validate.scene.box import box, centroids

@@ -198,11 +198,6 @@ def test_the_misprinted_update_moves_by_the_new_velocity() -> None:
     for scheme in (IMPLICIT, replace(IMPLICIT, update="misprinted")):
         stepper = scheme.prepare(system)
         states.append(stepper.step(stepper.rest(), np.array([0.001])))
-    sound, misprinted = states
-    for state in states:
-        assert state.u is not None
-        assert state.v is not None
-    free = system.free
+    sound, misprinted = (state.inner for state in states)
     assert misprinted.v == pytest.approx(sound.v)
-    ahead = misprinted.u[free] - sound.u[free]  # type: ignore[index]
-    assert ahead == pytest.approx(STEP * sound.v[free], rel=1e-9)  # type: ignore[index]
+    assert misprinted.u - sound.u == pytest.approx(STEP * sound.v, rel=1e-9)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fluid_steps import NINE, slope_at, stepped, volume_ratios
+from fluid_steps import NINE, pressures, slope_at, stepped, volume_ratios
 
 from validate.fem.system import Responses
 from validate.solve.fluid import ExactPressure, PressureLoop, tuned_gain
@@ -21,12 +21,12 @@ def test_one_percent_in_at_most_one_update(phantom: Responses, strain: float) ->
 
 
 def test_loop_tends_to_the_exact_pressure(phantom: Responses) -> None:
-    exact = stepped(ExactPressure(), phantom, NINE).pressures
+    exact = stepped(ExactPressure(), phantom, NINE)
     for tolerance in (1e-3, 1e-6, 1e-9):
         loop = stepped(PressureLoop(tolerance=tolerance), phantom, NINE)
         error = abs(volume_ratios(phantom, loop)[0] - 1)
         assert error <= tolerance
-        assert loop.pressures == pytest.approx(exact, abs=30e3 * tolerance)
+        assert pressures(loop) == pytest.approx(pressures(exact), abs=30e3 * tolerance)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 1.5])
@@ -36,7 +36,7 @@ def test_tolerance_zero_ends_by_stagnation(phantom: Responses, factor: float) ->
     state = stepped(loop, phantom, NINE)
     assert state.failure is None
     assert state.updates < 100
-    assert state.pressures == pytest.approx(exact.pressures, rel=1e-10)
+    assert pressures(state) == pytest.approx(pressures(exact), rel=1e-10)
 
 
 @pytest.mark.parametrize("gain", [0.0, -1e3, -24_500.0, -1e7])
@@ -51,12 +51,12 @@ def test_gain_without_or_against_effect_is_reported(phantom: Responses, gain: fl
 def test_limit_of_the_gain_is_twice_the_slope_at_the_solution(phantom: Responses) -> None:
     exact = stepped(ExactPressure(), phantom, NINE)
     slope = slope_at(phantom, exact)
-    near = replace(exact, pressures=1.01 * exact.pressures)
+    near = replace(exact, inner=replace(exact.inner, z=exact.inner.z * [1.0, 1.01]))
     loop = PressureLoop(tolerance=1e-7, max_updates=4000)
     below = replace(loop, gain=1.99 * slope).on(phantom).step(near, NINE)
     above = replace(loop, gain=2.01 * slope).on(phantom).step(near, NINE)
     assert below.failure is None
-    assert below.pressures == pytest.approx(exact.pressures, abs=30e3 * 1e-7)
+    assert pressures(below) == pytest.approx(pressures(exact), abs=30e3 * 1e-7)
     assert above.failure is not None
     assert above.failure[0] == "not_converged"
     assert "4000 updates" in above.failure[1]
@@ -67,7 +67,7 @@ def test_gain_far_too_large_diverges_and_keeps_the_last_state(phantom: Responses
     state = stepper.step(stepper.rest(), NINE)
     assert state.failure is not None
     assert state.failure[0] == "diverged"
-    assert not state.inputs.any()
+    assert not state.inner.z.any()
 
 
 @pytest.mark.parametrize("limit", [0, 1])
@@ -100,4 +100,4 @@ def test_gain_of_each_cavity_is_its_own(two_cavities: Responses) -> None:
     state = stepped(PressureLoop(tolerance=1e-6), two_cavities, 0.006)
     exact = stepped(ExactPressure(), two_cavities, 0.006)
     assert state.failure is None
-    assert state.pressures == pytest.approx(exact.pressures, rel=1e-4)
+    assert pressures(state) == pytest.approx(pressures(exact), rel=1e-4)

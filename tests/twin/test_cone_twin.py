@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validate.register.placed import placed
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
@@ -13,8 +12,8 @@ from validate.fem.hyperelastic import Body
 from validate.fem.system import build, responses
 from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.papers.ekf_nfem.cone_twin import (
-    ConeTwin,
     LoadTable,
+    TwinSettings,
     cone_scene,
     crosshead,
     load_table,
@@ -25,19 +24,20 @@ from validate.recording.digest import digest
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
+from validate.register.markers import placed_markers
 from validate.scene.mesh_file import read_mesh
 from validate.solve.newton import StaticNewton
 
 MESH = read_mesh(Path(__file__).resolve().parents[2] / "experiments" / "meshes" / "cone.npz")
-COARSE = ConeTwin(radial=2, axial=4, loads=4)
+COARSE = TwinSettings(radial=2, axial=4, loads=4)
 QUIET = replace(COARSE, sd_force=0.0, sd_stage=0.0, sd_marker=0.0, missing=0.0)
 
 
-def made(settings: ConeTwin) -> Recording:
+def made(settings: TwinSettings) -> Recording:
     return record_cone(settings, lambda _: None)
 
 
-def table(settings: ConeTwin) -> LoadTable:
+def table(settings: TwinSettings) -> LoadTable:
     places = np.array(list(marker_places(settings).values()))
     return load_table(cone_scene(settings), places, settings.force, settings.loads)
 
@@ -53,7 +53,7 @@ def quiet() -> Recording:
 
 
 def displacement(recording: Recording, name: str) -> Floats:
-    seen = placed(recording, MESH)
+    seen = placed_markers(recording, MESH)
     j = seen.names.index(name)
     return np.asarray(seen.x[:, j] - seen.rest[j])
 
@@ -158,9 +158,9 @@ def test_it_survives_a_file_and_is_placed_on_the_shipped_mesh(
     write_recording(twin, tmp_path / "x.mcap")
     read = read_recording(tmp_path / "x.mcap")
     assert digest(read) == digest(twin)
-    seen = placed(read, MESH)
-    assert seen.rows.outside.max() < 1e-9  # every marker is on a node
-    assert seen.rows.weights.max(axis=1).toarray() == pytest.approx(np.ones(8))
+    seen = placed_markers(read, MESH)
+    assert seen.positions.outside.max() < 1e-9  # every marker is on a node
+    assert seen.positions.weights.max(axis=1).toarray() == pytest.approx(np.ones(8))
     assert float(seen.tre.max()) < 2e-5
 
 
@@ -177,7 +177,7 @@ def test_markers_turned_by_a_quarter_are_found(twin: Recording) -> None:
     names = tuple({**turned, "base3": "base1"}.get(n, n) for n in markers.names)
     spoilt = replace(twin, markers={"markers": replace(markers, names=names)})
     with pytest.raises(RegistrationError, match="permuted"):
-        placed(spoilt, MESH)
+        placed_markers(spoilt, MESH)
 
 
 def test_what_cannot_be_reached_is_refused() -> None:
@@ -212,7 +212,7 @@ def test_the_papers_load_is_within_the_noise(project_root: Path) -> None:
 @pytest.mark.timeout(900)
 def test_the_shipped_recording_is_made_again(project_root: Path) -> None:
     read = read_recording(project_root / "recordings" / "ekf_cone.mcap")
-    again = made(ConeTwin())
+    again = made(TwinSettings())
     for topic in ("stage", "load_cell"):
         assert again.signals[topic].y == pytest.approx(read.signals[topic].y, abs=1e-9)
     there, here = read.markers["markers"].x, again.markers["markers"].x

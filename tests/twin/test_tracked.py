@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validate.register.placed import placed
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, RegistrationError
@@ -13,6 +12,7 @@ from validate.fem.system import build
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
+from validate.register.markers import placed_markers
 from validate.scene.box import box
 from validate.scene.scene import Drive, Material, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
@@ -45,21 +45,21 @@ def made(camera: Camera, at: Points | None = None) -> Recording:
 
 
 def displacement(recording: Recording, name: str) -> Floats:
-    seen = placed(recording, MESH)
+    seen = placed_markers(recording, MESH)
     j = seen.names.index(name)
     return np.asarray(seen.x[:, j] - seen.rest[j])
 
 
 def test_an_exact_camera_gives_back_the_displacements() -> None:
     at, recording = points(), made(Camera(0.0, every=5))
-    seen = placed(recording, MESH)
+    seen = placed_markers(recording, MESH)
     assert seen.t == pytest.approx(np.arange(81) * 0.005)
     assert recording.markers["markers"].frame == "camera"
     assert np.abs(recording.markers["markers"].x[0] - seen.rest).max() > 0.1  # a frame of its own
     for j, name in enumerate(("A", "B")):
         told = np.vstack([np.zeros(3), at.u[4::5, j]])
         assert displacement(recording, name) == pytest.approx(told, abs=1e-15)
-    assert np.abs(seen.rows.outside).max() < 1e-12
+    assert np.abs(seen.positions.outside).max() < 1e-12
 
 
 def test_fiducials_do_not_move_and_up_is_the_scenes_z() -> None:
@@ -95,7 +95,7 @@ def test_missing_looks_are_counted_and_never_the_first() -> None:
     assert seen[0].all()
     assert (seen.all(axis=2) == seen.any(axis=2)).all()  # a point is unseen as a whole
     assert 1 - seen[1:].mean() == pytest.approx(0.1, abs=0.02)  # 2400 looks
-    assert placed(made(Camera(1e-5, missing=0.1)), MESH).x.shape == (401, 6, 3)
+    assert placed_markers(made(Camera(1e-5, missing=0.1)), MESH).x.shape == (401, 6, 3)
 
 
 def test_streams_are_apart_and_seeded() -> None:
@@ -109,7 +109,7 @@ def test_streams_are_apart_and_seeded() -> None:
 
 def test_a_registration_is_as_good_as_the_still_looks() -> None:
     """Fitted on 100 looks, A's error from registration is a tenth of a look's noise."""
-    seen = placed(made(Camera(2e-5)), MESH)
+    seen = placed_markers(made(Camera(2e-5)), MESH)
     assert float(seen.tre.max()) < 1e-5
     truth = np.vstack([np.zeros(3), points().u[:, 0]])
     error = displacement(made(Camera(2e-5)), "A") - truth
@@ -136,7 +136,9 @@ def test_it_survives_a_file(tmp_path: Path) -> None:
     assert mine.names == theirs.names
     assert read.record("provenance")["same_model"] == "true"
     assert read.record("provenance")["element"] == "P1"
-    assert placed(read, MESH).x == pytest.approx(placed(recording, MESH).x, nan_ok=True)
+    assert placed_markers(read, MESH).x == pytest.approx(
+        placed_markers(recording, MESH).x, nan_ok=True
+    )
 
 
 def test_a_run_with_probes_becomes_points() -> None:
@@ -164,11 +166,11 @@ def test_a_planar_set_is_placed_by_its_up() -> None:
     flat = {k: np.array([*p, 0.1]) for k, p in flat.items()}
     at = replace(points(), names=("B",), rest=REST[1:], u=points().u[:, 1:])
     recording = record_tracked(ORIGIN, at, flat, Camera(0.0), {})
-    seen = placed(recording, MESH)
+    seen = placed_markers(recording, MESH)
     assert seen.x[200, 0] - seen.rest[0] == pytest.approx(at.u[199, 0], abs=1e-14)
     down = {"up": " ".join(str(-float(v)) for v in recording.record("camera")["up"].split())}
     with pytest.raises(RegistrationError, match="mirrored"):
-        placed(replace(recording, metadata={**recording.metadata, "camera": down}), MESH)
+        placed_markers(replace(recording, metadata={**recording.metadata, "camera": down}), MESH)
 
 
 @pytest.mark.parametrize(
@@ -190,4 +192,4 @@ def test_records_that_are_no_vectors_are_refused() -> None:
     recording = made(Camera(0.0))
     spoilt = {**recording.metadata, "camera": {"up": "0 1"}}
     with pytest.raises(RegistrationError, match="camera 'up' is '0 1': expected three numbers"):
-        placed(replace(recording, metadata=spoilt), MESH)
+        placed_markers(replace(recording, metadata=spoilt), MESH)

@@ -5,31 +5,31 @@ import shapely
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
-from validate.compare.skin import Skin
+from validate.compare.boundary import Boundary
 
 # Share of the body's size by which an edge must reach past a triangle on both sides: triangles of
 # one flat side lie off their common plane by rounding.
 _PAST = 1e-10
 
 
-def crossings(skin: Skin) -> int:
+def crossings(boundary: Boundary) -> int:
     """Pairs of pieces without a common point that meet: 0 for the boundary of a sound body.
 
     In space an edge must pass through the other triangle, from strictly one side to the other;
     triangles that lie flat on each other are not seen.
     """
-    first, second = _close(skin)
-    if skin.points.shape[1] == 2:
+    first, second = _close(boundary)
+    if boundary.points.shape[1] == 2:
         return len(first)
-    x = skin.points[skin.pieces]
-    past = _PAST * float(np.ptp(skin.points, axis=0).max())
+    x = boundary.points[boundary.pieces]
+    past = _PAST * float(np.ptp(boundary.points, axis=0).max())
     hits = _pierces(x[first], x[second], past) | _pierces(x[second], x[first], past)
     return int(hits.sum())
 
 
-def _close(skin: Skin) -> tuple[Ints, Ints]:
+def _close(boundary: Boundary) -> tuple[Ints, Ints]:
     """Pairs (k,), (k,) of pieces without a common point that meet, in space whose boxes do."""
-    x = skin.points[skin.pieces]
+    x = boundary.points[boundary.pieces]
     low, high = x.min(axis=1), x.max(axis=1)
     if x.shape[2] == 2:
         segments = shapely.linestrings(x)
@@ -40,7 +40,9 @@ def _close(skin: Skin) -> tuple[Ints, Ints]:
     once = first < second
     first, second = first[once], second[once]
     meet = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
-    shared = (skin.pieces[first][:, :, None] == skin.pieces[second][:, None, :]).any(axis=(1, 2))
+    shared = (boundary.pieces[first][:, :, None] == boundary.pieces[second][:, None, :]).any(
+        axis=(1, 2)
+    )
     keep = meet & ~shared
     return np.asarray(first[keep]), np.asarray(second[keep])
 

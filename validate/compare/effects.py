@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.residual import Residual
-from validate.compare.score import max_length, rms
+from validate.compare.score import max_length
 
 TELLS_APART = 2.0
 

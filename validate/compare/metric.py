@@ -1,34 +1,63 @@
-"""What a metric of two fields is: a name, a formula, units, what it rests on, a definition."""
+"""What a metric is: a name, a formula, its unit, what it rests on, a definition."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
-from validate.compare.pair import Pair
 from validate.compare.score import Score
 
 
+class Compared(Protocol):
+    """What a metric is taken of: a run beside its reference."""
+
+    @property
+    def against(self) -> str:
+        """Name of the reference."""
+        ...
+
+    @property
+    def where(self) -> str:
+        """On what the two are compared, in words."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, object]:
+        """What stands for the names in braces of a metric's unit."""
+        ...
+
+
+C_contra = TypeVar("C_contra", bound=Compared, contravariant=True)
+
+
 @dataclass(frozen=True)
-class Metric:
-    """`value(pair)` in `units` (2-D, 3-D), resting on `count(pair)` points of a kind `of`.
+class Counted(Generic[C_contra]):
+    """`number` of things of a kind `of` that a metric rests on."""
+
+    of: str
+    number: Callable[[C_contra], int]
+
+
+@dataclass(frozen=True)
+class Metric(Generic[C_contra]):
+    """`value(compared)` in `unit`, as "m", or "m^{dimension}" filled in by what is compared.
 
     `symmetric`: the same when run and reference change places. `value` raises `ComparisonError`
     where the metric does not exist (0/0, a crossing boundary), with the reason.
     """
 
     name: str
-    value: Callable[[Pair], float]
-    units: tuple[str, str]
-    count: Callable[[Pair], int]
-    of: str
+    value: Callable[[C_contra], float]
+    unit: str
     definition: str
-    symmetric: bool
+    counted: Counted[C_contra]
+    symmetric: bool = False
 
-    def score(self, pair: Pair) -> Score:
-        """The metric of the pair as a score against the reference."""
-        unit = self.units[pair.on.dimension - 2]
-        words = f"{self.definition}; {pair.where}; counted: {self.of}"
-        return Score(self.name, self.value(pair), unit, self.count(pair), pair.other.name, words)
+    def unit_of(self, compared: C_contra) -> str:
+        return self.unit.format(**compared.units)
 
-
-def count_nodes(pair: Pair) -> int:
-    return len(pair.on.nodes)
+    def score(self, compared: C_contra, prefix: str = "") -> Score:
+        """The score `<prefix><name>` against the reference."""
+        words = f"{self.definition}; {compared.where}; counted: {self.counted.of}"
+        value, count = self.value(compared), self.counted.number(compared)
+        unit = self.unit_of(compared)
+        return Score(prefix + self.name, value, unit, count, compared.against, words)

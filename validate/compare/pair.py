@@ -1,5 +1,6 @@
 """Two displacement fields side by side on one mesh: what every metric of two runs reads."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,8 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, checked
-from validate.compare.sanity import Soundness, require_upright, soundness
-from validate.compare.skin import Skin, skin
+from validate.compare.boundary import Boundary, deformed_boundary
+from validate.compare.soundness import Soundness, require_upright, soundness
 from validate.errors import ComparisonError
 from validate.fem.assemble import stiffness
 from validate.fem.locate import barycentric_rows
@@ -39,14 +40,14 @@ class Field:
         object.__setattr__(self, "u", u)
 
     @cached_property
-    def skin(self) -> Skin:
+    def boundary(self) -> Boundary:
         """Where the field puts the body's boundary."""
-        return skin(self.mesh, self.mesh.nodes + self.u)
+        return deformed_boundary(self.mesh, self.mesh.nodes + self.u)
 
     @cached_property
     def soundness(self) -> Soundness:
         """Inverted cells, the volume enclosed and crossings of the deformed body."""
-        return soundness(self.mesh, self.u, self.skin)
+        return soundness(self.mesh, self.u, self.boundary)
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Common:
 
 
 @dataclass(frozen=True)
-class Pair:
+class FieldPair:
     """`one` against `other` (the reference), both carried onto a common mesh.
 
     u_one, u_other (n, d) m at the nodes of `on`; `outside` (k,) m holds how far every carried node
@@ -109,9 +110,17 @@ class Pair:
         return float(np.linalg.norm(np.ptp(self.on.nodes, axis=0)))
 
     @property
-    def swapped(self) -> "Pair":
+    def swapped(self) -> "FieldPair":
         """The same pair with the other field as reference."""
-        return Pair(self.other, self.one, self.common, self.u_other, self.u_one, self.outside)
+        return FieldPair(self.other, self.one, self.common, self.u_other, self.u_one, self.outside)
+
+    @property
+    def against(self) -> str:
+        return self.other.name
+
+    @property
+    def units(self) -> Mapping[str, object]:
+        return {"dimension": self.on.dimension}
 
     @property
     def where(self) -> str:
@@ -122,7 +131,7 @@ class Pair:
         return f"{words}, {count_outside(self)} of {len(self.outside)} carried nodes outside"
 
 
-def pair(one: Field, other: Field, onto: Mesh | Scene | Common | None = None) -> Pair:
+def pair(one: Field, other: Field, onto: Mesh | Scene | Common | None = None) -> FieldPair:
     """Both fields on one mesh: `onto`, or else the mesh of `other`, the reference.
 
     A field on another mesh is interpolated at the nodes of `onto`; a node outside that mesh reads
@@ -141,7 +150,7 @@ def pair(one: Field, other: Field, onto: Mesh | Scene | Common | None = None) ->
     u_one, away_one = _carried(one, on)
     u_other, away_other = _carried(other, on)
     outside = np.concatenate([away_one, away_other])
-    return Pair(one, other, common, u_one, u_other, outside)
+    return FieldPair(one, other, common, u_one, u_other, outside)
 
 
 def _common(onto: Mesh | Scene | Common | None, other: Field) -> Common:
@@ -161,7 +170,7 @@ def same_mesh(one: Mesh, other: Mesh) -> bool:
     )
 
 
-def count_outside(pair: Pair) -> int:
+def count_outside(pair: FieldPair) -> int:
     return int((pair.outside > ON_THE_MESH * pair.size).sum())
 
 

@@ -38,7 +38,7 @@ class Residual:
     role: Role = "validates"
 
     def __post_init__(self) -> None:
-        values = checked(self.values, self.name, (None, None), error=ComparisonError)
+        values = checked(self.values, f"residual {self.name}", (None, None), error=ComparisonError)
         if values.size == 0:
             raise ComparisonError(f"{self.name}: 0 matched points, nothing was compared")
         object.__setattr__(self, "values", values)

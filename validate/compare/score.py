@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.compare.residual import Residual
 from validate.solve.types import Run
 
@@ -20,11 +20,6 @@ class Score:
     count: int
     against: str
     definition: str
-
-
-def rms(values: Floats) -> float:
-    """Root of the mean squared length of the rows (k, c)."""
-    return float(np.sqrt((values**2).sum(axis=1).mean()))
 
 
 def mean_length(values: Floats) -> float:

@@ -6,37 +6,33 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
-from validate.compare.skin import Skin, normals
+from validate.compare.boundary import Boundary, normals
+from validate.scene.shape_functions import symmetric_points
 
-# Barycentric Gauss points of degree 3 (segments) and 2 (triangles).
-_G = (1 - 1 / np.sqrt(3)) / 2
-_SAMPLES = {
-    2: np.array([[1 - _G, _G], [_G, 1 - _G]]),
-    3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6,
-}
+_SAMPLES = {2: symmetric_points(1, 3)[0], 3: symmetric_points(2, 2)[0]}  # segment, triangle
 _CHUNK = 200_000  # point-piece pairs measured at once
 
 
-def hausdorff(one: Skin, other: Skin) -> float:
+def hausdorff(one: Boundary, other: Boundary) -> float:
     """max over both directions of the largest distance of a sample to the other boundary, m."""
     if _same(one, other):
         return 0.0
     return float(max(_all_samples(one, other).max(), _all_samples(other, one).max()))
 
 
-def mean_surface_distance(one: Skin, other: Skin) -> float:
+def mean_surface_distance(one: Boundary, other: Boundary) -> float:
     """Mean of the two directions' mean distances, each weighted by length (area), m."""
     if _same(one, other):
         return 0.0
     return (_mean(one, other) + _mean(other, one)) / 2
 
 
-def distances(points: Floats, skin: Skin) -> Floats:
+def distances(points: Floats, boundary: Boundary) -> Floats:
     """Distance m of every point (k, d) to the boundary, exact up to rounding."""
-    x = skin.points[skin.pieces]
+    x = boundary.points[boundary.pieces]
     centres = x.mean(axis=1)
     reach = float(np.linalg.norm(x - centres[:, None], axis=2).max())
-    near, _ = cKDTree(skin.points).query(points)
+    near, _ = cKDTree(boundary.points).query(points)
     # The nearest piece holds a point no further than the nearest corner is.
     lists = cKDTree(centres).query_ball_point(points, np.asarray(near) * (1 + 1e-9) + reach)
     found = np.full(len(points), np.inf)
@@ -47,25 +43,25 @@ def distances(points: Floats, skin: Skin) -> Floats:
     return found
 
 
-def _same(one: Skin, other: Skin) -> bool:
+def _same(one: Boundary, other: Boundary) -> bool:
     """Whether nothing differs: Gauss points of one boundary would miss it by rounding, 1e-16."""
     return np.array_equal(one.points, other.points) and np.array_equal(one.pieces, other.pieces)
 
 
-def _all_samples(one: Skin, other: Skin) -> Floats:
+def _all_samples(one: Boundary, other: Boundary) -> Floats:
     return distances(np.vstack([one.points, _gauss(one)]), other)
 
 
-def _mean(one: Skin, other: Skin) -> float:
+def _mean(one: Boundary, other: Boundary) -> float:
     found = distances(_gauss(one), other).reshape(len(one.pieces), -1).mean(axis=1)
     weights = np.linalg.norm(normals(one), axis=1)
     return float(found @ weights / weights.sum())
 
 
-def _gauss(skin: Skin) -> Floats:
-    samples = _SAMPLES[skin.pieces.shape[1]]
-    places = np.einsum("qa,sad->sqd", samples, skin.points[skin.pieces])
-    return np.asarray(places.reshape(-1, skin.points.shape[1]))
+def _gauss(boundary: Boundary) -> Floats:
+    samples = _SAMPLES[boundary.pieces.shape[1]]
+    places = np.einsum("qa,sad->sqd", samples, boundary.points[boundary.pieces])
+    return np.asarray(places.reshape(-1, boundary.points.shape[1]))
 
 
 def _parts(lengths: list[int]) -> list[slice]:

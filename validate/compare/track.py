@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, checked, rms
 from validate.compare.score import Score
 from validate.errors import ComparisonError
 
@@ -49,7 +49,7 @@ def mae(error: TrackError) -> float:
 
 
 def rmse(error: TrackError) -> float:
-    return float(np.sqrt((error.values**2).mean()))
+    return rms(error.values)
 
 
 def sd_of_absolute(error: TrackError) -> float:

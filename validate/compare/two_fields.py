@@ -1,67 +1,62 @@
-"""All metrics of two displacement fields, in one registry and behind one call (paper 002, III)."""
+"""All metrics of two displacement fields, in one tuple and behind one call (paper 002, III)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from validate.compare.fields import ENERGY_METRICS, FIELD_METRICS
-from validate.compare.interior import INTERIOR_METRICS
-from validate.compare.metric import Metric
-from validate.compare.pair import Common, Field, Pair, count_outside, pair
+from validate.compare.field_norms import ENERGY_METRICS, FIELD_METRICS
+from validate.compare.interior_error import INTERIOR_METRICS
+from validate.compare.metric import Counted, Metric
+from validate.compare.pair import Common, Field, FieldPair, count_outside, pair
 from validate.compare.score import Score
-from validate.compare.shape import SHAPE_METRICS
+from validate.compare.shape_error import OF_BODIES, SHAPE_METRICS
 from validate.errors import ComparisonError
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
-CHECKS: tuple[Metric, ...] = (
+_CARRIED: Counted[FieldPair] = Counted("nodes carried from another mesh", lambda p: len(p.outside))
+
+CHECKS: tuple[Metric[FieldPair], ...] = (
     Metric(
         "inverted",
         lambda p: float(len(p.one.soundness.inverted)),
-        ("1", "1"),
-        lambda p: p.one.soundness.cells,
-        "cells",
+        "1",
         "cells whose Jacobian is not positive at a node or Gauss point of the deformed run",
-        symmetric=False,
+        Counted("cells", lambda p: p.one.soundness.cells),
     ),
     Metric(
         "inverted.reference",
         lambda p: float(len(p.other.soundness.inverted)),
-        ("1", "1"),
-        lambda p: p.other.soundness.cells,
-        "cells",
+        "1",
         "cells whose Jacobian is not positive at a node or Gauss point of the deformed reference",
-        symmetric=False,
+        Counted("cells", lambda p: p.other.soundness.cells),
     ),
     Metric(
         "crossings",
         lambda p: float(p.one.soundness.crossings + p.other.soundness.crossings),
-        ("1", "1"),
-        lambda p: len(p.one.skin.pieces) + len(p.other.skin.pieces),
-        "boundary segments or triangles of both",
+        "1",
         "pairs of boundary pieces of either deformed body that cross; E_s exists where it is 0",
+        OF_BODIES,
         symmetric=True,
     ),
     Metric(
         "outside",
         lambda p: float(count_outside(p)),
-        ("1", "1"),
-        lambda p: len(p.outside),
-        "nodes carried from another mesh",
+        "1",
         "nodes of the common mesh outside the mesh they read; they take its nearest point",
+        _CARRIED,
         symmetric=True,
     ),
     Metric(
         "outside.max",
         lambda p: float(p.outside.max(initial=0.0)),
-        ("m", "m"),
-        lambda p: len(p.outside),
-        "nodes carried from another mesh",
+        "m",
         "largest distance of a node of the common mesh from the mesh it reads",
+        _CARRIED,
         symmetric=True,
     ),
 )
 
-METRICS_OF_FIELDS: tuple[Metric, ...] = (
+METRICS_OF_FIELDS: tuple[Metric[FieldPair], ...] = (
     *CHECKS,
     *FIELD_METRICS,
     *ENERGY_METRICS,
@@ -71,15 +66,15 @@ METRICS_OF_FIELDS: tuple[Metric, ...] = (
 
 
 @dataclass(frozen=True)
-class Compared:
+class FieldScores:
     """Scores of a pair, and the metrics that do not exist there with the reason of each."""
 
-    pair: Pair
+    pair: FieldPair
     scores: tuple[Score, ...]
     refused: tuple[tuple[str, str], ...]
 
 
-def compared(between: Pair, metrics: Sequence[Metric] | None = None) -> Compared:
+def compared(between: FieldPair, metrics: Sequence[Metric[FieldPair]] | None = None) -> FieldScores:
     """Every metric that exists for the pair; the rest (0/0 at rest, crossings) by reason.
 
     Without a scene on the common mesh the energy norms are left out, as they have no moduli.
@@ -90,14 +85,14 @@ def compared(between: Pair, metrics: Sequence[Metric] | None = None) -> Compared
             scores.append(metric.score(between))
         except ComparisonError as error:
             refused.append((metric.name, str(error)))
-    return Compared(between, tuple(scores), tuple(refused))
+    return FieldScores(between, tuple(scores), tuple(refused))
 
 
 def compare_fields(
     one: Field,
     other: Field,
     onto: Mesh | Scene | Common | None = None,
-    metrics: Sequence[Metric] | None = None,
+    metrics: Sequence[Metric[FieldPair]] | None = None,
 ) -> tuple[Score, ...]:
     """Scores of the run `one` against the reference `other`, also on different meshes.
 
@@ -115,7 +110,7 @@ def compare_fields(
     return found.scores
 
 
-def _default(between: Pair) -> tuple[Metric, ...]:
+def _default(between: FieldPair) -> tuple[Metric[FieldPair], ...]:
     if between.common.scene is not None:
         return METRICS_OF_FIELDS
     return tuple(m for m in METRICS_OF_FIELDS if m not in ENERGY_METRICS)

@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2
 
+from validate.arrays import rms
 from validate.compare.residual import Residual
-from validate.compare.score import rms
 from validate.errors import ComparisonError
 
 Verdict = Literal["agrees", "differs", "cannot decide"]

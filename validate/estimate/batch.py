@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validate.arrays import Floats, checked
 from validate.errors import ComparisonError
-from validate.estimate.covariance import Gain
 from validate.estimate.displacement_filter import DisplacementStepper, InModes
 from validate.estimate.gains import GainSequence
 
@@ -33,7 +31,7 @@ def shared_gain_run(stepper: DisplacementStepper, inputs: Floats, z: Floats, row
     m, nt = len(stepper.sensor.names), len(inputs)
     z = checked(z, "z [m]", (None, nt, m), nan=True, error=ComparisonError)
     _require_schedule(stepper, z)
-    walk = _Walk(stepper, modes, gains, len(z))
+    walk = _Seeds(stepper, modes, gains, len(z))
     free = stepper.system.free
     read, driven = rows[:, free] @ modes.shapes, rows @ stepper.system.moves
     values, nis = np.empty((len(z), nt, len(rows))), np.zeros((len(z), nt))
@@ -58,7 +56,7 @@ def _require_schedule(stepper: DisplacementStepper, z: Floats) -> None:
         )
 
 
-class _Walk:
+class _Seeds:
     """Amplitudes (n, seeds) with their rates; they change in place."""
 
     def __init__(
@@ -67,13 +65,14 @@ class _Walk:
         n = len(modes.factors[0])
         self.stepper, self.modes, self.gains = stepper, modes, gains
         self.x, self.v, self.a = (np.zeros((n, seeds)) for _ in range(3))
-        self.motion, self.loads, self.k = stepper.excitation.rest(), np.zeros(0), 0
-        self._last: tuple[Gain, tuple[NDArray[np.bool_], Floats, Floats, Floats]] | None = None
+        self.inputs, self.k = stepper.excitation.rest(), 0
         self.fq, self.fv, self.fa, self.ff = (f[:, None] for f in modes.factors)
 
     def step(self, inputs: Floats, z: Floats) -> Floats:
         """NIS (seeds,) of the step, whose estimates are then in `x`."""
-        f = self._force(inputs)
+        self.k += 1
+        f, self.inputs, a = self.stepper.excitation.step(self.k, inputs, self.inputs, self.a)
+        self.a = a if a.ndim == 2 else np.repeat(a[:, None], len(z), axis=1)
         prior = self.fq * self.x
         prior += self.fv * self.v
         prior += self.fa * self.a
@@ -84,29 +83,10 @@ class _Walk:
         self.x = x
         return nis
 
-    def _force(self, inputs: Floats) -> Floats:
-        s = self.stepper
-        drives = len(s.scene.drives)
-        new, old = inputs[drives:], self.loads if self.k else np.zeros(len(inputs) - drives)
-        if self.k == 0 and s.starts is not None:
-            old, self.a = new, np.repeat((s.starts @ new)[:, None], self.x.shape[1], axis=1)
-        motion = s.excitation.moved(self.motion, inputs[:drives])
-        f = s.excitation.force(new, old, motion, self.motion)
-        self.motion, self.loads, self.k = motion, new, self.k + 1
-        return f
-
     def _corrected(self, prior: Floats, z: Floats) -> tuple[Floats, Floats]:
-        gain = self.gains.at(self.k)
+        gain, s = self.gains.at(self.k), self.stepper.sensor
         if gain is None:
             return prior, np.zeros(len(z))
-        i, H, driven, inverse = self._read(gain)
-        y = z.T[i] - H @ prior - (driven @ self.motion.q)[:, None]
-        return prior + gain.G @ y, (y * (inverse @ y)).sum(axis=0)
-
-    def _read(self, gain: Gain) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
-        """Rows of the seen components and S_yy^-1; kept while the gain repeats."""
-        if self._last is None or self._last[0] is not gain:
-            i, s = np.array(gain.seen), self.stepper.sensor
-            inverse = np.linalg.inv(gain.S_yy[np.ix_(i, i)])
-            self._last = gain, (i, s.H[i], s.driven[i], inverse)
-        return self._last[1]
+        i = np.array(gain.seen)
+        y = z.T[i] - s.H[i] @ prior - (s.driven[i] @ self.inputs.q)[:, None]
+        return prior + gain.G @ y, gain.nis(y)

@@ -5,20 +5,19 @@ form at the best gain, P+ = P- + G B^T + B G^T with B = G S_yy / 2 - P- H^T, whi
 construction, and to which an error in G adds only its square.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from validate.arrays import Floats
+from validate.estimate.kalman import Gain, Seen, best_gain, joseph, propagated
 from validate.estimate.modal_kernel import advance, mirrored
-from validate.estimate.small import joseph
 
 
 @dataclass(frozen=True)
 class Claim:
-    """P (n, n) m^2, of which `Modal` fills the lower triangle; PHt (n, m) = P H^T.
+    """P (n, n) m^2, of which `Decoupled` fills the lower triangle; PHt (n, m) = P H^T.
 
     G, B (n, r): an update not yet added to P, r = 0 for none.
     """
@@ -27,15 +26,6 @@ class Claim:
     PHt: Floats
     G: Floats
     B: Floats
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Gain G (n, k) of the k `seen` components of m, and S_yy (m, m) m^2 of all of them."""
-
-    G: Floats
-    S_yy: Floats
-    seen: tuple[bool, ...]
 
 
 class Recursion(Protocol):
@@ -48,9 +38,11 @@ class Recursion(Protocol):
         """What is claimed before the first step."""
         ...
 
-    def predict(self, claim: Claim) -> Claim: ...
+    def predict(self, claim: Claim, steps: int = 1) -> Claim:
+        """What is claimed so many steps >= 1 later, nothing measured."""
+        ...
 
-    def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]: ...
+    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]: ...
 
 
 class Covariance(Recursion, Protocol):
@@ -70,27 +62,6 @@ def claimed(P: Floats, PHt: Floats) -> Claim:
     return Claim(P, PHt, none, none)
 
 
-def best_gain(PHt: Floats, H: Floats, R: Floats, seen: tuple[bool, ...]) -> Gain:
-    """G = P H^T S_yy^-1 over the seen components, R (m,) m^2."""
-    S_yy = H @ PHt + np.diag(R)
-    S_yy = (S_yy + S_yy.T) / 2
-    if all(seen):
-        return Gain(_divided(PHt, S_yy), S_yy, seen)
-    i = np.array(seen)
-    return Gain(_divided(PHt[:, i], S_yy[np.ix_(i, i)]), S_yy, seen)
-
-
-def _divided(PHt: Floats, S: Floats) -> Floats:
-    """P H^T S^-1 by Cholesky; LAPACK itself, as scipy's checks take ten times the work of small S.
-
-    Raises `LinAlgError` for an S that is not positive definite.
-    """
-    _, G, info = dposv(S, PHt.T)
-    if info:
-        raise np.linalg.LinAlgError(f"S_yy {S.shape} is not positive definite (pivot {info})")
-    return np.ascontiguousarray(G.T)
-
-
 @dataclass(frozen=True)
 class Dense:
     """P- = A P A^T + Q and Joseph's update with dense matrices, as paper 001 prints its filter."""
@@ -100,16 +71,27 @@ class Dense:
     H: Floats
     R: Floats
     P0: Floats
+    _kept: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
 
     def start(self) -> Claim:
         return claimed(self.P0, self.P0 @ self.H.T)
 
-    def predict(self, claim: Claim) -> Claim:
-        P = self.A @ claim.P @ self.A.T + self.Q
+    def over(self, steps: int) -> tuple[Floats, Floats]:
+        """A and Q (n, n) of so many steps >= 1 together, by repeated squaring; kept."""
+        if steps == 1:
+            return self.A, self.Q
+        if steps not in self._kept:
+            half, odd = self.over(steps // 2), steps % 2 == 1
+            twice = _chained(half, half)
+            self._kept[steps] = _chained((self.A, self.Q), twice) if odd else twice
+        return self._kept[steps]
+
+    def predict(self, claim: Claim, steps: int = 1) -> Claim:
+        P = propagated(claim.P, *self.over(steps))
         return claimed(P, P @ self.H.T)
 
-    def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]:
-        gain, i = best_gain(claim.PHt, self.H, self.R, seen), np.array(seen)
+    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
+        gain, i = best_gain(claim.PHt, self.H @ claim.PHt + np.diag(self.R), seen), np.array(seen)
         P = joseph(claim.P, gain.G, self.H[i], np.diag(self.R[i]))
         return gain, claimed((P + P.T) / 2, claim.PHt)
 
@@ -117,9 +99,34 @@ class Dense:
         return claim.P
 
 
+def _chained(one: tuple[Floats, Floats], then: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    return then[0] @ one[0], propagated(one[1], *then)
+
+
 @dataclass(frozen=True)
-class Modal:
-    """The same where the transition is diagonal, A = diag(f): P- = P * f f^T + Q, no product."""
+class Steady:
+    """A covariance that has settled: `prior` is claimed before every measurement."""
+
+    covariance: Dense
+    prior: Claim
+
+    @property
+    def H(self) -> Floats:
+        return self.covariance.H
+
+    def start(self) -> Claim:
+        return self.covariance.start()
+
+    def predict(self, claim: Claim, steps: int = 1) -> Claim:
+        return self.prior
+
+    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
+        return self.covariance.update(claim, seen)
+
+
+@dataclass(frozen=True)
+class Decoupled:
+    """As `Dense` where the transition is diagonal, A = diag(f): P- = P * f f^T + Q, no product."""
 
     f: Floats
     Q: Floats
@@ -130,11 +137,13 @@ class Modal:
     def start(self) -> Claim:
         return claimed(self.P0, self.P0 @ self.H.T)
 
-    def predict(self, claim: Claim) -> Claim:
-        return claimed(*advance(claim.P, claim.G, claim.B, self.f, self.Q, self.H))
+    def predict(self, claim: Claim, steps: int = 1) -> Claim:
+        for _ in range(steps):
+            claim = claimed(*advance(claim.P, claim.G, claim.B, self.f, self.Q, self.H))
+        return claim
 
-    def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]:
-        gain, i = best_gain(claim.PHt, self.H, self.R, seen), np.array(seen)
+    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
+        gain, i = best_gain(claim.PHt, self.H @ claim.PHt + np.diag(self.R), seen), np.array(seen)
         B = gain.G @ gain.S_yy[np.ix_(i, i)] / 2 - claim.PHt[:, i]
         return gain, Claim(claim.P, claim.PHt, gain.G, np.ascontiguousarray(B))
 

@@ -5,7 +5,7 @@ velocity and acceleration are inputs, recursed beside the filter and not part of
 knows nothing of them. Its transition J^-1 A alone decides P, hence the gains need no data.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol
@@ -14,14 +14,22 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.covariance import Claim, Covariance, Gain
-from validate.estimate.gains import Claims, GainSequence, Seen
-from validate.estimate.innovation import Innovation, innovation, innovation_traces, nothing
-from validate.estimate.measured import Timetable
+from validate.estimate.covariance import Claim, Covariance
+from validate.estimate.gains import Claims, GainSequence
+from validate.estimate.kalman import (
+    Gain,
+    Innovation,
+    Seen,
+    innovation,
+    innovation_units,
+    nothing,
+)
+from validate.estimate.measurements import Timetable
 from validate.fem.system import System
-from validate.solve.dynamic import InertialStepper, spread
-from validate.solve.newmark_rule import Excitation, Motion, Propagation, Rule
-from validate.solve.types import State, Trace
+from validate.solve.dynamic import InertialStepper
+from validate.solve.excitation import Excitation, Inputs
+from validate.solve.newmark_rule import Propagation, Rule
+from validate.solve.types import State
 
 Recursion = Literal["prior", "posterior"]
 Structure = Literal["white", "load"]
@@ -116,7 +124,7 @@ class InModes:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensed:
     """Where measurements land, and rows: H (m, n) of the coordinates, `driven` (m, k) of drives."""
 
     names: tuple[str, ...]
@@ -126,13 +134,13 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Inner:
-    """State (n,) with its rates, the drives' motion, and what is claimed (None: precomputed)."""
+class Estimate:
+    """State (n,) with its rates, the inputs, and what is claimed (None: precomputed)."""
 
     x: Floats
     v: Floats
     a: Floats
-    motion: Motion
+    inputs: Inputs
     claim: Claim | None
 
 
@@ -156,17 +164,15 @@ class DisplacementStepper(InertialStepper):
     """One filter step: predict, correct where something was measured, recurse v and a.
 
     With `gains` they were computed before; without, the covariance is recursed at every step. It
-    is recursed in the coordinates `claimed`; `excitation` is in `coordinates`, and so are `starts`
-    (n, l), accelerations at rest per newton.
+    is recursed in the coordinates `claimed`; `excitation` is in `coordinates`.
     """
 
     coordinates: Coordinates
     excitation: Excitation
     covariance: Covariance
-    sensor: Sensor
+    sensor: Sensed
     when: Mapping[int, Seen]
     gains: GainSequence | None
-    starts: Floats | None
     recursion: Recursion
     claimed: Coordinates
     settled: float
@@ -177,29 +183,33 @@ class DisplacementStepper(InertialStepper):
         object.__setattr__(self, "_claims", Claims(self.covariance, self.when, self.settled))
         object.__setattr__(self, "_spread", Spread(self.claimed, self.covariance))
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """NIS with its degrees, innovations with their sd, and the drives' forces."""
+        return {**innovation_units(self.sensor.names), **super().units}
+
     def rest(self) -> State:
         zeros = np.zeros(len(self.covariance.P0))
         claim = None if self.gains else self.covariance.start()
-        inner = Inner(zeros, zeros, zeros, self.excitation.rest(), claim)
-        inputs = np.zeros(len(self.scene.inputs))
-        numbers = self.reactions.named(np.zeros(self._drives))
-        return self._state(inputs, 0, numbers=numbers, extra=inner)
+        return State(0, Estimate(zeros, zeros, zeros, self.excitation.rest(), claim))
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The posterior at the end of a step; `drives` are the inputs there, loads included."""
-        last: Inner = state.extra
-        k, new, old, a = self._drives, drives[self._drives :], state.drives[self._drives :], last.a
-        if state.k == 0 and self.starts is not None:
-            old, a = new, self.starts @ new
-        motion = self.excitation.moved(last.motion, drives[:k])
-        f = self.excitation.force(new, old, motion, last.motion)
-        prior = self.coordinates.predict(last.x, last.v, a, f)
-        step = state.k + 1
-        gain, claim = self._gain(step, last.claim)
-        x, seen = self._corrected(prior, gain, step, motion.q)
+    def step(self, state: State, inputs: Floats) -> State:
+        """The posterior at the end of a step; `inputs` are those there, loads included."""
+        last: Estimate = state.inner
+        k, of = state.k + 1, self.coordinates
+        f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
+        prior = of.predict(last.x, last.v, a, f)
+        gain, claim = self._gain(k, last.claim)
+        x, seen = self._corrected(prior, gain, k, moved.q)
         towards = prior if self.recursion == "prior" else x
-        inner = Inner(x, *self.coordinates.rates(towards, last.x, last.v, a), motion, claim)
-        return self._done(drives, step, inner, seen)
+        v, a = of.rates(towards, last.x, last.v, a)
+        inner = Estimate(x, v, a, moved, claim)
+        if not np.isfinite(a.sum() + x.sum()):
+            return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
+        numbers = {**seen.numbers(self.sensor.names)}
+        if self.reactions.names:
+            numbers |= self.forces(of.free(x), of.free(v), of.free(a), moved)
+        return State(k, inner, numbers=numbers)
 
     def _gain(self, step: int, claim: Claim | None) -> tuple[Gain | None, Claim | None]:
         if self.gains is not None:
@@ -214,40 +224,19 @@ class DisplacementStepper(InertialStepper):
         z = self.sensor.table.at(step)
         if z is None or gain is None:
             return prior, nothing(len(self.sensor.names))
-        found = innovation(z, self.sensor.H @ prior + self.sensor.driven @ driven, gain.S_yy)
-        return prior + gain.G @ found.y[list(gain.seen)], found
-
-    def _done(self, inputs: Floats, step: int, inner: Inner, seen: Innovation) -> State:
-        if not np.isfinite(inner.a.sum() + inner.x.sum()):
-            why = ("diverged", f"the estimate is not finite at step {step}")
-            return self._state(inputs, step, extra=inner, failure=why)
-        numbers = {**seen.numbers(self.sensor.names)}
-        if self._drives:
-            m, of = inner.motion, self.coordinates.free
-            u, v, a = (
-                spread(self.system, of(free), driven)
-                for free, driven in ((inner.x, m.q), (inner.v, m.rate), (inner.a, m.acceleration))
-            )
-            numbers |= self.reactions.numbers(u, v, a, inputs[self._drives :])
-        return self._state(inputs, step, numbers=numbers, extra=inner)
+        found = innovation(z, self.sensor.H @ prior + self.sensor.driven @ driven, gain)
+        return prior + gain.G @ found.y[np.array(gain.seen)], found
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
-        inner: Inner = state.extra
-        u = spread(self.system, self.coordinates.free(inner.x), inner.motion.q)
-        return u.reshape(self.scene.mesh.nodes.shape)
+        inner: Estimate = state.inner
+        return self.nodal(self.coordinates.free(inner.x), inner.inputs.q)
 
     def sd(self, state: State) -> Floats:
         """Claimed standard deviations (n, d) m; prescribed unknowns have none."""
-        inner: Inner = state.extra
-        claim = self._claims.at(state.k) if inner.claim is None else inner.claim
-        full = np.zeros(len(self.system.moves))
-        full[self.system.free] = self._spread.at(claim)
-        return full.reshape(self.scene.mesh.nodes.shape)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Of the inputs and drives, NIS with its degrees, innovations with their sd."""
-        return super().traces(states) | innovation_traces(self.sensor.names, states)
+        claim = state.inner.claim
+        claim = self._claims.at(state.k) if claim is None else claim
+        return self.nodal(self._spread.at(claim), np.zeros(0))
 
 
 def load_shapes(system: System, H: Floats) -> Floats:

@@ -5,29 +5,29 @@ are refused here, before the first step and after every one.
 """
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.estimate.core_stepper import CoreStepper, require_loads
-from validate.estimate.filterpy_door import (
+from validate.estimate.filterpy_names import (
     EnsembleKalmanFilter,
     KalmanFilter,
     MerweScaledSigmaPoints,
     UnscentedKalmanFilter,
     seeded,
 )
-from validate.estimate.innovation import Innovation, innovation, nothing
+from validate.estimate.kalman import Innovation, best_gain, innovation, nothing
 from validate.estimate.linear_model import LinearModel, require_symmetric
-from validate.estimate.measured import Measurements, timetable
+from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
+from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import reactions, require_linear
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import Stepper
 
 Make = Callable[[LinearModel], Any]
@@ -122,6 +122,14 @@ class Guest:
     filters which draw from numpy's global generator.
     """
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",),
+        inertia=True,
+        cavities=False,
+        drives=False,
+        contact=GLUED,
+    )
+
     make: Make | str = quantity("KalmanFilter", "1", "name, or a function of the model")
     dt: float = quantity(0.002, "s", "time step")
     modes: int = quantity(5, "1", "lowest modes kept")
@@ -134,17 +142,15 @@ class Guest:
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
         shapes are not the model's."""
-        require_linear(system)
-        require_loads(system)
-        R = measurements.sd**2 if self.R is None else np.full(len(measurements.sd), self.R)
+        require_handled(system.scene, self)
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
+        R = measurements.variances(self.R)
         reduced = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
         with seeded(self.seed):
             first = _made(self.make)(reduced.model)
         require_shapes(first, reduced.model)
         core = GuestCore(reduced, first, self.seed)
-        table = timetable(measurements, self.dt)
-        return CoreStepper(system, reactions(system), core, measurements.names, table)
+        return CoreStepper(system, core, measurements.names, timetable(measurements, self.dt))
 
 
 def _made(make: Make | str) -> Make:
@@ -195,6 +201,10 @@ class GuestCore:
     first: Any
     seed: int
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        return {}
+
     def start(self) -> Visit:
         return Visit(copy.deepcopy(self.first))
 
@@ -206,8 +216,9 @@ class GuestCore:
             guest.predict(u=loads)
             if z is None or not np.isfinite(z).all():
                 return Visit(guest), nothing(len(model.H))
-            S_yy = model.H @ guest.P @ model.H.T + model.R
-            found = innovation(z, model.H @ guest.x, S_yy)
+            PHt = guest.P @ model.H.T
+            gain = best_gain(PHt, model.H @ PHt + model.R)
+            found = innovation(z, model.H @ guest.x, gain)
             guest.update(z)
         require_shapes(guest, model)
         return Visit(guest), found
@@ -219,5 +230,5 @@ class GuestCore:
         lift = self.reduced.lift
         return np.asarray(np.einsum("ij,ij->i", lift @ inner.guest.P, lift))
 
-    def numbers(self, inner: Visit) -> dict[str, tuple[float, str]]:
+    def numbers(self, inner: Visit) -> Mapping[str, float]:
         return {}

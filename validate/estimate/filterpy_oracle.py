@@ -6,25 +6,27 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.filterpy_door import (
+from validate.estimate.filterpy_guest import kalman
+from validate.estimate.filterpy_names import (
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
     MerweScaledSigmaPoints,
     UnscentedKalmanFilter,
     drawing,
 )
-from validate.estimate.filterpy_guest import kalman
-from validate.estimate.linear_model import LinearModel
-from validate.estimate.small import (
+from validate.estimate.kalman import (
     Gaussian,
-    SigmaPoints,
     ekf_predict,
     ekf_update,
+    kf_predict,
+    kf_update,
+)
+from validate.estimate.linear_model import LinearModel
+from validate.estimate.sampled_kalman import (
+    SigmaPoints,
     enkf_predict,
     enkf_update,
     ensemble_gaussian,
-    kf_predict,
-    kf_update,
     ukf_predict,
     ukf_update,
 )

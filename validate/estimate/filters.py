@@ -1,25 +1,36 @@
 """Every filter there is. A new one is one file beside this and its name here."""
 
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
-from validate.estimate.steady import ReducedKf
+from validate.estimate.reduced_kf import ReducedKf
 from validate.fem.system import System
+from validate.solve.handles import Handles
 from validate.solve.types import Stepper
 
 
 class Filter(Protocol):
     """Settings of a filter: it sees a system and its measurements, never the truth."""
 
+    handles: ClassVar[Handles]
+
     def prepare(self, system: System, measurements: Measurements) -> Stepper: ...
 
 
-LINEAR_FILTERS: tuple[type[Filter], ...] = (KfFem, ModalKf, ReducedKf, LoadScale, Guest)
-EXPLICIT_FILTERS: tuple[type[Filter], ...] = (NodeEKF, ReducedEKF)
-FILTERS: tuple[type[Filter], ...] = (*LINEAR_FILTERS, *EXPLICIT_FILTERS)
+FILTERS: tuple[type[Filter], ...] = (
+    KfFem,
+    ModalKf,
+    ReducedKf,
+    LoadScale,
+    Guest,
+    NodeEKF,
+    ReducedEKF,
+)
+LINEAR_FILTERS = tuple(f for f in FILTERS if "linear" in f.handles.law)
+EXPLICIT_FILTERS = tuple(f for f in FILTERS if "linear" not in f.handles.law)

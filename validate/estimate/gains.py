@@ -7,14 +7,13 @@ from types import MappingProxyType
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.covariance import Claim, Covariance, Gain, Recursion
-from validate.estimate.measured import Timetable
+from validate.estimate.covariance import Claim, Covariance, Recursion
+from validate.estimate.kalman import Gain, Seen
+from validate.estimate.measurements import Timetable
 
 # Change of the gain from one measurement to the next, of its largest entry, at which it is taken as
 # settled: with a memory of a hundred measurements 1e-4 is left of it, below every noise's effect.
 SETTLED = 1e-6
-
-Seen = tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,7 @@ def events(
         if last is not None and settled and same:
             yield Event(k, last, claim, True)
         else:
-            for _ in range(k - step):
-                claim = recursion.predict(claim)
-            gain, claim = recursion.update(claim, seen)
+            gain, claim = recursion.update(recursion.predict(claim, k - step), seen)
             settled = last is not None and same and _close(gain.G, last.G, tolerance)
             last, pattern = gain, (k - step, seen)
             yield Event(k, gain, claim, False)
@@ -123,8 +120,8 @@ class Claims:
         while self._ahead is not None and self._ahead.step <= step:
             self._claim, self._step = self._ahead.claim, self._ahead.step
             self._ahead = next(self._walk, None)
-        for _ in range(step - self._step):
-            self._claim = self._covariance.predict(self._claim)
+        if step > self._step:
+            self._claim = self._covariance.predict(self._claim, step - self._step)
         self._step = step
         return self._claim
 

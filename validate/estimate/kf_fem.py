@@ -11,41 +11,34 @@ not measured; `structure="load"` does.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.covariance import Covariance, Dense, Modal
+from validate.estimate.covariance import Covariance, Decoupled, Dense
 from validate.estimate.displacement_filter import (
     Coordinates,
     DisplacementStepper,
     InModes,
     Nodal,
     Recursion,
-    Sensor,
+    Sensed,
     Structure,
     load_shapes,
 )
 from validate.estimate.gains import GainSequence, gain_sequence, schedule
-from validate.estimate.measured import Measurements, Timetable, timetable
-from validate.estimate.observed import observed
-from validate.fem.factor import factorise
+from validate.estimate.measurements import Measurements, Timetable, timetable
+from validate.estimate.observable import observed
 from validate.fem.modes import modes_of
 from validate.fem.once import once
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import StartName, reactions, require_linear
-from validate.solve.newmark_rule import (
-    Excitation,
-    Rule,
-    RuleName,
-    excitation,
-    per_mode,
-    propagation,
-    rule_of,
-)
+from validate.solve.dynamic import reactions
+from validate.solve.excitation import Excitation, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.newmark_rule import Rule, RuleName, per_mode, propagation, rule_of
 from validate.solve.types import Stepper
 
 Gains = Literal["every_step", "shared"]
@@ -59,6 +52,10 @@ class DisplacementNoise:
     `structure`: "white" gives every unknown Q and P0 on its own; "load" gives them to the static
     displacement of each load as a whole, Q where it moves a measured component most.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(0.002, "s", "time step")
     Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, read as mm2")
@@ -79,10 +76,6 @@ class DisplacementNoise:
         if self.R is not None and not (np.isfinite(self.R) and self.R > 0):
             raise SceneError(f"variance R = {self.R:g} m2: a number above 0 (1 mm2 is 1e-6)")
 
-    def variances(self, measurements: Measurements) -> Floats:
-        """R (m,) m^2 of the measured components."""
-        return measurements.sd**2 if self.R is None else np.full(len(measurements.sd), self.R)
-
 
 @dataclass(frozen=True)
 class KfFem(DisplacementNoise):
@@ -96,7 +89,7 @@ class KfFem(DisplacementNoise):
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
         load; `ComparisonError` for measurements that land on no step."""
-        require_linear(system)
+        require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt)
         nodal = Nodal(propagation(system, rule))
         if self.gains == "every_step":
@@ -108,7 +101,7 @@ class KfFem(DisplacementNoise):
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
 
     def _dense(self, system: System, measurements: Measurements, nodal: Nodal) -> Covariance:
-        H, R = measurements.free(system.free), self.variances(measurements)
+        H, R = measurements.free(system.free), measurements.variances(self.R)
         noise = noise_shape(self, system, nodal, H)
         A = nodal.propagation.transition()
         return Dense(A, self.Q * noise, H, R, self.P0 * noise)
@@ -126,7 +119,9 @@ class KfFem(DisplacementNoise):
 def shared_gains(covariance: Covariance, table: Timetable, settled: float) -> GainSequence:
     """All gains of the measurements, from the narrowest recursion that gives them."""
     when = schedule(table)
-    narrow = observed(covariance, max(when, default=1)) if isinstance(covariance, Modal) else None
+    narrow = (
+        observed(covariance, max(when, default=1)) if isinstance(covariance, Decoupled) else None
+    )
     return gain_sequence(narrow or covariance, when, settled)
 
 
@@ -147,9 +142,9 @@ def modal_covariance(
 ) -> Covariance:
     """The recursion whose transition is diagonal."""
     H = measurements.free(system.free)
-    noise, R = noise_shape(settings, system, modes, H), settings.variances(measurements)
+    noise, R = noise_shape(settings, system, modes, H), measurements.variances(settings.R)
     seen = np.ascontiguousarray(H @ modes.shapes)
-    return Modal(modes.factors[0], settings.Q * noise, seen, R, settings.P0 * noise)
+    return Decoupled(modes.factors[0], settings.Q * noise, seen, R, settings.P0 * noise)
 
 
 def noise_shape(
@@ -172,20 +167,18 @@ def stepper_of(
     gains: GainSequence | None,
 ) -> DisplacementStepper:
     """The stepper in `coordinates`, its covariance recursed in those of `claimed`."""
-    rule = rule_of(settings.rule, settings.dt)
     table, H = timetable(measurements, settings.dt), measurements.free(system.free)
     seen = H @ coordinates.shapes if isinstance(coordinates, InModes) else H
-    starts = initial_accelerations(system) if settings.a0 == "equilibrium" else None
+    excited = excitation(system, rule_of(settings.rule, settings.dt), a0=settings.a0)
     return DisplacementStepper(
         system,
         reactions(system),
         coordinates,
-        excitation_in(coordinates, excitation(system, rule)),
+        excitation_in(coordinates, excited),
         covariance,
-        Sensor(measurements.names, table, seen, np.asarray(measurements.H @ system.moves)),
+        Sensed(measurements.names, table, seen, np.asarray(measurements.H @ system.moves)),
         schedule(table),
         gains,
-        None if starts is None else coordinates.amplitudes(starts),
         settings.recursion,
         claimed,
         settings.settled,
@@ -201,11 +194,5 @@ def excitation_in(coordinates: Coordinates, nodal: Excitation) -> Excitation:
         stiffness=of(nodal.stiffness),
         damping=of(nodal.damping),
         mass=of(nodal.mass),
+        starts=None if nodal.starts is None else coordinates.amplitudes(nodal.starts),
     )
-
-
-def initial_accelerations(system: System) -> Floats:
-    """M^-1 f (m, l) of one newton of each load on the body at rest."""
-    mesh, free = system.scene.mesh, system.free
-    M = system.M[free][:, free]
-    return factorise(M, free // mesh.dimension, mesh.nodes).solve(system.loads[free])

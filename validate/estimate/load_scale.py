@@ -6,20 +6,21 @@ modulus is a wrong scale, which one measured node shows and every node then gain
 where the shape would swing, `prepare` refuses.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.core_stepper import CoreStepper, require_loads
 from validate.estimate.displacement_filter import load_shapes
-from validate.estimate.innovation import Innovation, innovation, nothing
-from validate.estimate.measured import Measurements, timetable
-from validate.estimate.small import Gaussian, kf_predict, kf_update
+from validate.estimate.kalman import Gaussian, Innovation, kf_predict, kf_update, nothing
+from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import reactions, require_linear
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import Stepper
 
 _OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
@@ -30,6 +31,14 @@ class LoadScale:
     """`scale_sd` is the doubt of the scale at the start (1 = none), `walk` its growth per sqrt(s);
     `Q` m^2 the variance that a step adds to the amplitude, R m^2 (None: the measurements' own)."""
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",),
+        inertia=True,
+        cavities=False,
+        drives=False,
+        contact=GLUED,
+    )
+
     dt: float = quantity(0.002, "s", "time step")
     scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")
     walk: float = quantity(0.0, "1/s^0.5", "random walk of the scale")
@@ -38,16 +47,13 @@ class LoadScale:
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
-        require_linear(system)
-        require_loads(system)
+        require_handled(system.scene, self)
         if len(system.scene.loads) != 1:
             raise SceneError(f"{len(system.scene.loads)} loads: one shape is for one load")
         H = measurements.free(system.free)
         shape = load_shapes(system, H)[:, 0]
-        R = measurements.sd**2 if self.R is None else np.full(len(measurements.sd), self.R)
-        core = _core(self, system, shape, H @ shape, R)
-        table = timetable(measurements, self.dt)
-        return CoreStepper(system, reactions(system), core, measurements.names, table)
+        core = _core(self, system, shape, H @ shape, measurements.variances(self.R))
+        return CoreStepper(system, core, measurements.names, timetable(measurements, self.dt))
 
 
 def _core(settings: LoadScale, system: System, s: Floats, seen: Floats, R: Floats) -> "ScaleCore":
@@ -74,6 +80,10 @@ class ScaleCore:
     keep: float
     per_newton: float
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        return {"load.scale": "1"}
+
     def start(self) -> Gaussian:
         return Gaussian(np.array([0.0, 1.0]), np.diag([0.0, self.settings.scale_sd**2]))
 
@@ -86,9 +96,8 @@ class ScaleCore:
         prior = kf_predict(inner, A, np.diag([s.Q, s.walk**2 * s.dt]))
         if z is None:
             return prior, nothing(len(self.seen))
-        H, i = np.outer(self.seen, [1.0, 0.0]), np.isfinite(z)
-        found = innovation(z, H @ prior.x, H @ prior.P @ H.T + np.diag(self.R))
-        return kf_update(prior, z[i], H[i], np.diag(self.R[i])).posterior, found
+        update = kf_update(prior, z, np.outer(self.seen, [1.0, 0.0]), np.diag(self.R))
+        return update.posterior, update.innovation
 
     def free(self, inner: Gaussian) -> Floats:
         return np.asarray(self.shape * inner.x[0])
@@ -96,5 +105,5 @@ class ScaleCore:
     def variances(self, inner: Gaussian) -> Floats:
         return np.asarray(self.shape**2 * inner.P[0, 0])
 
-    def numbers(self, inner: Gaussian) -> dict[str, tuple[float, str]]:
-        return {"load.scale": (float(inner.x[1]), "1")}
+    def numbers(self, inner: Gaussian) -> Mapping[str, float]:
+        return {"load.scale": float(inner.x[1])}

@@ -16,10 +16,10 @@ from validate.estimate.kf_fem import (
     shared_gains,
     stepper_of,
 )
-from validate.estimate.measured import Measurements, timetable
+from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import require_linear
+from validate.solve.handles import require_handled
 from validate.solve.newmark_rule import rule_of
 from validate.solve.types import Stepper
 
@@ -32,7 +32,7 @@ class ModalKf(DisplacementNoise):
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what linear schemes refuse and for damping that couples modes."""
-        require_linear(system)
+        require_handled(system.scene, self)
         return self.with_modes(system, measurements, in_modes(system, rule_of(self.rule, self.dt)))
 
     def with_modes(

@@ -8,22 +8,23 @@ Departures: noise intensities are variances in m^2 (the paper's .001, .1, .001 r
 "node" and "companion" blocks, the Joseph form and the correction of U_{t-dt} are named options.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, UsageError
 from validate.estimate import node_ekf_kernel as kernel
-from validate.estimate.explicit_walk import ExplicitModel, Walk, beyond, explicit_model, walk
-from validate.estimate.innovation import Innovation, innovation_traces, nothing
-from validate.estimate.measured import Measurements, Timetable, timetable
+from validate.estimate.explicit_filter import ExplicitFilterStepper
+from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.kalman import Innovation
+from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.scene.scene import Scene
-from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Trace
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.types import Ending, Stepper
 
 Block = Literal["component", "node", "companion"]
 _PURE = 1e-9  # how far a row's largest weight may lie from 1 to read a node
@@ -38,6 +39,8 @@ class NodeEKF:
     `correct_previous` shifts U_{t-dt} with U_t ("companion" estimates it anyway). `overflow`: at
     variances beyond 1e300 m^2 the run stops, or they are held there and counted.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
@@ -56,104 +59,58 @@ class NodeEKF:
         if min(self.P0, self.Qp) < 0 or (self.Qm is not None and self.Qm <= 0):
             raise UsageError("P0 and Qp are variances >= 0, Qm one above 0")
 
-    def prepare(self, system: System, measurements: Measurements) -> "NodeStepper":
+    def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
         measurements that are no components of nodes or that land between the steps."""
-        steps = walk(system, explicit_model(system), self.dt, self.substeps)
-        m = len(measurements.names)
-        R = measurements.sd**2 if self.Qm is None else np.full(m, self.Qm)
+        require_handled(system.scene, self)
+        explicit = explicit_step(system, self.dt, self.substeps)
         free = np.zeros(len(system.moves))
         free[system.free] = 1.0
-        refusal = beyond(system, steps.h) if self.beyond_limit == "refuse" else ""
-        rows = _components(measurements)
-        times = timetable(measurements, steps.h)
-        return NodeStepper(
-            self, steps, measurements.names, rows, R, times, free, self.Qp * free, refusal
-        )
+        rows, R = _components(measurements), measurements.variances(self.Qm)
+        core = NodeCore(self, explicit, rows, R, free, self.Qp * free)
+        refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
+        times = timetable(measurements, explicit.h)
+        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal)
 
 
 @dataclass(frozen=True)
-class Memory:
-    """U_{t-h} (N,) m, the packed covariances P of `node_ekf_kernel`, and how many are held."""
+class NodeMemory:
+    """U_t and U_{t-h} (N,) m, the packed covariances P of `node_ekf_kernel`, how many are held."""
 
+    u: Floats
     before: Floats
     P: Floats
     held: int = 0
 
 
 @dataclass(frozen=True)
-class NodeStepper:
-    """A prepared `NodeEKF`; `rows` (m,) are the measured unknowns, R (m,) their variances m^2."""
+class NodeCore:
+    """`rows` (m,) are the measured unknowns, R (m,) their variances m^2; `free` (N,) is 1 where an
+    unknown is free, Q (N,) m^2 its process noise."""
 
     settings: NodeEKF
-    walk: Walk
-    names: tuple[str, ...]
+    explicit: ExplicitStep
     rows: Ints
     R: Floats
-    times: Timetable
     free: Floats
     Q: Floats
-    refusal: str
 
     @property
-    def scene(self) -> Scene:
-        return self.walk.system.scene
+    def units(self) -> Mapping[str, str]:
+        return {"covariance.held": "1"}
 
-    @property
-    def model(self) -> ExplicitModel:
-        return self.walk.model
-
-    def rest(self) -> State:
-        """U_0 = U_{-dt} = 0 (step i), with variances P0 of the free unknowns."""
+    def start(self) -> NodeMemory:
+        """Step i: variances P0 of the free unknowns."""
         N, block = len(self.free), self.settings.block
         P = np.zeros((_ROWS[block], N // 3 if block == "node" else N))
         variances = self.settings.P0 * self.free
         P[:3] = variances.reshape(-1, 3).T if block == "node" else variances
-        inputs = np.zeros(len(self.scene.inputs))
         u = np.zeros(N)
-        return State(inputs, NOTHING, 0, NO_SURFACE, u=u, extra=Memory(u, P))
+        return NodeMemory(u, u, P)
 
-    def step(self, state: State, drives: Floats) -> State:
-        """`substeps` explicit steps with prediction and, where measured, update of every node."""
-        if self.refusal:
-            return replace(state, failure=("refused", self.refusal))
-        assert state.u is not None
-        u, memory, found = state.u, state.extra, nothing(len(self.names))
-        memory = Memory(memory.before, memory.P.copy(), memory.held)
-        for part in range(self.walk.parts):
-            u, memory = self._predicted(u, memory, self.walk.inputs(state.drives, drives, part))
-            if failure := self._failure(u, memory):
-                return replace(state, failure=failure)
-            z = self.times.at(state.k * self.walk.parts + part + 1)
-            if z is not None:
-                u, memory, found = self._corrected(u, memory, z, found)
-        numbers = {**found.numbers(self.names), "covariance.held": float(memory.held)}
-        return State(
-            drives, NOTHING, 0, NO_SURFACE, u=u, numbers=numbers, k=state.k + 1, extra=memory
-        )
-
-    def field(self, state: State) -> Floats:
-        """Displacements (n, 3) m."""
-        assert state.u is not None
-        return state.u.reshape(-1, 3)
-
-    def sd(self, state: State) -> Floats:
-        """Standard deviations (n, 3) m of the nodes."""
-        P = state.extra.P
-        return np.asarray(
-            np.sqrt(P[:3].T if self.settings.block == "node" else P[0].reshape(-1, 3))
-        )
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Innovations, NIS, and how many covariances are held at the end of the number range."""
-        held = np.array([s.numbers.get("covariance.held", 0.0) for s in states])
-        return innovation_traces(self.names, states) | {"covariance.held": Trace(held, "1")}
-
-    def _predicted(
-        self, u: Floats, memory: Memory, inputs: tuple[Floats, Floats]
-    ) -> tuple[Floats, Memory]:
-        """Eqs 35 and 36; P is changed in place, the caller owns it."""
-        w, P, c = self.walk, memory.P, self.settings
+    def predict(self, memory: NodeMemory, loads: Floats, drives: Floats) -> NodeMemory:
+        """Eqs 35 and 36."""
+        w, u, P, c = self.explicit, memory.u, memory.P.copy(), self.settings
         if c.block == "node":
             R, K = w.model.force_and_blocks(u)
             count = kernel.spread_nodes(P, w.c2, w.w, K, self.Q)
@@ -164,13 +121,20 @@ class NodeStepper:
             R, K = w.model.force_and_diagonal(u)
             count = kernel.spread_components(P, w.c2, w.w, K, self.Q)
         held = kernel.clip(P) if count and c.overflow == "hold" else count
-        return w.following(u, memory.before, R, *inputs), Memory(u, P, held)
+        return NodeMemory(w.following(u, memory.before, R, loads, drives), u, P, held)
 
-    def _corrected(
-        self, u: Floats, memory: Memory, z: Floats, found: Innovation
-    ) -> tuple[Floats, Memory, Innovation]:
-        """Eqs 37-39 at the measured nodes; `found` gains this update's NIS."""
-        c, P, m = self.settings, memory.P, len(z)
+    def failure(self, memory: NodeMemory) -> tuple[Ending, str] | None:
+        if not memory.held or self.settings.overflow == "hold":
+            return None
+        return "diverged", (
+            f"{memory.held} of {memory.P.shape[1]} covariances beyond {kernel.HUGE:g} m2: nodes "
+            "without measurements grow like a^(2k); overflow='hold' goes on with the field, "
+            "block='companion' keeps them small"
+        )
+
+    def correct(self, memory: NodeMemory, number: int, z: Floats) -> tuple[NodeMemory, Innovation]:
+        """Eqs 37-39 at the measured nodes; u and P are changed in place, this step made them."""
+        c, u, P, m = self.settings, memory.u, memory.P, len(z)
         y, sd, joseph = np.empty(m), np.empty(m), c.covariance == "joseph"
         before = memory.before.copy()
         dof = kernel.innovations(u, P, self.rows, z, self.R, y, sd)
@@ -179,20 +143,16 @@ class NodeStepper:
         else:
             update = kernel.correct_nodes if c.block == "node" else kernel.correct_components
             nis = update(u, before, P, self.rows, z, self.R, joseph, c.correct_previous)
-        total = Innovation(y, sd, found.nis + nis, found.dof + dof)
-        return u, Memory(before, P, memory.held), total
+        return NodeMemory(u, before, P, memory.held), Innovation(y, sd, nis, dof)
 
-    def _failure(self, u: Floats, memory: Memory) -> tuple[Ending, str] | None:
-        largest = kernel.farthest(u)
-        if not largest < self.walk.far:
-            return "diverged", self.walk.lost(largest)
-        if not memory.held or self.settings.overflow == "hold":
-            return None
-        return "diverged", (
-            f"{memory.held} of {memory.P.shape[1]} covariances beyond {kernel.HUGE:g} m2: nodes "
-            "without measurements grow like a^(2k); overflow='hold' goes on with the field, "
-            "block='companion' keeps them small"
-        )
+    def sd(self, memory: NodeMemory, number: int) -> Floats:
+        P = memory.P
+        variances = P[:3].T if self.settings.block == "node" else P[0].reshape(-1, 3)
+        return np.asarray(np.sqrt(variances))
+
+    def numbers(self, memory: NodeMemory) -> Mapping[str, float]:
+        """How many covariances are held at the end of the number range."""
+        return {"covariance.held": float(memory.held)}
 
 
 def _components(measurements: Measurements) -> Ints:

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from validate.arrays import Floats
 from validate.errors import UsageError
-from validate.estimate.explicit_walk import Walk
+from validate.estimate.explicit_step import ExplicitStep
 from validate.fem.system import System
 
 _DENSE = 400  # unknowns up to which all modes are found at once
@@ -51,13 +51,13 @@ def modes(system: System, r: int) -> Basis:
     return Basis(Phi, np.asarray(squares))
 
 
-def pod(walk: Walk, r: int, force: float) -> Basis:
+def pod(explicit: ExplicitStep, r: int, force: float) -> Basis:
     """The r strongest shapes of runs in which each load in turn ramps to `force` N and stays.
 
     Raises `UsageError` without loads, or for more shapes than snapshots.
     """
-    system = walk.system
-    runs = [_snapshots(walk, j, force) for j in range(system.loads.shape[1])]
+    system = explicit.system
+    runs = [_snapshots(explicit, j, force) for j in range(system.loads.shape[1])]
     if not runs or not 1 <= r <= len(runs) * _SNAPSHOTS:
         raise UsageError(
             f"{r} shapes from the snapshots of {len(runs)} loads, {_SNAPSHOTS} each: a POD basis "
@@ -72,17 +72,17 @@ def pod(walk: Walk, r: int, force: float) -> Basis:
     return Basis(Phi, np.asarray(squares))
 
 
-def _snapshots(walk: Walk, load: int, force: float) -> Floats:
+def _snapshots(explicit: ExplicitStep, load: int, force: float) -> Floats:
     """Displacements (N, `_SNAPSHOTS`) m of the model under one load."""
-    lowest = float(np.sqrt(modes(walk.system, 1).squares[0]))
-    steps = max(_SNAPSHOTS, int(_PERIODS * 2 * np.pi / lowest / walk.h))
+    lowest = float(np.sqrt(modes(explicit.system, 1).squares[0]))
+    steps = max(_SNAPSHOTS, int(_PERIODS * 2 * np.pi / lowest / explicit.h))
     kept = frozenset(np.linspace(1, steps, _SNAPSHOTS).astype(int).tolist())
-    loads, drives = np.zeros(walk.columns.shape[1]), np.zeros(walk.moves.shape[1])
-    u = before = np.zeros(len(walk.system.moves))
+    loads, drives = np.zeros(explicit.columns.shape[1]), np.zeros(explicit.moves.shape[1])
+    u = before = np.zeros(len(explicit.system.moves))
     shots = []
     for k in range(steps):
         loads[load] = force * min(_PERIODS * k / steps, 1.0)
-        u, before = walk.following(u, before, walk.model.force(u), loads, drives), u
+        u, before = explicit.following(u, before, explicit.model.force(u), loads, drives), u
         if k + 1 in kept:
             shots.append(u)
     return np.array(shots).T

@@ -12,24 +12,28 @@ and both U_t and U_{t-h} are corrected, so that a correction is no kick. Joseph'
 Departures: paper 003 filters node by node (`NodeEKF`), where no measurement reaches other nodes.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
-from validate.estimate import node_ekf_kernel as kernel
-from validate.estimate.explicit_walk import Walk, beyond, explicit_model, walk
-from validate.estimate.innovation import Innovation, innovation_traces, nothing
-from validate.estimate.measured import Measurements, Timetable, timetable
+from validate.estimate.covariance import Dense
+from validate.estimate.explicit_filter import ExplicitFilterStepper
+from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.gains import Event, events, schedule
+from validate.estimate.kalman import Innovation, innovation
+from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_basis import Basis, modes, pod
-from validate.estimate.reduced_gains import Jump, ReducedModel, Update, updates
+from validate.estimate.reduced_kf import steady
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.scene.scene import Scene
-from validate.solve.types import NO_SURFACE, NOTHING, State, Trace
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.types import Ending, Stepper
+
+_SETTLED = 1e-9  # change of a gain from one update to the next: with slow modes 1e-6 is too early
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,8 @@ class ReducedEKF:
     static response to each load (rank 1). `gains`: the exact sequence, which needs no data and is
     found before the run, or the steady gain from the start.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
@@ -58,23 +64,25 @@ class ReducedEKF:
         if min(self.load_walk, self.load_sd, self.process) < 0:
             raise UsageError("load_walk, load_sd and process are standard deviations >= 0")
 
-    def prepare(self, system: System, measurements: Measurements) -> "ReducedStepper":
+    def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for what the explicit step cannot do, `UsageError` for a basis that
         does not exist, `ComparisonError` for a steady gain that does not, or times off the steps.
         """
-        steps = walk(system, explicit_model(system), self.dt, self.substeps)
-        refusal = beyond(system, steps.h) if self.beyond_limit == "refuse" else ""
-        times = timetable(measurements, steps.h)
-        basis = modes(system, 1) if refusal else self._basis(steps)
-        model = reduced_model(self, steps, basis, measurements)
-        found = {} if refusal else updates(model, times, steady=self.gains == "steady")
+        require_handled(system.scene, self)
+        explicit = explicit_step(system, self.dt, self.substeps)
+        refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
+        times = timetable(measurements, explicit.h)
+        basis = modes(system, 1) if refusal else self._basis(explicit)
+        model = shapes_covariance(self, explicit, basis, measurements)
+        when = {} if refusal else schedule(times)
+        recursion = steady(model, when) if self.gains == "steady" and when else model
+        updates = {e.step: e for e in events(recursion, when, _SETTLED)}
         sensed = np.unique(measurements.H.indices).astype(np.int64)
         rows = np.ascontiguousarray(measurements.H[:, sensed].toarray())
-        return ReducedStepper(
-            self, steps, measurements.names, sensed, rows, times, model, found, refusal
-        )
+        core = ShapesCore(explicit, basis.Phi, model, updates, sensed, rows)
+        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal)
 
-    def _basis(self, steps: Walk) -> Basis:
+    def _basis(self, steps: ExplicitStep) -> Basis:
         if self.basis == "pod":
             basis = pod(steps, self.shapes, self.snapshot_load)
         else:
@@ -88,10 +96,11 @@ class ReducedEKF:
         return basis
 
 
-def reduced_model(
-    settings: ReducedEKF, steps: Walk, basis: Basis, measurements: Measurements
-) -> ReducedModel:
-    """Central difference in modal form; noises grow with the square root of a step."""
+def shapes_covariance(
+    settings: ReducedEKF, steps: ExplicitStep, basis: Basis, measurements: Measurements
+) -> Dense:
+    """Of (q, q_before, bias), s = 2 r + l numbers, over one explicit step: central difference in
+    modal form; noises grow with the square root of a step."""
     Phi, loads, h = basis.Phi, steps.system.loads, steps.h
     r, l = Phi.shape[1], loads.shape[1]
     now, old, bias = slice(0, r), slice(r, 2 * r), slice(2 * r, 2 * r + l)
@@ -109,7 +118,7 @@ def reduced_model(
     P0[bias, bias] = settings.load_sd**2 * np.eye(l)
     H = np.zeros((len(measurements.names), 2 * r + l))
     H[:, now] = measurements.H @ Phi
-    return ReducedModel(Phi, Jump(A, Q), P0, H, np.diag(measurements.sd**2))
+    return Dense(A, Q, H, measurements.sd**2, P0)
 
 
 def _directions(settings: ReducedEKF, system: System, basis: Basis) -> Floats:
@@ -125,97 +134,62 @@ def _directions(settings: ReducedEKF, system: System, basis: Basis) -> Floats:
 
 
 @dataclass(frozen=True)
-class Beside:
-    """U_{t-h} (N,) m, bias (l,) N, and the explicit step of the last update (0: none)."""
+class ShapesMemory:
+    """U_t and U_{t-h} (N,) m, bias (l,) N, and the explicit step of the last update (0: none)."""
 
+    u: Floats
     before: Floats
     bias: Floats
     at: int
 
 
 @dataclass(frozen=True)
-class ReducedStepper:
-    """A prepared `ReducedEKF`; `rows` (m, c) read measured components from the `sensed` (c,)
-    unknowns; `updates` are by explicit step."""
+class ShapesCore:
+    """`updates` are by explicit step; `rows` (m, c) read measured components from the `sensed` (c,)
+    unknowns."""
 
-    settings: ReducedEKF
-    walk: Walk
-    names: tuple[str, ...]
+    explicit: ExplicitStep
+    Phi: Floats
+    covariance: Dense
+    updates: Mapping[int, Event]
     sensed: Ints
     rows: Floats
-    times: Timetable
-    model: ReducedModel
-    updates: Mapping[int, Update]
-    refusal: str
 
     @property
-    def scene(self) -> Scene:
-        return self.walk.system.scene
+    def units(self) -> Mapping[str, str]:
+        return {f"{load.name}.bias": "N" for load in self.explicit.system.scene.loads}
 
-    def rest(self) -> State:
-        """U_0 = U_{-h} = 0, known."""
-        zeros = np.zeros(len(self.walk.system.moves))
-        bias = np.zeros(len(self.scene.loads))
-        inputs = np.zeros(len(self.scene.inputs))
-        return State(inputs, NOTHING, 0, NO_SURFACE, u=zeros, extra=Beside(zeros, bias, 0))
+    def start(self) -> ShapesMemory:
+        zeros = np.zeros(len(self.Phi))
+        return ShapesMemory(zeros, zeros, np.zeros(len(self.units)), 0)
 
-    def step(self, state: State, drives: Floats) -> State:
-        """`substeps` plain explicit steps; an update where something was measured."""
-        if self.refusal:
-            return replace(state, failure=("refused", self.refusal))
-        assert state.u is not None
-        u, beside, found = state.u, state.extra, nothing(len(self.names))
-        for part in range(self.walk.parts):
-            loads, ends = self.walk.inputs(state.drives, drives, part)
-            R = self.walk.model.force(u)
-            following = self.walk.following(u, beside.before, R, loads + beside.bias, ends)
-            u, beside = following, Beside(u, beside.bias, beside.at)
-            number = state.k * self.walk.parts + part + 1
-            z = self.times.at(number)
-            if z is not None:
-                u, beside, found = self._corrected(u, beside, z, number, found)
-        largest = kernel.farthest(u)
-        if not largest < self.walk.far:
-            return replace(state, failure=("diverged", self.walk.lost(largest)))
-        return State(
-            drives, NOTHING, 0, NO_SURFACE, u=u, numbers=self._numbers(found, beside),
-            k=state.k + 1, extra=beside,
-        )  # fmt: skip
+    def predict(self, memory: ShapesMemory, loads: Floats, drives: Floats) -> ShapesMemory:
+        u, R = memory.u, self.explicit.model.force(memory.u)
+        new = self.explicit.following(u, memory.before, R, loads + memory.bias, drives)
+        return ShapesMemory(new, u, memory.bias, memory.at)
 
-    def field(self, state: State) -> Floats:
-        """Displacements (n, 3) m."""
-        assert state.u is not None
-        return state.u.reshape(-1, 3)
+    def failure(self, memory: ShapesMemory) -> tuple[Ending, str] | None:
+        return None
 
-    def sd(self, state: State) -> Floats:
-        """Standard deviations (n, 3) m: what the shapes span, diag(Phi P Phi^T)."""
-        beside, model = state.extra, self.model
-        jump = model.over(state.k * self.walk.parts - beside.at)
-        P = self.updates[beside.at].P if beside.at else model.P0
-        P = (jump.A @ P @ jump.A.T + jump.Q)[: model.r, : model.r]
-        variances = np.maximum(((model.Phi @ P) * model.Phi).sum(axis=1), 0)
+    def correct(
+        self, memory: ShapesMemory, number: int, z: Floats
+    ) -> tuple[ShapesMemory, Innovation]:
+        gain, r = self.updates[number].gain, self.Phi.shape[1]
+        found = innovation(z, self.rows @ memory.u[self.sensed], gain)
+        dx = gain.G @ found.y[np.array(gain.seen)]
+        moved = self.Phi @ dx[: 2 * r].reshape(2, r).T
+        u, before = memory.u + moved[:, 0], memory.before + moved[:, 1]
+        return ShapesMemory(u, before, memory.bias + dx[2 * r :], number), found
+
+    def sd(self, memory: ShapesMemory, number: int) -> Floats:
+        """What the shapes span, diag(Phi P Phi^T)."""
+        covariance, r = self.covariance, self.Phi.shape[1]
+        claim = self.updates[memory.at].claim if memory.at else covariance.start()
+        if number > memory.at:
+            claim = covariance.predict(claim, number - memory.at)
+        variances = np.maximum(((self.Phi @ claim.P[:r, :r]) * self.Phi).sum(axis=1), 0)
         return np.asarray(np.sqrt(variances).reshape(-1, 3))
 
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Innovations, NIS, and `<load>.bias` N."""
-        traces = innovation_traces(self.names, states)
-        for load in self.scene.loads:
-            name = f"{load.name}.bias"
-            traces[name] = Trace(np.array([s.numbers.get(name, 0.0) for s in states]), "N")
-        return traces
-
-    def _numbers(self, found: Innovation, beside: Beside) -> Mapping[str, float]:
-        loads = zip(self.scene.loads, beside.bias.tolist(), strict=True)
-        return {**found.numbers(self.names), **{f"{load.name}.bias": b for load, b in loads}}
-
-    def _corrected(
-        self, u: Floats, beside: Beside, z: Floats, number: int, found: Innovation
-    ) -> tuple[Floats, Beside, Innovation]:
-        """The update; `found` gains this one's NIS."""
-        update, r = self.updates[number], self.model.r
-        y = np.where(np.isfinite(z), z - self.rows @ u[self.sensed], 0.0)
-        dx = update.G @ y
-        moved = self.model.Phi @ dx[: 2 * r].reshape(2, r).T
-        after = Beside(beside.before + moved[:, 1], beside.bias + dx[2 * r :], number)
-        nis = found.nis + float(y @ update.inverse @ y)
-        return u + moved[:, 0], after, Innovation(y, update.sd, nis, found.dof + update.dof)
+    def numbers(self, memory: ShapesMemory) -> Mapping[str, float]:
+        """`<load>.bias` N."""
+        return dict(zip(self.units, memory.bias.tolist(), strict=True))

@@ -15,9 +15,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.linear_model import LinearModel
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
+from validate.solve.modal import left_out
 from validate.solve.modal_walk import exact_walk
 
 
@@ -57,7 +58,7 @@ def reduced_model(
     Raises `SceneError` for damping that couples the modes.
     """
     lowest = modes_of(system, min(modes, len(system.free)))
-    rest = _left_out(system, lowest)
+    rest = left_out(system, lowest, np.ascontiguousarray(system.loads[system.free]))
     F, B = _transition(system, lowest, _kept(system, rest, dt), dt)
     l = rest.shape[1]
     lift = np.hstack([lowest.shapes, np.zeros_like(lowest.shapes), rest, np.zeros_like(rest)])
@@ -83,15 +84,6 @@ def _transition(system: System, modes: Modes, kept: Floats, dt: float) -> tuple[
     F[:, -l:] = B  # a bias is a load
     F[-l:, -l:] = np.eye(l)
     return F, B
-
-
-def _left_out(system: System, modes: Modes) -> Floats:
-    """Static displacements (m, l) of the modes that are cut off, per newton of each load."""
-    loads = np.ascontiguousarray(system.loads[system.free])
-    if modes.shapes.shape[0] == modes.shapes.shape[1]:
-        return np.zeros_like(loads)
-    kept = modes.shapes @ ((modes.shapes.T @ loads) / modes.omega[:, None] ** 2)
-    return np.asarray(system.factor().solve(loads) - kept)
 
 
 def _kept(system: System, rest: Floats, dt: float) -> Floats:

@@ -1,8 +1,9 @@
-"""Volume of a closed cavity and the load of its pressure, linear and quadratic facets.
+"""Volume (area) of a closed cavity and the load of its pressure, linear and quadratic facets.
 
-V = 1/3 closed integral of x . n dA (paper 000, eqs 12-13), n pointing from the fluid into the
-solid; the load of a unit pressure is its exact derivative, f_p = dV/dx (eq 8, consistent nodal
-forces). Facet sets point out of the solid, so into the fluid: signs are turned here, once.
+V = 1/d closed integral of x . n dA (paper 000, eqs 12-13, in the plane eq 11, whose two printed
+forms have opposite signs), n pointing from the fluid into the solid; the load of a unit pressure is
+its exact derivative, f_p = dV/dx (eq 8, consistent nodal forces). Facet sets point out of the
+solid, so into the fluid: signs are turned here, once.
 
 Departures: the trilinear form is integrated exactly on the facet instead of Mirtich's projections
 (eqs 14-16), which divide by zero on flat facets; positions are taken about the cavity's centroid,
@@ -16,9 +17,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.cavity_area import area_bilinear, area_load
-from validate.fem.facets import WEIGHTS, facet_shapes
 from validate.scene.mesh import Mesh
+from validate.scene.shape_functions import Quadrature, facet_rule
 
 
 @dataclass(frozen=True)
@@ -71,13 +71,10 @@ def volume_of(surface: CavitySurface, positions: Floats) -> float:
 
 
 def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
-    """dV/dx (n, d) m^2: nodal forces of a unit pressure, fluid pushing on the solid."""
-    if positions.shape[1] == 2:
-        return area_load(surface.facets, positions)
-    N, dxi, deta = facet_shapes(surface.facets.shape[1])
+    """dV/dx (n, d) m^(d - 1): nodal forces of a unit pressure, fluid pushing on the solid."""
+    rule = _rule(surface, positions)
     x = positions[surface.facets]
-    normal = -np.cross(_at(dxi, x), _at(deta, x))
-    nodal = np.einsum("q,qm,fqd->fmd", WEIGHTS, N, normal)
+    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, _into_solid(rule, x, x))
     load = np.zeros_like(positions)
     np.add.at(load, surface.facets, nodal)
     return load
@@ -102,14 +99,19 @@ def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
 
 
 def _trilinear(surface: CavitySurface, a: Floats, b: Floats, c: Floats) -> Floats:
-    local = surface.local()
-    if a.shape[1] == 2:
-        return np.asarray(area_bilinear(local, b, c))
-    N, dxi, deta = facet_shapes(surface.facets.shape[1])
-    normal = -np.cross(_at(dxi, b[local]), _at(deta, c[local]))
-    return np.asarray(np.einsum("q,fqd,fqd->", WEIGHTS, _at(N, a[local]), normal) / 3)
+    local, rule, d = surface.local(), _rule(surface, a), a.shape[1]
+    value = a if d == 3 else b
+    normal = _into_solid(rule, b[local], c[local])
+    return np.asarray(np.einsum("q,fqd,fqd->", rule.weights, rule.at(value[local]), normal) / d)
 
 
-def _at(values: Floats, nodal: Floats) -> Floats:
-    """Fields (f, q, d) at the quadrature points from nodal values (f, m, d)."""
-    return np.asarray(np.einsum("qm,fmd->fqd", values, nodal))
+def _into_solid(rule: Quadrature, b: Floats, c: Floats) -> Floats:
+    """Normals (f, q, d) of facets with nodes b and c (f, m, d): bilinear, in the plane of c."""
+    if c.shape[2] == 2:
+        along = rule.jacobians(c)[..., 0]
+        return np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    return np.asarray(-np.cross(rule.jacobians(b)[..., 0], rule.jacobians(c)[..., 1]))
+
+
+def _rule(surface: CavitySurface, positions: Floats) -> Quadrature:
+    return facet_rule(positions.shape[1], surface.facets.shape[1])

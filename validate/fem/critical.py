@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
@@ -195,15 +194,6 @@ def _elasticity(lam: Floats, mu: Floats, d: int) -> Floats:
     return np.asarray(
         lam[:, None, None] * np.outer(normal, normal) + mu[:, None, None] * np.diag(weights)
     )
-
-
-def frequency_range(system: System) -> tuple[float, float]:
-    """Lowest and highest angular frequency 1/s with the consistent mass."""
-    free = system.free
-    K, M = (sparse.csc_array(X[free][:, free]) for X in (system.K, system.M))
-    lowest = eigsh(K, k=1, M=M, sigma=0.0, which="LM", return_eigenvectors=False)
-    highest = eigsh(K, k=1, M=M, which="LM", return_eigenvectors=False)
-    return float(np.sqrt(lowest[0])), float(np.sqrt(highest[0]))
 
 
 def _wave_modulus(m: Material) -> float:

@@ -30,7 +30,7 @@ _LAWS = {"svk": SVK, "neo_hooke": NEO_HOOKE}
 
 
 @dataclass(frozen=True)
-class Look:
+class BodyLook:
     """A state of the body: stored energy J, least det F, cells of `cells` with det F <= 0."""
 
     energy: float
@@ -40,7 +40,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ExplicitMotion:
     """Rows (6, N): u m, last increment d m, forces r at u and `old` one step before N, v, a."""
 
     rows: Floats
@@ -51,7 +51,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Rule:
+class CentralRule:
     """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `explicit_kernels.advance`.
 
     `held` unknowns move by `moves` (held, k) times the drives, `loaded` take `loads` (loaded, l).
@@ -103,20 +103,11 @@ class ExplicitBody:
         add(self.law, self.geometry, self.cells, _own(u), f, self._parts)
         return f
 
-    def tangent_diagonal(self, u: Floats) -> Floats:
-        """The diagonal (N,) N/m of K_t."""
-        return self.force_and_diagonal(u)[1]
-
     def force_and_diagonal(self, u: Floats) -> tuple[Floats, Floats]:
         """Internal forces (N,) N and the diagonal (N,) N/m of K_t, in one pass."""
         f, d = self._pull(u), self._own_springs.copy()
         self._blocks(u, f, d)
         return f, d
-
-    def tangent_blocks(self, u: Floats) -> Floats:
-        """The blocks (n, 3, 3) N/m of K_t that couple a node with itself."""
-        six = self.force_and_blocks(u)[1]
-        return six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
 
     def force_and_blocks(self, u: Floats) -> tuple[Floats, Floats]:
         """Internal forces (N,) N and the nodes' own blocks (n, 6): xx, yy, zz, xy, xz, yz N/m."""
@@ -132,17 +123,17 @@ class ExplicitBody:
         kernels.add_products(self.law, self.geometry, self.cells, _own(u), _own(v), f, self.work)
         return f
 
-    def look(self, u: Floats) -> Look:
+    def look(self, u: Floats) -> BodyLook:
         """Stored energy and det F of all cells: not for every step."""
         count = len(self.scene.mesh.cells)
         energy, least, inverted = kernels.looked_at(
             self.law, count, self.geometry, self.cells, _own(u), self.work
         )
-        return Look(energy + float(u @ self._pull(u)) / 2, least, inverted, count)
+        return BodyLook(energy + float(u @ self._pull(u)) / 2, least, inverted, count)
 
     def advance(
-        self, motion: Motion, rule: Rule, begin: Floats, end: Floats, substeps: int
-    ) -> tuple[Motion, float, float, bool]:
+        self, motion: ExplicitMotion, rule: CentralRule, begin: Floats, end: Floats, substeps: int
+    ) -> tuple[ExplicitMotion, float, float, bool]:
         """Central-difference steps from inputs `begin` to `end` (k + l,), in one compiled call.
 
         Returns the new motion; work J of loads and prescribed motion and J taken by damping, both
@@ -157,7 +148,7 @@ class ExplicitBody:
             self._parts,
         )  # fmt: skip
         rows.setflags(write=False)
-        return Motion(rows), work, taken, math.isfinite(size)
+        return ExplicitMotion(rows), work, taken, math.isfinite(size)
 
     def _pull(self, u: Floats) -> Floats:
         """Forces (N,) N of the springs alone."""

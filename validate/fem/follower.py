@@ -12,7 +12,7 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.fem.cavity import CavitySurface
-from validate.fem.facets import WEIGHTS, facet_shapes
+from validate.scene.shape_functions import facet_rule
 
 
 def volume_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_array:
@@ -28,8 +28,8 @@ def volume_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_arra
 
 def _antisymmetric(per_facet: int) -> Floats:
     """A (m, m, m): the facet's integrals of N_a dN_b/dxi dN_c/deta, signed mean of all orders."""
-    N, dxi, deta = facet_shapes(per_facet)
-    M = np.einsum("q,qa,qb,qc->abc", WEIGHTS, N, dxi, deta)
+    rule = facet_rule(3, per_facet)
+    M = np.einsum("q,qa,qb,qc->abc", rule.weights, rule.N, rule.dN[..., 0], rule.dN[..., 1])
     signed = [np.linalg.det(np.eye(3)[list(p)]) * M.transpose(p) for p in permutations(range(3))]
     return np.asarray(np.mean(signed, axis=0))
 

@@ -15,20 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assemble import shape_gradients
 from validate.fem.laws import green_strain, law_of, volume_change
 from validate.fem.nodal_mean import NodalMean
 from validate.fem.pattern import NodePattern
 from validate.fem.surface import foundation_stiffness
-from validate.scene.mesh import EDGES, Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
+from validate.scene.shape_functions import simplex_slopes, symmetric_points
 
 _BLOCK = 2048  # cells at a time: bounds the memory of the kernel's temporaries
-# Barycentric coordinates and weights of the points: the centroid, or four of degree 2.
-_A, _B = (5 + 3 * np.sqrt(5)) / 20, (5 - np.sqrt(5)) / 20
-_POINTS = {1: np.full((1, 4), 0.25), 2: np.full((4, 4), _B) + (_A - _B) * np.eye(4)}
 
 
 @dataclass(frozen=True)
@@ -153,14 +151,5 @@ def _point_gradients(mesh: Mesh) -> Floats:
     dL = shape_gradients(mesh)
     if mesh.order == 1:
         return dL[:, None]
-    slopes = np.array([_quadratic_slopes(L) for L in _POINTS[2]])
+    slopes = simplex_slopes(2, symmetric_points(3, 2)[0])
     return np.asarray((slopes.reshape(-1, 4) @ dL).reshape(len(dL), *slopes.shape[:2], 3))
-
-
-def _quadratic_slopes(L: Floats) -> Floats:
-    """dN/dL (10, 4) of N = L (2 L - 1) at vertices, 4 L_i L_j on edges."""
-    i, j = np.array(EDGES[3]).T
-    edge: Ints = np.arange(6)
-    middle = np.zeros((6, 4))
-    middle[edge, i], middle[edge, j] = 4 * L[j], 4 * L[i]
-    return np.vstack([np.diag(4 * L - 1), middle])

@@ -8,8 +8,13 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
-from validate.scene.bricks import shapes, slopes
-from validate.scene.mesh import EDGES, Mesh
+from validate.scene.mesh import Mesh
+from validate.scene.shape_functions import (
+    barycentric,
+    brick_slopes,
+    brick_values,
+    simplex_values,
+)
 
 _CANDIDATES = 24  # nearest cell centres tried per point
 _INVERSIONS = 12  # Newton steps to a brick's local coordinates; a parallelepiped takes one
@@ -37,7 +42,7 @@ def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
     clipped /= clipped.sum(axis=1, keepdims=True)
     corners = mesh.nodes[mesh.corners[cell]]
     feet = np.einsum("ka,kad->kd", clipped, corners)
-    weights = _shape_values(clipped, mesh.order)
+    weights = simplex_values(mesh.order, clipped)
     return Rows(_csr(mesh.cells[cell], weights, mesh), np.linalg.norm(points - feet, axis=1))
 
 
@@ -53,15 +58,14 @@ def facet_samples(mesh: Mesh, facets: Ints, parts: int) -> tuple[Rows, Ints]:
     """Every facet split into parts^2 triangles: rows of the sample points and triangles (t, 3)."""
     grid = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
     number = {ij: k for k, ij in enumerate(grid)}
-    xi = np.array(grid) / parts
-    L = np.stack([1 - xi.sum(axis=1), xi[:, 0], xi[:, 1]], axis=1)
+    L = barycentric(np.array(grid) / parts)
     small = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in grid if i + j < parts]
     small += [
         (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1])
         for i, j in grid
         if i + j < parts - 1
     ]
-    values = np.tile(_shape_values(L, mesh.order), (len(facets), 1))
+    values = np.tile(simplex_values(mesh.order, L), (len(facets), 1))
     nodes = np.repeat(facets, len(grid), axis=0)
     first = len(grid) * np.arange(len(facets))[:, None, None]
     triangles = (first + np.array(small)[None]).reshape(-1, 3)
@@ -89,7 +93,7 @@ def _brick_rows(mesh: Mesh, points: Floats) -> Rows:
     cells = _near_cells(mesh, points)
     x = mesh.nodes[mesh.corners[cells]]
     flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
-    weights = shapes(np.clip(_local(flat, each), 0.0, 1.0))
+    weights = brick_values(np.clip(_local(flat, each), 0.0, 1.0))
     feet = np.einsum("ka,kad->kd", weights, flat)
     away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
     # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
@@ -102,18 +106,10 @@ def _local(x: Floats, points: Floats) -> Floats:
     """Local coordinates (k, d) of points (k, d) in the bricks of corners x (k, 2^d, d)."""
     xi = np.full(points.shape, 0.5)
     for _ in range(_INVERSIONS):
-        missed = points - np.einsum("ka,kad->kd", shapes(xi), x)
-        J = np.einsum("kad,kaj->kdj", x, slopes(xi))
+        missed = points - np.einsum("ka,kad->kd", brick_values(xi), x)
+        J = np.einsum("kad,kaj->kdj", x, brick_slopes(xi))
         xi = np.clip(xi + np.linalg.solve(J, missed[..., None])[..., 0], -_STRAY, 1 + _STRAY)
     return xi
-
-
-def _shape_values(L: Floats, order: int) -> Floats:
-    """N (k, m) from barycentric coordinates L (k, 3 or 4)."""
-    if order == 1:
-        return L
-    i, j = np.array(EDGES[L.shape[1] - 1]).T
-    return np.hstack([L * (2 * L - 1), 4 * L[:, i] * L[:, j]])
 
 
 def _csr(nodes: Ints, weights: Floats, mesh: Mesh) -> sparse.csr_array:

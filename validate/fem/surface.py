@@ -4,9 +4,9 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, Ints
-from validate.fem.facets import WEIGHTS, facet_shapes
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Membrane, Scene
+from validate.scene.shape_functions import facet_rule
 
 
 def surface_stiffness(scene: Scene) -> tuple[sparse.csr_array, ...]:
@@ -20,10 +20,10 @@ def surface_stiffness(scene: Scene) -> tuple[sparse.csr_array, ...]:
 def foundation_stiffness(mesh: Mesh, foundation: Foundation) -> sparse.csr_array:
     """K (N, N) N/m of springs to the ground, k integral of N_a N_b dA per held component."""
     facets = mesh.facets[foundation.facets]
-    N, dxi, deta = facet_shapes(facets.shape[1])
-    x = mesh.nodes[facets]
-    area = np.linalg.norm(np.cross(_at(dxi, x), _at(deta, x)), axis=2)
-    mass = np.einsum("q,fq,qa,qb->fab", WEIGHTS, area, N, N)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=2)
+    mass = np.einsum("q,fq,qa,qb->fab", rule.weights, area, rule.N, rule.N)
     select = np.zeros((3, 3))
     select[foundation.components, foundation.components] = foundation.stiffness
     return _assembled(mesh, facets, np.einsum("fab,ij->faibj", mass, select))
@@ -37,28 +37,23 @@ def membrane_stiffness(mesh: Mesh, membrane: Membrane) -> sparse.csr_array:
     it carries compression too, where a slack one would wrinkle.
     """
     facets = mesh.facets[membrane.facets]
-    _, dxi, deta = facet_shapes(facets.shape[1])
-    x = mesh.nodes[facets]
-    e1, e2 = _at(dxi, x), _at(deta, x)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    e1, e2 = J[..., 0], J[..., 1]
     normal = np.cross(e1, e2)
     area = np.linalg.norm(normal, axis=2)
     n = normal / area[..., None]
-    dual1 = np.cross(e2, n) / area[..., None]
-    dual2 = np.cross(n, e1) / area[..., None]
-    g = np.einsum("qa,fqi->fqai", dxi, dual1) + np.einsum("qa,fqi->fqai", deta, dual2)
+    dual = np.stack([np.cross(e2, n), np.cross(n, e1)], axis=2) / area[..., None, None]
+    g = np.einsum("qaj,fqji->fqai", rule.dN, dual)
     P = np.eye(3) - np.einsum("fqi,fqj->fqij", n, n)
     mu = membrane.material.shear_modulus
     nu = membrane.material.nu
     plane = 2 * mu * nu / (1 - nu)  # lambda' = E nu / (1 - nu^2)
-    w = membrane.thickness * WEIGHTS * area
+    w = membrane.thickness * rule.weights * area
     K = plane * np.einsum("fq,fqai,fqbj->faibj", w, g, g)
     K += mu * np.einsum("fq,fqbi,fqaj->faibj", w, g, g)
     K += mu * np.einsum("fq,fqak,fqbk,fqij->faibj", w, g, g, P)
     return _assembled(mesh, facets, K)
-
-
-def _at(values: Floats, nodal: Floats) -> Floats:
-    return np.asarray(np.einsum("qm,fmd->fqd", values, nodal))
 
 
 def _assembled(mesh: Mesh, facets: Ints, K: Floats) -> sparse.csr_array:

@@ -1,6 +1,6 @@
 """The system of a scene: stiffness, held unknowns, factorisation, and its response columns.
 
-A linear scene driven by plates and cavity pressures is the sum of fixed fields: u = sum_j q_j u_j
+A linear scene with drives and cavity pressures is the sum of fixed fields: u = sum_j q_j u_j
 + sum_i P_i u_i. They are solved for once; every later step is a short product (the columns of the
 condensed inverse of paper 000, eqs 18-20, for just the inputs that the scene has).
 """
@@ -72,7 +72,7 @@ class System:
 class Responses:
     """Fields (m, n, d) m per unit input: drives (m per m) first, then cavities (m per Pa).
 
-    `reactions` (drives, m): plate force per unit input, N/m and N/Pa, compression positive.
+    `reactions` (drives, m): force of the drive per unit input, N/m and N/Pa, compression positive.
     `volumes` (cavities, m + 1, m + 1, m + 1): see `volume_form`; the first slot is the rest shape.
     """
 
@@ -146,7 +146,7 @@ def _loaded_field(system: System, factor: Factor, load: Floats) -> Floats:
 
 
 def _reactions(system: System, columns: list[Floats], loads: list[Floats]) -> Floats:
-    """Force of the plates on the body along each drive: residual K u - f of every column."""
+    """Force of each drive on the body along it: residual K u - f of every column."""
     drives = len(system.scene.drives)
     residuals = [system.K @ u for u in columns]
     for i, load in enumerate(loads):

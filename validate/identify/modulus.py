@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import RecordingError, UsageError
 from validate.recording.types import Recording
 
@@ -190,7 +190,7 @@ def load_noise(force: Floats) -> float:
         raise RecordingError(
             f"{len(force)} forces for a noise estimate, at least {MIN_SAMPLES} needed"
         )
-    return float(np.sqrt(np.mean(np.diff(force, 2) ** 2) / 6))
+    return rms(np.diff(force, 2)) / float(np.sqrt(6))
 
 
 def _samples(recording: Recording, topic: str, unit: str) -> Floats:

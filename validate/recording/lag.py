@@ -132,12 +132,11 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
             f"{int(usable.sum())} samples meet the reference, {MIN_MATCHED} are needed"
         )
     t, y = seen.t[usable], seen.y[usable, 0]
+    tries = np.linspace(-width, width, _TRIES)
     tau = start
     for _ in range(_MAX_STEPS):
         along = np.column_stack([np.ones_like(t), smooth(t + tau)])
-        across = slope(t + tau)
-        g = across - along @ np.linalg.lstsq(along, across, rcond=None)[0]
-        tries = np.linspace(-width, width, _TRIES)
+        g = _without(along, slope(t + tau))
         left = np.stack([_left(along, x_of(t + tau + x), y) for x in tries])
         falls, at_zero = np.polyfit(tries, left @ g, 1)
         if not falls < 0:
@@ -153,6 +152,11 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
         f"no best offset near {start:+.4g} s: the streams do not follow each other there; align "
         "them by a marked event"
     )
+
+
+def _without(along: Floats, x: Floats) -> Floats:
+    """x less its least-squares parts along the columns."""
+    return np.asarray(x - along @ np.linalg.lstsq(along, x, rcond=None)[0])
 
 
 def _left(along: Floats, x: Floats, y: Floats) -> Floats:

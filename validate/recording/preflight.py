@@ -33,9 +33,8 @@ _KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours", IMAGE: "fra
 class Topic:
     """One channel: kind is markers, signal, contours, frames, mirror or foreign.
 
-    Times are in ns, None: empty;
-    first_ns and last_ns are the earliest and latest time of measurement; `unit` is empty where the
-    schema says none. `clock` holds rate, gaps and duplicates.
+    first_ns and last_ns are the earliest and latest time of measurement, None: empty; `unit` is
+    empty where the schema says none. `clock` holds rate, gaps and duplicates.
     """
 
     name: str
@@ -88,11 +87,13 @@ def inspect_recording(path: Path) -> Inspection:
             fill(collected, messages_of(stream, verified, collected.keys()))
         except RecordingError as error:
             defects.append(str(error))
-    topics: list[Topic] = []
-    for number, channel in verified.channels.items():
-        topic, found = _topic(verified, number, channel, collected.get(number))
-        topics.append(topic)
-        defects += found
+    topics = [_topic(verified, n, c, collected.get(n)) for n, c in verified.channels.items()]
+    return _inspection(verified, topics, defects)
+
+
+def _inspection(
+    verified: Verified, topics: list[tuple[Topic, list[str]]], defects: list[str]
+) -> Inspection:
     return Inspection(
         source=verified.source,
         profile=verified.header.profile,
@@ -102,8 +103,8 @@ def inspect_recording(path: Path) -> Inspection:
         messages=verified.messages,
         attachments=verified.attachments,
         metadata=tuple(record.name for record in verified.metadata),
-        topics=tuple(topics),
-        defects=tuple(defects),
+        topics=tuple(topic for topic, _ in topics),
+        defects=(*defects, *(line for _, found in topics for line in found)),
         clock_offsets=tuple(_offset_lines(verified)),
     )
 

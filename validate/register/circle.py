@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import RegistrationError
 
 
@@ -35,7 +35,7 @@ def fit_circle(points: Floats, sd: float) -> Circle:
 
     found = least_squares(off_circle, start)
     x, residual = found.x, np.asarray(found.fun)
-    off = float(np.sqrt((residual**2).mean()))
+    off = rms(residual)
     if off > 0.2 * x[2]:
         raise RegistrationError(
             f"the outline is no circle: {1e3 * off:.2f} mm rms off a radius of {1e3 * x[2]:.2f} mm"

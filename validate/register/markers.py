@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import RegistrationError
 from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
 from validate.recording.types import Markers, Recording
@@ -96,7 +96,7 @@ class MarkerObservation:
         shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
         off = (shown - self.x[samples]).reshape(-1, self.x.shape[2])
         off = off[np.isfinite(off).all(axis=1)]
-        tre = float(np.sqrt((self.tre**2).mean() / 3))
+        tre = rms(self.tre) / float(np.sqrt(3))
         return tuple(
             Deviation(g.quantity, off[:, list(g.axes)], "m", self.sd, tre, g.words)
             for g in self.together
@@ -223,4 +223,4 @@ def _require_scale(x: Floats, rest: Floats) -> None:
 
 
 def _spread(points: Floats) -> float:
-    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    return rms(points - points.mean(axis=0))

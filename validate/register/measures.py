@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.register.transform import Similarity, fit_rigid, fit_similarity
 
 P_EXCESS = 1e-3  # chance that noise alone exceeds a bound stated here
@@ -48,11 +48,6 @@ class Outlier(NamedTuple):
 def least_squares(scaled: bool) -> Fit:
     """The rigid fit, or the one with a scale."""
     return fit_similarity if scaled else fit_rigid
-
-
-def rms(vectors: Floats) -> float:
-    """Root mean square length of vectors (k, d), in their unit."""
-    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
 def chi_square_bound(dof: int, p: float = P_EXCESS) -> float:

@@ -18,10 +18,10 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, checked, rms
 from validate.errors import RegistrationError
 from validate.register import measures
-from validate.register.measures import FEWEST, Fit, Outlier, Reflection, rms
+from validate.register.measures import FEWEST, Fit, Outlier, Reflection
 from validate.register.relabel import label_fault
 from validate.register.transform import Similarity, check_spread, spread
 from validate.register.two_step import Up, fit_plane, fit_two_step

@@ -13,8 +13,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats, Ints
-from validate.register.measures import CLEARLY, Fit, chi_square_bound, rms
+from validate.arrays import Floats, Ints, rms
+from validate.register.measures import CLEARLY, Fit, chi_square_bound
 from validate.register.transform import Similarity, spread
 
 STEPS = 50  # assignment and refit; the residual falls each time, few are needed

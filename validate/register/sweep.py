@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError, RegistrationError
 from validate.recording.images.outline import Outline, extract_outline
 from validate.recording.types import Frames
@@ -154,7 +154,7 @@ def _stack(frames: Frames, positions: Floats, kept: list[tuple[int, Outline]]) -
         radii,
         tuple(o.points for _, o in kept),
         np.array(ends),
-        float(np.sqrt(np.mean([o.sd**2 for _, o in kept]))),
+        rms([o.sd for _, o in kept]),
         float(np.diff(positions).max() / np.sqrt(12)),
         (first, len(frames.images) - 1 - last),
     )

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.effects import Effect, effect
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
-from validate.compare.score import rms
 from validate.compare.verdict import OWN_COVARIANCE, SAFETY, Accept, Check, Sensitivity, judge
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows

@@ -23,12 +23,12 @@ from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact, Plates, between_plates
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Cavity, Drive, Material, Scene, Support
 from validate.solve.fluid import ExactPressure, NoFluid
 
 _WITHIN = 0.1e-3  # m: the stage stood at a load
+_PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
 _TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
-_PLATES = Plates("x0", "x1", floor="y0")
 _PLANE = (
     Together("marker.inplane", (0, 2), "position along the stage and sideways"),
     Together("marker.vertical", (1,), "position along the vertical"),
@@ -123,8 +123,9 @@ def inclusion_test(
             inputs=(
                 Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)),
                       one, "E within its declared uncertainty"),
-                Input("Poisson ratio", changed("material", nu=lambda p: p.material.nu - p.ranges.nu),
-                      one, "nu within its declared uncertainty"),
+                Input("Poisson ratio",
+                      changed("material", nu=lambda p: p.material.nu - p.ranges.nu), one,
+                      "nu within its declared uncertainty"),
                 Input("plate friction", changed(plates="bonded"),
                       lambda p: p.ranges.friction, "between slipping and bonded plates"),
             ),
@@ -148,10 +149,11 @@ def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
     mesh = block_with_inclusion(block, nodes, _inclusion(recording, p))
     return between_plates(
         mesh if model.order == 1 else quadratic(mesh),
-        _PLATES,
         Material(p.material.E, p.material.nu),
         p.plates,
+        _PLATES,
         "pointwise" if model.order == 2 else "nodal_mean",
+        cavities=(Cavity("inclusion", "cavity"),),
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, cast
 
 from validate.errors import UsageError
-from validate.estimate.measured import measurements
+from validate.estimate.measurements import measurements
 from validate.fem.system import System
 from validate.parameters import part, quantity
 from validate.register.registered import Registered

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import chdtri
 
+from validate.arrays import rms
 from validate.compare.effects import TELLS_APART, Change, Effect
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
-from validate.compare.score import rms
 from validate.report.numbers import at_load, fixed, scale, shown_unit, text, with_unit
 from validate.report.observed import finished, last_residual
 from validate.report.page import (

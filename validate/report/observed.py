@@ -1,8 +1,8 @@
 """Picks that all figures share: which methods to draw, and a method's view of the measurement."""
 
+from validate.arrays import rms
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
-from validate.compare.score import rms
 from validate.register.observe import Hold, MarkerObservation, OutlineObservation
 from validate.report.loads import at_holds
 from validate.solve.types import Run, StepTimes

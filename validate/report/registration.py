@@ -3,10 +3,10 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.compare.residual import Residual
 from validate.compare.result import Result
-from validate.compare.score import max_length, rms
+from validate.compare.score import max_length
 from validate.register.observe import MarkerObservation
 from validate.register.quality import Registration
 from validate.report.numbers import shown_unit, text, with_unit

@@ -8,7 +8,7 @@ import pyvista as pv
 
 from validate.report.body import Body
 from validate.report.page import Picture, Pixels
-from validate.scene.mesh import EDGES
+from validate.scene.shape_functions import EDGES
 
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it

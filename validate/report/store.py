@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.compare.effects import Effect
 from validate.compare.published import Published
 from validate.compare.result import MethodResult, Result
@@ -76,7 +76,7 @@ def document(result: Result, created: str) -> Json:
         "effects": [_effect(e) for e in result.effects],
         "rest": [
             {"name": r.name, "unit": r.unit, "sd": _finite(r.sd), "count": r.count,
-             "rms": _finite(float(np.sqrt((r.values**2).sum(axis=1).mean())))}
+             "rms": _finite(rms(r.values))}
             for r in result.rest
         ],
         "identified": [_score(s) for s in result.identified],

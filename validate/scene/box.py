@@ -4,8 +4,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.scene.bricks import CORNERS
 from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells
+from validate.scene.shape_functions import CORNERS
 
 
 def box(size: tuple[float, ...], cells: tuple[int, ...]) -> Mesh:

@@ -8,6 +8,7 @@ removed with the inclusion, where the paper does not say what became of them.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -25,12 +26,12 @@ from validate.scene.mesh import (
 _MOST_NODES = 100_000  # before memory is taken: P2 has 8 times as many
 _ROUNDS = 6  # of removing flattened cells and projecting again
 _FLAT = 1e-3  # a cell smaller than this share of the median one counts as flattened
-FACES = ("x0", "x1", "y0", "y1", "z0", "z1")
+SIDES = ("x0", "x1", "y0", "y1", "z0", "z1")  # as of `scene.box`
 
 
 @dataclass(frozen=True)
 class Block:
-    """Sizes m along x, y and z, from the origin."""
+    """A box from the origin; sizes in m."""
 
     size_x: float
     size_y: float
@@ -43,11 +44,15 @@ class Block:
 
 @dataclass(frozen=True)
 class Capsule:
-    """Cylinder with half-spheres at its ends, axis along y: centre (3,) m, radius m, length m."""
+    """Cylinder with half-spheres at its ends: centre (3,) m, radius m, length m.
+
+    `axis` 0, 1 or 2: along x, y or z.
+    """
 
     centre: tuple[float, float, float]
     radius: float
     length: float
+    axis: int = 1
 
     def __post_init__(self) -> None:
         if not (self.radius > 0 and self.length >= 2 * self.radius):
@@ -60,7 +65,8 @@ class Capsule:
         """The nearest point of the axis segment for every point (n, 3)."""
         half = self.length / 2 - self.radius
         foot = np.tile(np.array(self.centre), (len(points), 1))
-        foot[:, 1] += np.clip(points[:, 1] - self.centre[1], -half, half)
+        i = self.axis
+        foot[:, i] += np.clip(points[:, i] - self.centre[i], -half, half)
         return foot
 
     def distance(self, points: Floats) -> Floats:
@@ -76,7 +82,9 @@ class Capsule:
     @property
     def reach(self) -> Floats:
         """Half extents (3,) m."""
-        return np.array([self.radius, self.length / 2, self.radius])
+        half = np.full(3, self.radius)
+        half[self.axis] = self.length / 2
+        return half
 
     @property
     def volume(self) -> float:
@@ -87,8 +95,8 @@ class Capsule:
 def block_with_inclusion(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> Mesh:
     """Linear tetrahedra around the inclusion; `grid` counts the nodes along x, y, z.
 
-    Facet sets: the six faces and "cavity". Raises `SceneError` when the inclusion touches a face,
-    is smaller than an element, or when the projection inverts a cell.
+    Facet sets: the six sides as of `scene.box` and "cavity". Raises `SceneError` when the inclusion
+    touches a face, is smaller than an element, or when the projection inverts a cell.
     """
     if min(grid) < 4:
         raise SceneError(f"mesh of {grid} nodes: at least 4 along each side are needed")
@@ -132,7 +140,7 @@ def _projected(
 def _require_inside(block: Block, shape: InclusionShape) -> None:
     centre = np.array(shape.centre)
     gaps = np.concatenate([centre - shape.reach, block.sizes - centre - shape.reach])
-    faces = ("x = 0", "y = 0", "z = 0", "x = max", "y = max", "z = max")
+    faces = [f"{axis} = {end}" for end in ("0", "max") for axis in "xyz"]
     if gaps.min() <= 0:
         raise SceneError(
             f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
@@ -142,7 +150,8 @@ def _require_inside(block: Block, shape: InclusionShape) -> None:
 
 def _require_resolved(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> None:
     centre = np.array(shape.centre)
-    h = float((np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1))[[0, 2]].max())
+    spacing = np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1)
+    h = float(np.delete(spacing, shape.axis).max())
     if 2 * shape.radius < h:
         raise SceneError(
             f"the inclusion's diameter {2e3 * shape.radius:.3g} mm is smaller than an element of "
@@ -165,9 +174,7 @@ def _named_facets(
     place = np.stack(np.unravel_index(np.arange(len(nodes)), grid), axis=-1)
     last = np.array(grid) - 1
     named, taken = {}, np.zeros(len(outside), dtype=bool)
-    for name, (axis, end) in zip(
-        FACES, ((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)), strict=True
-    ):
+    for name, (axis, end) in zip(SIDES, product(range(3), (0, 1)), strict=True):
         on = (place[outside, axis] == last[axis] * end).all(axis=1)
         named[name], taken = outside[on], taken | on
     named["cavity"] = outside[~taken]

@@ -23,6 +23,10 @@ class InclusionShape(Protocol):
         """Middle of its bounding box."""
 
     @property
+    def axis(self) -> int:
+        """The coordinate axis 0, 1 or 2 nearest to its own."""
+
+    @property
     def reach(self) -> Floats:
         """Half extents (3,) of its bounding box."""
 
@@ -103,6 +107,10 @@ class SlicedShape:
     def centre(self) -> tuple[float, float, float]:
         x, y, z = self._box.mean(axis=0).tolist()
         return x, y, z
+
+    @property
+    def axis(self) -> int:
+        return int(np.argmax(np.abs(self.pose[:3, 2])))
 
     @property
     def reach(self) -> Floats:

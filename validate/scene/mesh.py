@@ -2,7 +2,7 @@
 
 Conventions: cells are positively oriented; facets are oriented outward from the solid; quadratic
 meshes list the vertices first, then one node per edge at its midpoint (straight edges), in the
-local order of `EDGES`. Corners of quad4 and hex8 run as in `scene.bricks`.
+local order of `EDGES`. Corners of quad4 and hex8 run as in `scene.shape_functions`.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, checked, checked_indices
 from validate.errors import SceneError
-from validate.scene.bricks import CORNERS, gauss_points, jacobians
+from validate.scene.shape_functions import CORNERS, EDGES, brick_rule, gauss_points
 
 Kind = Literal["tri3", "tri6", "tet4", "tet10", "quad4", "hex8"]
 DIMENSION: Mapping[str, int] = {
@@ -27,10 +27,6 @@ _NODES: Mapping[str, tuple[int, int]] = {
     "tri3": (3, 2), "tri6": (6, 3), "tet4": (4, 3), "tet10": (10, 6), "quad4": (4, 2),
     "hex8": (8, 4),
 }  # fmt: skip
-EDGES: Mapping[int, tuple[tuple[int, int], ...]] = {
-    2: ((0, 1), (1, 2), (0, 2)),
-    3: ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
-}
 # Outward facets by dimension and corners of a cell.
 _FACETS: Mapping[tuple[int, int], tuple[tuple[int, ...], ...]] = {
     (2, 3): ((0, 1), (1, 2), (2, 0)),
@@ -115,8 +111,8 @@ def cell_volumes(mesh: Mesh) -> Floats:
     """Signed volume (area in 2-D) of every cell (e,), from its vertices; bricks by quadrature."""
     x = mesh.nodes[mesh.corners]
     if mesh.bricks:
-        points, weight = gauss_points(mesh.dimension)
-        return np.asarray(weight * np.linalg.det(jacobians(x, points)).sum(axis=1))
+        rule = brick_rule(*gauss_points(mesh.dimension, 2))
+        return np.asarray(np.linalg.det(rule.jacobians(x)) @ rule.weights)
     size = {2: 2.0, 3: 6.0}[mesh.dimension]
     return np.asarray(np.linalg.det(x[:, 1:] - x[:, :1]) / size)
 
@@ -140,8 +136,9 @@ def _least_volumes(mesh: Mesh) -> Floats:
     """Signed volume (e,) of every cell as its worst corner has it: bricks may fold over there."""
     if not mesh.bricks:
         return cell_volumes(mesh)
-    x = mesh.nodes[mesh.corners]
-    return np.asarray(np.linalg.det(jacobians(x, CORNERS[mesh.dimension])).min(axis=1))
+    corners = CORNERS[mesh.dimension]
+    at_corners = brick_rule(corners, np.zeros(len(corners)))
+    return np.asarray(np.linalg.det(at_corners.jacobians(mesh.nodes[mesh.corners])).min(axis=1))
 
 
 def kuhn_cells(shape: tuple[int, ...]) -> Ints:

@@ -85,7 +85,7 @@ class Pin:
 class Drive:
     """A facet set moved along `direction` (d,), a unit vector along an axis, by a named input in m.
 
-    The reported force is that on the plate against the motion: compression positive. With `point`
+    The reported force is that on the driver against the motion: compression positive. With `point`
     m only the set's node nearest to it moves, as under a needle. `speeds`: the true velocity of a
     motion that is planned piecewise linear, (from t s, m/s) in rising order, each valid from its
     instant on; what dynamic schemes read whose drive rates are "given".

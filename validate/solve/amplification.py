@@ -15,6 +15,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.matrices import damping_of, mass_of
 from validate.fem.system import System
+from validate.solve.dynamic import Moving
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.explicit_linear import UpdateName as ExplicitUpdate
 from validate.solve.newmark import Newmark
@@ -105,19 +106,18 @@ def step_matrix(stepper: Stepper, system: System) -> Floats:
 
     Raises `SceneError` above 400 free unknowns.
     """
-    free, m = system.free, len(system.free)
+    m = len(system.free)
     if m > STEPPED_LIMIT:
         raise SceneError(f"{m} unknowns: a step's dense map has at most {STEPPED_LIMIT}")
-    # A state that has been under way: the first step treats loads in its own way.
-    rest = replace(stepper.rest(), k=1)
+    rest = stepper.rest()
+    assert isinstance(rest.inner, Moving)
     still = np.zeros(len(system.scene.inputs))
     columns = np.empty((3 * m, 3 * m))
     for j in range(3 * m):
-        fields = np.zeros((3, len(system.moves)))
-        fields[j // m, free[j % m]] = 1.0
-        after = stepper.step(replace(rest, u=fields[0], v=fields[1], a=fields[2]), still)
-        assert after.u is not None
-        assert after.v is not None
-        assert after.a is not None
-        columns[:, j] = np.concatenate([after.u[free], after.v[free], after.a[free]])
+        x = np.zeros((3, m))
+        x[j // m, j % m] = 1.0
+        # A state that has been under way: the first step treats loads in its own way.
+        one = replace(rest, k=1, inner=replace(rest.inner, u=x[0], v=x[1], a=x[2]))
+        after: Moving = stepper.step(one, still).inner
+        columns[:, j] = np.concatenate([after.u, after.v, after.a])
     return columns

@@ -8,9 +8,9 @@ Lanczos, taken anew as the body deforms. Stiffness damping (beta K of eq 18) wou
 is taken at the last half step ("lagged"), which costs no solve and lowers the limit.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -18,17 +18,18 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assemble import lumped, mass
 from validate.fem.critical import lanczos_step
-from validate.fem.explicit import ExplicitBody, Look, Motion, Rule
+from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitMotion
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
-from validate.solve.dynamic import input_kind
-from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.types import Ending, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
 _DEFORMED = 0.02  # of the body's size: the critical step is taken anew after such a motion
-_UNITS = {"displacement": "m", "force": "N", "strain": "J", "kinetic": "J", "external": "J"}
-_UNITS |= {"damped": "J", "critical_step": "s"}
+_SEEN = dict.fromkeys(
+    ("energy.strain", "energy.kinetic", "energy.external", "energy.damped"), "J"
+) | {"det_F.min": "1", "inverted": "1", "critical_step": "s"}
 
 Damping = Literal["none", "mass", "lagged"]
 
@@ -43,6 +44,8 @@ class CentralDifference:
     and, when the body has deformed further, the critical step are looked at; traces hold between.
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")
@@ -68,11 +71,11 @@ class CentralDifference:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for what has no explicit form, a missing density, cavities."""
-        if system.scene.cavities:
-            raise SceneError("explicit dynamics knows no fluid in cavities; drop them")
+        require_handled(system.scene, self)
         beta = self._beta(system.scene)
         still = np.zeros(len(system.moves))
-        past = Past(Motion(np.zeros((6, len(still)))), still)
+        inputs = np.zeros(len(system.scene.inputs))
+        past = Past(ExplicitMotion(np.zeros((6, len(still)))), still, inputs)
         plates = system.moves[system.held]
         feels_loads = bool(system.loads[system.held].any())
         body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
@@ -96,14 +99,14 @@ class CentralDifference:
             raise SceneError(f"lagged damping is for one stiffness damping, got {sorted(betas)} s")
         return float(betas.pop())
 
-    def _rule(self, system: System, beta: float) -> Rule:
+    def _rule(self, system: System, beta: float) -> CentralRule:
         alpha = np.zeros(len(system.moves))
         if self.damping != "none":
             alpha = lumped_damping(system) / system.masses
         half, free = alpha * self.step / 2, np.zeros(len(alpha))
         free[system.free] = 1.0
         loaded = np.intersect1d(np.flatnonzero(system.loads.any(axis=1)), system.free)
-        return Rule(
+        return CentralRule(
             self.step,
             free * (1 - half) / (1 + half),
             free * self.step**2 / system.masses / (1 + half),
@@ -117,10 +120,11 @@ class CentralDifference:
 
 @dataclass(frozen=True)
 class Past:
-    """What a step needs besides the state; `limit` s was taken at the displacements `limit_u`."""
+    """Motion and inputs after a step; `limit` s was taken at the displacements `limit_u`."""
 
-    motion: Motion
+    motion: ExplicitMotion
     limit_u: Floats
+    inputs: Floats
     limit: float = np.inf
     work: float = 0.0
     taken: float = 0.0
@@ -134,7 +138,7 @@ class CentralStepper:
     settings: CentralDifference
     system: System
     body: ExplicitBody
-    rule: Rule
+    rule: CentralRule
     beta: float
     held: Ints
     plates: Floats
@@ -146,45 +150,44 @@ class CentralStepper:
     def scene(self) -> Scene:
         return self.system.scene
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Energies half a step before the last watch, det F and critical step then, forces."""
+        return _SEEN | {f"{d.name}.force": "N" for d in self.scene.drives}
+
     def warm(self) -> None:
         """Compiles: no step is charged with it."""
-        inputs = np.zeros(len(self.scene.inputs))
+        inputs = self.start.inputs
         self.body.advance(self.start.motion, self.rule, inputs, inputs, 1)
         self.body.look(self.start.motion["u"])
 
     def rest(self) -> State:
-        u, inputs = self.start.motion["u"], np.zeros(len(self.scene.inputs))
+        u = self.start.motion["u"]
         seen = self._seen(self.start, self.body.look(u))
-        numbers = {**seen, **self._forces(u, inputs)}
-        return State(
-            inputs, NOTHING, 0, NO_SURFACE, u=u, numbers=numbers, v=u, a=u, extra=self.start
-        )
+        return State(0, self.start, numbers=seen | self._forces(u, self.start.inputs))
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
-        past: Past = state.extra
+        past: Past = state.inner
         if state.k == 0 and self._refused(past.limit, self.settings.margin):
             return replace(state, failure=("refused", self._too_large(past.limit)))
         k, substeps = state.k + 1, self.settings.substeps
         motion, work, taken, finite = self.body.advance(
-            past.motion, self.rule, state.drives, inputs, substeps
+            past.motion, self.rule, past.inputs, inputs, substeps
         )
         if not finite:
             ratio = self.rule.dt / past.limit
             words = f"step {k}: displacements not finite; dt is {ratio:.3g} of the critical step"
             return replace(state, failure=("diverged", words))
-        new = _worked(past, motion, work, taken)
+        new = _worked(past, motion, inputs, work, taken)
         numbers, failure = dict(state.numbers), None
         if k % self.settings.watch == 0 or k == 1:
             new, seen, failure = self._watched(new, k)
             numbers |= seen
         numbers |= self._forces(motion["r"], inputs)
-        return State(
-            inputs, NOTHING, substeps, NO_SURFACE, failure, motion["u"], numbers, k,
-            motion["v"], motion["a"], new,
-        )  # fmt: skip
+        return State(k, new, failure, substeps, numbers)
 
-    def _forces(self, r: Floats, inputs: Floats) -> Mapping[str, float]:
+    def _forces(self, r: Floats, inputs: Floats) -> dict[str, float]:
         """Forces N of the plates on the whole body (eq 32), compression positive, no inertia."""
         if not self.scene.drives:
             return {}
@@ -216,7 +219,7 @@ class CentralStepper:
             return past, seen, ("refused", f"step {k}: as deformed, {self._too_large(past.limit)}")
         return past, seen, None
 
-    def _increment_energy(self, motion: Motion, ratio: float, kinetic: float) -> float:
+    def _increment_energy(self, motion: ExplicitMotion, ratio: float, kinetic: float) -> float:
         """d K d/8 J of the last increment: what central difference holds beyond the work done.
 
         In a linear body strain + kinetic - work is exactly this at half steps, as long as the run
@@ -246,7 +249,7 @@ class CentralStepper:
         limit = float(np.hypot(undamped, self.beta)) - self.beta
         return replace(past, limit=limit, limit_u=u)
 
-    def _seen(self, past: Past, look: Look) -> dict[str, float]:
+    def _seen(self, past: Past, look: BodyLook) -> dict[str, float]:
         d = past.motion["d"][self.system.free]
         kinetic = float(self.masses @ (d * d)) / (2 * self.rule.dt**2)
         return {
@@ -273,18 +276,19 @@ class CentralStepper:
 
     def field(self, state: State) -> Floats:
         """Displacements (n, 3) m of all nodes."""
-        assert state.u is not None
-        return state.u.reshape(-1, 3)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Inputs, plate forces, energies J half a step before the last watch, det F, limit."""
-        return numbered(self.scene, self.rest().numbers, states)
+        u: Floats = state.inner.motion["u"]
+        return u.reshape(-1, 3)
 
 
-def _worked(past: Past, motion: Motion, more: float, taken: float) -> Past:
+def _worked(past: Past, motion: ExplicitMotion, inputs: Floats, more: float, taken: float) -> Past:
     work = past.work + more
-    return Past(
-        motion, past.limit_u, past.limit, work, past.taken + taken, max(past.most, abs(work))
+    return replace(
+        past,
+        motion=motion,
+        inputs=inputs,
+        work=work,
+        taken=past.taken + taken,
+        most=max(past.most, abs(work)),
     )
 
 
@@ -294,15 +298,3 @@ def lumped_damping(system: System) -> Floats:
     if not scene.regions:
         return scene.material.mass_damping * system.masses
     return lumped(scene, mass(scene, damping=True))
-
-
-def numbered(scene: Scene, names: Iterable[str], states: Sequence[State]) -> dict[str, Trace]:
-    """Traces of the inputs and of the states' numbers, with units by the last word of the name."""
-    traces = {}
-    for j, name in enumerate(scene.inputs):
-        kind, unit = input_kind(scene, j)
-        traces[f"{name}.{kind}"] = Trace(np.array([s.drives[j] for s in states]), unit)
-    for name in names:
-        unit = _UNITS.get(name.rpartition(".")[2], "1")
-        traces[name] = Trace(np.array([s.numbers[name] for s in states]), unit)
-    return traces

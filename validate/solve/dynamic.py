@@ -1,20 +1,16 @@
 """What linear schemes with inertia share: fields, traces and the forces of drives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import SceneError
-from validate.fem.factor import factorise
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
-from validate.scene.scene import Scene, Weight
-from validate.solve.types import NO_SURFACE, NOTHING, State, Trace
-
-StartName = Literal["equilibrium", "zero"]
+from validate.scene.scene import Scene
+from validate.solve.excitation import Excitation, Inputs
+from validate.solve.types import State
 
 
 @dataclass(frozen=True)
@@ -53,21 +49,19 @@ def reactions(
     return Reactions(names, system.scene.copies, rows @ system.K, C, M, rows @ system.loads)
 
 
-def require_linear(system: System) -> None:
-    """Raises `SceneError` for a law at large strain, or a cavity, whose fluid nobody would feel."""
-    law = system.scene.material.law
-    if law != "linear":
-        raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
-    if system.scene.cavities:
-        raise SceneError(
-            "linear schemes with loads know no fluid in cavities; drop them from the scene, or "
-            "use ExactPressure"
-        )
+@dataclass(frozen=True)
+class Moving:
+    """Displacements, velocities, accelerations (m,) of the free unknowns, and the inputs."""
+
+    u: Floats
+    v: Floats
+    a: Floats
+    inputs: Inputs
 
 
 @dataclass(frozen=True)
 class InertialStepper:
-    """Base of steppers whose states name their inputs and the drives' forces."""
+    """Base of steppers whose states tell the drives' forces."""
 
     system: System
     reactions: Reactions
@@ -77,63 +71,36 @@ class InertialStepper:
         return self.system.scene
 
     @property
-    def _drives(self) -> int:
-        return len(self.scene.drives)
+    def units(self) -> Mapping[str, str]:
+        """`<drive>.force` N, compression positive."""
+        return {f"{name}.force": "N" for name in self.reactions.names}
 
-    def _state(self, inputs: Floats, k: int, updates: int = 0, **fields: object) -> State:
-        return State(inputs, NOTHING, updates, NO_SURFACE, k=k, **fields)  # type: ignore[arg-type]
+    def forces(self, u: Floats, v: Floats, a: Floats, inputs: Inputs) -> Mapping[str, float]:
+        """The drives' forces at u, v, a (m,) of the free unknowns."""
+        if not self.reactions.names:
+            return {}
+        driven = inputs.q, inputs.rate, inputs.acceleration
+        u, v, a = (spread(self.system, x, q) for x, q in zip((u, v, a), driven, strict=True))
+        return self.reactions.numbers(u, v, a, inputs.loads)
+
+    def nodal(self, free: Floats, driven: Floats) -> Floats:
+        """(n, d) of all nodes, from the free unknowns (m,) and the drives (k,)."""
+        return spread(self.system, free, driven).reshape(self.scene.mesh.nodes.shape)
+
+
+@dataclass(frozen=True)
+class MovingStepper(InertialStepper):
+    """Base of those that carry the motion of the free unknowns themselves."""
+
+    excitation: Excitation
 
     def rest(self) -> State:
-        zeros = np.zeros(self.system.moves.shape[0])
-        inputs = np.zeros(len(self.scene.inputs))
-        still = self.reactions.named(np.zeros(self._drives))
-        return self._state(inputs, 0, u=zeros, v=zeros, a=zeros, numbers=still)
+        zeros = np.zeros(len(self.system.free))
+        return State(0, Moving(zeros, zeros, zeros, self.excitation.rest()))
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
-        assert state.u is not None
-        return state.u.reshape(self.scene.mesh.nodes.shape)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """`<drive>.displacement` m, `<drive>.force` N (compression positive), `<load>.force` N.
-
-        A load's force is its input: with `per_node` that at each node, else the total. A weight's
-        trace is `<weight>.acceleration` m/s^2.
-        """
-        names = self.scene.inputs
-        inputs = np.array([s.drives for s in states]).reshape(len(states), len(names))
-        traces = {}
-        for j, name in enumerate(names):
-            moved = j < self._drives
-            kind, unit = input_kind(self.scene, j)
-            traces[f"{name}.{kind}"] = Trace(inputs[:, j], unit)
-            if moved:
-                force = np.array([s.numbers[f"{name}.force"] for s in states])
-                traces[f"{name}.force"] = Trace(force, "N")
-        return traces
-
-
-def input_kind(scene: Scene, j: int) -> tuple[str, str]:
-    """What the scene's input j is, and its unit."""
-    drives = len(scene.drives)
-    if j < drives:
-        return "displacement", "m"
-    weighs = isinstance(scene.loads[j - drives], Weight)
-    return ("acceleration", "m/s^2") if weighs else ("force", "N")
-
-
-def starting_accelerations(
-    system: System, mass: MassName = "consistent", a0: StartName = "equilibrium"
-) -> Floats | None:
-    """M^-1 f (m, l) m/s^2 that one unit of each load gives the body at rest; None for a0 = 0."""
-    if a0 == "zero":
-        return None
-    loads = system.loads[system.free]
-    if mass == "lumped":
-        return np.asarray(loads / system.masses[system.free][:, None])
-    mesh = system.scene.mesh
-    M = system.M[system.free][:, system.free]
-    return factorise(M, system.free // mesh.dimension, mesh.nodes).solve(loads)
+        return self.nodal(state.inner.u, state.inner.inputs.q)
 
 
 def elastic_forces(system: System, u: Floats) -> Floats:

@@ -10,7 +10,7 @@ of its "mass lumping" error most is the second. Prescribed unknowns keep all the
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy import sparse
@@ -22,22 +22,11 @@ from validate.fem.factor import factorise
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import (
-    InertialStepper,
-    StartName,
-    reactions,
-    require_linear,
-    spread,
-    starting_accelerations,
-)
+from validate.solve.dynamic import Moving, MovingStepper, reactions
+from validate.solve.excitation import DriveRates, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear_solvers import Diagonal, Solver
-from validate.solve.newmark_rule import (
-    DriveRates,
-    Excitation,
-    Motion,
-    excitation,
-    rule_of,
-)
+from validate.solve.newmark_rule import rule_of
 from validate.solve.types import Ending, State, Stepper
 
 UpdateName = Literal["printed", "lagged"]
@@ -53,6 +42,10 @@ class ExplicitLinear:
     A dt above the critical step is refused at the first step, or with `beyond_limit` "run" goes on
     until displacements are 100 times the body's size.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(1e-4, "s", "time step")
     mass: MassName = quantity("lumped", "1", "mass matrix")
@@ -77,7 +70,7 @@ class ExplicitLinear:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
-        require_linear(system)
+        require_handled(system.scene, self)
         free, terms = system.free, self.damping_terms
         matrices = mass_of(system, self.mass), damping_of(system, self.mass, terms), system.K
         M, C, K = (sparse.csr_array(X[free][:, free]) for X in matrices)
@@ -87,9 +80,8 @@ class ExplicitLinear:
         return ExplicitStepper(
             system,
             reactions(system, self.mass, terms),
+            excitation(system, rule, self.mass, self.drive_rates, terms, self.a0),
             self,
-            excitation(system, rule, self.mass, self.drive_rates, terms),
-            starting_accelerations(system, self.mass, self.a0),
             C,
             K,
             _solver(J, free // mesh.dimension, mesh.nodes),
@@ -137,61 +129,35 @@ def highest_frequency(system: System, mass: MassName) -> float:
 
 
 @dataclass(frozen=True)
-class ExplicitStepper(InertialStepper):
-    """`C`, `K` (m, m) over the free unknowns, `solver` of the accelerations' matrix, `limit` s.
-
-    `starts` as in `NewmarkStepper`; `size` m is the body's.
-    """
+class ExplicitStepper(MovingStepper):
+    """`C`, `K` (m, m) over the free unknowns, `solver` of the accelerations' matrix, `limit` s,
+    `size` m of the body."""
 
     settings: ExplicitLinear
-    excitation: Excitation
-    starts: Floats | None
     C: sparse.csr_array
     K: sparse.csr_array
     solver: Solver
     limit: float
     size: float
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The state at the end of a step; `drives` are the inputs there, loads included."""
-        assert state.u is not None
-        assert state.v is not None
-        assert state.a is not None
-        k, free, h = self._drives, self.system.free, self.settings.dt
-        new, old = drives[k:], state.drives[k:]
-        v, a = state.v[free], state.a[free]
-        if state.k == 0 and self.starts is not None:
-            a = self.starts @ new
-        motion = state.extra if isinstance(state.extra, Motion) else self.excitation.rest()
-        moved = self.excitation.moved(motion, drives[:k])
-        f = self.excitation.force(new, old, moved, motion)
-        half = v + h / 2 * a
-        u = state.u[free] + h * half
+    def step(self, state: State, inputs: Floats) -> State:
+        """The state at the end of a step; `inputs` are those there, loads included."""
+        last: Moving = state.inner
+        h, k = self.settings.dt, state.k + 1
+        f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
+        half = last.v + h / 2 * a
+        u = last.u + h * half
         a = self.solver.solve(f - self.K @ u - self.C @ half)
-        return self._done(state, drives, moved, (u, half + h / 2 * a, a))
-
-    def _done(
-        self, state: State, inputs: Floats, moved: Motion, free: tuple[Floats, Floats, Floats]
-    ) -> State:
-        driven = moved.q, moved.rate, moved.acceleration
-        u, v, a = (spread(self.system, x, q) for x, q in zip(free, driven, strict=True))
-        return self._state(
-            inputs,
-            state.k + 1,
-            u=u,
-            v=v,
-            a=a,
-            numbers=self.reactions.numbers(u, v, a, inputs[self._drives :]),
-            extra=moved,
-            failure=self._failure(state.k, u),
-        )
+        v = half + h / 2 * a
+        numbers = self.forces(u, v, a, moved)
+        return State(k, Moving(u, v, a, moved), self._failure(k, u), numbers=numbers)
 
     def _failure(self, k: int, u: Floats) -> tuple[Ending, str] | None:
         times = self.settings.dt / self.limit
         over = f"dt {self.settings.dt:.3g} s is {times:.4g} times the critical step "
         over += f"{self.limit:.4g} s ({self.settings.treatment})"
-        if k == 0 and times > 1 + _ROUNDING and self.settings.beyond_limit == "refuse":
+        if k == 1 and times > 1 + _ROUNDING and self.settings.beyond_limit == "refuse":
             return "refused", f"{over}; take a smaller dt, or beyond_limit=run to see it diverge"
         if not float(np.abs(u).max()) <= _RUNAWAY * self.size:
-            return "diverged", f"step {k + 1}: displacements over {_RUNAWAY:g} body sizes; {over}"
+            return "diverged", f"step {k}: displacements over {_RUNAWAY:g} body sizes; {over}"
         return None

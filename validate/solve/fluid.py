@@ -4,7 +4,8 @@ All work on the response columns: u = sum_a z_a u_a with z = (drives, pressures)
 volume is a cubic polynomial in z (fixed normals: exact, not a series) and needs no facets.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear import LinearStepper, condensed
-from validate.solve.types import Scheme, State, Stepper
+from validate.solve.types import Ending, State, Stepper
 
+_COLUMNS = Handles(("linear",), inertia=False, cavities=True, loads=False, contact=GLUED)
 _NEWTON_STEPS = 30
 _ROUNDING = 4e-15  # relative volume error that rounding alone leaves
 
@@ -24,7 +27,10 @@ _ROUNDING = 4e-15  # relative volume error that rounding alone leaves
 class NoFluid:
     """The cavity is empty: gauge pressure zero, its volume changes freely."""
 
+    handles: ClassVar[Handles] = _COLUMNS
+
     def prepare(self, system: System) -> Stepper:
+        require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
@@ -39,6 +45,8 @@ class ExactPressure:
     Departures from paper 000: eq 10 is replaced by the root it tends to; no tolerance, no gain.
     """
 
+    handles: ClassVar[Handles] = _COLUMNS
+
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
 
     def __post_init__(self) -> None:
@@ -46,6 +54,7 @@ class ExactPressure:
             raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
 
     def prepare(self, system: System) -> Stepper:
+        require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
@@ -61,12 +70,15 @@ class PressureLoop:
     `warm_start` begins each step at the last pressure, as the haptic loop does.
     """
 
+    handles: ClassVar[Handles] = _COLUMNS
+
     gain: float | None = quantity(None, "Pa", "Kp; none: tuned on the volume's response")
     tolerance: float = quantity(0.01, "1", "|1 - V/V0| at which it stops")
     max_updates: int = quantity(100, "1", "of the pressure in a step")
     warm_start: bool = quantity(True, "1", "begin at the last step's pressure")
 
     def prepare(self, system: System) -> Stepper:
+        require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
@@ -114,15 +126,16 @@ def _real_roots(polynomial: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class _Settling(LinearStepper):
-    def _settled(self, z: Floats, updates: int) -> State:
+    def _settled(self, k: int, z: Floats, updates: int, ratios: Floats | None = None) -> State:
         """The state of a root z; a failure when it is not on the branch that begins at P = 0."""
-        if _least_slope(self.responses.volumes, z, self.responses.drives) > 0:
-            return self._state(z[1:], updates)
+        drives = self.responses.drives
+        if _least_slope(self.responses.volumes, z, drives) > 0:
+            return self._state(k, z, updates, ratios=ratios)
         why = (
-            f"pressures {z[self.responses.drives + 1 :].tolist()} Pa are a spurious root: between "
-            "zero and there the volume falls as pressure grows; check the gain's sign and the load"
+            f"pressures {z[drives + 1 :].tolist()} Pa are a spurious root: between zero and there "
+            "the volume falls as pressure grows; check the gain's sign and the load"
         )
-        return self._state(z[1:], updates, ("not_converged", why))
+        return self._state(k, z, updates, ("not_converged", why), ratios)
 
 
 def _rises(a: float, b: float, c: float, P: float) -> bool:
@@ -148,17 +161,18 @@ def _least_slope(forms: Floats, z: Floats, drives: int) -> float:
 
 @dataclass(frozen=True)
 class DryStepper(LinearStepper):
-    def step(self, state: State, drives: Floats) -> State:
-        return self._state(np.concatenate([drives, np.zeros_like(state.pressures)]), 0)
+    def step(self, state: State, inputs: Floats) -> State:
+        still = np.zeros(len(self.responses.volumes))
+        return self._state(state.k + 1, np.concatenate([[1.0], inputs, still]), 0)
 
 
 @dataclass(frozen=True)
 class ExactStepper(_Settling):
     volume_ratio: float
 
-    def step(self, state: State, drives: Floats) -> State:
+    def step(self, state: State, inputs: Floats) -> State:
         one = len(self.responses.volumes) == 1
-        return self._one_cavity(state, drives) if one else self._cavities(state, drives)
+        return self._one_cavity(state, inputs) if one else self._cavities(state, inputs)
 
     def _one_cavity(self, state: State, drives: Floats) -> State:
         """Newton on the scalar cubic in P: with the drives fixed its coefficients are numbers."""
@@ -166,10 +180,11 @@ class ExactStepper(_Settling):
         z = np.concatenate([[1.0], drives, [0.0]])
         W = form @ z
         y = W @ z
-        target = self.volume_ratio * float(form[0, 0, 0])
+        V0 = float(form[0, 0, 0])
+        target = self.volume_ratio * V0
         a, b, c = float(form[p, p, p]), 3 * float(W[p, p]), 3 * float(y[p])
         d = float(y @ z) - target
-        P, failed = float(state.pressures[0]), ""
+        P, failed = float(state.inner.z[p - 1]), ""
         for updates in range(_NEWTON_STEPS):
             error = ((a * P + b) * P + c) * P + d
             slope = (3 * a * P + 2 * b) * P + c
@@ -185,28 +200,27 @@ class ExactStepper(_Settling):
             failed = f"error {error / target:.2%} after {updates} Newton steps"
         elif not _rises(a, b, c, P):
             failed = f"P = {P:.4g} Pa is a spurious root: volume falls as pressure grows before it"
-        if failed:
-            why = f"no pressure keeps the volume: {failed}"
-            return self._state(z[1:], updates, ("not_converged", why))
-        return self._state(z[1:], updates)
+        ratio = np.array([(((a * P + b) * P + c) * P + d + target) / V0])
+        why: tuple[Ending, str] = ("not_converged", f"no pressure keeps the volume: {failed}")
+        return self._state(state.k + 1, z, updates, why if failed else None, ratio)
 
     def _cavities(self, state: State, drives: Floats) -> State:
         """Newton on all volumes together; one cavity's pressure changes the others' volumes."""
         forms, k = self.responses.volumes, self.responses.drives
         target = self.volume_ratio * self.responses.rest_volumes
-        z = np.concatenate([[1.0], drives, state.pressures])
+        z = np.concatenate([[1.0], drives, state.inner.z[k:]])
         for updates in range(_NEWTON_STEPS):
             slopes = forms @ z @ z
             error = slopes @ z - target
             if np.abs(error / target).max(initial=0.0) <= _ROUNDING:
-                return self._settled(z, updates)
+                return self._settled(state.k + 1, z, updates)
             step = np.linalg.solve(3 * slopes[:, k + 1 :], error)
             z[k + 1 :] -= step
             if np.abs(step).max() <= 1e-14 * np.abs(z[k + 1 :]).max():
-                return self._settled(z, updates + 1)
+                return self._settled(state.k + 1, z, updates + 1)
         worst = float(np.abs(error / target).max())
         why = f"no pressure keeps the volume: error {worst:.2%} after {_NEWTON_STEPS} Newton steps"
-        return self._state(z[1:], _NEWTON_STEPS, ("not_converged", why))
+        return self._state(state.k + 1, z, _NEWTON_STEPS, ("not_converged", why))
 
 
 @dataclass(frozen=True)
@@ -214,26 +228,24 @@ class LoopStepper(_Settling):
     gains: Floats
     settings: PressureLoop
 
-    def step(self, state: State, drives: Floats) -> State:
-        k, V0 = self.responses.drives, self.responses.rest_volumes
-        start = state.pressures if self.settings.warm_start else np.zeros_like(state.pressures)
-        z = np.concatenate([[1.0], drives, start])
-        last = np.inf
+    def step(self, state: State, inputs: Floats) -> State:
+        volumes, V0 = self.responses.volumes, self.responses.rest_volumes
+        k, last = self.responses.drives, np.inf
+        start = state.inner.z[k:] if self.settings.warm_start else np.zeros(len(self.gains))
+        z = np.concatenate([[1.0], inputs, start])
         for updates in range(self.settings.max_updates + 1):
-            error = 1 - (self.responses.volumes @ z @ z @ z) / V0
+            ratios = (volumes @ z @ z @ z) / V0
+            error = 1 - ratios
             worst = float(np.abs(error).max(initial=0.0))
             if worst <= self.settings.tolerance or last <= worst <= _ROUNDING:
-                return self._settled(z, updates)
+                return self._settled(state.k + 1, z, updates, ratios)
             if not worst < 1e3:
                 why = f"volume error {worst:.1e} after {updates} updates, gain too large"
-                return self._state(state.inputs, updates, ("diverged", why))
+                return replace(state, updates=updates, failure=("diverged", why))
             z[k + 1 :] += self.gains * error
             last = worst
         why = (
             f"volume error {worst:.2%} after {self.settings.max_updates} updates, tolerance "
             f"{self.settings.tolerance:.2%}, gain {self.gains.tolist()} Pa"
         )
-        return self._state(z[1:], self.settings.max_updates, ("not_converged", why))
-
-
-LINEAR: tuple[type[Scheme], ...] = (NoFluid, ExactPressure, PressureLoop)
+        return self._state(state.k + 1, z, self.settings.max_updates, ("not_converged", why))

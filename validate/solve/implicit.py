@@ -8,9 +8,9 @@ what paper 003's rates for the plain finite elements correspond to.
 Departures: stiffness damping is that of the body at rest, not of K(U).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy import sparse
@@ -23,8 +23,9 @@ from validate.fem.hyperelastic import Body
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
-from validate.solve.central import lumped_damping, numbered
-from validate.solve.types import NO_SURFACE, NOTHING, Ending, State, Stepper, Trace
+from validate.solve.central import lumped_damping
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.types import Ending, State, Stepper
 
 RateRule = Literal["average", "backward_euler", "static"]
 _HALVINGS = 6  # of a Newton correction that does not lower the residual
@@ -37,6 +38,8 @@ class NewtonDynamics:
 
     `cuts`: for load steps of statics; a dynamic step fails at once: take a smaller dt.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
 
     dt: float = quantity(0.01, "s", "time step")
     rule: RateRule = quantity("average", "1", "how v and a follow u; static: neither")
@@ -56,8 +59,7 @@ class NewtonDynamics:
         """Raises `SceneError` for a linear law, cavities, regions, or a missing density, and in
         statics for a body that can move rigidly."""
         scene = system.scene
-        if scene.cavities:
-            raise SceneError("Newton dynamics knows no fluid in cavities; use StaticNewton")
+        require_handled(scene, self)
         N = len(system.moves)
         M = C = sparse.csr_array((N, N))
         if self.rule != "static" and self.mass == "lumped":
@@ -85,6 +87,16 @@ class _Rates:
 
 
 @dataclass(frozen=True)
+class Settled:
+    """Displacements, velocities, accelerations (N,) in balance under the inputs (k + l,)."""
+
+    u: Floats
+    v: Floats
+    a: Floats
+    inputs: Floats
+
+
+@dataclass(frozen=True)
 class ImplicitStepper:
     """`M` kg and `C` N s/m (N, N) are zero in statics; `order` (free,) is that of elimination."""
 
@@ -99,35 +111,39 @@ class ImplicitStepper:
     def scene(self) -> Scene:
         return self.system.scene
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        forces = {f"{d.name}.force": "N" for d in self.scene.drives}
+        return forces | {"energy.strain": "J", "energy.kinetic": "J"}
+
     def rest(self) -> State:
         u, inputs = np.zeros(len(self.system.moves)), np.zeros(len(self.scene.inputs))
-        numbers = self._numbers(u, u, u, inputs)
-        return State(inputs, NOTHING, 0, NO_SURFACE, u=u, numbers=numbers, v=u, a=u)
+        return State(0, Settled(u, u, u, inputs), numbers=self._numbers(u, u, u, inputs))
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
         at, k = replace(state, updates=0), state.k + 1
-        done, size = 0.0, 1.0
+        done, size, begin = 0.0, 1.0, state.inner.inputs
         static = self.settings.rule == "static"
         while done < 1:
             share = min(done + size, 1.0)
-            new = self._solved(at, state.drives + share * (inputs - state.drives))
+            new = self._solved(at, begin + share * (inputs - begin))
             if new.failure is None:
                 at, done = replace(new, updates=at.updates + new.updates), share
             elif static and size > 0.5**self.settings.cuts:
                 size /= 2
             else:
                 return replace(state, failure=_stopped(new, k, done))
-        return replace(at, k=k, drives=inputs)
+        return replace(at, k=k, inner=replace(at.inner, inputs=inputs))
 
     def _solved(self, state: State, inputs: Floats) -> State:
         """One load step by Newton from the state's displacements."""
-        assert state.u is not None
-        rates, drives = self._rates(state), len(self.scene.drives)
+        last: Settled = state.inner
+        rates, drives = self._rates(last), len(self.scene.drives)
         f, free = self.system.loads @ inputs[drives:], self.system.free
-        move = self.system.moves @ (inputs - state.drives)[:drives]
-        u = state.u
-        residual, acting = self._residual(u, state, rates, f)
+        move = self.system.moves @ (inputs - last.inputs)[:drives]
+        u = last.u
+        residual, acting = self._residual(u, last, rates, f)
         for iteration in range(self.settings.max_iterations + 1):
             small = self.settings.tolerance * acting + _ROUNDING * self.body.unit_force
             if np.linalg.norm(residual[free]) <= small and not move.any():
@@ -141,26 +157,23 @@ class ImplicitStepper:
             if negative:
                 words = f"tangent not positive definite ({negative} negative pivots)"
                 return replace(state, failure=("not_converged", words))
-            u, residual, acting = self._searched(u, correction, residual, state, rates, f, move)
+            u, residual, acting = self._searched(u, correction, residual, last, rates, f, move)
             move = np.zeros_like(move)
         size = float(np.linalg.norm(residual[free])) / acting if acting else np.inf
         words = f"residual {size:.1e} after {self.settings.max_iterations} iterations"
         return replace(state, failure=("not_converged", words))
 
-    def _rates(self, state: State) -> _Rates:
-        assert state.v is not None
-        assert state.a is not None
+    def _rates(self, last: Settled) -> _Rates:
         dt, zero = self.settings.dt, np.zeros(len(self.system.moves))
         if self.settings.rule == "average":
-            return _Rates(2 / dt, 4 / dt**2, -state.v, -4 / dt * state.v - state.a)
+            return _Rates(2 / dt, 4 / dt**2, -last.v, -4 / dt * last.v - last.a)
         if self.settings.rule == "backward_euler":
-            return _Rates(1 / dt, 1 / dt**2, zero, -state.v / dt)
+            return _Rates(1 / dt, 1 / dt**2, zero, -last.v / dt)
         return _Rates(0.0, 0.0, zero, zero)
 
-    def _residual(self, u: Floats, state: State, rates: _Rates, f: Floats) -> tuple[Floats, float]:
+    def _residual(self, u: Floats, last: Settled, rates: _Rates, f: Floats) -> tuple[Floats, float]:
         """R + C v + M a - f (N,) N, and the size of what acts."""
-        assert state.u is not None
-        d = u - state.u
+        d = u - last.u
         R, inertia = self.body.force(u), self.M @ (rates.q * d + rates.a)
         acting = max(float(np.linalg.norm(x)) for x in (R, inertia, f))
         return R + inertia + self.C @ (rates.p * d + rates.v) - f, acting
@@ -177,7 +190,7 @@ class ImplicitStepper:
         return correction, factor.negative_pivots
 
     def _searched(
-        self, u: Floats, correction: Floats, residual: Floats, state: State, rates: _Rates,
+        self, u: Floats, correction: Floats, residual: Floats, last: Settled, rates: _Rates,
         f: Floats, move: Floats,
     ) -> tuple[Floats, Floats, float]:  # fmt: skip
         """The correction, halved while it raises the residual or inverts cells.
@@ -187,7 +200,7 @@ class ImplicitStepper:
         free, before = self.system.free, np.linalg.norm(residual[self.system.free])
         for share in 0.5 ** np.arange(_HALVINGS + 1):
             new = u + move + share * (correction - move)
-            after, acting = self._residual(new, state, rates, f)
+            after, acting = self._residual(new, last, rates, f)
             better = np.linalg.norm(after[free]) < before or move.any()
             if better and not self.body.inverted(new):
                 break
@@ -196,15 +209,14 @@ class ImplicitStepper:
     def _found(
         self, state: State, u: Floats, rates: _Rates, inputs: Floats, iterations: int
     ) -> State:
-        assert state.u is not None
-        d = u - state.u
+        d = u - state.inner.u
         v, a = rates.p * d + rates.v, rates.q * d + rates.a
         bad = self.body.inverted(u)
         if bad:
             words = f"{bad.count} of {bad.points} elements inverted (det F <= 0)"
             return replace(state, failure=("invalid", words))
         numbers = self._numbers(u, v, a, inputs)
-        return replace(state, drives=inputs, updates=iterations, u=u, v=v, a=a, numbers=numbers)
+        return State(state.k, Settled(u, v, a, inputs), None, iterations, numbers)
 
     def _numbers(self, u: Floats, v: Floats, a: Floats, inputs: Floats) -> Mapping[str, float]:
         """Plate forces N on the whole body, compression positive, with inertia; energies J."""
@@ -218,12 +230,8 @@ class ImplicitStepper:
 
     def field(self, state: State) -> Floats:
         """Displacements (n, 3) m of all nodes."""
-        assert state.u is not None
-        return state.u.reshape(-1, 3)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Inputs, plate forces N, strain and kinetic energy J of every step."""
-        return numbered(self.scene, self.rest().numbers, states)
+        u: Floats = state.inner.u
+        return u.reshape(-1, 3)
 
 
 def _stopped(failed: State, k: int, done: float) -> tuple[Ending, str]:

@@ -1,7 +1,8 @@
 """Steppers that superpose response columns: what all linear quasi-static schemes share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,57 +10,76 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import Responses
 from validate.scene.scene import Scene
-from validate.solve.types import Ending, State, Trace
+from validate.solve.types import Ending, State
+
+
+@dataclass(frozen=True)
+class Superposed:
+    """Amounts z (m,) of the columns, drives m and pressures Pa, and what a haptic tick needs: the
+    displacements `surface` (s d,) m of the nodes of cavities and driven plates."""
+
+    z: Floats
+    surface: Floats
 
 
 @dataclass(frozen=True)
 class LinearStepper:
-    """u = sum_a z_a u_a with z = (drives, pressures); `kept` (s, d, m) are the columns u_a at the
-    nodes of the cavities and driven plates, the condensed model that a step evaluates."""
+    """u = sum_a z_a u_a with z = (drives, pressures); `rows` (s d + k, m) are the columns u_a at
+    the nodes of the cavities and driven plates, the condensed model that a step evaluates, and the
+    plates' forces."""
 
     responses: Responses
-    kept: Floats
+    rows: Floats
 
     @property
     def scene(self) -> Scene:
         return self.responses.scene
 
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        cavities = [c.name for c in self.scene.cavities]
+        return (
+            {f"{d.name}.force": "N" for d in self.scene.drives}
+            | {f"{name}.pressure": "Pa" for name in cavities}
+            | {f"{name}.volume_ratio": "1" for name in cavities}
+        )
+
     def rest(self) -> State:
-        zeros = np.zeros(self.kept.shape[2])
-        k = self.responses.drives
-        return State(zeros[:k], zeros[k:], 0, np.zeros(self.kept.shape[:2]))
+        return self._state(0, np.eye(self.rows.shape[1] + 1)[0], 0)
 
     def _state(
-        self, inputs: Floats, updates: int, failure: tuple[Ending, str] | None = None
+        self,
+        k: int,
+        z: Floats,
+        updates: int,
+        failure: tuple[Ending, str] | None = None,
+        ratios: Floats | None = None,
     ) -> State:
-        k = self.responses.drives
-        return State(inputs[:k], inputs[k:], updates, self.kept @ inputs, failure)
+        """From (1, z) (1 + m,), and the cavities' V/V0 where they are known already."""
+        drives = self.responses.drives
+        if ratios is None:
+            ratios = self.ratios(z)
+        moved, plates = self.rows @ z[1:], len(self.rows) - drives
+        found = (*moved[plates:].tolist(), *z[drives + 1 :].tolist(), *ratios.tolist())
+        numbers = dict(zip(self.units, found, strict=True))
+        return State(k, Superposed(z[1:], moved[:plates]), failure, updates, numbers)
+
+    def ratios(self, z: Floats) -> Floats:
+        """V/V0 (c,) at (1, z) (1 + m,)."""
+        return np.asarray(self.responses.volumes @ z @ z @ z / self.responses.rest_volumes)
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
-        return np.asarray(np.tensordot(state.inputs, self.responses.fields, 1))
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Drives, plate forces, pressures and volumes of every step."""
-        r = self.responses
-        z = np.array([s.inputs for s in states]).reshape(len(states), r.fields.shape[0])
-        traces = {}
-        for j, drive in enumerate(r.scene.drives):
-            traces[f"{drive.name}.displacement"] = Trace(z[:, j], "m")
-            traces[f"{drive.name}.force"] = Trace(z @ r.reactions[j], "N")
-        one = np.hstack([np.ones((len(z), 1)), z])
-        for i, cavity in enumerate(r.scene.cavities):
-            V = np.einsum("abc,ta,tb,tc->t", r.volumes[i], one, one, one, optimize=True)
-            traces[f"{cavity.name}.pressure"] = Trace(z[:, r.drives + i], "Pa")
-            traces[f"{cavity.name}.volume_ratio"] = Trace(V / r.rest_volumes[i], "1")
-        return traces
+        return np.asarray(np.tensordot(state.inner.z, self.responses.fields, 1))
 
 
 def condensed(responses: Responses) -> Floats:
-    """Columns at the nodes of the cavities and driven plates: the condensed model."""
+    """Rows at the nodes of the cavities and driven plates, then the plates' forces."""
     scene = responses.scene
     sets = [c.facets for c in scene.cavities] + [d.facets for d in scene.drives]
     if not sets:
         raise SceneError("scene without drive and cavity: nothing moves")
     nodes = np.unique(np.concatenate([scene.mesh.facet_nodes(name) for name in sets]))
-    return np.ascontiguousarray(responses.fields[:, nodes].transpose(1, 2, 0))
+    kept = responses.fields[:, nodes].reshape(len(responses.fields), -1).T
+    forces = responses.reactions.reshape(-1, kept.shape[1])
+    return np.ascontiguousarray(np.vstack([kept, forces]))

@@ -1,5 +1,6 @@
 """The loop over steps, written once: it steps, times, traces and stops where a step fails."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -8,25 +9,29 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.fem.locate import Rows, barycentric_rows
-from validate.solve.types import Outcome, Run, State, Stepper, StepTimes, Trace, Uncertain
+from validate.scene.scene import Scene, Weight
+from validate.solve.types import Outcome, Run, Stepper, StepTimes, Trace, Uncertain
 
 _UNTIMED = 20  # first steps left out of the step times: caches and allocators settle
 _AXES = "xyz"
 
 
 def march(
-    method: str, stepper: Stepper, t: Floats, drives: Floats, at: Ints, setup_s: float
+    method: str, stepper: Stepper, t: Floats, inputs: Floats, at: Ints, setup_s: float
 ) -> Run:
     """Steps through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`.
 
-    Inputs are drives in m, then loads in N. The scene's probes are traced at every step.
+    Inputs are drives in m, then loads in N. Inputs, the numbers of the states and the scene's
+    probes are traced at every step.
     """
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
-    walk, outcome = _walk(stepper, drives, frozenset(at.tolist()))
-    done = len(walk.states)
-    updates = np.array([float(s.updates) for s in walk.states])
-    traces = {"updates": Trace(updates, "1")} | stepper.traces(walk.states)
+    walk, outcome = _walk(stepper, inputs, frozenset(at.tolist()))
+    done = len(walk.updates)
+    traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
+    traces |= _given(stepper.scene, inputs[:done])
+    for name, unit in stepper.units.items():
+        traces[name] = Trace(np.array([numbers[name] for numbers in walk.numbers]), unit)
     traces |= _probed(stepper, walk.probes)
     seconds = np.array(walk.seconds)
     seconds = seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds[:done]
@@ -38,31 +43,46 @@ def march(
 
 @dataclass(frozen=True)
 class _Walk:
-    """What is kept of the steps: light states, seconds, probes (p, d) m, fields at the frames."""
+    """What is kept of the steps: numbers, seconds, probes (p, d) m, and fields at the frames."""
 
-    states: list[State] = field(default_factory=list)
+    updates: list[int] = field(default_factory=list)
+    numbers: list[Mapping[str, float]] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     probes: list[Floats] = field(default_factory=list)
     fields: list[Floats] = field(default_factory=list)
     sd: list[Floats] = field(default_factory=list)
 
 
-def _walk(stepper: Stepper, drives: Floats, at: frozenset[int]) -> tuple[_Walk, Outcome]:
+def _walk(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> tuple[_Walk, Outcome]:
     walk, state, rows = _Walk(), stepper.rest(), _probe_rows(stepper)
-    for i, value in enumerate(drives):
+    for i, value in enumerate(inputs):
         start = perf_counter()
         state = stepper.step(state, value)
         walk.seconds.append(perf_counter() - start)
         if state.failure:
             return walk, Outcome(state.failure[0], i, state.failure[1])
-        walk.states.append(state.light)
+        walk.updates.append(state.updates)
+        walk.numbers.append(state.numbers)
         if rows is not None:
             walk.probes.append(rows.apply(stepper.field(state)))
         if i in at:
             walk.fields.append(stepper.field(state))
             if isinstance(stepper, Uncertain):
                 walk.sd.append(stepper.sd(state))
-    return walk, Outcome("finished", len(drives))
+    return walk, Outcome("finished", len(inputs))
+
+
+def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
+    """`<drive>.displacement` m, `<load>.force` N (with `per_node` that at each node, else the
+    total), `<weight>.acceleration` m/s^2."""
+    traces = {
+        f"{d.name}.displacement": Trace(y, "m")
+        for d, y in zip(scene.drives, inputs.T, strict=False)
+    }
+    for load, y in zip(scene.loads, inputs.T[len(scene.drives) :], strict=False):
+        kind, unit = ("acceleration", "m/s^2") if isinstance(load, Weight) else ("force", "N")
+        traces[f"{load.name}.{kind}"] = Trace(y, unit)
+    return traces
 
 
 def _probe_rows(stepper: Stepper) -> Rows | None:

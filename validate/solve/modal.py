@@ -9,8 +9,9 @@ Departures: a cut-off cluster of equal frequencies is taken whole, so there may 
 asked for. The static correction has no rates: it gives no share of damping and inertia forces.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -19,23 +20,11 @@ from validate.errors import SceneError
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import (
-    InertialStepper,
-    Reactions,
-    StartName,
-    reactions,
-    require_linear,
-    spread,
-)
+from validate.solve.dynamic import InertialStepper, Reactions, reactions
+from validate.solve.excitation import Excitation, Inputs, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.modal_walk import Walk, exact_walk, walk_by_rule
-from validate.solve.newmark_rule import (
-    Excitation,
-    Motion,
-    RuleName,
-    excitation,
-    require_start,
-    rule_of,
-)
+from validate.solve.newmark_rule import RuleName, require_start, rule_of
 from validate.solve.types import State, Stepper
 
 
@@ -47,6 +36,10 @@ class Modal:
     its end value; the others are Newmark's rules per mode. `a0` as in `Newmark`: with
     "equilibrium" the loads of the first step already act at t = 0, with "zero" they rise there.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(0.002, "s", "time step")
     modes: int | None = quantity(None, "1", "lowest modes kept; none: all")
@@ -64,7 +57,7 @@ class Modal:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for laws at large strain, cavities, damping that couples modes."""
-        require_linear(system)
+        require_handled(system.scene, self)
         modes = modes_of(system, self.modes)
         exact = self.propagate in ("linear", "constant")
         name: RuleName = "average" if exact else self.propagate  # type: ignore[assignment]
@@ -73,9 +66,10 @@ class Modal:
             require_start(system, rule, "consistent")
         excited = excitation(system, rule)
         walk = exact_walk(modes, self.dt, self.propagate) if exact else walk_by_rule(modes, rule)
-        rest = _left_out(system, modes, excited) if self.static_correction else None
+        columns = _columns(excited)
+        rest = left_out(system, modes, columns) if self.static_correction else None
         rows, at_once = reactions(system), self.a0 == "equilibrium"
-        forces = np.ascontiguousarray(modes.shapes.T @ _columns(excited))
+        forces = np.ascontiguousarray(modes.shapes.T @ columns)
         projected = _projected(system, rows, modes)
         return ModalStepper(system, rows, modes, excited, walk, forces, rest, projected, at_once)
 
@@ -85,9 +79,8 @@ def _columns(excited: Excitation) -> Floats:
     return np.hstack([excited.loads, -excited.stiffness, -excited.damping, -excited.mass])
 
 
-def _left_out(system: System, modes: Modes, excited: Excitation) -> Floats:
-    """Static displacements (m, l + 3 k) of the modes that are cut off, per unit of excitation."""
-    forces = _columns(excited)
+def left_out(system: System, modes: Modes, forces: Floats) -> Floats:
+    """Static displacements (m, c) of the modes that are cut off, under forces (m, c) N."""
     if modes.shapes.shape[0] == modes.shapes.shape[1]:
         return np.zeros_like(forces)
     kept = modes.shapes @ ((modes.shapes.T @ forces) / modes.omega[:, None] ** 2)
@@ -103,12 +96,12 @@ def _projected(system: System, rows: Reactions, modes: Modes) -> tuple[Floats, F
 
 @dataclass(frozen=True)
 class ModalState:
-    """Modal coordinates, rates, accelerations (r,), the drives' motion, statics (l + 3 k,)."""
+    """Modal coordinates, rates, accelerations (r,); inputs, also as one `signal` (l + 3 k,)."""
 
     q: Floats
     v: Floats
     a: Floats
-    motion: Motion
+    inputs: Inputs
     signal: Floats
 
 
@@ -116,68 +109,61 @@ class ModalState:
 class ModalStepper(InertialStepper):
     """States keep modal coordinates; the field is formed when it is asked for.
 
-    `forces` (r, l + 3 k) are those on the modes, `left_out` (m, l + 3 k) the displacements of the
-    modes cut off, `projected` (k, r) the drives' rows of K, C, M on the shapes.
+    `forces_on` (r, l + 3 k) are those on the modes, `left_out` (m, l + 3 k) the displacements of
+    the modes cut off, `projected` (k, r) the drives' rows of K, C, M on the shapes.
     """
 
     modes: Modes
     excitation: Excitation
     walk: Walk
-    forces: Floats
+    forces_on: Floats
     left_out: Floats | None
     projected: tuple[Floats, Floats, Floats]
     equilibrium: bool
 
     def rest(self) -> State:
-        r, motion = len(self.modes.omega), self.excitation.rest()
-        zeros, inputs = np.zeros(r), np.zeros(len(self.scene.inputs))
-        signal = np.zeros(self.forces.shape[1])
-        start = ModalState(zeros, zeros, zeros, motion, signal)
-        numbers = self.reactions.named(np.zeros(self._drives))
-        return self._state(inputs, 0, numbers=numbers, extra=start)
+        zeros, signal = np.zeros(len(self.modes.omega)), np.zeros(self.forces_on.shape[1])
+        return State(0, ModalState(zeros, zeros, zeros, self.excitation.rest(), signal))
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The state at the end of a step; `drives` are the inputs there, loads included."""
-        last: ModalState = state.extra
-        k, a = self._drives, last.a
-        moved = self.excitation.moved(last.motion, drives[:k])
-        new, old = _signal(drives[k:], moved), last.signal
-        if state.k == 0 and self.equilibrium:
+    def step(self, state: State, inputs: Floats) -> State:
+        """The state at the end of a step; `inputs` are those there, loads included."""
+        last: ModalState = state.inner
+        k, a, old = state.k + 1, last.a, last.signal
+        moved = self.excitation.moved(k, inputs, last.inputs)
+        new = _signal(moved)
+        if k == 1 and self.equilibrium:
             old = old.copy()
-            old[: len(drives) - k] = drives[k:]
-            a = self.forces @ old
-        f_old, f_new = self._ends(old, new)
-        q, v, a = self.walk.step(last.q, last.v, a, f_old, f_new)
-        extra = ModalState(q, v, a, moved, new)
-        numbers = self._forces_of_drives(extra, drives[k:]) if k else {}
-        return self._state(drives, state.k + 1, numbers=numbers, extra=extra)
+            old[: len(moved.loads)] = moved.loads
+            a = self.forces_on @ old
+        q, v, a = self.walk.step(last.q, last.v, a, *self._ends(old, new))
+        inner = ModalState(q, v, a, moved, new)
+        return State(k, inner, numbers=self._forces_of_drives(inner))
 
     def _ends(self, old: Floats, new: Floats) -> tuple[Floats, Floats]:
         """Modal forces at both ends; for a rule the one force of its balance, given as new."""
         rule = self.walk.rule
         if rule is None:
-            return self.forces @ old, self.forces @ new
+            return self.forces_on @ old, self.forces_on @ new
         mixed = rule.weighted(new, old)
-        if self._drives and rule.am != 0:
-            mixed[-self._drives :] = rule.weighted_a(new, old)[-self._drives :]
-        f = self.forces @ mixed
+        if self.reactions.names and rule.am != 0:
+            k = len(self.reactions.names)
+            mixed[-k:] = rule.weighted_a(new, old)[-k:]
+        f = self.forces_on @ mixed
         return f, f
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
-        u = spread(self.system, self._free(state.extra), state.extra.motion.q)
-        return u.reshape(self.scene.mesh.nodes.shape)
-
-    def _free(self, modal: ModalState) -> Floats:
+        modal: ModalState = state.inner
         u = self.modes.shapes @ modal.q
-        return u if self.left_out is None else u + self.left_out @ modal.signal
+        u = u if self.left_out is None else u + self.left_out @ modal.signal
+        return self.nodal(u, modal.inputs.q)
 
-    def _forces_of_drives(self, modal: ModalState, loads: Floats) -> dict[str, float]:
-        rows, (K, C, M), motion = self.reactions, self.projected, modal.motion
+    def _forces_of_drives(self, modal: ModalState) -> Mapping[str, float]:
+        rows, (K, C, M), of = self.reactions, self.projected, modal.inputs
+        if not rows.names:
+            return {}
         moves = self.system.moves
-        driven = rows.numbers(
-            moves @ motion.q, moves @ motion.rate, moves @ motion.acceleration, loads
-        )
+        driven = rows.numbers(moves @ of.q, moves @ of.rate, moves @ of.acceleration, of.loads)
         forces = K @ modal.q + C @ modal.v + M @ modal.a
         if self.left_out is not None:
             forces = forces + rows.K[:, self.system.free] @ (self.left_out @ modal.signal)
@@ -185,5 +171,5 @@ class ModalStepper(InertialStepper):
         return {name: driven[name] + shares[name] for name in driven}
 
 
-def _signal(loads: Floats, motion: Motion) -> Floats:
-    return np.concatenate([loads, motion.q, motion.rate, motion.acceleration])
+def _signal(inputs: Inputs) -> Floats:
+    return np.concatenate([inputs.loads, inputs.q, inputs.rate, inputs.acceleration])

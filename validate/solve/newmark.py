@@ -11,7 +11,7 @@ ring for ever. Show none of them; take backward Euler or generalised alpha, or r
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -20,27 +20,18 @@ from validate.errors import SceneError
 from validate.fem.matrices import DampingTerms, MassName
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic import (
-    InertialStepper,
-    StartName,
-    reactions,
-    require_linear,
-    spread,
-    starting_accelerations,
-)
+from validate.solve.dynamic import Moving, MovingStepper, reactions
+from validate.solve.excitation import DriveRates, StartName, excitation
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
 from validate.solve.newmark_rule import (
-    DriveRates,
-    Excitation,
-    Motion,
     Propagation,
     RuleName,
-    excitation,
     propagation,
     require_start,
     rule_of,
 )
-from validate.solve.types import State, Stepper
+from validate.solve.types import Ending, State, Stepper
 
 UpdateName = Literal["newmark", "misprinted"]
 
@@ -55,6 +46,10 @@ class Newmark:
     accelerations of prescribed unknowns by backward differences of the drives, or by the rule,
     which makes average acceleration ring with growing amplitude on a ramp.
     """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
+    )
 
     dt: float = quantity(0.002, "s", "time step")
     rule: RuleName = quantity("average", "1", "how v and a follow u within a step")
@@ -76,7 +71,7 @@ class Newmark:
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
-        require_linear(system)
+        require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt, self.rho_inf)
         terms = self.damping_terms
         if self.a0 == "equilibrium" and system.scene.loads:
@@ -84,41 +79,30 @@ class Newmark:
         return NewmarkStepper(
             system,
             reactions(system, self.mass, terms),
+            excitation(system, rule, self.mass, self.drive_rates, terms, self.a0),
             propagation(system, rule, self.mass, self.solver, terms, self.tolerance),
-            excitation(system, rule, self.mass, self.drive_rates, terms),
-            starting_accelerations(system, self.mass, self.a0),
             self.update == "misprinted",
         )
 
 
 @dataclass(frozen=True)
-class NewmarkStepper(InertialStepper):
-    """`starts` (m, l): accelerations of the body at rest per newton of load, None for a0 = 0."""
-
+class NewmarkStepper(MovingStepper):
     propagation: Propagation
-    excitation: Excitation
-    starts: Floats | None
     misprinted: bool = False
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The state at the end of a step; `drives` are the inputs there, loads included."""
-        assert state.u is not None
-        assert state.v is not None
-        assert state.a is not None
-        k, free = self._drives, self.propagation.free
-        new, old = drives[k:], state.drives[k:]
-        u, v, a = state.u[free], state.v[free], state.a[free]
-        if state.k == 0 and self.starts is not None:
-            old, a = new, self.starts @ new
-        motion = state.extra if isinstance(state.extra, Motion) else self.excitation.rest()
-        moved = self.excitation.moved(motion, drives[:k])
-        f = self.excitation.force(new, old, moved, motion)
+    def step(self, state: State, inputs: Floats) -> State:
+        """The state at the end of a step; `inputs` are those there, loads included."""
+        last: Moving = state.inner
+        u, v, k = last.u, last.v, state.k + 1
+        f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
         solved = self._solved(u, self.propagation.history(u, v, a) + f)
         u_new = solved.x
         v_new, a_new = self.propagation.rates(u_new, u, v, a)
         if self.misprinted:
             u_new = u_new + self.propagation.rule.h * (v_new - v)
-        return self._done(state, drives, moved, solved, (u_new, v_new, a_new))
+        numbers = self.forces(u_new, v_new, a_new, moved)
+        new = Moving(u_new, v_new, a_new, moved)
+        return State(k, new, _failure(k, new, solved), solved.iterations, numbers)
 
     def _solved(self, u: Floats, b: Floats) -> Solved:
         solver = self.propagation.solver
@@ -126,33 +110,11 @@ class NewmarkStepper(InertialStepper):
             return solver.solve_from(b, u)
         return Solved(solver.solve(b), 0, True)
 
-    def _done(
-        self,
-        state: State,
-        inputs: Floats,
-        moved: Motion,
-        solved: Solved,
-        free: tuple[Floats, Floats, Floats],
-    ) -> State:
-        u, v, a = free
-        full_u = spread(self.system, u, moved.q)
-        full_v = spread(self.system, v, moved.rate)
-        full_a = spread(self.system, a, moved.acceleration)
-        numbers = self.reactions.numbers(full_u, full_v, full_a, inputs[self._drives :])
-        failure = None
-        if not np.isfinite(full_a.sum()):
-            failure = ("diverged", f"accelerations are not finite at step {state.k + 1}")
-        elif not solved.converged:
-            why = f"{solved.iterations} iterations leave the residual above the tolerance"
-            failure = ("not_converged", f"step {state.k + 1}: {why}")
-        return self._state(
-            inputs,
-            state.k + 1,
-            u=full_u,
-            v=full_v,
-            a=full_a,
-            numbers=numbers,
-            extra=moved,
-            failure=failure,
-            updates=solved.iterations,
-        )
+
+def _failure(k: int, new: Moving, solved: Solved) -> tuple[Ending, str] | None:
+    if not np.isfinite(new.a.sum()):
+        return "diverged", f"accelerations are not finite at step {k}"
+    if not solved.converged:
+        why = f"{solved.iterations} iterations leave the residual above the tolerance"
+        return "not_converged", f"step {k}: {why}"
+    return None

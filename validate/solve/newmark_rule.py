@@ -22,11 +22,9 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
-from validate.scene.scene import Drive
 from validate.solve.linear_solvers import TOLERANCE, Solver, SolverName, solver_of
 
 RuleName = Literal["average", "backward_euler", "generalised_alpha"]
-DriveRates = Literal["difference", "rule", "given"]
 
 
 @dataclass(frozen=True)
@@ -191,90 +189,3 @@ def _weights(r: Rule) -> tuple[tuple[float, float, float], tuple[float, float, f
     masses = (m * c, m * c * r.h, m * r.b0 / r.b1 - r.am)
     dampings = (w * d, w * (r.h * d - 1) - r.af, w * r.h * (r.h * r.b0 * d - r.g0))
     return masses, dampings, -r.af
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Drives q (k,) m with their rates m/s and accelerations m/s^2 after `steps` steps."""
-
-    q: Floats
-    rate: Floats
-    acceleration: Floats
-    steps: int = 0
-
-
-@dataclass(frozen=True)
-class Excitation:
-    """What inputs do to the free unknowns: columns of loads (m, l) and of drives (m, k).
-
-    Prescribed unknowns are coupled by K, C and M. Their `rates`: "rule" by the rule's formulas
-    (which average acceleration makes ring, growing, on a ramp), "difference" by backward
-    differences: the rate of second order, the acceleration one step late; "given" are the drives'
-    own `speeds`, whose jumps have no acceleration.
-    """
-
-    rule: Rule
-    loads: Floats
-    stiffness: Floats
-    damping: Floats
-    mass: Floats
-    rates: DriveRates = "difference"
-    given: tuple[Drive, ...] = ()
-
-    @property
-    def drives(self) -> int:
-        return int(self.stiffness.shape[1])
-
-    def rest(self) -> Motion:
-        zeros = np.zeros(self.drives)
-        return Motion(zeros, zeros, zeros)
-
-    def moved(self, motion: Motion, q: Floats) -> Motion:
-        """The drives at the end of a step that takes them to q (k,) m."""
-        h, steps = self.rule.h, motion.steps + 1
-        if self.rates == "given":
-            speeds = np.array([_speed(d, steps * h, h) for d in self.given])
-            return Motion(q, speeds, np.zeros_like(speeds), steps)
-        if self.rates == "rule":
-            rates = self.rule.rates(q, motion.q, motion.rate, motion.acceleration)
-            return Motion(q, *rates, steps)
-        mean, last = (q - motion.q) / h, motion.rate - h / 2 * motion.acceleration
-        acceleration = (mean - last) / h
-        return Motion(q, mean + h / 2 * acceleration, acceleration, steps)
-
-    def force(self, new: Floats, old: Floats, moved: Motion, motion: Motion) -> Floats:
-        """Forces (m,) N at the balance of a step from the loads `old` to `new` (l,) N."""
-        r, f = self.rule, self.loads @ self.rule.weighted(new, old)
-        if not self.drives:
-            return np.asarray(f)
-        f = f - self.stiffness @ r.weighted(moved.q, motion.q)
-        f -= self.damping @ r.weighted(moved.rate, motion.rate)
-        f -= self.mass @ r.weighted_a(moved.acceleration, motion.acceleration)
-        return np.asarray(f)
-
-
-def _speed(drive: Drive, t: float, h: float) -> float:
-    """The planned velocity m/s at t, at a jump that behind it; instants as near as 1e-6 h count."""
-    passed = [v for start, v in drive.speeds if start <= t + 1e-6 * h]
-    return passed[-1] if passed else 0.0
-
-
-def excitation(
-    system: System,
-    rule: Rule,
-    mass: MassName = "consistent",
-    rates: DriveRates = "difference",
-    terms: DampingTerms = "full",
-) -> Excitation:
-    """Columns of the system's loads and drives over its free unknowns.
-
-    Raises `SceneError` for rates "given" of a drive without `speeds`.
-    """
-    given = system.scene.drives if rates == "given" else ()
-    for drive in given:
-        if not drive.speeds:
-            raise SceneError(f"drive '{drive.name}' has no speeds; use drive_rates = difference")
-    matrices = system.K, damping_of(system, mass, terms), mass_of(system, mass)
-    K, C, M = (np.ascontiguousarray((X @ system.moves)[system.free]) for X in matrices)
-    loads = np.ascontiguousarray(system.loads[system.free])
-    return Excitation(rule, loads, K, C, M, rates, given)

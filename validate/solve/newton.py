@@ -6,24 +6,24 @@ with the state it led to, so that stepping on from there needs no new one. Resul
 memory within the tolerance only.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
-from validate.solve.types import Ending, State, Stepper, Trace
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.types import Ending, State, Stepper
 
 _VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
 _NEGATIVE, _MADE = "tangent.negative_pivots", "newton.factorisations"
-_NOTHING_DONE = MappingProxyType({_NEGATIVE: 0.0, _MADE: 0.0})
 _HALVINGS = 8  # of a Newton correction in the line search
 
 
@@ -34,6 +34,8 @@ class StaticNewton:
     `contraction` 0 makes a new factorisation at every iteration. `watch`: negative pivots of the
     tangent are counted anew when drives have moved so far.
     """
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
     fluid: Literal["exact", "none"] = quantity("exact", "1", "keeps its volume, or is not there")
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
@@ -55,13 +57,12 @@ class StaticNewton:
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a linear law or a body that can move rigidly."""
         scene = system.scene
-        sets = [c.facets for c in scene.cavities] + [d.facets for d in scene.drives]
-        if not sets:
+        require_handled(scene, self)
+        if not (scene.cavities or scene.drives):
             raise SceneError("scene without drive and cavity: nothing moves")
-        nodes = np.unique(np.concatenate([scene.mesh.facet_nodes(name) for name in sets]))
         problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
         rest = _rest(problem)
-        return NewtonStepper(self, problem, nodes, rest.balance, _Memory(rest))
+        return NewtonStepper(self, problem, replace(rest, factorisations=0), _Memory(rest))
 
 
 @dataclass(frozen=True)
@@ -107,46 +108,61 @@ def _rest(problem: Equilibrium) -> Found:
 
 
 @dataclass(frozen=True)
-class NewtonStepper:
-    """`surface_nodes` (s,) are the nodes that a state's `surface` shows."""
+class Loaded:
+    """Displacements u (N,) m and pressures (c,) Pa in equilibrium under drives (k,) m."""
 
+    u: Floats
+    pressures: Floats
+    drives: Floats
+
+
+@dataclass(frozen=True)
+class NewtonStepper:
     settings: StaticNewton
     problem: Equilibrium
-    surface_nodes: Ints
-    start: Balance
+    start: Found
     memory: _Memory
 
     @property
     def scene(self) -> Scene:
         return self.problem.system.scene
 
-    def rest(self) -> State:
-        return self._state(self.start, np.zeros(len(self.scene.drives)))
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Plate forces, pressures, volumes, and what Newton did."""
+        cavities = [c.name for c in self.scene.cavities]
+        return (
+            {f"{d.name}.force": "N" for d in self.scene.drives}
+            | {f"{name}.pressure": "Pa" for name in cavities}
+            | {f"{name}.volume_ratio": "1" for name in cavities}
+            | {_NEGATIVE: "1", _MADE: "1"}
+        )
 
-    def step(self, state: State, drives: Floats) -> State:
-        """From the state's load to `drives` (k,) m, at once or in halves of the way.
+    def rest(self) -> State:
+        return self._state(0, self.start)
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """From the state's load to drives (k,) m, at once or in halves of the way.
 
         A failure keeps the last load that was reached and says what stopped the body there.
         """
-        target = np.full(len(state.pressures), self.settings.volume_ratio)
-        good = self._known(state, target)
+        target = np.full(len(state.inner.pressures), self.settings.volume_ratio)
+        good = self._known(state.inner, target)
         kept = not self.problem.constrained or np.abs(good.balance.ratios - target).max() <= _VOLUME
-        if kept and (drives == state.drives).all():
+        if kept and (inputs == state.inner.drives).all():
             numbers = MappingProxyType({**state.numbers, _MADE: 0.0})
-            return replace(state, updates=0, numbers=numbers)
-        return self._walked(good, np.array(drives, dtype=np.float64), target)
+            return replace(state, k=state.k + 1, updates=0, numbers=numbers)
+        return self._walked(state.k, good, np.array(inputs, dtype=np.float64), target)
 
-    def _known(self, state: State, target: Floats) -> Found:
+    def _known(self, at: Loaded, target: Floats) -> Found:
         """The equilibrium of a state: remembered, or its forces and tangent made again."""
-        if state.u is None:
-            raise SceneError("a state without displacements: begin with this stepper's rest()")
-        if self.memory.last.balance.u is state.u:
+        if self.memory.last.balance.u is at.u:
             return replace(self.memory.last, iterations=0, factorisations=0)
-        balance = self.problem.balance(state.u, state.pressures, target)
-        tangent = self.problem.tangent(balance, state.drives)
-        return Found(balance, tangent, state.drives, factorisations=1)
+        balance = self.problem.balance(at.u, at.pressures, target)
+        tangent = self.problem.tangent(balance, at.drives)
+        return Found(balance, tangent, at.drives, factorisations=1)
 
-    def _walked(self, good: Found, drives: Floats, target: Floats) -> State:
+    def _walked(self, k: int, good: Found, drives: Floats, target: Floats) -> State:
         """Load steps to `drives`; each failure halves them, to 2^-max_cuts of the way at least."""
         begin, ratios = good.drives, good.balance.ratios
         done, size = 0.0, 1.0
@@ -159,9 +175,9 @@ class NewtonStepper:
             elif size > 2.0**-self.settings.max_cuts:
                 size /= 2
             else:
-                return self._found_state(good, _stopped(found, good.drives))
+                return self._state(k, good, _stopped(found, good.drives))
         self.memory.last = good
-        return self._found_state(good)
+        return self._state(k + 1, good)
 
     def _load_step(self, good: Found, drives: Floats, target: Floats) -> Found | Failed:
         """One load step: linear prediction, corrections, and what the result must satisfy."""
@@ -238,46 +254,23 @@ class NewtonStepper:
         tangent = self.problem.tangent(found.balance, found.drives)
         return replace(found, tangent=tangent, factorisations=found.factorisations + 1)
 
-    def _found_state(self, found: Found, failure: tuple[Ending, str] | None = None) -> State:
-        did = {_NEGATIVE: float(found.tangent.negative), _MADE: float(found.factorisations)}
-        state = self._state(found.balance, found.drives, did)
-        return replace(state, updates=found.iterations, failure=failure)
-
-    def _state(
-        self, at: Balance, drives: Floats, did: Mapping[str, float] = _NOTHING_DONE
-    ) -> State:
-        scene, forces = self.scene, self.problem.forces(at)
-        numbers = {f"{d.name}.force": float(f) for d, f in zip(scene.drives, forces, strict=True)}
-        for cavity, ratio in zip(scene.cavities, at.ratios, strict=True):
-            numbers[f"{cavity.name}.volume_ratio"] = float(ratio)
+    def _state(self, k: int, found: Found, failure: tuple[Ending, str] | None = None) -> State:
+        at = found.balance
         at.u.setflags(write=False)
-        surface, kept = (
-            at.u.reshape(-1, 3)[self.surface_nodes],
-            MappingProxyType({**numbers, **did}),
+        numbers = (
+            *self.problem.forces(at).tolist(),
+            *at.pressures.tolist(),
+            *at.ratios.tolist(),
+            float(found.tangent.negative),
+            float(found.factorisations),
         )
-        return State(drives, at.pressures, 0, surface, None, at.u, kept)
+        named = MappingProxyType(dict(zip(self.units, numbers, strict=True)))
+        return State(k, Loaded(at.u, at.pressures, found.drives), failure, found.iterations, named)
 
     def field(self, state: State) -> Floats:
         """Displacements (n, 3) m of all nodes."""
-        if state.u is None:
-            raise SceneError("a state without displacements: begin with this stepper's rest()")
-        return state.u.reshape(-1, 3)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        """Drives, plate forces, pressures, volumes, and what Newton did, of every step."""
-        traces = {}
-        for j, drive in enumerate(self.scene.drives):
-            traces[f"{drive.name}.displacement"] = Trace(
-                np.array([s.drives[j] for s in states]), "m"
-            )
-        for i, cavity in enumerate(self.scene.cavities):
-            traces[f"{cavity.name}.pressure"] = Trace(
-                np.array([s.pressures[i] for s in states]), "Pa"
-            )
-        for name in self.rest().numbers:
-            unit = "N" if name.endswith(".force") else "1"
-            traces[name] = Trace(np.array([s.numbers[name] for s in states]), unit)
-        return traces
+        u: Floats = state.inner.u
+        return u.reshape(-1, 3)
 
 
 def _added(before: Found, found: Found) -> Found:

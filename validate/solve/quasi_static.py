@@ -1,12 +1,14 @@
 """Statics at every step, K u = f: what a slow enough motion tends to. No mass is assembled."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import System
-from validate.solve.dynamic import InertialStepper, reactions, require_linear
+from validate.solve.dynamic import InertialStepper, reactions
+from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.types import State, Stepper
 
 
@@ -14,9 +16,13 @@ from validate.solve.types import State, Stepper
 class QuasiStatic:
     """Linear statics of drives and loads, by superposition of one solved column per input."""
 
+    handles: ClassVar[Handles] = Handles(
+        ("linear",), inertia=False, cavities=False, loads=True, contact=GLUED
+    )
+
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""
-        require_linear(system)
+        require_handled(system.scene, self)
         columns = np.hstack([system.moves, np.zeros_like(system.loads)])
         forces = np.hstack([-(system.K @ system.moves), system.loads])
         columns[system.free] = system.factor().solve(forces[system.free])
@@ -25,13 +31,20 @@ class QuasiStatic:
 
 @dataclass(frozen=True)
 class QuasiStaticStepper(InertialStepper):
-    """`columns` (N, k + l): displacements of a unit of every input."""
+    """States carry displacements (N,) m; `columns` (N, k + l) are those of a unit input each."""
 
     columns: Floats
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The static state under the inputs `drives`: drives in m, then loads in N."""
-        u = self.columns @ drives
+    def rest(self) -> State:
+        return State(0, np.zeros(len(self.columns)))
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """The static state under the inputs: drives in m, then loads in N."""
+        u = self.columns @ inputs
         still = np.zeros_like(u)
-        numbers = self.reactions.numbers(u, still, still, drives[self._drives :])
-        return self._state(drives, state.k + 1, u=u, v=still, a=still, numbers=numbers)
+        numbers = self.reactions.numbers(u, still, still, inputs[len(self.scene.drives) :])
+        return State(state.k + 1, u, numbers=numbers)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes."""
+        return np.reshape(state.inner, self.scene.mesh.nodes.shape)

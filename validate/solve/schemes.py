@@ -1,8 +1,11 @@
 """Every scheme there is. A new one is one file beside this and its name here."""
 
+from collections.abc import Callable
+
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.fluid import LINEAR
+from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.handles import Handles
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
@@ -11,16 +14,29 @@ from validate.solve.quasi_static import QuasiStatic
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
-# Linear schemes of drives and loads, without cavities.
-INERTIAL: tuple[type[Scheme], ...] = (QuasiStatic, Newmark, Modal, ExplicitLinear)
-
-# Dynamics at large strain of drives and loads, without cavities.
-LARGE_INERTIAL: tuple[type[Scheme], ...] = (CentralDifference, NewtonDynamics)
-
 SCHEMES: tuple[type[Scheme], ...] = (
-    *LINEAR,
+    NoFluid,
+    ExactPressure,
+    PressureLoop,
     StaticNewton,
     Tabulated,
-    *INERTIAL,
-    *LARGE_INERTIAL,
+    QuasiStatic,
+    Newmark,
+    Modal,
+    ExplicitLinear,
+    CentralDifference,
+    NewtonDynamics,
 )
+
+
+def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
+    """The schemes whose `handles` pass, in order."""
+    return tuple(scheme for scheme in SCHEMES if handle(scheme.handles))
+
+
+# Linear schemes of drives and cavities, and those of drives and loads.
+LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities)
+INERTIAL = schemes_that(lambda h: "linear" in h.law and h.loads)
+
+# Dynamics at large strain of drives and loads, without cavities.
+LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia)

@@ -5,8 +5,9 @@ solution per sample: cubic Lagrange interpolation between converged states is ex
 of fourth order between. Its step time is that of the interpolation, not of a solution.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.scene.scene import Scene
-from validate.solve.types import Ending, Scheme, State, Stepper, Trace
+from validate.solve.handles import LARGE, Handles
+from validate.solve.types import Ending, Scheme, State, Stepper
 
 _NODES = 4  # of the interpolation
 _BEYOND = 0.01  # grid steps of extrapolation: the noise of a stage that stands at the last load
@@ -23,6 +25,8 @@ _BEYOND = 0.01  # grid steps of extrapolation: the noise of a stage that stands 
 @dataclass(frozen=True)
 class Tabulated:
     """Settings: solves `inner` at whole multiples of `step` of the one drive."""
+
+    handles: ClassVar[Handles] = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
     inner: Scheme
     step: float = field(metadata={"unit": "m", "doc": "between the loads that are solved"})
@@ -49,6 +53,8 @@ class _Table:
 
 @dataclass(frozen=True)
 class TabulatedStepper:
+    """States carry their field (n, d) m."""
+
     inner: Stepper
     grid: float
     table: _Table
@@ -57,20 +63,24 @@ class TabulatedStepper:
     def scene(self) -> Scene:
         return self.inner.scene
 
-    def rest(self) -> State:
-        return self.table.states[0]
+    @property
+    def units(self) -> Mapping[str, str]:
+        return self.inner.units
 
-    def step(self, state: State, drives: Floats) -> State:
-        """The state at `drives` (1,) m; a failure beyond the last load that has a solution."""
-        place = float(drives[0]) / self.grid
+    def rest(self) -> State:
+        return self._at(0, self.table.states[0])
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """The state at a drive (1,) m; a failure beyond the last load that has a solution."""
+        place = float(inputs[0]) / self.grid
         self._extend(max(int(np.ceil(place - _BEYOND)), _NODES - 1))
-        last = len(self.table.states) - 1
+        table, last = self.table, len(self.table.states) - 1
         if place > last + _BEYOND:
-            return replace(self.table.states[last], failure=self.table.failure)
+            return replace(self._at(state.k, table.states[last]), failure=table.failure)
         if abs(place - round(place)) < 1e-9 and 0 <= round(place) <= last:
-            return replace(self.table.states[round(place)], drives=drives)
+            return self._at(state.k + 1, table.states[round(place)])
         first = max(0, min(int(np.floor(place)) - 1, last - _NODES + 1))
-        return self._between(place, first, min(first + _NODES, last + 1), drives)
+        return self._between(state.k + 1, place, first, min(first + _NODES, last + 1))
 
     def _extend(self, count: int) -> None:
         table = self.table
@@ -82,29 +92,16 @@ class TabulatedStepper:
             else:
                 table.states.append(found)
 
-    def _between(self, place: float, first: int, end: int, drives: Floats) -> State:
+    def _at(self, k: int, solved: State) -> State:
+        return State(k, self.inner.field(solved), None, solved.updates, solved.numbers)
+
+    def _between(self, k: int, place: float, first: int, end: int) -> State:
         states, nodes = self.table.states[first:end], np.arange(first, end, dtype=float)
         weights = [float(np.prod([(place - o) / (n - o) for o in nodes if o != n])) for n in nodes]
-
-        def mixed(values: Sequence[Floats]) -> Floats:
-            return np.asarray(sum(w * v for w, v in zip(weights, values, strict=True)))
-
-        numbers = {
-            name: float(sum(w * s.numbers[name] for w, s in zip(weights, states, strict=True)))
-            for name in states[0].numbers
-        }
-        return State(
-            drives,
-            mixed([s.pressures for s in states]),
-            0,
-            mixed([s.surface for s in states]),
-            None,
-            mixed([s.u for s in states if s.u is not None]),
-            numbers,
-        )
+        pairs = list(zip(weights, states, strict=True))
+        u = sum(w * self.inner.field(s) for w, s in pairs)
+        numbers = {name: float(sum(w * s.numbers[name] for w, s in pairs)) for name in self.units}
+        return State(k, u, numbers=numbers)
 
     def field(self, state: State) -> Floats:
-        return self.inner.field(state)
-
-    def traces(self, states: Sequence[State]) -> dict[str, Trace]:
-        return self.inner.traces(states)
+        return np.asarray(state.inner)

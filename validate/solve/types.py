@@ -1,15 +1,14 @@
 """States, outcomes and runs."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal, Protocol, runtime_checkable
-
-import numpy as np
+from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from validate.arrays import Floats, Ints, checked
 from validate.fem.system import System
 from validate.scene.scene import Scene
+from validate.solve.handles import Handles
 
 Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]
 
@@ -25,60 +24,36 @@ class Outcome:
 
 @dataclass(frozen=True)
 class State:
-    """One step: drives (k,) m, pressures (c,) Pa, updates it took, surface (s, d) m.
+    """After `k` steps: `inner` is what the scheme itself carries, the rest is common to all.
 
-    `surface` is the displacement of the cavity and plate nodes, what a haptic tick needs.
-    `failure` is empty or the ending and its reason. Schemes whose fields are not sums of fixed
-    columns keep the displacements `u` (N,) m of all unknowns and their numbers by trace name.
-    Dynamic schemes keep the number `k` of steps done, velocities `v` (N,) m/s and accelerations
-    `a` (N,) m/s^2, and what else they need in `extra` (a filter its covariance); their `drives`
-    are all inputs: drives in m, then loads in N.
+    `failure` is empty or the ending and its reason; `updates` counts what an iteration took;
+    `numbers` are what the step found, by the trace names of the stepper's `units`.
     """
 
-    drives: Floats
-    pressures: Floats
-    updates: int
-    surface: Floats
+    k: int
+    inner: Any
     failure: tuple[Ending, str] | None = None
-    u: Floats | None = None
+    updates: int = 0
     numbers: Mapping[str, float] = field(default_factory=dict)
-    k: int = 0
-    v: Floats | None = None
-    a: Floats | None = None
-    extra: Any = None
-
-    @property
-    def inputs(self) -> Floats:
-        return np.concatenate([self.drives, self.pressures])
-
-    @property
-    def light(self) -> "State":
-        """The state without its fields: what is kept of every step."""
-        return replace(self, u=None, v=None, a=None, extra=None)
-
-
-NOTHING = np.zeros(0)
-NOTHING.setflags(write=False)
-NO_SURFACE = np.zeros((0, 3))
-NO_SURFACE.setflags(write=False)
 
 
 class Stepper(Protocol):
-    """A prepared scheme: steps, and what a state means: field (n, d) m, traces per step.
+    """A prepared scheme: steps through inputs (k + l,), drives in m, then loads in N.
 
-    `traces` gets states without their fields (`State.light`).
+    `units` names every number of its states; `field` gives displacements (n, d) m of all nodes.
     """
 
     @property
     def scene(self) -> Scene: ...
 
+    @property
+    def units(self) -> Mapping[str, str]: ...
+
     def rest(self) -> State: ...
 
-    def step(self, state: State, drives: Floats) -> State: ...
+    def step(self, state: State, inputs: Floats) -> State: ...
 
     def field(self, state: State) -> Floats: ...
-
-    def traces(self, states: Sequence[State]) -> dict[str, "Trace"]: ...
 
 
 @runtime_checkable
@@ -91,7 +66,9 @@ class Uncertain(Protocol):
 
 
 class Scheme(Protocol):
-    """Settings of a scheme. `prepare` does all that is done once."""
+    """Settings of a scheme that steps. `prepare` does all that is done once."""
+
+    handles: ClassVar[Handles]
 
     def prepare(self, system: System) -> Stepper: ...
 

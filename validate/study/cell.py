@@ -18,7 +18,7 @@ from validate.errors import ComparisonError, UsageError, ValidateError
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.gains import schedule
-from validate.estimate.measured import Timetable, measurements, timetable
+from validate.estimate.measurements import Timetable, measurements, timetable
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system

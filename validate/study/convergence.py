@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import ComparisonError
 
 SAFETY, UNSURE = (
@@ -54,7 +54,7 @@ def convergence(h: Sequence[float], answers: Sequence[Floats], theoretical: floa
     """
     if len(h) != len(answers) or len(h) < 2 or min(np.diff(h)) <= 0:
         raise ComparisonError(f"{len(answers)} answers at sizes {list(h)}: two and more, rising")
-    steps = [_rms(a - b) for a, b in pairwise(answers)]
+    steps = [rms(np.atleast_2d(a - b)) for a, b in pairwise(answers)]
     r21 = h[1] / h[0]
     if len(h) == 2:
         return _made("two only", None, theoretical, r21, steps, answers)
@@ -101,9 +101,3 @@ def _made(
     extrapolated = answers[0] + share * (answers[0] - answers[1])
     index = (SAFETY if trusted else UNSURE) * error
     return Convergence(conduct, order, used, tuple(steps), error, index, extrapolated)
-
-
-def _rms(values: Floats) -> float:
-    """Root mean square of the vectors (..., d), or of numbers."""
-    square = np.asarray(values) ** 2
-    return float(np.sqrt(square.sum(axis=-1).mean() if square.ndim else square))

@@ -10,7 +10,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.covariance import Dense, Modal
+from validate.estimate.covariance import Decoupled, Dense
 from validate.estimate.displacement_filter import DisplacementStepper, InModes, Nodal
 from validate.estimate.kf_fem import excitation_in, in_modes, shared_gains
 
@@ -25,7 +25,7 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
             return None
     if isinstance(covariance, Dense):
         covariance = _turned(covariance, modes)
-    gains, starts, nodal = stepper.gains, stepper.starts, isinstance(stepper.coordinates, Nodal)
+    gains, nodal = stepper.gains, isinstance(stepper.coordinates, Nodal)
     if gains is None:
         gains = shared_gains(covariance, stepper.sensor.table, stepper.settled)
     elif nodal:
@@ -38,12 +38,11 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
         claimed=modes,
         covariance=covariance,
         gains=gains,
-        starts=modes.amplitudes(starts) if nodal and starts is not None else starts,
         sensor=replace(stepper.sensor, H=covariance.H),
     )
 
 
-def _turned(nodal: Dense, modes: InModes) -> Modal:
+def _turned(nodal: Dense, modes: InModes) -> Decoupled:
     """The recursion of nodal displacements in amplitudes, its transition diagonal."""
     Q = _white(nodal.Q, modes)
     if Q is None:
@@ -52,7 +51,7 @@ def _turned(nodal: Dense, modes: InModes) -> Modal:
     if P0 is None:
         P0 = modes.amplitudes(modes.amplitudes(nodal.P0).T)
     H = np.ascontiguousarray(nodal.H @ modes.shapes)
-    return Modal(modes.factors[0], Q, H, nodal.R, P0)
+    return Decoupled(modes.factors[0], Q, H, nodal.R, P0)
 
 
 def _scaled(one: Floats, other: Floats, turned: Floats) -> Floats | None:

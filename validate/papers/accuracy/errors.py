@@ -129,7 +129,7 @@ def _gaps(errors: Mapping[str, Errors]) -> str:
 
 
 def units_in(dimension: int) -> dict[str, str]:
-    return {name: m.units[dimension - 2] for name, m in _METRICS.items()}
+    return {name: m.unit.format(dimension=dimension) for name, m in _METRICS.items()}
 
 
 def errors_exhibit(errors: Mapping[str, Errors], dimension: int, figures: Mapping[str, str],

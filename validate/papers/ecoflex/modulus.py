@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.score import Score
 from validate.fem.system import build as build_system
 from validate.identify.law import LawFit, fit_scale
@@ -77,7 +78,8 @@ def _law_fit(recordings: Sequence[Recording], p: LoggedCylinder, method: Method)
         seen = place(recording, p, scene)
         states = [stepper.step(stepper.rest(), q) for q in seen.inputs]
         good = [s.failure is None for s in states]
-        curves.append(stepper.traces(states)["stage.force"].y[good])
+        found = [s.numbers["stage.force"] for s in states if s.failure is None]
+        curves.append(np.array(found))
         forces.append(seen.of(SignalObservation)[0].y[good, 0])
     return fit_scale(curves, forces)
 
@@ -96,7 +98,7 @@ def _law_scores(name: str, label: str, fit: LawFit, logs: int) -> tuple[Score, .
 def _scores(found: ModulusSummary, bonded: float, gent: float) -> tuple[Score, ...]:
     logs, samples = len(found.fits), sum(f.count for f in found.fits)
     bracket = apparent_to_material(found, bonded)
-    noise = float(np.sqrt(np.mean([f.noise**2 for f in found.fits])))
+    noise = rms([f.noise for f in found.fits])
     rows = [
         ("modulus.E", found.mean, "Pa", samples, "apparent modulus, mean over the logs"),
         ("modulus.E.sd_repeats", found.sd_repeats or 0.0, "Pa", logs, "sd of one log's modulus"),

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.papers.ekf_nfem.tables import locking_table, readings_table, steps_table
 from validate.register.markers import MarkerObservation
@@ -119,8 +120,8 @@ def _ranking(main: Mapping[str, Followed], force: float) -> NumberTable:
         for f in main.values()
         if "node_B" in f.scored
     }
-    rms = {k: [_MM * float(np.sqrt((e.values**2).mean())) for e in v] for k, v in errors.items()}
-    ordered = sorted(rms.items(), key=lambda item: item[1][0])
+    off = {k: [_MM * rms(e.values) for e in v] for k, v in errors.items()}
+    ordered = sorted(off.items(), key=lambda item: item[1][0])
     rows: tuple[tuple[Entry, ...], ...] = tuple(
         (i + 1, label, *values) for i, (label, values) in enumerate(ordered)
     )

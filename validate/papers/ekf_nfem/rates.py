@@ -14,7 +14,7 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.estimate.measured import Measurements
+from validate.estimate.measurements import Measurements
 from validate.fem.critical import lanczos_step
 from validate.fem.system import System, build
 from validate.scene.box import box

@@ -13,7 +13,7 @@ from validate.arrays import Floats
 from validate.compare.published import Figure, Values
 from validate.fem.system import Responses, build, responses
 from validate.papers.fluid_inclusion.square import square_with_hole
-from validate.papers.fluid_inclusion.twin import PLATES
+from validate.papers.fluid_inclusion.twin import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.plates import between_plates
 from validate.scene.scene import Cavity, Material, Scene, Support
@@ -36,7 +36,8 @@ def _fig_4() -> Responses:
 def _phantom() -> Responses:
     block = Block(0.060, 0.045, 0.070)
     mesh = block_with_inclusion(block, (9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
-    return responses(build(between_plates(mesh, PLATES, Material(15.2e3, 0.485), "slip")))
+    material = Material(15.2e3, 0.485)
+    return responses(build(between_plates(mesh, material, "slip", PLATES, cavities=CAVITIES)))
 
 
 def _largest_pressure(_: Values) -> float:

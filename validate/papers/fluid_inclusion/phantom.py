@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from validate.papers.fluid_inclusion.twin import PLATES, PhantomTwin, record_phantom
+from validate.papers.fluid_inclusion.twin import CAVITIES, PLATES, PhantomTwin, record_phantom
 from validate.parameters import quantity, require_ranges
 from validate.recording.images.outline import outlines_of
 from validate.recording.mcap.read import read_recording
@@ -161,10 +161,11 @@ def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Sce
     contact = model.plates if p.plates == "as_method" else p.plates
     return between_plates(
         mesh if order == 1 else quadratic(mesh),
-        PLATES,
         Material(p.material.E, p.material.nu, model.law),
         contact,
+        PLATES,
         "pointwise" if order == 2 else model.dilatation,
+        cavities=CAVITIES,
         friction=p.friction,
         membrane=_membrane(p.membrane),
     )

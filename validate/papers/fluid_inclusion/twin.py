@@ -18,7 +18,7 @@ from validate.register.plane import SurfaceSampler, cavity_sampler, section
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
 from validate.scene.plates import Plates, between_plates
-from validate.scene.scene import LawName, Material
+from validate.scene.scene import Cavity, Drive, LawName, Material, Support
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton
@@ -27,7 +27,6 @@ from validate.solve.types import Scheme
 from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
-PLATES = Plates("x0", "x1", floor="y0")  # the probe, the stage and the table
 FRAME = "phantom"  # x from the probe to the stage, y up, z lateral
 _LAWS = {
     "linear": "linear elasticity, small strain",
@@ -37,6 +36,9 @@ _LAWS = {
 IMAGE_POSE = np.array(
     [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0225], [1.0, 0.0, 0.0, 0.015], [0.0, 0.0, 0.0, 1.0]]
 )
+# The stage presses towards the probe; the block stands on a table.
+PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
+CAVITIES = (Cavity("inclusion", "cavity"),)
 PROFILE = StageProfile((0.0, 0.003, 0.006, 0.009), speed=1e-3, hold=7.0, rate=10.0)
 PEN_TURN, PEN_SHIFT = (62.0, -17.0, 128.0), (0.412, -0.236, -1.137)
 SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers", "b_mode")
@@ -74,7 +76,7 @@ def record_phantom(
     progress("mesh")
     grid = (twin.nodes_x, twin.nodes_y, twin.nodes_z)
     mesh = quadratic(block_with_inclusion(size, grid, capsule))
-    scene = between_plates(mesh, PLATES, material, "slip")
+    scene = between_plates(mesh, material, "slip", PLATES, cavities=CAVITIES)
     progress(f"factorise {mesh.nodes.size} unknowns")
     stepper = _scheme(material).prepare(build(scene))
     t, stage, middles = PROFILE.positions()

@@ -21,7 +21,7 @@ from validate.replay.followed import Truth, truth_of
 from validate.scene.box import box, centroids
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
-from validate.solve.dynamic import StartName
+from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark
 from validate.twin.stepped import SteppedTwin

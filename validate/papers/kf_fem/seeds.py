@@ -12,7 +12,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.filterpy_oracle import oracle_table
-from validate.estimate.measured import measurements
+from validate.estimate.measurements import measurements
 from validate.estimate.modal_kf import ModalKf
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System

@@ -103,6 +103,8 @@ def _recording(
     time, signals = _signals(picks, flips)
     stamps = np.round(time * 1e9).astype(np.int64)
     digest = hashlib.sha256(data).hexdigest()
+    origin = {"file": path.name, "sha256": digest, "specimen in file": label}
+    sizes = {key: repr(value) for key, value in specimen.items()}
     return Recording(
         name=path.stem,
         source=Source(path.name, digest, len(data), "text file: integrity not provable"),
@@ -111,13 +113,8 @@ def _recording(
         clock={topic: clock_of(topic, None, stamps, stamps) for topic in signals},
         metadata={
             "header": dict(table.header),
-            "specimen": {**{k: repr(v) for k, v in specimen.items()}, "test": kind or "not stated"},
-            "provenance": {
-                "file": path.name,
-                "sha256": digest,
-                "specimen in file": label,
-                **_provenance(table, picks, flips, notes),
-            },
+            "specimen": {**sizes, "test": kind or "not stated"},
+            "provenance": {**origin, **_provenance(table, picks, flips, notes)},
         },
     )
 

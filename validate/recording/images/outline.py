@@ -13,12 +13,13 @@ Limits: the region must be star-shaped about its centroid; regions under about 2
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError
 from validate.recording.images.discs import candidates
 from validate.recording.images.polar import Grey, Wall, speckle_area, trace
@@ -103,27 +104,19 @@ def outlines_of(
     Options as in `extract_outline`. Raises `RecordingError` naming the first image without one and
     how many there are: none is left out silently.
     """
+    find = partial(extract_outline, centre=centre, radius=radius, shape=shape, bright=bright)
     outlines: list[Outline] = []
     refused: list[str] = []
     for i, image in enumerate(frames.images):
         try:
-            outlines.append(
-                extract_outline(
-                    image,
-                    frames.m_per_px,
-                    centre=centre,
-                    radius=radius,
-                    shape=shape,
-                    bright=bright,
-                )
-            )
+            outlines.append(find(image, frames.m_per_px))
         except RecordingError as error:
             refused.append(f"image {i} (t = {frames.t[i]:.3f} s): {error}")
     if refused:
         raise RecordingError(
             f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
         )
-    sd = float(np.sqrt(np.mean([o.sd**2 for o in outlines])))
+    sd = rms([o.sd for o in outlines])
     return Contours(frames.t, tuple(o.points for o in outlines), sd, frames.pose, frames.frame)
 
 
@@ -181,7 +174,7 @@ def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats
 
 def _refusal(wall: Wall, judged: Quality) -> str:
     """Why a wall is none; empty when it is."""
-    radius = 1e3 * float(np.sqrt((wall.radius**2).mean()))
+    radius = 1e3 * rms(wall.radius)
     place = f"at ({1e3 * wall.centre[0]:.1f}, {1e3 * wall.centre[1]:.1f}) mm, radius {radius:.1f}"
     if wall.missing > MAX_MISSING:
         return (

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.recording.images.closed_path import closed_path
 from validate.recording.images.image import blurred, sampled
 
@@ -100,7 +100,7 @@ def trace(grey: Grey, centre: Floats, radius: float, rounds: int = len(_SURROUND
         chosen = closed_path(cost, _STIFFNESS * (2 * np.pi / RAYS) / slope**2)
         path = gaussian_filter1d(radii[chosen], 1.4, mode="wrap")
         centre, path = recentred(centre, path)
-        radius = float(np.sqrt((path**2).mean()))
+        radius = rms(path)
     evidence = -float(cost[np.arange(RAYS), chosen].sum())
     return Wall(centre, path, levels, evidence, _missing(grey, centre, path))
 

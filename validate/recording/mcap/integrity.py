@@ -12,7 +12,6 @@ import os
 import zlib
 from array import array
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO
@@ -44,6 +43,7 @@ from validate.recording.types import Source
 MAX_MESSAGES = 10_000_000
 NOT_PROVABLE = "integrity not provable: no data CRC"
 _KNOWN = frozenset(int(op) for op in Op)
+_IN_DATA = {Op.HEADER, Op.MESSAGE, Op.CHUNK, Op.ATTACHMENT, Op.METADATA}
 
 
 def verify(stream: BinaryIO, path: Path) -> Verified:
@@ -136,29 +136,30 @@ class _Walk:
             self._dispatch(opcode, content)
 
     def _dispatch(self, opcode: int, content: bytes) -> None:
-        in_data: dict[int, Callable[[bytes], None]] = {
-            Op.HEADER: self._take_header,
-            Op.MESSAGE: self._take_message,
-            Op.CHUNK: self._take_chunk,
-            Op.ATTACHMENT: self._take_attachment,
-            Op.METADATA: lambda c: self._metadata.append(Metadata.read(c)),
-        }
-        anywhere: dict[int, Callable[[bytes], None]] = {
-            Op.SCHEMA: self._take_schema,
-            Op.CHANNEL: self._take_channel,
-            Op.STATISTICS: self._take_statistics,
-            Op.CHUNK_INDEX: lambda c: self._indexed_places.append(chunk_index_place(c)),
-        }
-        if opcode in in_data and self._data_crc is not None:
+        if opcode in _IN_DATA and self._data_crc is not None:
             raise RecordingError(f"a {Op(opcode).name} record after the end of the data")
-        take = in_data.get(opcode) or anywhere.get(opcode)
-        if take:
-            take(content)
-        elif opcode not in _KNOWN:
-            self._unknown += 1
-
-    def _take_header(self, content: bytes) -> None:
-        self._header = Header.read(content)
+        match opcode:
+            case Op.HEADER:
+                self._header = Header.read(content)
+            case Op.SCHEMA:
+                self._take_schema(content)
+            case Op.CHANNEL:
+                self._take_channel(content)
+            case Op.MESSAGE:
+                self._take_message(content)
+            case Op.CHUNK:
+                self._take_chunk(content)
+            case Op.ATTACHMENT:
+                check_attachment(content)
+                self._attachments += 1
+            case Op.METADATA:
+                self._metadata.append(Metadata.read(content))
+            case Op.STATISTICS:
+                self._claimed = statistics_messages(content)
+            case Op.CHUNK_INDEX:
+                self._indexed_places.append(chunk_index_place(content))
+            case _ if opcode not in _KNOWN:
+                self._unknown += 1
 
     def _take_schema(self, content: bytes) -> None:
         schema = Schema.read(content)
@@ -192,28 +193,21 @@ class _Walk:
     def _take_chunk(self, content: bytes) -> None:
         chunk = Chunk.read(content)
         channels: set[int] = set()
-        inner: dict[int, Callable[[bytes], object]] = {
-            Op.SCHEMA: self._take_schema,
-            Op.CHANNEL: self._take_channel,
-            Op.MESSAGE: lambda c: channels.add(self._count(c)),
-        }
         for opcode, body in records_in(chunk.data):
-            if opcode in inner:
-                inner[opcode](body)
-            elif opcode in _KNOWN:
-                raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
+            match opcode:
+                case Op.SCHEMA:
+                    self._take_schema(body)
+                case Op.CHANNEL:
+                    self._take_channel(body)
+                case Op.MESSAGE:
+                    channels.add(self._count(body))
+                case _ if opcode in _KNOWN:
+                    raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
         self.chunks += 1
         self._compressions[chunk.compression or "none"] += 1
         self._chunk_places.add((self.record_at, HEAD.size + len(content)))
         at = self._at - len(content)
         self._spans.append(Span(at, len(content), True, frozenset(channels)))
-
-    def _take_attachment(self, content: bytes) -> None:
-        check_attachment(content)
-        self._attachments += 1
-
-    def _take_statistics(self, content: bytes) -> None:
-        self._claimed = statistics_messages(content)
 
     def _data_end(self, content: bytes) -> None:
         if self._data_crc is not None:

@@ -11,69 +11,52 @@ for quadratic tetrahedra, whose vertex weights are negative.
 
 import numpy as np
 
-from validate.compare.metric import Metric
-from validate.compare.pair import Pair
-from validate.errors import ComparisonError
-from validate.fem.cells import nodal_volumes, rule, values_at, volumes_at
+from validate.compare.metric import Counted, Metric
+from validate.compare.pair import FieldPair
+from validate.fem.cells import rule, values_at, volumes_at
 
 _POINTS = 4  # Gauss points along an axis; the distance has a kink where the fields agree
 
 
-def printed(pair: Pair) -> float:
+def printed(pair: FieldPair) -> float:
     """E_i with the paper's normaliser: integral of |u' - u| over |M0|^(1/d); m^2 (2-D), m^3."""
     distance, volume = _integrals(pair)
     return distance / float(volume ** (1 / pair.on.dimension))
 
 
-def mean_distance(pair: Pair) -> float:
+def mean_distance(pair: FieldPair) -> float:
     """Integral of |u' - u| over the volume (area), m."""
     distance, volume = _integrals(pair)
     return distance / volume
 
 
-def weighted_nodal_sum(pair: Pair) -> float:
-    """sum_a w_a |u'_a - u_a| over the volume, m: at least the mean distance, for linear elements.
-
-    Raises `ComparisonError` for quadratic meshes, where it is no bound.
-    """
-    if pair.on.order != 1:
-        raise ComparisonError(
-            f"the weighted nodal sum has negative weights on {pair.on.kind}; use the quadrature"
-        )
-    weights = nodal_volumes(pair.on)
-    return float(weights @ np.linalg.norm(pair.difference, axis=1) / weights.sum())
-
-
-def count_points(pair: Pair) -> int:
-    """Quadrature points of the interior error."""
-    return len(pair.on.cells) * len(rule(pair.on, _POINTS).weights)
-
-
-def _integrals(pair: Pair) -> tuple[float, float]:
+def _integrals(pair: FieldPair) -> tuple[float, float]:
     points = rule(pair.on, _POINTS)
     dv = volumes_at(pair.on, points)
     distance = np.linalg.norm(values_at(pair.on, points, pair.difference), axis=2)
     return float((dv * distance).sum()), float(dv.sum())
 
 
-INTERIOR_METRICS: tuple[Metric, ...] = (
+_POINTS_OF: Counted[FieldPair] = Counted(
+    "quadrature points", lambda p: len(p.on.cells) * len(rule(p.on, _POINTS).weights)
+)
+
+INTERIOR_METRICS: tuple[Metric[FieldPair], ...] = (
     Metric(
         "E_i",
         printed,
-        ("m^2", "m^3"),
-        count_points,
-        "quadrature points",
+        "m^{dimension}",
         "interior error as printed (paper 002, III C): integral of |u' - u| over the body at rest, "
         "over the square root of its area (cube root of its volume)",
+        _POINTS_OF,
         symmetric=True,
     ),
     Metric(
         "E_i.mean",
         mean_distance,
-        ("m", "m"),
-        count_points,
-        "quadrature points",
+        "m",
         "mean distance: integral of |u' - u| over the body at rest, over its area (volume)",
+        _POINTS_OF,
         symmetric=True,
     ),
 )

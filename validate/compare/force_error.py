@@ -1,11 +1,12 @@
 """Errors of a force over time: of its peak, on the whole, and in phase."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
+from validate.compare.metric import Counted, Metric
 from validate.compare.score import Score
 from validate.compare.track import TRACK_METRICS, TrackError, rmse
 from validate.errors import ComparisonError, RecordingError
@@ -20,7 +21,8 @@ _COVERAGE = 0.5  # share of the run that must overlap the reference at every tri
 class ForcePair:
     """A run's force and the reference force at the reference's times t (nt,) s, both (nt,) N.
 
-    `run` and `reference` are the whole signals; `lag_within` s bounds the search for the phase.
+    `run` and `reference` are the whole signals; `lag_within` s bounds the search for the phase;
+    `against` names the reference.
     """
 
     name: str
@@ -30,6 +32,15 @@ class ForcePair:
     run: Signal
     reference: Signal
     lag_within: float
+    against: str
+
+    @property
+    def where(self) -> str:
+        return f"{self.name} at the reference's times the run meets"
+
+    @property
+    def units(self) -> Mapping[str, object]:
+        return {"force": self.run.unit}
 
     @property
     def track(self) -> TrackError:
@@ -37,7 +48,9 @@ class ForcePair:
         return TrackError(self.name, "force", error, float(np.ptp(self.y_reference)))
 
 
-def force_pair(name: str, run: Signal, reference: Signal, lag_within: float) -> ForcePair:
+def force_pair(
+    name: str, run: Signal, reference: Signal, lag_within: float, against: str
+) -> ForcePair:
     """The run interpolated at the reference's times that it meets, gaps excluded.
 
     Raises `ComparisonError` for different units, several columns, or fewer than 10 met samples.
@@ -57,7 +70,7 @@ def force_pair(name: str, run: Signal, reference: Signal, lag_within: float) -> 
         )
     t = reference.t[seen]
     y = np.interp(t, run.t, run.y[:, 0])
-    return ForcePair(name, t, y, reference.y[seen, 0], run, reference, lag_within)
+    return ForcePair(name, t, y, reference.y[seen, 0], run, reference, lag_within, against)
 
 
 def peak_error(force: ForcePair) -> float:
@@ -76,8 +89,7 @@ def rms_error(force: ForcePair) -> float:
 
 def relative_rms_error(force: ForcePair) -> float:
     """Root mean square error over the root mean square of the reference."""
-    scale = float(np.sqrt((force.y_reference**2).mean()))
-    return rms_error(force) / _positive(scale, force)
+    return rms_error(force) / _positive(rms(force.y_reference), force)
 
 
 def phase_error(force: ForcePair) -> float:
@@ -105,38 +117,47 @@ def _positive(scale: float, force: ForcePair) -> float:
     return scale
 
 
-FORCE_METRICS: tuple[tuple[str, Callable[[ForcePair], float], str | None, str], ...] = (
-    ("peak", peak_error, None, "largest |force| of the run less that of the reference"),
-    ("peak.relative", relative_peak_error, "1", "peak error over the reference's largest |force|"),
-    ("rms", rms_error, None, "root mean square of run less reference"),
-    ("rms.relative", relative_rms_error, "1", "rms error over the reference's root mean square"),
-    (
+_SAMPLES: Counted[ForcePair] = Counted("samples of the reference", lambda f: len(f.t))
+
+
+def _of_track(value: Callable[[TrackError], float]) -> Callable[[ForcePair], float]:
+    return lambda f: value(f.track)
+
+
+#: Of a force alone, and MAE, RMSE, SD, NRMSE as for displacements.
+FORCE_METRICS: tuple[Metric[ForcePair], ...] = (
+    Metric(
+        "peak", peak_error, "{force}", "largest |force| of the run less the reference's", _SAMPLES
+    ),
+    Metric(
+        "peak.relative",
+        relative_peak_error,
+        "1",
+        "peak error over the reference's largest |force|",
+        _SAMPLES,
+    ),
+    Metric("rms", rms_error, "{force}", "root mean square of run less reference", _SAMPLES, True),
+    Metric(
+        "rms.relative",
+        relative_rms_error,
+        "1",
+        "rms error over the reference's root mean square",
+        _SAMPLES,
+    ),
+    Metric(
         "phase",
         phase_error,
         "s",
         "how much later the run comes than the reference: lag of best correlation",
+        _SAMPLES,
+    ),
+    *(
+        Metric(name, _of_track(value), "{force}" if unit == "m" else unit, words, _SAMPLES)
+        for name, value, unit, words in TRACK_METRICS
     ),
 )
 
 
-def force_scores(force: ForcePair, against: str) -> tuple[Score, ...]:
-    """Scores `<name>.<metric>` of the force, and MAE, RMSE, SD, NRMSE as for displacements."""
-    n, unit = len(force.t), force.run.unit
-    words = f"{force.name} at the reference's times the run meets"
-    scores = [
-        Score(f"{force.name}.{name}", value(force), own or unit, n, against, f"{words}; {text}")
-        for name, value, own, text in FORCE_METRICS
-    ]
-    error = force.track
-    scores += [
-        Score(
-            f"{force.name}.{name}",
-            value(error),
-            unit if own == "m" else own,
-            n,
-            against,
-            f"{words}; {text}",
-        )
-        for name, value, own, text in TRACK_METRICS
-    ]
-    return tuple(scores)
+def force_scores(force: ForcePair) -> tuple[Score, ...]:
+    """Scores `<name>.<metric>` of the force."""
+    return tuple(metric.score(force, f"{force.name}.") for metric in FORCE_METRICS)

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from validate.register.observe import Hold, Registered
-from validate.replay.sureness import consistency_exhibit, consistency_scores, nees_of, nis_of
-from validate.replay.tracking import Followed, Truth
 
 from validate.arrays import Floats
-from validate.recording.types import Signal
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
+from validate.replay.consistency import consistency_exhibit, consistency_scores, nees_of, nis_of
+from validate.replay.followed import Followed, Truth
 from validate.scene.box import box
 from validate.scene.scene import Material, Probe, Scene, Support
 from validate.solve.types import Outcome, Run, Trace
@@ -53,9 +53,8 @@ def followed(
             "innovation.tip.x.sd": Trace(np.full(STEPS, 2.0), "m"),
         }
     run = Run("kf", T, at, u, traces, Outcome("finished", STEPS), 0.0, None, claimed)
-    stage = Signal(T, np.ones((STEPS, 1)), "N", 0.0, "scene")
-    seen = Registered(stage, (Hold("end", 1.0, float(T[-1])),), None, None, ())
-    return Followed("kf", "filter", case, SCENE, seen, run, Truth({"tip": path}))
+    seen = Registered((SignalObservation("pull", "drives", T, np.ones((STEPS, 1)), "N", 0.0),))
+    return Followed("kf", "filter", case, SCENE, (seen,), (run,), {}, Truth({"tip": path}))
 
 
 def rows_of(found: Followed, others: dict[str, Any] | None = None) -> list[dict[str, Any]]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats, Ints
+from validate.compare.boundary import Boundary, enclosed
 from validate.compare.crossing import crossings
-from validate.compare.skin import Skin, enclosed
 from validate.errors import ComparisonError
 from validate.fem.cells import jacobians, nodal_rule, rule
 from validate.scene.mesh import Mesh
@@ -27,7 +27,7 @@ class Soundness:
     crossings: int
 
 
-def soundness(mesh: Mesh, u: Floats, boundary: Skin) -> Soundness:
+def soundness(mesh: Mesh, u: Floats, boundary: Boundary) -> Soundness:
     """The state of the body with displacement u (n, d) m and that deformed boundary."""
     return Soundness(
         inverted_cells(mesh, u), len(mesh.cells), enclosed(boundary), crossings(boundary)

@@ -76,6 +76,10 @@ class Measurements:
         names = tuple(self.names[i] for i in pick)
         return Measurements(self.t, self.H[pick], self.z[:, pick], self.sd[pick], names)
 
+    def variances(self, R: float | None) -> Floats:
+        """R (m,) m^2 of the components: the one that is given, else their own sd squared."""
+        return self.sd**2 if R is None else np.full(len(self.sd), R)
+
     def free(self, free: Ints) -> Floats:
         """H over the free unknowns, dense (m, free)."""
         return np.ascontiguousarray(self.H[:, free].toarray())

@@ -1,9 +1,4 @@
-"""Kalman filters for any small model, as pure functions: what is written once and trusted.
-
-Compact references with generic f and h; `filterpy_guest.oracle_table` shows that they equal
-filterpy's to rounding. States x (n,), covariances P (n, n), measurements z (m,), all of one
-system of units. Updates are in Joseph's form, which stays symmetric and positive for any gain.
-"""
+"""Kalman filters by samples, for any small model: unscented and ensemble, as pure functions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,63 +7,9 @@ import numpy as np
 from scipy.linalg import cholesky
 
 from validate.arrays import Floats
+from validate.estimate.kalman import Gaussian, Update, best_gain, innovation
 
 Function = Callable[[Floats], Floats]
-
-
-@dataclass(frozen=True)
-class Gaussian:
-    """Mean x (n,) and covariance P (n, n)."""
-
-    x: Floats
-    P: Floats
-
-
-@dataclass(frozen=True)
-class Update:
-    """A posterior with the innovation y (m,), its covariance S_yy (m, m) and the gain G (n, m)."""
-
-    posterior: Gaussian
-    y: Floats
-    S_yy: Floats
-    G: Floats
-
-    @property
-    def nis(self) -> float:
-        """y^T S_yy^-1 y."""
-        return float(self.y @ np.linalg.solve(self.S_yy, self.y))
-
-
-def joseph(P: Floats, G: Floats, H: Floats, R: Floats) -> Floats:
-    """(I - G H) P (I - G H)^T + G R G^T: positive whatever the gain."""
-    I_GH = np.eye(len(P)) - G @ H
-    return np.asarray(I_GH @ P @ I_GH.T + G @ R @ G.T)
-
-
-def kf_predict(prior: Gaussian, A: Floats, Q: Floats, forced: Floats | float = 0.0) -> Gaussian:
-    """x- = A x + forced, P- = A P A^T + Q."""
-    return Gaussian(A @ prior.x + forced, A @ prior.P @ A.T + Q)
-
-
-def kf_update(prior: Gaussian, z: Floats, H: Floats, R: Floats) -> Update:
-    """The linear update (paper 001, eq 3)."""
-    return ekf_update(prior, z, lambda x: np.asarray(H @ x), lambda _: H, R)
-
-
-def ekf_predict(prior: Gaussian, f: Function, jacobian: Function, Q: Floats) -> Gaussian:
-    """x- = f(x), P- = A P A^T + Q with A = df/dx (n, n) at x."""
-    A = jacobian(prior.x)
-    return Gaussian(f(prior.x), A @ prior.P @ A.T + Q)
-
-
-def ekf_update(prior: Gaussian, z: Floats, h: Function, jacobian: Function, R: Floats) -> Update:
-    """The update with H = dh/dx (m, n) at the prior."""
-    H = jacobian(prior.x)
-    PHt = prior.P @ H.T
-    S_yy = H @ PHt + R
-    G = np.asarray(np.linalg.solve(S_yy, PHt.T).T, dtype=np.float64)
-    y = z - h(prior.x)
-    return Update(Gaussian(prior.x + G @ y, joseph(prior.P, G, H, R)), y, S_yy, G)
 
 
 @dataclass(frozen=True)
@@ -110,10 +51,10 @@ def ukf_update(prior: Gaussian, z: Floats, h: Function, R: Floats, sigma: SigmaP
     seen = np.array([h(p) for p in points])
     middle = mean @ seen
     weighted = covariance[:, None] * (seen - middle)
-    S_yy = (seen - middle).T @ weighted + R
-    G: Floats = np.linalg.solve(S_yy, weighted.T @ (points - prior.x)).T
-    y = z - middle
-    return Update(Gaussian(prior.x + G @ y, prior.P - G @ S_yy @ G.T), y, S_yy, G)
+    gain = best_gain((points - prior.x).T @ weighted, (seen - middle).T @ weighted + R)
+    found = innovation(z, middle, gain)
+    P = prior.P - gain.G @ gain.S_yy @ gain.G.T
+    return Update(Gaussian(prior.x + gain.G @ found.y, P), gain, found)
 
 
 def enkf_predict(members: Floats, f: Function, noise: Floats) -> Floats:
@@ -125,9 +66,9 @@ def enkf_update(members: Floats, z: Floats, h: Function, R: Floats, noise: Float
     """Members (N, n) corrected by perturbed measurements z + noise (N, m) (Burgers et al. 1998)."""
     seen = np.array([h(member) for member in members])
     off, apart = members - members.mean(axis=0), seen - seen.mean(axis=0)
-    S_yy = apart.T @ apart / (len(members) - 1) + R
-    G: Floats = np.linalg.solve(S_yy, apart.T @ off / (len(members) - 1)).T
-    return np.asarray(members + (z + noise - seen) @ G.T)
+    degrees = len(members) - 1
+    gain = best_gain(off.T @ apart / degrees, apart.T @ apart / degrees + R)
+    return np.asarray(members + (z + noise - seen) @ gain.G.T)
 
 
 def ensemble_gaussian(members: Floats) -> Gaussian:

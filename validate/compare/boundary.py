@@ -10,7 +10,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
-from validate.scene.mesh import EDGES, Mesh, boundary_facets
+from validate.scene.mesh import Mesh, boundary_facets
+from validate.scene.shape_functions import EDGES
 
 _PIECES = {
     2: ((0, 1),),
@@ -21,14 +22,14 @@ _SEGMENTS = ((0, 2), (2, 1))  # an edge with its middle node
 
 
 @dataclass(frozen=True)
-class Skin:
+class Boundary:
     """points (p, d) m of a closed boundary, pieces (s, d) oriented outward, by point number."""
 
     points: Floats
     pieces: Ints
 
 
-def skin(mesh: Mesh, nodal: Floats) -> Skin:
+def deformed_boundary(mesh: Mesh, nodal: Floats) -> Boundary:
     """The boundary of a mesh whose nodes moved to `nodal` (n, d) m.
 
     Point and piece numbers depend on the mesh alone: two skins of one mesh correspond.
@@ -44,35 +45,35 @@ def skin(mesh: Mesh, nodal: Floats) -> Skin:
     return _used(nodal, np.vstack([facets[:, list(piece)] for piece in local]))
 
 
-def outline_skin(outline: Floats) -> Skin:
+def outline_boundary(outline: Floats) -> Boundary:
     """A closed curve (k, 2) m, recorded or drawn, as a boundary; its sense is turned outward."""
     points = checked(outline, "outline [m]", (None, 2), error=ComparisonError)
     if len(points) < 3:
         raise ComparisonError(f"an outline of {len(points)} points encloses nothing; 3 are needed")
     number = np.arange(len(points))
-    closed = Skin(points, np.stack([number, np.roll(number, -1)], axis=1))
-    return closed if enclosed(closed) > 0 else Skin(points, closed.pieces[:, ::-1])
+    closed = Boundary(points, np.stack([number, np.roll(number, -1)], axis=1))
+    return closed if enclosed(closed) > 0 else Boundary(points, closed.pieces[:, ::-1])
 
 
-def enclosed(skin: Skin) -> float:
+def enclosed(boundary: Boundary) -> float:
     """Signed area m^2 or volume m^3 inside; negative when the boundary points inward."""
-    x = skin.points - skin.points.mean(axis=0)
+    x = boundary.points - boundary.points.mean(axis=0)
     size = {2: 2.0, 3: 6.0}[x.shape[1]]
-    return float(np.linalg.det(x[skin.pieces]).sum() / size)
+    return float(np.linalg.det(x[boundary.pieces]).sum() / size)
 
 
-def normals(skin: Skin) -> Floats:
+def normals(boundary: Boundary) -> Floats:
     """Outward normals (s, d) with the length m or area m^2 of the piece as their length."""
-    x = skin.points[skin.pieces]
+    x = boundary.points[boundary.pieces]
     if x.shape[2] == 2:
         along = x[:, 1] - x[:, 0]
         return np.stack([along[:, 1], -along[:, 0]], axis=1)
     return np.asarray(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2)
 
 
-def _used(points: Floats, pieces: Ints) -> Skin:
+def _used(points: Floats, pieces: Ints) -> Boundary:
     used, number = np.unique(pieces, return_inverse=True)
-    return Skin(np.asarray(points[used]), number.reshape(pieces.shape))
+    return Boundary(np.asarray(points[used]), number.reshape(pieces.shape))
 
 
 def _boundary(mesh: Mesh) -> Ints:

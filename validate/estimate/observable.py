@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.covariance import Claim, Gain, Modal, Recursion, best_gain, claimed
+from validate.estimate.covariance import Claim, Decoupled, Recursion, claimed
+from validate.estimate.kalman import Gain, Seen, best_gain
 
 _LEFT = 1e-12  # share of A^k H^T outside the space that is taken as none
 _WORTH = 5  # times narrower than the whole, or the whole is cheaper
@@ -36,18 +37,20 @@ class Observed:
     def start(self) -> Claim:
         return claimed(self.PV0, self.PV0 @ self.rows.T)
 
-    def predict(self, claim: Claim) -> Claim:
-        PV = self.f[:, None] * (claim.P @ self.T) + self.QV
+    def predict(self, claim: Claim, steps: int = 1) -> Claim:
+        PV = claim.P
+        for _ in range(steps):
+            PV = self.f[:, None] * (PV @ self.T) + self.QV
         return claimed(PV, PV @ self.rows.T)
 
-    def update(self, claim: Claim, seen: tuple[bool, ...]) -> tuple[Gain, Claim]:
-        gain = best_gain(claim.PHt, self.H, self.R, seen)
+    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
+        gain = best_gain(claim.PHt, self.H @ claim.PHt + np.diag(self.R), seen)
         i = np.array(seen)
         PV = claim.P - gain.G @ (claim.PHt[:, i].T @ self.V)
         return gain, claimed(PV, claim.PHt)
 
 
-def observed(covariance: Modal, steps: int) -> Recursion:
+def observed(covariance: Decoupled, steps: int) -> Recursion:
     """The narrow recursion if `steps` steps stay in a space that is narrow, else `covariance`."""
     f, H, n = covariance.f, covariance.H, len(covariance.f)
     V = np.linalg.qr(H.T)[0]

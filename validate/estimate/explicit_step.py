@@ -40,7 +40,7 @@ class ExplicitModel(Protocol):
 
 
 @dataclass(frozen=True)
-class Walk:
+class ExplicitStep:
     """U' = c2 U - c1 U_{t-h} + w (F - R(U)), all (N,); held unknowns have zeros in c2, c1 and w.
 
     `parts` steps of h s make one step of `march`. Loads reach the `loaded` unknowns by `columns`,
@@ -90,12 +90,7 @@ class Walk:
         )  # fmt: skip
 
 
-def explicit_model(system: System) -> ExplicitModel:
-    """The compiled body of a scene."""
-    return ExplicitBody(system.scene)
-
-
-def walk(system: System, model: ExplicitModel, dt: float, parts: int) -> Walk:
+def explicit_step(system: System, dt: float, parts: int) -> ExplicitStep:
     """The step of h = dt/parts; raises `SceneError` for damping that is not diagonal."""
     h, lags = dt / parts, system.scene.per_cell(lambda m: m.stiffness_damping)
     if lags.any():
@@ -107,8 +102,9 @@ def walk(system: System, model: ExplicitModel, dt: float, parts: int) -> Walk:
     free = np.zeros(len(system.moves))
     free[system.free] = 1 / (1 + half[system.free])
     loaded, driven = (np.flatnonzero(X.any(axis=1)) for X in (system.loads, system.moves))
-    return Walk(
-        system, model, h, parts, 2 * free, (1 - half) * free, free * h * h / system.masses,
+    return ExplicitStep(
+        system, ExplicitBody(system.scene), h, parts,
+        2 * free, (1 - half) * free, free * h * h / system.masses,
         loaded, np.ascontiguousarray(system.loads[loaded]),
         driven, np.ascontiguousarray(system.moves[driven]),
     )  # fmt: skip

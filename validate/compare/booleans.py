@@ -8,14 +8,14 @@ import numpy as np
 import shapely
 
 from validate.arrays import Floats
-from validate.compare.skin import Skin, enclosed
+from validate.compare.boundary import Boundary, enclosed
 from validate.errors import ComparisonError
 
 # Share of the volume by which the library may differ from the signed sum before we mistrust it.
 _TRUST = 1e-6
 
 
-def symmetric_difference(one: Skin, other: Skin) -> float:
+def symmetric_difference(one: Boundary, other: Boundary) -> float:
     """|A - B| + |B - A|, m^2 or m^3. Raises `ComparisonError` where a boundary encloses no body."""
     if one.points.shape[1] == 2:
         a, b = polygon(one), polygon(other)
@@ -27,9 +27,9 @@ def symmetric_difference(one: Skin, other: Skin) -> float:
     return float(((solid - reference).volume() + (reference - solid).volume()) * size**3)
 
 
-def polygon(skin: Skin) -> shapely.MultiPolygon:
+def polygon(boundary: Boundary) -> shapely.MultiPolygon:
     """The plane body inside a boundary: outer loops run anticlockwise, holes clockwise."""
-    rings = [shapely.Polygon(skin.points[loop]) for loop in _loops(skin)]
+    rings = [shapely.Polygon(boundary.points[loop]) for loop in _loops(boundary)]
     outward = [shapely.is_ccw(r.exterior) for r in rings]
     shells = [r for r, out in zip(rings, outward, strict=True) if out]
     holes = [r for r, out in zip(rings, outward, strict=True) if not out]
@@ -37,19 +37,19 @@ def polygon(skin: Skin) -> shapely.MultiPolygon:
         shapely.Polygon(s.exterior, [h.exterior for h in holes if s.contains(h)]) for s in shells
     ]
     body = shapely.MultiPolygon(parts)
-    area = enclosed(skin)
+    area = enclosed(boundary)
     if not body.is_valid or abs(body.area - area) > _TRUST * abs(area):
         raise ComparisonError(
-            f"a boundary of {len(skin.pieces)} segments encloses no plane body "
+            f"a boundary of {len(boundary.pieces)} segments encloses no plane body "
             f"({shapely.is_valid_reason(body)}, {body.area:.4g} of {area:.4g} m2)"
         )
     return body
 
 
-def _loops(skin: Skin) -> list[list[int]]:
-    after = dict(skin.pieces.tolist())
-    if len(after) != len(skin.pieces):
-        twice = len(skin.pieces) - len(after)
+def _loops(boundary: Boundary) -> list[list[int]]:
+    after = dict(boundary.pieces.tolist())
+    if len(after) != len(boundary.pieces):
+        twice = len(boundary.pieces) - len(after)
         raise ComparisonError(f"the boundary touches itself in {twice} nodes; it is no outline")
     loops = []
     while after:
@@ -62,11 +62,11 @@ def _loops(skin: Skin) -> list[list[int]]:
     return loops
 
 
-def _solid(skin: Skin, middle: Floats, size: float) -> manifold3d.Manifold:
-    points = np.ascontiguousarray((skin.points - middle) / size)
-    triangles = np.ascontiguousarray(skin.pieces, dtype=np.uint64)
+def _solid(boundary: Boundary, middle: Floats, size: float) -> manifold3d.Manifold:
+    points = np.ascontiguousarray((boundary.points - middle) / size)
+    triangles = np.ascontiguousarray(boundary.pieces, dtype=np.uint64)
     solid = manifold3d.Manifold(manifold3d.Mesh64(points, triangles))
-    volume = enclosed(skin) / size**3
+    volume = enclosed(boundary) / size**3
     if solid.status() != manifold3d.Error.NoError or abs(solid.volume() - volume) > _TRUST * volume:
         raise ComparisonError(
             f"a boundary of {len(triangles)} triangles encloses no solid "

@@ -1,0 +1,91 @@
+"""A material point against closed forms: incompressible, St. Venant-Kirchhoff, small strain."""
+
+import numpy as np
+import pytest
+
+from validate.errors import SceneError
+from validate.fem.laws import law_of
+from validate.fem.stretch_response import response
+from validate.scene.material_point import MaterialPoint, StretchMode
+from validate.scene.scene import LawName, Material
+
+E, NU = 12_000.0, 0.4
+STRETCHES = np.array([0.6, 0.8, 1.0, 1.2, 1.5])
+MODES: tuple[StretchMode, ...] = ("uniaxial", "equibiaxial", "pure_shear")
+#: Small-strain modulus over E by mode, and the power of the incompressible stress.
+STIFFER = {"uniaxial": 1.0, "equibiaxial": 1 / (1 - NU), "pure_shear": 1 / (1 - NU**2)}
+POWER = {"uniaxial": -2, "equibiaxial": -5, "pure_shear": -3}
+
+
+def point(mode: StretchMode, law: LawName, nu: float = NU) -> MaterialPoint:
+    return MaterialPoint(Material(E, nu, law), mode)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_neo_hooke_tends_to_the_incompressible_form(mode: StretchMode) -> None:
+    """mu (l - l^-2), mu (l - l^-5), mu (l - l^-3); the gap falls with 1 - 2 nu."""
+    gaps = []
+    for nu in (0.4999, 0.49999):
+        found = response(point(mode, "neo_hooke", nu), STRETCHES)
+        exact = E / (2 * (1 + nu)) * (STRETCHES - STRETCHES ** POWER[mode])
+        gaps.append(np.abs(found["nominal_stress"] - exact).max() / E)
+    assert gaps[1] < 1e-3
+    assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.01)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_saint_venant_kirchhoff_is_its_closed_form(mode: StretchMode) -> None:
+    """P = E' l (l^2 - 1)/2 for every nu, E' the small-strain modulus of the mode."""
+    stretches = np.array([0.6, 0.9, 1.0, 1.1, 1.3])
+    found = response(point(mode, "svk"), stretches)["nominal_stress"]
+    exact = STIFFER[mode] * E * stretches * (stretches**2 - 1) / 2
+    assert found == pytest.approx(exact, rel=1e-12, abs=1e-12 * E)
+
+
+@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+@pytest.mark.parametrize("mode", MODES)
+def test_small_strain_has_the_modulus_and_the_sign_of_the_strain(
+    mode: StretchMode, law: LawName
+) -> None:
+    strain = np.array([-1e-8, 0.0, 1e-8])
+    found = response(point(mode, law), 1 + strain)
+    assert found["nominal_stress"] == pytest.approx(STIFFER[mode] * E * strain, rel=1e-6, abs=1e-12)
+    assert (found["free_stretch"] - 1)[[0, 2]] @ strain[[0, 2]] < 0
+
+
+@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+@pytest.mark.parametrize("mode", MODES)
+def test_stress_is_the_slope_of_the_energy(mode: StretchMode, law: LawName) -> None:
+    """With free faces without stress: dW/dl = P, twice that where two directions are pulled."""
+    place, step = point(mode, law), 1e-5
+
+    def energy(stretch: float) -> float:
+        free = float(response(place, np.array([stretch]))["free_stretch"][0])
+        second = {"uniaxial": free, "equibiaxial": stretch, "pure_shear": 1.0}[mode]
+        H = np.diag([stretch, second, free])[None] - np.eye(3)
+        return float(law_of(place.material).energy(H)[0])
+
+    pulled = 2 if mode == "equibiaxial" else 1
+    for stretch in (0.8, 1.2):
+        slope = (energy(stretch + step) - energy(stretch - step)) / (2 * step)
+        found = response(place, np.array([stretch]))["nominal_stress"][0]
+        assert slope == pytest.approx(pulled * found, rel=1e-7)
+
+
+def test_the_volume_follows_the_stretches() -> None:
+    found = response(point("uniaxial", "neo_hooke"), STRETCHES)
+    assert found["volume_ratio"] == pytest.approx(STRETCHES * found["free_stretch"] ** 2, rel=1e-14)
+    assert point("uniaxial", "svk").inputs == ("stretch",)
+
+
+def test_states_that_a_law_does_not_have_are_refused() -> None:
+    with pytest.raises(SceneError, match="law 'linear' has no form at large strain"):
+        response(point("uniaxial", "linear"), STRETCHES)
+    with pytest.raises(SceneError, match=r"stretch 0.5: the law 'svk' has sense above 0.5774"):
+        response(point("uniaxial", "svk"), np.array([0.5]))
+    with pytest.raises(SceneError, match="stretch 0: the law 'neo_hooke' has sense above 0"):
+        response(point("uniaxial", "neo_hooke"), np.array([0.0]))
+    with pytest.raises(SceneError, match="at stretch 2 no free stretch is without stress"):
+        response(point("uniaxial", "svk"), np.array([1.1, 2.0]))
+    with pytest.raises(SceneError, match="stretches: 1 of 1 values not finite"):
+        response(point("uniaxial", "svk"), np.array([np.nan]))

@@ -1,0 +1,227 @@
+"""A block of 27 boxes that is pulled: over time by a force, or at three holds by its top."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.verdict import Accept
+from validate.estimate.reduced_kf import ReducedKf
+from validate.fem.system import System, build
+from validate.parameters import quantity
+from validate.recording.types import Recording
+from validate.register.follow import follow_signal
+from validate.register.markers import placed_markers
+from validate.register.registered import Registered
+from validate.register.signals import driving, holds_at, validating
+from validate.replay.experiment import Case, Experiment, Twin
+from validate.replay.followed import Truth, truth_of
+from validate.replay.method import Method
+from validate.scene.box import box
+from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
+from validate.solve.fluid import NoFluid
+from validate.solve.march import march, output_frames
+from validate.solve.newmark import Newmark
+from validate.solve.types import Ending, State, Stepper
+from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+
+DT, STEPS, SIDE = 0.002, 30, 0.01
+PROBES = {"node_A": (SIDE, SIDE, SIDE), "node_B": (0.0, SIDE, 2 * SIDE / 3)}
+FIDUCIALS = {"f1": (0.0, 0.0, 0.0), "f2": (SIDE, 0.0, 0.0), "f3": (0.0, SIDE, 0.0)}
+
+
+@dataclass(frozen=True)
+class TwinCard:
+    stiffness: float = quantity(1.0, "1", "its modulus over the models'")
+    missing: float = quantity(0.0, "1", "share of looks without a marker")
+
+
+@dataclass(frozen=True)
+class Card:
+    E: float = quantity(10e3, "Pa", "modulus of the models")
+    cells: int = quantity(3, "1", "boxes along an edge")
+    sd: float = quantity(1e-5, "m", "noise")
+    twin: TwinCard = field(default_factory=TwinCard)
+
+
+def scene(E: float, cells: int = 3) -> Scene:
+    return Scene(
+        box((SIDE, SIDE, SIDE), (cells,) * 3),
+        Material(E, 0.3, "linear", 1000.0, 0.0, 0.05),
+        (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+        probes=tuple(Probe(name, at) for name, at in PROBES.items()),
+    )
+
+
+def true_run(card: Card, frames: int = 200) -> tuple[Scene, Any]:
+    true = scene(card.twin.stiffness * card.E)
+    t = DT * np.arange(1, STEPS + 1)
+    force = 0.05 * np.minimum(t / 0.02, 1.0)[:, None]
+    stepper = Newmark(DT).prepare(build(true))
+    return true, march("twin", stepper, t, force, output_frames(STEPS, frames), 0.0)
+
+
+def record(card: Card, progress: Callable[[str], None]) -> Recording:
+    true, run = true_run(card)
+    return record_tracked(
+        Origin("tiny", 3, True),
+        points_of(run, true),
+        {k: np.array(v) for k, v in FIDUCIALS.items()},
+        Camera(card.sd, 1, card.twin.missing, still=10_000),
+        {"pull": Reading(run.traces["pull.force"].y, "N")},
+    )
+
+
+def truth(card: Card, seen: Registered) -> Truth:
+    true, run = true_run(card)
+    return truth_of(run, true)
+
+
+@dataclass(frozen=True)
+class Breaking:
+    """Steps as another stepper until one fails."""
+
+    inner: Stepper
+    at: int
+    failure: tuple[Ending, str]
+
+    @property
+    def scene(self) -> Scene:
+        return self.inner.scene
+
+    def rest(self) -> State:
+        return self.inner.rest()
+
+    def step(self, state: State, drives: Floats) -> State:
+        stepped = self.inner.step(state, drives)
+        return replace(stepped, failure=self.failure) if stepped.k == self.at else stepped
+
+    def field(self, state: State) -> Floats:
+        return self.inner.field(state)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        return self.inner.units
+
+
+@dataclass(frozen=True)
+class Breaks:
+    """A scheme whose step `at` fails."""
+
+    dt: float = quantity(DT, "s", "time step")
+    at: int = quantity(1, "1", "step that fails")
+    ending: str = quantity("refused", "1", "its ending")
+
+    def prepare(self, system: System) -> Stepper:
+        ending: Any = self.ending
+        return Breaking(Newmark(self.dt).prepare(system), self.at, (ending, "told so"))
+
+
+def sets(card: Card, seen: Registered) -> dict[str, Any]:
+    return {"dt": DT}
+
+
+A = ("node_A",)
+METHODS = {
+    "fem": Method("FEM", Newmark()),
+    "timed": Method("FEM, timed", Newmark(), steps=5),
+    "slow": Method("FEM, long steps", Newmark(), stride=3),
+    "kf": Method("filter", ReducedKf(modes=5, load_start=0.02, load_walk=0.05), markers=A),
+    "refused": Method("refused", Breaks()),
+    "diverged": Method("diverged", Breaks(at=8, ending="diverged")),
+}
+
+
+def stiffer(card: Card) -> Card:
+    return replace(card, twin=replace(card.twin, stiffness=1.25))
+
+
+def missed(card: Card) -> Card:
+    return replace(card, twin=replace(card.twin, missing=0.4))
+
+
+TINY = Experiment(
+    name="tiny",
+    title="tiny",
+    source="this test",
+    parameters=Card(),
+    methods=METHODS,
+    accepted=("fem",),
+    accept=(Accept("node_B", 1e-4, "ours"),),
+    load=lambda card, folder: (record(card, print),),
+    build=lambda recording, card, model: scene(card.E, card.cells),
+    place=lambda recording, card, its: follow_signal(recording, its.mesh, "pull", "N"),
+    sets=sets,
+    axis="z",
+    reference="fem",
+    cases=(
+        Case("stiff", "25 % stiffer", stiffer),
+        Case("missing", "looks are missing", missed, methods=("kf", "diverged")),
+    ),
+    twin=Twin(record, truth, same_model=True),
+    path=Path(__file__),
+)
+
+
+# --- the same block at holds ------------------------------------------------------------------
+
+
+LOADS = (1e-4, 2e-4, 3e-4)  # m
+
+
+def moved_scene(E: float, cells: int = 3) -> Scene:
+    """The block with its top moved upward."""
+    drive = Drive("stage", "z1", (0.0, 0.0, 1.0))
+    return replace(scene(E, cells), loads=(), drives=(drive,))
+
+
+def moved_run(card: Card) -> tuple[Scene, Any]:
+    true = moved_scene(card.twin.stiffness * card.E)
+    y = np.linspace(0, LOADS[-1], STEPS + 1)[1:, None]
+    t = np.arange(1.0, STEPS + 1)
+    stepper = NoFluid().prepare(build(true))
+    return true, march("twin", stepper, t, y, output_frames(STEPS, 2), 0.0)
+
+
+def record_moved(card: Card, progress: Callable[[str], None]) -> Recording:
+    true, run = moved_run(card)
+    stage = np.linspace(0, LOADS[-1], STEPS + 1)[1:]
+    readings = {
+        "stage": Reading(stage, "m"),
+        "cell": Reading(run.traces["stage.force"].y, "N", 1e-4),
+    }
+    at = {k: np.array(v) for k, v in FIDUCIALS.items()}
+    camera = Camera(card.sd, 1, card.twin.missing, still=10_000)
+    return record_tracked(Origin("moved", 3, True), points_of(run, true), at, camera, readings)
+
+
+def moved_truth(card: Card, seen: Registered) -> Truth:
+    """The twin's motion at the recorded samples, rest first."""
+    true, run = moved_run(card)
+    probes = truth_of(run, true).probes
+    return Truth({name: np.vstack([np.zeros((1, 3)), u]) for name, u in probes.items()})
+
+
+def place_moved(recording: Recording, card: Card, its: Scene) -> Registered:
+    stage = driving(recording, "stage", "m")
+    cell = validating(recording, "cell", "N", quantity="force", trace="stage.force")
+    markers = placed_markers(recording, its.mesh)
+    rest, *holds = holds_at(stage, stage.t, LOADS, 1e-6)
+    return Registered((stage, markers, cell), tuple(holds), rest)
+
+
+AT_HOLDS = replace(
+    TINY,
+    methods={"fem": Method("FEM", NoFluid())},
+    accept=(Accept("node_B", 1e-4, "ours"), Accept("force", 0.1, "ours")),
+    load=lambda card, folder: (record_moved(card, print),),
+    build=lambda recording, card, model: moved_scene(card.E, card.cells),
+    place=place_moved,
+    sets=lambda card, seen: {},
+    cases=(Case("stiff", "25 % stiffer", stiffer),),
+    twin=Twin(record_moved, moved_truth, same_model=True),
+)

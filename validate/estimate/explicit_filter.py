@@ -1,0 +1,114 @@
+"""The stepper of filters that predict with the explicit step, around a core that they bring."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.estimate import node_ekf_kernel as kernel
+from validate.estimate.explicit_step import ExplicitStep
+from validate.estimate.kalman import Innovation, innovation_units, nothing
+from validate.estimate.measurements import Timetable
+from validate.scene.scene import Scene
+from validate.solve.types import Ending, State
+
+
+class Memory(Protocol):
+    """What a core carries: displacements (N,) m, and what else it needs."""
+
+    @property
+    def u(self) -> Floats: ...
+
+
+class ExplicitCore(Protocol):
+    """A filter between and at measurements; explicit steps are numbered 1, 2, ..."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Of what else it estimates, by trace name."""
+        ...
+
+    def start(self) -> Memory: ...
+
+    def predict(self, memory: Any, loads: Floats, drives: Floats) -> Memory:
+        """One explicit step from the loads N at its start to the drives m at its end."""
+        ...
+
+    def failure(self, memory: Any) -> tuple[Ending, str] | None: ...
+
+    def correct(self, memory: Any, number: int, z: Floats) -> tuple[Memory, Innovation]:
+        """By what was measured at the end of step `number` (m,), NaN = missing."""
+        ...
+
+    def sd(self, memory: Any, number: int) -> Floats:
+        """Standard deviations (n, 3) m after step `number`."""
+        ...
+
+    def numbers(self, memory: Any) -> Mapping[str, float]: ...
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The core's memory, and the inputs (k + l,) at the end of the step."""
+
+    memory: Any
+    inputs: Floats
+
+
+@dataclass(frozen=True)
+class ExplicitFilterStepper:
+    """`refusal` says why no step is made; empty where the step is small enough."""
+
+    explicit: ExplicitStep
+    core: ExplicitCore
+    names: tuple[str, ...]
+    times: Timetable
+    refusal: str
+
+    @property
+    def scene(self) -> Scene:
+        return self.explicit.system.scene
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """NIS with its degrees, innovations with their sd, and the core's own."""
+        return {**innovation_units(self.names), **self.core.units}
+
+    def rest(self) -> State:
+        """U_0 = U_{-h} = 0."""
+        return State(0, Followed(self.core.start(), np.zeros(len(self.scene.inputs))))
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """`parts` explicit steps, each with an update where something was measured."""
+        if self.refusal:
+            return replace(state, failure=("refused", self.refusal))
+        core, parts, last = self.core, self.explicit.parts, state.inner
+        memory, found = last.memory, nothing(len(self.names))
+        for part in range(parts):
+            memory = core.predict(memory, *self.explicit.inputs(last.inputs, inputs, part))
+            if failure := self._failure(memory):
+                return replace(state, failure=failure)
+            number = state.k * parts + part + 1
+            z = self.times.at(number)
+            if z is not None:
+                memory, new = core.correct(memory, number, z)
+                found = replace(new, nis=found.nis + new.nis, dof=found.dof + new.dof)
+        numbers = {**found.numbers(self.names), **core.numbers(memory)}
+        return State(state.k + 1, Followed(memory, inputs), numbers=numbers)
+
+    def _failure(self, memory: Memory) -> tuple[Ending, str] | None:
+        largest = kernel.farthest(memory.u)
+        if not largest < self.explicit.far:
+            return "diverged", self.explicit.lost(largest)
+        return self.core.failure(memory)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, 3) m."""
+        u: Floats = state.inner.memory.u
+        return u.reshape(-1, 3)
+
+    def sd(self, state: State) -> Floats:
+        """Standard deviations (n, 3) m of the nodes."""
+        return self.core.sd(state.inner.memory, state.k * self.explicit.parts)

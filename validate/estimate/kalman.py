@@ -1,0 +1,152 @@
+"""The formulas of a Kalman filter, written once: predict, innovation, gain, update.
+
+Pure functions of states x (n,), covariances P (n, n) and measurements z (m,), NaN = missing, all of
+one system of units; `filterpy_oracle.oracle_table` shows that they equal filterpy's to rounding.
+Updates are in Joseph's form, which stays symmetric and positive for any gain.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.linalg.lapack import dposv
+
+from validate.arrays import Floats
+
+Function = Callable[[Floats], Floats]
+Seen = tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Gain G (n, k) of the k `seen` components of m, and S_yy (m, m) m^2 of all of them.
+
+    `root` (k, k) is the upper Cholesky factor of S_yy over the seen components.
+    """
+
+    G: Floats
+    S_yy: Floats
+    seen: Seen
+    root: Floats
+
+    @cached_property
+    def sd(self) -> Floats:
+        """Standard deviations (m,) of the innovations, zero where nothing is seen."""
+        return np.where(self.seen, np.sqrt(np.diag(self.S_yy)), 0.0)
+
+    def nis(self, y: Floats) -> Floats:
+        """y^T S_yy^-1 y of innovations (k,) or (k, s) of the seen components."""
+        return np.asarray((y * cho_solve((self.root, False), y, check_finite=False)).sum(axis=0))
+
+
+def best_gain(PHt: Floats, S_yy: Floats, seen: Seen | None = None) -> Gain:
+    """G = P H^T S_yy^-1 over the seen components, from P H^T (n, m) and H P H^T + R (m, m).
+
+    LAPACK itself, as scipy's checks take ten times the work of a small S. Raises `LinAlgError` for
+    an S that is not positive definite.
+    """
+    S = S_yy = (S_yy + S_yy.T) / 2
+    if seen is None:
+        seen = (True,) * len(S_yy)
+    elif not all(seen):
+        i = np.array(seen)
+        PHt, S = PHt[:, i], S_yy[np.ix_(i, i)]
+    root, G, info = dposv(S, PHt.T)
+    if info:
+        raise np.linalg.LinAlgError(f"S_yy {S.shape} is not positive definite (pivot {info})")
+    return Gain(np.ascontiguousarray(G.T), S_yy, seen, root)
+
+
+def propagated(P: Floats, A: Floats, Q: Floats) -> Floats:
+    """P- = A P A^T + Q."""
+    return np.asarray(A @ P @ A.T + Q)
+
+
+def joseph(P: Floats, G: Floats, H: Floats, R: Floats) -> Floats:
+    """(I - G H) P (I - G H)^T + G R G^T: positive whatever the gain."""
+    return propagated(P, np.eye(len(P)) - G @ H, G @ R @ G.T)
+
+
+@dataclass(frozen=True)
+class Innovation:
+    """y = z - H u_prior (m,) m, zero where nothing was measured; sd (m,) m, zero there too.
+
+    `nis` = y^T S_yy^-1 y of the `dof` components that were measured.
+    """
+
+    y: Floats
+    sd: Floats
+    nis: float
+    dof: int
+
+    def numbers(self, names: tuple[str, ...]) -> Mapping[str, float]:
+        """By trace name, for `State.numbers`."""
+        numbers = {"nis": self.nis, "nis.dof": float(self.dof)}
+        for name, y, sd in zip(names, self.y.tolist(), self.sd.tolist(), strict=True):
+            numbers[f"innovation.{name}"] = y
+            numbers[f"innovation.{name}.sd"] = sd
+        return numbers
+
+
+def innovation(z: Floats, predicted: Floats, gain: Gain) -> Innovation:
+    """Of z (m,) where the gain has seen it, against the predicted (m,)."""
+    seen = np.array(gain.seen)
+    y = np.where(seen, z - predicted, 0.0)
+    return Innovation(y, gain.sd, float(gain.nis(y[seen])), int(seen.sum()))
+
+
+def nothing(m: int) -> Innovation:
+    """A step without a measurement."""
+    return Innovation(np.zeros(m), np.zeros(m), 0.0, 0)
+
+
+def innovation_units(names: tuple[str, ...]) -> dict[str, str]:
+    """Units of what `Innovation.numbers` tells."""
+    units = {"nis": "1", "nis.dof": "1"}
+    for name in names:
+        units |= {f"innovation.{name}": "m", f"innovation.{name}.sd": "m"}
+    return units
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Mean x (n,) and covariance P (n, n)."""
+
+    x: Floats
+    P: Floats
+
+
+@dataclass(frozen=True)
+class Update:
+    """A posterior with the gain and the innovation that led to it."""
+
+    posterior: Gaussian
+    gain: Gain
+    innovation: Innovation
+
+
+def kf_predict(prior: Gaussian, A: Floats, Q: Floats, forced: Floats | float = 0.0) -> Gaussian:
+    """x- = A x + forced, P- = A P A^T + Q."""
+    return Gaussian(A @ prior.x + forced, propagated(prior.P, A, Q))
+
+
+def kf_update(prior: Gaussian, z: Floats, H: Floats, R: Floats) -> Update:
+    """The linear update (paper 001, eq 3)."""
+    return ekf_update(prior, z, lambda x: np.asarray(H @ x), lambda _: H, R)
+
+
+def ekf_predict(prior: Gaussian, f: Function, jacobian: Function, Q: Floats) -> Gaussian:
+    """x- = f(x), P- = A P A^T + Q with A = df/dx (n, n) at x."""
+    return Gaussian(f(prior.x), propagated(prior.P, jacobian(prior.x), Q))
+
+
+def ekf_update(prior: Gaussian, z: Floats, h: Function, jacobian: Function, R: Floats) -> Update:
+    """The update with H = dh/dx (m, n) at the prior."""
+    H, i = jacobian(prior.x), np.isfinite(z)
+    PHt = prior.P @ H.T
+    gain = best_gain(PHt, H @ PHt + R, tuple(i.tolist()))
+    found = innovation(z, h(prior.x), gain)
+    P = joseph(prior.P, gain.G, H[i], R[np.ix_(i, i)])
+    return Update(Gaussian(prior.x + gain.G @ found.y[i], P), gain, found)

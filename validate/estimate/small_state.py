@@ -1,0 +1,82 @@
+"""The stepper of filters with a small state: what they share, around a core that they bring."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.estimate.kalman import Innovation, innovation_units
+from validate.estimate.measurements import Timetable
+from validate.fem.system import System
+from validate.scene.scene import Scene
+from validate.solve.dynamic import spread
+from validate.solve.types import State
+
+
+class Core(Protocol):
+    """A small filter: its state is opaque, `loads` (l,) are the forces in N at the step's end."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Of what else it estimates, by trace name."""
+        ...
+
+    def start(self) -> Any: ...
+
+    def step(self, inner: Any, k: int, loads: Floats, z: Floats | None) -> tuple[Any, Innovation]:
+        """Step k = 1, 2, ... with what was measured there (m,), NaN = missing; None: predict."""
+        ...
+
+    def free(self, inner: Any) -> Floats:
+        """Estimated displacements (m,) m of the free unknowns."""
+        ...
+
+    def variances(self, inner: Any) -> Floats:
+        """Their claimed variances (m,) m^2."""
+        ...
+
+    def numbers(self, inner: Any) -> Mapping[str, float]: ...
+
+
+@dataclass(frozen=True)
+class CoreStepper:
+    """States carry what the core does."""
+
+    system: System
+    core: Core
+    names: tuple[str, ...]
+    table: Timetable
+
+    @property
+    def scene(self) -> Scene:
+        return self.system.scene
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """NIS with its degrees, innovations with their sd, and the core's own."""
+        return {**innovation_units(self.names), **self.core.units}
+
+    def rest(self) -> State:
+        return State(0, self.core.start())
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """The posterior at the end of a step; `inputs` are those there, loads alone."""
+        k = state.k + 1
+        inner, seen = self.core.step(state.inner, k, inputs, self.table.at(k))
+        if not np.isfinite(self.core.free(inner)).all():
+            return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
+        numbers = {**seen.numbers(self.names), **self.core.numbers(inner)}
+        return State(k, inner, numbers=numbers)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes."""
+        return self._nodal(self.core.free(state.inner))
+
+    def sd(self, state: State) -> Floats:
+        """Claimed standard deviations (n, d) m; held unknowns have none."""
+        return self._nodal(np.sqrt(np.maximum(self.core.variances(state.inner), 0.0)))
+
+    def _nodal(self, free: Floats) -> Floats:
+        return spread(self.system, free, np.zeros(0)).reshape(self.scene.mesh.nodes.shape)

@@ -1,0 +1,76 @@
+"""What a scheme or filter can handle, declared on its settings, and the one refusal of the rest."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Protocol
+
+from validate.errors import SceneError
+from validate.scene.scene import LawName, Scene
+
+ContactName = Literal["foundations", "membranes"]
+LARGE: tuple[LawName, ...] = ("svk", "neo_hooke")
+GLUED: tuple[ContactName, ...] = ("foundations", "membranes")
+
+
+@dataclass(frozen=True)
+class Handles:
+    """`law`: the laws it solves; `contact`: what may be glued to facets.
+
+    `inertia` says that it marches in time with masses; the others which parts a scene may have.
+    `mesh` is False for what solves a material point.
+    """
+
+    law: tuple[LawName, ...]
+    inertia: bool
+    cavities: bool
+    drives: bool = True
+    loads: bool = True
+    contact: tuple[ContactName, ...] = ("foundations",)
+    mesh: bool = True
+
+    def covers(self, scene: Scene) -> bool:
+        return not _refused(self, scene)
+
+
+class Handling(Protocol):
+    """Settings that declare what they handle."""
+
+    handles: ClassVar[Handles]
+
+
+# Where to go instead: what handles the refused part, by name. A test asserts that each does.
+INSTEAD: Mapping[str, tuple[str, ...]] = {
+    "linear": ("ExactPressure", "Newmark"),
+    "svk": ("StaticNewton", "NewtonDynamics"),
+    "neo_hooke": ("StaticNewton", "NewtonDynamics"),
+    "cavities": ("ExactPressure", "StaticNewton"),
+    "loads": ("QuasiStatic", "NewtonDynamics"),
+    "drives": ("KfFem", "ModalKf"),
+    "membranes": ("QuasiStatic", "Newmark"),
+}
+
+
+def require_handled(scene: Scene, settings: Handling) -> None:
+    """Raises `SceneError` that names what the settings cannot handle, and what can."""
+    refused = _refused(settings.handles, scene)
+    if refused:
+        what, why = refused
+        name, others = type(settings).__name__, " or ".join(INSTEAD[what])
+        raise SceneError(f"{name} {why}; use {others}")
+
+
+def _refused(handles: Handles, scene: Scene) -> tuple[str, str] | None:
+    """The first part of a scene that is not handled, as a key of `INSTEAD` and in words."""
+    law = scene.material.law
+    if law not in handles.law:
+        return law, f"cannot solve the law '{law}', only {', '.join(handles.law)}"
+    if scene.cavities and not handles.cavities:
+        return "cavities", "knows no fluid in cavities; drop them from the scene"
+    if scene.loads and not handles.loads:
+        return "loads", f"knows no loads, the scene has {len(scene.loads)}"
+    if not handles.drives and (scene.drives or not scene.loads):
+        counts = f"{len(scene.drives)} drives and {len(scene.loads)} loads"
+        return "drives", f"needs loads alone, the scene has {counts}"
+    if scene.membranes and "membranes" not in handles.contact:
+        return "membranes", "knows no membranes: they are linear only"
+    return None
