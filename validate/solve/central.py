@@ -74,7 +74,8 @@ class CentralDifference:
         require_handled(system.scene, self)
         beta = self._beta(system.scene)
         still = np.zeros(len(system.moves))
-        past = Past(ExplicitMotion(np.zeros((6, len(still)))), still, np.zeros(len(system.scene.inputs)))
+        inputs = np.zeros(len(system.scene.inputs))
+        past = Past(ExplicitMotion(np.zeros((6, len(still)))), still, inputs)
         plates = system.moves[system.held]
         feels_loads = bool(system.loads[system.held].any())
         body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
@@ -279,7 +280,7 @@ class CentralStepper:
         return u.reshape(-1, 3)
 
 
-def _worked(past: Past, motion: Motion, inputs: Floats, more: float, taken: float) -> Past:
+def _worked(past: Past, motion: ExplicitMotion, inputs: Floats, more: float, taken: float) -> Past:
     work = past.work + more
     return replace(
         past,
