@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from validate.compare.exhibit import Chart, Series
+from validate.compare.exhibit import Chart, Picture, Series
 from validate.compare.result import Result
-from validate.report.page import Picture
 from validate.report.style import MEASURED, NOISE, PALETTE, Look, draw, free_look, looks
 
 _WIDTH, _HEIGHT = 8.6, 4.3  # inches without the legend
@@ -20,6 +19,7 @@ _LEGEND_WIDTH = 96  # characters of a legend's row at this width
 _FEW = 16  # points of a line that are marked, so that a sweep shows what was run
 _MANY = 400  # points drawn smaller from here on
 _SPARSE = 60  # points that lie on the lines; more of them would hide these
+_SHADES = (MEASURED, "#5F5F5F", "#8C8C8C", "#AFAFAF")  # of several recordings
 _GAP = 0.058  # between the names of two levels, share of the axes' height
 
 
@@ -67,17 +67,22 @@ def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Look]]
     taken = {known[s.label].colour for s in series if s.label in known}
     free = [c for c in PALETTE if c not in taken] or list(PALETTE)
     if len(unknown) > len(free):  # a sweep: its order becomes the order of the colours
-        shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(unknown)))
-        free = [mpl.colors.to_hex(c) for c in shades]
+        ramp = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(unknown)))
+        free = [mpl.colors.to_hex(c) for c in ramp]
     others = {id(s): free_look(i, free[i]) for i, s in enumerate(unknown)}
-    return [(s, known.get(s.label) or others.get(id(s)) or _given(s)) for s in series]
+    logs = (s for s in series if s.style == "points" and _is_given(s, series))
+    shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
+    return [
+        (s, known.get(s.label) or others.get(id(s)) or _given(s, shades.get(id(s), MEASURED)))
+        for s in series
+    ]
 
 
-def _given(series: Series) -> Look:
-    """A reference is a wide grey line under the others, what was measured black points."""
+def _given(series: Series, shade: str) -> Look:
+    """A reference is a wide grey line under the others, what was measured dark points."""
     if series.style == "line":
         return Look("#9A9A9A", "-", "o", 3.6)
-    return Look(MEASURED, "-", "o", 1.2)
+    return Look(shade, "-", "o", 1.2)
 
 
 def _known(result: Result) -> Mapping[str, Look]:
@@ -107,6 +112,10 @@ def _fill(figure: Figure, chart: Chart, drawn: list[_Drawn]) -> None:
         ax.set_xscale("log", nonpositive="mask")
     if "y" in chart.log:
         ax.set_yscale("log", nonpositive="mask")
+    if chart.linear:
+        ax.set_yscale("symlog", linthresh=chart.linear, linscale=0.7)
+        ax.yaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "−"))
+        ax.axhline(0, color=MEASURED, lw=0.8)
     for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
         _draw_one(ax, d)
     ax.set(xlabel=chart.x, ylabel=chart.y)

@@ -5,20 +5,18 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats, Ints
-from validate.report.body import Body
-from validate.report.page import Picture
+from validate.compare.exhibit import Picture
+from validate.report.body import ShownBody
 from validate.report.style import draw
 from validate.scene.mesh import boundary_facets
 
 _MM = 1e3
 
 
-def cut(body: Body) -> Picture:
+def cut(body: ShownBody) -> Picture:
     """Displacement magnitude on the cut (with a cavity) or on the side seen, deformed, mm."""
     pixels = draw(lambda f: _axes(f, body), 6.0, 5.4)
-    what = (
-        "cut through the inclusion in the image plane" if body.normal is not None else "side view"
-    )
+    what = f"cut through {body.cut}" if body.normal is not None else "side view"
     pressure = "" if body.pressure is None else f" Cavity pressure {body.pressure:.4g} Pa."
     words = (
         f"{body.label} at {body.load}: {what}, deformed true to scale, coloured by the "
@@ -27,7 +25,7 @@ def cut(body: Body) -> Picture:
     return Picture("cut", words, "Section: " + words, pixels, photo=True)
 
 
-def _axes(figure: Figure, body: Body) -> None:
+def _axes(figure: Figure, body: ShownBody) -> None:
     normal = body.normal
     polygons, size = _side_polygons(body) if normal is None else _cut_polygons(body, normal)
     ax = figure.subplots()
@@ -48,7 +46,7 @@ def _axes(figure: Figure, body: Body) -> None:
         ax.set_title(f"cavity pressure {body.pressure:.0f} Pa")
 
 
-def _screen(body: Body) -> tuple[Floats, Floats]:
+def _screen(body: ShownBody) -> tuple[Floats, Floats]:
     """Directions to the right and upward on paper, for a cut (seen along -normal) or a side."""
     along = np.abs(body.toward)
     if body.normal is not None:
@@ -56,7 +54,7 @@ def _screen(body: Body) -> tuple[Floats, Floats]:
     return np.abs(np.roll(along, 1)), along
 
 
-def _cut_polygons(body: Body, normal: Floats) -> tuple[list[Floats], Floats]:
+def _cut_polygons(body: ShownBody, normal: Floats) -> tuple[list[Floats], Floats]:
     """Polygons where the plane cuts the cells, and the mean displacement in each, mm."""
     nodes, u = _MM * body.mesh.nodes, body.u
     height = (nodes - body.origin) @ normal
@@ -84,7 +82,7 @@ def _crossing(cell: Ints, height: Floats, nodes: Floats, u: Floats) -> tuple[Flo
     return nodes[i] + s * (nodes[j] - nodes[i]), u[i] + s * (u[j] - u[i])
 
 
-def _side_polygons(body: Body) -> tuple[list[Floats], Floats]:
+def _side_polygons(body: ShownBody) -> tuple[list[Floats], Floats]:
     """Facets that face the viewer, from the far ones to the near ones."""
     facets = boundary_facets(body.mesh.corners, 3)
     right, upward = _screen(body)

@@ -8,9 +8,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats, Ints
-from validate.compare.exhibit import NodeMap
+from validate.compare.exhibit import NodeMap, Picture
 from validate.report.numbers import scale, shown_unit
-from validate.report.page import Picture
 from validate.report.style import draw
 from validate.scene.mesh import Mesh, boundary_facets
 

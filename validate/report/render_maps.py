@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from validate.compare.exhibit import NodeMap
+from validate.compare.exhibit import NodeMap, Picture, Pixels
 from validate.report.maps import TOWARD_EYE, Range, bar_title, colours, values, words
-from validate.report.page import Picture, Pixels
 from validate.report.renders import BAR
 from validate.scene.mesh import boundary_facets
 

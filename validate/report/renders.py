@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from validate.report.body import Body
-from validate.report.page import Picture, Pixels
-from validate.scene.shape_functions import EDGES
+from validate.compare.exhibit import Picture, Pixels
+from validate.report.body import ShownBody
+from validate.scene.mesh import EDGES
 
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
@@ -36,8 +36,8 @@ class _View:
     edges: bool = False
 
 
-def renders(body: Body) -> tuple[Picture, ...]:
-    """The body opened and deformed, from above at rest and deformed, and with element edges.
+def renders(body: ShownBody) -> tuple[Picture, ...]:
+    """The body opened and deformed, against the cut at rest and deformed, with element edges.
 
     Two of them for a whole body without plates.
     """
@@ -46,7 +46,7 @@ def renders(body: Body) -> tuple[Picture, ...]:
     )  # fmt: skip
     whole = body.normal is None
     plates = "; plates grey" if body.plates else ""
-    opened = "whole" if whole else "cut open through the inclusion in the image plane"
+    opened = "whole" if whole else f"cut open through {body.cut}"
     cut = "" if whole else " at and behind the cut"
     flat = "from the side" if whole else "against the cut"
     deformed = (
@@ -72,7 +72,7 @@ def renders(body: Body) -> tuple[Picture, ...]:
     )
 
 
-def _shot(body: Body, view: _View) -> Pixels:
+def _shot(body: ShownBody, view: _View) -> Pixels:
     plotter: Any = pv.Plotter(off_screen=True, window_size=SIZE, lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
@@ -91,7 +91,7 @@ def _shot(body: Body, view: _View) -> Pixels:
     return pixels[..., :3].copy()
 
 
-def _add_body(plotter: Any, body: Body, scale: float, edges: bool) -> None:
+def _add_body(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
     count = body.mesh.cells.shape[1]
     packed = np.hstack([np.full((len(body.mesh.cells), 1), count), body.mesh.cells]).ravel()
     kinds = np.full(len(body.mesh.cells), _CELL[count], dtype=np.uint8)
@@ -118,7 +118,7 @@ def _decimals(top: float) -> str:
     return f"%.{max(1, 1 - int(np.floor(np.log10(top))))}f" if top > 1e-5 else "%.1e"
 
 
-def _add_wall(plotter: Any, body: Body, scale: float, edges: bool) -> None:
+def _add_wall(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
     if body.cavity is None:
         return
     facets = body.mesh.facets[body.cavity]
@@ -163,7 +163,7 @@ def _quarters() -> list[list[int]]:
 _QUARTERS = _quarters()
 
 
-def _aim(plotter: Any, body: Body, oblique: bool) -> None:
+def _aim(plotter: Any, body: ShownBody, oblique: bool) -> None:
     """A camera fixed by the body at rest, so that a wrong size shows.
 
     Without plates to see it by, the deformed body is kept in the picture.

@@ -14,8 +14,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
 from validate.recording.types import Markers
-from validate.register.observe import MarkerObservation
-from validate.report import foxglove
+from validate.register.markers import MarkerObservation
+from validate.report import foxglove, observed
 from validate.report.foxglove import Rgba
 from validate.report.foxglove_schemas import SCENE, TRANSFORMS
 from validate.report.replay_signals import one_in, thinned
@@ -36,12 +36,13 @@ _MARKER_FRAMES = 1500  # instants of measured markers, at most
 
 def transforms(view: View, others: Sequence[Track]) -> list[Track]:
     """Image and marker frames in the scene's, once, at the first time of the `others`."""
-    seen, children = view.registered, list[tuple[str, Floats]]()
-    if seen.outline is not None:
-        children.append((view.local("image"), seen.outline.pose))
+    children = list[tuple[str, Floats]]()
+    image, seen = observed.outline(view.registered), observed.markers(view.registered)
+    if image is not None:
+        children.append((view.local("image"), image.pose))
     recorded = _recorded(view)
-    if recorded is not None and seen.markers is not None:
-        children.append((view.local(recorded.frame), seen.markers.registration.transform.matrix))
+    if recorded is not None and seen is not None:
+        children.append((view.local(recorded.frame), seen.registration.transform.matrix))
     if not children:
         return []
     start = min(int(t.ns[0]) for t in others)
@@ -57,7 +58,7 @@ def transforms(view: View, others: Sequence[Track]) -> list[Track]:
 
 def outlines(view: View) -> list[Track]:
     """All measured outlines; the simulated ones at the loads; both as lines, simulated moving."""
-    seen = view.registered.outline
+    seen = observed.outline(view.registered)
     if seen is None:
         return []
     words = ["as measured"] * len(seen.t)
@@ -107,7 +108,7 @@ def _lines(
 
 def markers(view: View) -> list[Track]:
     """Measured markers in their own frame where it is known; the simulated ones in the scene's."""
-    seen = view.registered.markers
+    seen = observed.markers(view.registered)
     if seen is None:
         return []
     recorded = _recorded(view)
@@ -134,7 +135,7 @@ def markers(view: View) -> list[Track]:
 
 def _recorded(view: View) -> Markers | None:
     """The markers as recorded, in their own frame; None when no shift and turn leads from it."""
-    seen = view.registered.markers
+    seen = observed.markers(view.registered)
     if seen is None or seen.registration.transform.s != 1.0:  # a transform of Foxglove has no scale
         return None
     for stream in view.recording.markers.values():

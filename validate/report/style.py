@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from validate.compare.exhibit import Pixels
 from validate.compare.result import Result
-from validate.report.page import Pixels
 
 MEASURED = "#000000"
 ACCEPTED = "#0072B2"
