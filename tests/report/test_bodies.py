@@ -11,12 +11,12 @@ import pytest
 from report_samples import small_result
 
 from validate.report import gl
-from validate.report.body import Body, body
+from validate.report.body import ShownBody, shown_body
 from validate.report.cut import cut
 
 
-def cube_body() -> Body:
-    found = body(small_result())
+def cube_body() -> ShownBody:
+    found = shown_body(small_result())
     assert found is not None
     return found
 
@@ -77,9 +77,9 @@ from report_samples import small_result
 from validate.report import gl
 if not gl.available():
     raise SystemExit(3)
-from validate.report.body import body
+from validate.report.body import shown_body
 from validate.report.renders import renders
-one = body(small_result())
+one = shown_body(small_result())
 for factor in (1.0, 2.0):
     np.savez(f"{sys.argv[1]}/{factor:g}.npz",
              **{p.name: p.pixels for p in renders(replace(one, u=factor * one.u))})

@@ -167,7 +167,8 @@ def _rise_panels(
                     label=method.label)  # fmt: skip
         ax.set(title=spaced(hold.label), xlabel=seen.labels[seen.plane[0]])
     axes[0].set_ylabel(f"displacement along {'xyz'[c]} / mm")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    columns = min(4, len(seen.loaded) + 1)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns)
 
 
 def _banded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
