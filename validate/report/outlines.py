@@ -1,6 +1,5 @@
 """Outlines of a cavity in the image, measured and simulated."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,14 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Exhibit, NumberTable, Picture, TableCell
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Picture, Series, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.register.outline_geometry import angular_points, enclosed, normal_distances
 from validate.register.outlines import Corner, OutlineObservation
 from validate.report.animation import moving_outline
 from validate.report.loads import at_holds
-from validate.report.numbers import shown_unit, spaced, text
+from validate.report.numbers import shown_unit, spaced
 from validate.report.observed import (
     Held,
     distinct,
@@ -25,7 +24,7 @@ from validate.report.observed import (
     outline_seen,
     shown_method,
 )
-from validate.report.style import ACCEPTED, MEASURED, NOISE, Look, draw, looks
+from validate.report.style import ACCEPTED, MEASURED, Look, draw, looks
 
 _MM = 1e3
 _GREY = "#9A9A9A"
@@ -67,7 +66,8 @@ def outlines(result: Result) -> Exhibit | None:
         "outlines",
         "Outlines in the image",
         tables=tuple(t for c in seen.corners if (t := _corner_table(result, at[1:], c))),
-        pictures=(*moving_outline(judged), _by_load(measured, first), _at_last(measured, drawn)),
+        charts=(_at_last(measured, drawn),),
+        pictures=(*moving_outline(judged), _by_load(measured, first, drawn)),
     )
 
 
@@ -95,47 +95,49 @@ def _closed(points: Floats) -> Floats:
 # --- every load ----------------------------------------------------------------------------------
 
 
-def _by_load(measured: _Outlines, judged: _Sections) -> Picture:
+def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> Picture:
     width = 2.6 * len(measured.holds) + 0.4
     label, loads = judged.method.label, measured.loads
     ringed = "".join(
         f" Ringed: the image angle {np.rad2deg(c.angle):.0f}°, {c.quantity}; its displacement "
-        "from rest is written below."
+        "from rest stands in the table."
         for c in measured.seen.corners
     )
     return Picture(
         "outlines",
         f"Outlines in image coordinates at {loads}, mm. Points: measured outline; line: section of "
-        f"{label} with the image plane; grey line: measured rest outline.{ringed}",
+        f"{label} with the image plane; grey line: measured rest outline; in the last "
+        f"panel also the other models, but for those whose line would lie on another's.{ringed}",
         f"Measured outline points and the simulated section of {label}, one panel per load "
         f"({loads}).",
-        draw(lambda figure: _panels(figure, measured, judged), width, 4.3),
+        draw(lambda figure: _panels(figure, measured, judged, drawn), width, 4.5),
     )
 
 
-def _panels(figure: Figure, measured: _Outlines, judged: _Sections) -> None:
+def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> None:
     count, rest = len(measured.holds), _closed(measured.measured[0])
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for i, (ax, hold) in enumerate(zip(axes, measured.holds, strict=True)):
         ax.plot(*rest.T, color=_GREY, lw=0.8, label="measured at rest")
         ax.plot(*(_MM * measured.measured[i]).T, ".", color=MEASURED, ms=3, label="measured")
-        ax.plot(*_closed(judged.sections[i]).T, color=ACCEPTED, label=judged.method.label)
+        for d in drawn if i == count - 1 else [judged]:
+            _section(ax, d, i)
         for corner in measured.seen.corners:
             _ring(ax, corner, (measured.measured[i], judged.sections[i]))
-        _write(ax, [r for c in measured.seen.corners if (r := _residual(judged.method, c, hold))])
         ax.set(title=spaced(hold.label), aspect="equal", xlabel="image x / mm")
-    _in_view(axes[0], [*measured.measured, *judged.sections], below=9)
-    axes[0].set_ylabel("image y / mm")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
-
-
-def _in_view(ax: Axes, outlines: Sequence[Floats], below: float) -> None:
-    """All outlines with some room, `below` mm under them; rows of an image count downward."""
-    everything = _MM * np.vstack(outlines)
+    everything = _MM * np.vstack([*measured.measured, *judged.sections])
     low, high = everything.min(axis=0), everything.max(axis=0)
-    ax.set_xlim(low[0] - 3, high[0] + 3)
-    ax.set_ylim(high[1] + below, low[1] - 3)
+    axes[0].set_xlim(low[0] - 3, high[0] + 3)
+    axes[0].set_ylim(high[1] + 3, low[1] - 3)  # rows of an image count downward
+    axes[0].set_ylabel("image y / mm")
+    handles, labels = axes[-1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(count + 1, 4))
+
+
+def _section(ax: Axes, drawn: _Sections, i: int) -> None:
+    look = drawn.look
+    ax.plot(*_closed(drawn.sections[i]).T, color=look.colour, ls=look.dash, lw=look.width,
+            label=drawn.method.label)  # fmt: skip
 
 
 def _ring(ax: Axes, corner: Corner, pair: tuple[Floats, Floats]) -> None:
@@ -146,14 +148,6 @@ def _ring(ax: Axes, corner: Corner, pair: tuple[Floats, Floats]) -> None:
 
 def _residual(method: MethodResult, corner: Corner, hold: Held) -> Residual | None:
     return method.residuals.get(f"{corner.quantity}@{hold.label}")
-
-
-def _write(ax: Axes, moved: list[Residual]) -> None:
-    words = "\n".join(
-        f"{r.quantity}\nmeasured {text(r.measured, 'm')} mm\nsimulated {text(r.simulated, 'm')} mm"
-        for r in moved
-    )
-    ax.text(0.04, 0.03, words, transform=ax.transAxes, va="bottom", fontsize=8)
 
 
 def _corner_table(result: Result, loaded: tuple[Held, ...], corner: Corner) -> NumberTable | None:
@@ -182,51 +176,25 @@ def _moved(residual: Residual | None, who: Literal["measured", "simulated"]) -> 
 # --- every method at the last load ---------------------------------------------------------------
 
 
-def _at_last(measured: _Outlines, drawn: list[_Sections]) -> Picture:
-    load = spaced(measured.holds[-1].label)
-    names = ", ".join(d.method.label for d in drawn)
-    return Picture(
-        "outline_models",
-        f"The outline at {load} by model. Left: image coordinates, mm. Right: "
-        "distance of the simulated outline from each measured point, mm, outward positive, against "
-        "the polar angle in the image; grey: ± 2 standard deviations of one measured point. Models "
-        "whose line would lie on another's are left out.",
-        f"Measured outline at {load} with the sections of {names}, and their "
-        "distances from the measured points around the outline.",
-        draw(lambda figure: _zoom_and_errors(figure, measured, drawn), 10.4, 4.9),
-    )
-
-
-def _zoom_and_errors(figure: Figure, measured: _Outlines, drawn: list[_Sections]) -> None:
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1.35))
-    points, sd = measured.measured[-1], _MM * measured.seen.sd
-    left.plot(*(_MM * points).T, ".", color=MEASURED, ms=4.5, label="measured")
+def _at_last(measured: _Outlines, drawn: list[_Sections]) -> Chart:
+    """Distances from the measured points around the outline."""
+    points, two = measured.measured[-1], np.full(2, 2 * _MM * measured.seen.sd)
     angle = _angles(points)
     order = np.argsort(angle)
-    right.axhspan(-2 * sd, 2 * sd, color=NOISE, lw=0)
-    right.axhline(0, color=MEASURED, lw=0.8)
-    for d in drawn:
-        style = {"color": d.look.colour, "ls": d.look.dash}
-        thin = d.look.width if d.look.colour == ACCEPTED else max(0.6 * d.look.width, 1)
-        left.plot(*_closed(d.sections[-1]).T, **style, lw=thin, label=d.method.label)
-        right.plot(angle[order], _MM * _off(d, measured)[order], **style, lw=d.look.width)
-    left.set(xlabel="image x / mm", ylabel="image y / mm", aspect="equal")
-    left.invert_yaxis()
-    _by_angle(right, measured.seen.corners)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    band = Series("± 2 sd of one point", np.array([0.0, 360.0]), -two, "band", two)
+    return Chart(
+        "outline_errors",
+        f"Distance of the simulated outline from each measured point at "
+        f"{spaced(measured.holds[-1].label)}",
+        "image angle / °",
+        "simulated − measured / mm",
+        (band, *(Series(d.method.label, angle[order], _MM * _off(d, measured)[order])
+                 for d in drawn)),
+        caption="Outward positive. Models whose line would lie on another's are left out.",
+    )  # fmt: skip
 
 
 def _angles(points: Floats) -> Floats:
     """Polar angles (k,) degrees in the image about the middle of the area inside."""
     away = points - enclosed(points)[1]
     return np.asarray(np.rad2deg(np.mod(np.arctan2(away[:, 1], away[:, 0]), 2 * np.pi)))
-
-
-def _by_angle(ax: Axes, named: tuple[Corner, ...]) -> None:
-    ax.set(xlabel="image angle / °", ylabel="simulated − measured / mm", xlim=(0, 360))
-    ax.set_xticks(range(0, 361, 45))
-    for corner in named:
-        at = np.rad2deg(corner.angle)
-        ax.axvline(at, color=_GREY, lw=0.8, ls=":")
-        ax.text(at + 3, 0.985, corner.quantity, color="#5A5A5A", va="top",
-                transform=ax.get_xaxis_transform())  # fmt: skip

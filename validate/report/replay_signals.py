@@ -7,7 +7,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.metadata import CALIBRATION, CALIBRATION_KEYS
-from validate.recording.mcap.schemas import IMAGE, SIGNAL, Json, image_message, signal_message
+from validate.recording.mcap.schemas import IMAGE, SIGNAL, image_message, signal_message
 from validate.recording.types import Frames
 from validate.report.observed import holds
 from validate.report.observed import signals as scalar_signals
@@ -45,14 +45,11 @@ def _names(quantities: list[str]) -> list[str]:
 
 
 def _signal(view: View, topic: str, t: Floats, y: Floats, unit: str, sd: float) -> Track:
-    topic, frame = view.prefix + topic, view.drive_frame
     every = one_in(len(t), _SAMPLES // view.coarse)
-    ns, kept = view.ns(t[::every], topic), y[::every]
-
-    def message(i: int) -> Json:
-        return signal_message(int(ns[i]), frame, unit, kept[i], sd)
-
-    return Track(topic, SIGNAL, ns, message, thinned(every, len(t), "samples"))
+    kept, frame, note = y[::every], view.drive_frame, thinned(every, len(t), "samples")
+    return view.track(
+        topic, SIGNAL, t[::every], lambda ns, i: signal_message(ns, frame, unit, kept[i], sd), note
+    )
 
 
 def images(view: View) -> list[Track]:
@@ -60,10 +57,8 @@ def images(view: View) -> list[Track]:
     streams = view.recording.frames
     several = len(streams) > 1
     return [
-        _images(view, f"{view.prefix}/image/{topic.strip('/')}/measured", frames)
-        if several
-        else _images(view, f"{view.prefix}/image/measured", frames)
-        for topic, frames in streams.items()
+        _images(view, f"/image/{topic.strip('/')}/measured" if several else "/image/measured", f)
+        for topic, f in streams.items()
     ]
 
 
@@ -72,16 +67,15 @@ def _images(view: View, topic: str, frames: Frames) -> Track:
     every = one_in(len(frames.t), _IMAGE_BYTES // view.coarse // size)
     at_loads = {int(np.abs(frames.t - hold.t).argmin()) for hold in holds(view.registered)}
     kept = sorted({*range(0, len(frames.t), every), *at_loads})
-    ns = view.ns(frames.t[kept], topic)
-
-    def message(i: int) -> Json:
-        return image_message(int(ns[i]), frames.frame, frames.images[kept[i]])
-
     scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
-    calibration = (CALIBRATION + topic, {key: repr(scale) for key, scale in scales})
-    records = (*pose_records(topic, frames.pose), calibration)
-    note = thinned(every, len(frames.t), "images, and those at the loads")
-    return Track(topic, IMAGE, ns, message, note, records)
+    named = view.prefix + topic
+    calibration = (CALIBRATION + named, {key: repr(scale) for key, scale in scales})
+    return view.track(
+        topic, IMAGE, frames.t[kept],
+        lambda ns, i: image_message(ns, frames.frame, frames.images[kept[i]]),
+        thinned(every, len(frames.t), "images, and those at the loads"),
+        (*pose_records(named, frames.pose), calibration),
+    )  # fmt: skip
 
 
 def one_in(count: int, most: int) -> int:

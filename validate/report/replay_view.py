@@ -72,9 +72,19 @@ class View:
         named = f"{self.prefix[1:]}/{name}" if self.prefix else name
         return f"{named} as recorded" if named == self.frame else named
 
-    def ns(self, t: Floats | Sequence[float], topic: str) -> Ints:
-        """Times (n,) s on the recording's clock, int64 ns."""
-        return stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), topic)
+    def track(
+        self,
+        topic: str,
+        schema: str,
+        t: Floats | Sequence[float],
+        message: Callable[[int, int], Json],
+        note: str = "",
+        records: Records = (),
+    ) -> Track:
+        """A topic (its prefix added) at times (n,) s: message(ns, i) is that of number i."""
+        named = self.prefix + topic
+        ns = stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), named)
+        return Track(named, schema, ns, lambda i: message(int(ns[i]), i), note, records)
 
     def held(self) -> tuple[Instant, ...]:
         """What the run computed, at the loads or over time; empty without a run."""
