@@ -11,8 +11,8 @@ import pytest
 from report_samples import small_result
 
 from validate.report import gl
+from validate.report.bodies import _without_gl
 from validate.report.body import ShownBody, shown_body
-from validate.report.cut import cut
 
 
 def cube_body() -> ShownBody:
@@ -39,9 +39,9 @@ def test_plates_lie_outside() -> None:
 
 def test_drawn_body_follows_the_displacement() -> None:
     one = cube_body()
-    two = cut(replace(one, u=2 * one.u))
-    assert two.pixels.shape == cut(one).pixels.shape
-    assert (two.pixels != cut(one).pixels).any()
+    two = _without_gl(replace(one, u=2 * one.u))
+    assert two.pixels.shape == _without_gl(one).pixels.shape
+    assert (two.pixels != _without_gl(one).pixels).any()
 
 
 def test_no_gl_by_variable(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.report.body import ShownBody
-from validate.report.cut import _cut_polygons
+from validate.report.cut import _polygons
 from validate.report.skin import skins
 from validate.scene.rod import bending_rod
 
@@ -38,7 +38,7 @@ def test_a_cut_shows_the_whole_section() -> None:
         up,
         along,
     )
-    polygons, _ = _cut_polygons(body, np.eye(3)[1])
+    polygons, _ = _polygons(body, np.eye(3)[1])
     area = 0.0
     for x, y in (p.T for p in polygons):
         area += abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2

@@ -118,7 +118,7 @@ def test_scores_without_a_load_are_listed(made: dict[str, DrawnExhibit]) -> None
 def test_body_at_its_largest_displacement(made: dict[str, DrawnExhibit]) -> None:
     (picture,) = made["body"].pictures
     largest = T[AT][np.abs(swing(T[AT])).argmax()]
-    assert f"Kalman filter at t = {largest:.4f} s: side view" in picture.caption
+    assert f"Kalman filter at t = {largest:.4f} s: displacement" in picture.caption
 
 
 def test_number_table_rounds_and_names_what_is_missing(made: dict[str, DrawnExhibit]) -> None:

@@ -32,7 +32,7 @@ def test_files_without_gl(tmp_path: Path) -> None:
     folder = path.parent
     names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     assert names >= {
-        "report.html", "results.json", "runs/soft.npz", "runs/stiff.npz", "figures/cut.png",
+        "report.html", "results.json", "runs/soft.npz", "runs/stiff.npz", "figures/map_body.png",
         "figures/chart_curve_force_plate.png", "tables/scores.csv", "tables/checks.csv",
         "tables/effects.csv", "tables/published.csv", "tables/load_displacement.csv",
     }  # fmt: skip
