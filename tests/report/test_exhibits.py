@@ -20,8 +20,9 @@ from validate.recording.mcap.read import read_recording
 from validate.report import charts, gl
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.html import page
-from validate.report.loads import at_holds, at_times, held
+from validate.report.loads import at_times, held
 from validate.report.maps import ranges, values
+from validate.report.observed import holds
 from validate.report.sections import exhibits
 from validate.report.store import document, schema, write_json, write_runs
 from validate.report.store_exhibits import rounded, thinned
@@ -130,8 +131,7 @@ def test_number_table_rounds_and_names_what_is_missing(made: dict[str, DrawnExhi
 
 def test_frames_are_told_from_loads(result: Result) -> None:
     follows, soft = result.methods[0], small_result().methods[0]
-    assert at_holds(soft.registered[0], soft.run)
-    assert not at_holds(follows.registered[0], follows.run)
+    assert not holds(follows.registered[0])
     assert [i.hold.label for i in held(soft.registered[0], soft.run) if i.hold] == ["0mm", "2mm"]
     few = at_times(follows.registered[0], follows.run, np.array([0.0, 0.5, 1.2]))
     assert [i.t for i in few] == pytest.approx([0.001, 0.5, 1.2], abs=0.005)

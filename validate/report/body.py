@@ -6,7 +6,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
-from validate.report.loads import at_holds
 from validate.report.numbers import significant, spaced, with_unit
 from validate.report.observed import Held, holds, outline, shown_method
 from validate.scene.mesh import Mesh
@@ -87,8 +86,8 @@ def shown_body(result: Result) -> ShownBody | None:
 def _frame(method: MethodResult) -> tuple[int, str]:
     """The last load; of a run over time the frame with the largest displacement."""
     run = method.run
-    if method.registered and at_holds(method.registered[0], run):
-        loads = holds(method.registered[0])
+    loads = holds(method.registered[0]) if method.registered else ()
+    if loads:
         frame = min(len(loads), len(run.u)) - 1
         return frame, _load(loads[frame])
     largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.register.registered import Registered
-from validate.report.observed import Held, driven, holds, steps_at_holds
+from validate.report.observed import Held, driven, holds
 from validate.solve.types import Run
 
 HOW = "between the loads interpolated linearly in the drive"
@@ -33,20 +33,14 @@ class Instant:
     computed: bool = True
 
 
-def at_holds(registered: Registered, run: Run) -> bool:
-    """The run's output frames are the loads: frame i belongs to load i. Else they follow time."""
-    steps = steps_at_holds(registered)[: len(run.at)]
-    return bool(holds(registered)) and np.sort(run.at).tolist() == steps
-
-
 def held(registered: Registered, run: Run) -> tuple[Instant, ...]:
     """The instants that the run computed, in order of time."""
-    if not at_holds(registered, run):
+    if not holds(registered):
         times = run.t[run.at]
         rows = zip(times.tolist(), driven(registered, times).tolist(), run.u, strict=True)
         return tuple(Instant(t, q, u, None) for t, q, u in rows)
     pairs = zip(holds(registered), run.u, strict=False)  # a run that ended early has fewer
-    return tuple(sorted((Instant(h.t, h.drive, u, h) for h, u in pairs), key=lambda i: i.t))
+    return tuple(Instant(h.t, h.drive, u, h) for h, u in pairs)
 
 
 def at_times(registered: Registered, run: Run, times: Floats) -> tuple[Instant, ...]:
@@ -55,7 +49,7 @@ def at_times(registered: Registered, run: Run, times: Floats) -> tuple[Instant, 
     Of a run over time the frames nearest to `times`, none interpolated.
     """
     known = held(registered, run)
-    if known and not at_holds(registered, run):
+    if known and not holds(registered):
         at = np.array([i.t for i in known])
         return tuple(known[i] for i in np.unique([np.abs(at - t).argmin() for t in times]))
     found = list(known)

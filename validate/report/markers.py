@@ -12,7 +12,6 @@ from validate.compare.exhibit import Exhibit, Picture
 from validate.compare.result import MethodResult, Result
 from validate.register.markers import MarkerObservation
 from validate.register.observation import nearest_sample
-from validate.report.loads import at_holds
 from validate.report.numbers import spaced, with_unit
 from validate.report.observed import (
     Held,
@@ -53,11 +52,10 @@ def markers(result: Result) -> Exhibit | None:
     """Vectors and positions at every load, motion across their plane; None without loads."""
     judged = shown_method(result)
     seen = markers_seen(judged) if judged else None
-    if seen is None or judged is None or not at_holds(judged.registered[0], judged.run):
+    at = holds(judged.registered[0]) if judged and seen else ()
+    if seen is None or judged is None or len(at) < 2:
         return None
-    rest, *loaded = holds(judged.registered[0])
-    if not loaded:
-        return None
+    rest, *loaded = at
     plane, across = flattest(seen.rest)
     labels = tuple(axis_label(judged.scene, i) for i in range(seen.rest.shape[1]))
     shown = _Seen(seen, rest, tuple(loaded), plane, across, labels)

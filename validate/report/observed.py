@@ -45,16 +45,13 @@ def driven(registered: Registered, t: Floats | float) -> Floats:
 
 
 def holds(registered: Registered) -> tuple[Held, ...]:
-    """The single instants at which everything was measured, rest first; none over time."""
+    """The single instants at which everything was measured, in time; none of a run over time.
+
+    Where there are any, the output frames of a run are at them.
+    """
     compared = [s for s in (registered.rest, *registered.selections) if s is not None]
-    times = [(s.label, float(s.t[0])) for s in compared if s.t is not None and len(s.t) == 1]
-    return tuple(Held(label, registered.stage(t), t) for label, t in times)
-
-
-def steps_at_holds(registered: Registered) -> list[int]:
-    """The steps at the loads, in order of time."""
-    times = [h.t for h in holds(registered)]
-    return sorted(int(np.abs(registered.t - t).argmin()) for t in times)
+    times = [(float(s.t[0]), s.label) for s in compared if s.t is not None and len(s.t) == 1]
+    return tuple(Held(label, registered.stage(t), t) for t, label in sorted(times))
 
 
 def signals(registered: Registered) -> tuple[SignalObservation, ...]:

@@ -14,7 +14,6 @@ from validate.compare.result import MethodResult, Result
 from validate.register.outline_geometry import angular_points, enclosed, normal_distances
 from validate.register.outlines import Corner, OutlineObservation
 from validate.report.animation import moving_outline
-from validate.report.loads import at_holds
 from validate.report.numbers import shown_unit, spaced
 from validate.report.observed import (
     Held,
@@ -56,9 +55,9 @@ def outlines(result: Result) -> Exhibit | None:
     """Outlines at every load, rivals and errors at the last one; None without outlines at loads."""
     judged = shown_method(result)
     seen = outline_seen(judged) if judged else None
-    if seen is None or judged is None or not at_holds(judged.registered[0], judged.run):
+    at = holds(judged.registered[0]) if judged and seen else ()
+    if seen is None or judged is None or not at:
         return None
-    at = holds(judged.registered[0])
     measured = _Outlines(seen, at, tuple(seen.measured(h.t) for h in at))
     drawn = _drawn(result, measured)
     first = next(d for d in drawn if d.method is judged)

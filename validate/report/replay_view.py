@@ -12,9 +12,9 @@ from validate.recording.mcap.schemas import Json
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.report.loads import HOW, Instant, at_holds, at_times, held
+from validate.report.loads import HOW, Instant, at_times, held
 from validate.report.numbers import significant, spaced
-from validate.report.observed import drive, outline
+from validate.report.observed import drive, holds, outline
 from validate.solve.types import Run
 
 Records = tuple[tuple[str, dict[str, str]], ...]
@@ -104,7 +104,7 @@ class View:
 
 def over_time(view: View) -> bool:
     """The run's fields are output frames at their own times, not those at loads."""
-    return view.run is not None and not at_holds(view.registered, view.run)
+    return view.run is not None and not holds(view.registered)
 
 
 def load_of(instant: Instant) -> str:
