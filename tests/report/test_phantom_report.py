@@ -50,7 +50,7 @@ def test_all_sections_that_apply(result: Result, sections: dict[str, DrawnExhibi
 def test_pictures_of_the_paper(sections: dict[str, DrawnExhibit]) -> None:
     names = {p.name for s in sections.values() for p in s.pictures}
     assert names == {
-        "outline", "outlines", "chart_outline_errors", "markers", "marker_rise",
+        "outline", "outlines", "chart_outline_errors", "markers", "markers_across",
         "errors_over_noise",
         "chart_curve_force_plate", "chart_curve_force_plate_error", "chart_curve_pressure",
         "chart_curve_pressure_error", "chart_volume_ratio", "cut", "registration",

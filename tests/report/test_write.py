@@ -59,7 +59,7 @@ def test_tables_are_si(tmp_path: Path) -> None:
         (a, b) for a in ("cube_a", "cube_b") for b in ("measured", "soft", "stiff")
     }
     last = [r for r in rows if r["who"] == "soft"][-1]
-    assert float(last["stage_m"]) == pytest.approx(0.002)
+    assert float(last["drive_m"]) == pytest.approx(0.002)
     assert float(last["value"]) == pytest.approx(4.0)
 
 

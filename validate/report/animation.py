@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Animation
 from validate.compare.result import MethodResult
 from validate.report.loads import HOW, Instant, in_steps
-from validate.report.numbers import spaced
+from validate.report.numbers import fixed_with_unit, spaced
 from validate.report.observed import drive, holds, outline_seen
 from validate.report.style import ACCEPTED, MEASURED, film
 
@@ -63,7 +63,7 @@ def _shot(simulated: Floats, measured: Floats, instant: Instant) -> _Shot:
     if instant.hold is not None:
         title = spaced(instant.hold.label)
     else:
-        title = f"{_MM * instant.drive:.1f} mm, interpolated"
+        title = f"{fixed_with_unit(instant.drive, instant.unit, 1)}, interpolated"
     closed = np.vstack([simulated, simulated[:1]])
     return _Shot(_MM * closed, _MM * measured, instant.hold is not None, title)
 

@@ -96,7 +96,7 @@ def _frame(method: MethodResult) -> tuple[int, str]:
 
 def _load(hold: Held) -> str:
     """The load in words; a label without a number is replaced by the drive's."""
-    return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.drive, "m")
+    return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.drive, hold.unit)
 
 
 def _toward(scene: Scene) -> Floats:

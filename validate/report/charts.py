@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from validate.compare.exhibit import Chart, Picture, Series
 from validate.compare.result import Result
-from validate.report.style import MEASURED, NOISE, PALETTE, Look, draw, free_look, looks
+from validate.report.style import MEASURED, NOISE, PALETTE, Style, draw, free_look, looks
 
 _WIDTH, _HEIGHT = 8.6, 4.3  # inches without the legend
 _LEGEND_WIDTH = 96  # characters of a legend's row at this width
@@ -26,7 +26,7 @@ _GAP = 0.058  # between the names of two levels, share of the axes' height
 @dataclass(frozen=True)
 class _Drawn:
     series: Series
-    look: Look
+    look: Style
 
 
 def picture(result: Result, chart: Chart) -> Picture:
@@ -61,7 +61,7 @@ def _styled(result: Result, chart: Chart) -> list[_Drawn]:
     return [_Drawn(s, pairs[id(s)]) for s in chart.series]
 
 
-def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Look]]:
+def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Style]]:
     known = _known(result)
     unknown = [s for s in series if s.label not in known and not _is_given(s, series)]
     taken = {known[s.label].colour for s in series if s.label in known}
@@ -78,14 +78,14 @@ def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Look]]
     ]
 
 
-def _given(series: Series, shade: str) -> Look:
+def _given(series: Series, shade: str) -> Style:
     """A reference is a wide grey line under the others, what was measured dark points."""
     if series.style == "line":
-        return Look("#9A9A9A", "-", "o", 3.6)
-    return Look(shade, "-", "o", 1.2)
+        return Style("#9A9A9A", "-", "o", 3.6)
+    return Style(shade, "-", "o", 1.2)
 
 
-def _known(result: Result) -> Mapping[str, Look]:
+def _known(result: Result) -> Mapping[str, Style]:
     styles = looks(result)
     return {**styles, **{m.label: styles[m.name] for m in result.methods}}
 
@@ -98,9 +98,9 @@ def _is_given(one: Series, series: list[Series]) -> bool:
     return alone or "measured" in one.label.lower()
 
 
-def _of_band(band: Series, lines: Mapping[str, Look]) -> Look:
+def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
     own = [name for name in lines if band.label.startswith(name)]
-    return lines[max(own, key=len)] if own else Look(NOISE, "-", "o", 0.0)
+    return lines[max(own, key=len)] if own else Style(NOISE, "-", "o", 0.0)
 
 
 # --- drawing -------------------------------------------------------------------------------------

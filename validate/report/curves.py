@@ -16,7 +16,7 @@ from validate.report.observed import distinct, drive, driven, finished, signals
 _MM = 1e3
 _AXIS = {"Pa": ("kPa", 1e-3)}
 _ON_ANOTHER = 0.01  # share of a signal's range below which two models draw one line
-_HEAD = ("recording", "who", "quantity", "t_s", "stage_m", "value", "unit")
+_HEAD = ("recording", "who", "quantity", "t_s", "drive_m", "value", "unit")
 Log = tuple[int, Registered, SignalObservation]  # which recording, and its signal
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.register.registered import Registered
-from validate.report.observed import Held, driven, holds
+from validate.report.observed import Held, drive, driven, holds
 from validate.solve.types import Run
 
 HOW = "between the loads interpolated linearly in the drive"
@@ -21,13 +21,14 @@ HOW = "between the loads interpolated linearly in the drive"
 
 @dataclass(frozen=True)
 class Instant:
-    """Displacements u (n, d) m at time t s and drive (SI); `hold` None: none of the loads.
+    """Displacements u (n, d) m at time t s and drive in SI `unit`; `hold` None: none of the loads.
 
     `computed` is False where it was interpolated.
     """
 
     t: float
     drive: float
+    unit: str
     u: Floats
     hold: Held | None
     computed: bool = True
@@ -38,9 +39,9 @@ def held(registered: Registered, run: Run) -> tuple[Instant, ...]:
     if not holds(registered):
         times = run.t[run.at]
         rows = zip(times.tolist(), driven(registered, times).tolist(), run.u, strict=True)
-        return tuple(Instant(t, q, u, None) for t, q, u in rows)
+        return tuple(Instant(t, q, drive(registered).unit, u, None) for t, q, u in rows)
     pairs = zip(holds(registered), run.u, strict=False)  # a run that ended early has fewer
-    return tuple(Instant(h.t, h.drive, u, h) for h, u in pairs)
+    return tuple(Instant(h.t, h.drive, h.unit, u, h) for h, u in pairs)
 
 
 def at_times(registered: Registered, run: Run, times: Floats) -> tuple[Instant, ...]:
@@ -79,4 +80,4 @@ def _between(a: Instant, b: Instant, t: float, q: float) -> Instant:
 
 def _mixed(a: Instant, b: Instant, share: float, t: float) -> Instant:
     q = a.drive + share * (b.drive - a.drive)
-    return Instant(t, q, a.u + share * (b.u - a.u), None, computed=False)
+    return Instant(t, q, a.unit, a.u + share * (b.u - a.u), None, computed=False)

@@ -15,7 +15,7 @@ from validate.scene.mesh import Mesh, boundary_facets
 
 Range = tuple[float, float]
 _MM = 1e3
-# Seen from the corner of +x, -y and above: right and upward on paper, for the flat drawing.
+# Every map is seen from the corner of +x, -y and +z, z upward on paper: its triad says so.
 TOWARD_EYE = np.array([0.62, -1.0, 0.62]) / np.linalg.norm([0.62, -1.0, 0.62])
 
 

@@ -23,7 +23,7 @@ from validate.report.observed import (
     shown_method,
 )
 from validate.report.plane import flattest
-from validate.report.style import ACCEPTED, MEASURED, Look, draw, looks
+from validate.report.style import ACCEPTED, MEASURED, Style, draw, looks
 
 _MM = 1e3
 _BANDS = 7  # groups of neighbours that a line joins
@@ -137,19 +137,19 @@ def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
     drawn = [(m, styles[m.name]) for m in known if m.name not in on]
     x, names = "xyz"[seen.plane[0]], ", ".join(m.label for m, _ in drawn)
     made = Picture(
-        "marker_rise",
+        "markers_across",
         f"Displacement of the markers along {'xyz'[c]} from rest against their {x}, mm. Bars: ± 1 "
         "standard deviation of a measured displacement (√2 times the declared noise). Each model's "
         f"line joins the mean of markers of equal rank in {x}.",
         f"Displacement of the markers along {'xyz'[c]} against {x} for each load: measured and "
         f"{names}.",
-        draw(lambda f: _rise_panels(f, seen, c, drawn), 3.3 * len(seen.loaded) + 0.6, 3.9),
+        draw(lambda f: _across_panels(f, seen, c, drawn), 3.3 * len(seen.loaded) + 0.6, 3.9),
     )
     return (made,)
 
 
-def _rise_panels(
-    figure: Figure, seen: _Seen, c: int, drawn: list[tuple[MethodResult, Look]]
+def _across_panels(
+    figure: Figure, seen: _Seen, c: int, drawn: list[tuple[MethodResult, Style]]
 ) -> None:
     axes = figure.subplots(1, len(seen.loaded), sharex=True, sharey=True, squeeze=False)[0]
     x, start = _MM * seen.markers.rest[:, seen.plane[0]], seen.at(seen.rest)[:, c]

@@ -27,10 +27,11 @@ _ALONG = 0.9  # part of a drive's direction above which it moves along an axis
 
 @dataclass(frozen=True)
 class Held:
-    """A load at which everything was measured: label such as "3mm", drive (SI) and time s."""
+    """A load at which everything was measured: label such as "3mm", drive in SI `unit`, time s."""
 
     label: str
     drive: float
+    unit: str
     t: float
 
 
@@ -51,7 +52,8 @@ def holds(registered: Registered) -> tuple[Held, ...]:
     """
     compared = [s for s in (registered.rest, *registered.selections) if s is not None]
     times = [(float(s.t[0]), s.label) for s in compared if s.t is not None and len(s.t) == 1]
-    return tuple(Held(label, registered.stage(t), t) for t, label in sorted(times))
+    unit = drive(registered).unit
+    return tuple(Held(label, registered.stage(t), unit, t) for t, label in sorted(times))
 
 
 def signals(registered: Registered) -> tuple[SignalObservation, ...]:

@@ -23,7 +23,7 @@ from validate.report.observed import (
     outline_seen,
     shown_method,
 )
-from validate.report.style import ACCEPTED, MEASURED, Look, draw, looks
+from validate.report.style import ACCEPTED, MEASURED, Style, draw, looks
 
 _MM = 1e3
 _GREY = "#9A9A9A"
@@ -47,7 +47,7 @@ class _Sections:
     """A method's sections (k, 2) m with the image plane at the loads."""
 
     method: MethodResult
-    look: Look
+    look: Style
     sections: tuple[Floats, ...]
 
 

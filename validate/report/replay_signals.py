@@ -1,4 +1,4 @@
-"""Topics of a replay that are no geometry: stage, force, pressure and images over time."""
+"""Topics of a replay that are no geometry: signals and images over time."""
 
 from dataclasses import replace
 

@@ -20,7 +20,7 @@ from validate.report.foxglove import Rgba
 from validate.report.foxglove_schemas import SCENE, TRANSFORMS
 from validate.report.replay_signals import one_in, thinned
 from validate.report.replay_view import Track, View, load_of, pose_records
-from validate.report.skin import OUTSIDE, Skin, skins
+from validate.report.skin import OUTSIDE, SurfacePart, skins
 
 Who = Literal["measured", "simulated"]
 Times = Floats | list[float]
@@ -192,7 +192,7 @@ def surface(view: View) -> list[Track]:
     return [view.track("/surface/simulated", SCENE, [i.t for i in moving], message, note)]
 
 
-def _left_out(parts: Sequence[Skin], shown: int, frames: int) -> Iterator[str]:
+def _left_out(parts: Sequence[SurfacePart], shown: int, frames: int) -> Iterator[str]:
     drawn, whole = sum(len(p.triangles) for p in parts), sum(p.whole for p in parts)
     if drawn < whole:
         yield f"{drawn} of {whole} triangles"

@@ -13,7 +13,7 @@ from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.report.loads import HOW, Instant, at_times, held
-from validate.report.numbers import significant, spaced
+from validate.report.numbers import fixed_with_unit, significant, spaced
 from validate.report.observed import drive, holds, outline
 from validate.solve.types import Run
 
@@ -113,7 +113,7 @@ def load_of(instant: Instant) -> str:
         return spaced(instant.hold.label)
     if instant.computed:
         return f"t = {significant(instant.t, 4)} s"
-    return f"{1e3 * instant.drive:.2f} mm, {HOW}"
+    return f"{fixed_with_unit(instant.drive, instant.unit, 2)}, {HOW}"
 
 
 def pose_records(topic: str, pose: Floats) -> Records:
