@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
 from validate.compare.published import Published
 from validate.register.markers import MarkerObservation

@@ -5,10 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.figure import Figure
 
+from validate.arrays import rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, Picture, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
-from validate.compare.score import max_length, rms
+from validate.compare.score import max_length
 from validate.register.markers import MarkerObservation
 from validate.register.quality import Registration
 from validate.report.numbers import shown_unit, with_unit

@@ -10,7 +10,7 @@ import pyvista as pv
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Picture, Pixels
 from validate.report.body import ShownBody
-from validate.scene.mesh import EDGES
+from validate.scene.shape_functions import EDGES
 
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it

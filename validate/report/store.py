@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
-from validate.compare.score import Score, rms
+from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.report.environment import environment, file_name
 from validate.report.observed import timed
