@@ -1,6 +1,7 @@
 """What a result shows beside its scores, as plain data: number tables, charts, maps on the mesh."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -174,3 +175,9 @@ class Exhibit:
     maps: tuple[NodeMap, ...] = ()
     heats: tuple[Heat, ...] = ()
     regimes: tuple[RegimeMap, ...] = ()
+
+
+def captioned(exhibit: Exhibit, captions: Mapping[str, str]) -> Exhibit:
+    """The exhibit with a sentence under each of its charts that is named."""
+    charts = (replace(c, caption=captions.get(c.name, c.caption)) for c in exhibit.charts)
+    return replace(exhibit, charts=tuple(charts))
