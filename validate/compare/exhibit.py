@@ -1,7 +1,8 @@
 """What a report shows, as plain data: sentences, tables, charts, maps on the mesh, pictures."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -247,3 +248,9 @@ class Exhibit:
     regimes: tuple[RegimeMap, ...] = ()
     pictures: tuple[Picture | Animation, ...] = ()
     data: tuple[NumberTable, ...] = ()
+
+
+def captioned(exhibit: Exhibit, captions: Mapping[str, str]) -> Exhibit:
+    """The exhibit with a sentence under each of its charts that is named."""
+    charts = (replace(c, caption=captions.get(c.name, c.caption)) for c in exhibit.charts)
+    return replace(exhibit, charts=tuple(charts))
