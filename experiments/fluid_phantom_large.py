@@ -46,6 +46,7 @@ EXPERIMENT = replace(
     LINEAR,
     name="fluid_phantom_large",
     title="Fluid inclusion in a phantom, twin at large strain",
+    source="Gosline, Salcudean, Yan (2004), section 4",
     parameters=PARAMETERS,
     methods=METHODS,
     accepted=("p2_neo_hooke",),

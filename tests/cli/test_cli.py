@@ -55,20 +55,44 @@ def refused(*arguments: str, cwd: Path | None = None, **environment: str) -> str
     return lines[0]
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["import", "--help"], []])
-def test_help_loads_none_of_the_heavy_libraries(arguments: list[str]) -> None:
+HEAVY = {
+    "vtk", "pyvista", "numba", "dask", "distributed", "matplotlib", "skfem", "shapely", "filterpy",
+    "jinja2", "scipy", "manifold3d",
+}  # fmt: skip
+FILES = {"numpy", "mcap", "cv2", "pint"}
+
+
+def loaded(*arguments: str) -> tuple[str, set[str]]:
+    """What a command prints, and the libraries it has loaded at its end."""
     script = (
         "import sys; from validate.cli.main import run; code = run(sys.argv[1:]);"
-        "heavy = {'numpy','scipy','skfem','pyvista','vtk','matplotlib','mcap','pint','shapely',"
-        "'cv2','filterpy','rich','jinja2'} & set(sys.modules);"
-        "print('LOADED', sorted(heavy)); sys.exit(code)"
+        "print('LOADED', *sys.modules); sys.exit(code)"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, *arguments], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0, done.stderr
-    assert "Usage" in done.stdout
-    assert done.stdout.splitlines()[-1] == "LOADED []"
+    shown, _, modules = done.stdout.partition("LOADED ")
+    return shown, {name.split(".")[0] for name in modules.split()}
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["import", "--help"], []])
+def test_help_loads_none_of_the_heavy_libraries(arguments: list[str]) -> None:
+    shown, modules = loaded(*arguments)
+    assert "Usage" in shown
+    assert not modules & (HEAVY | FILES | {"rich"})
+
+
+def test_the_list_of_experiments_loads_none_of_the_heavy_libraries() -> None:
+    shown, modules = loaded("list")
+    assert "fluid_phantom" in shown
+    assert not modules & (HEAVY | FILES)
+
+
+def test_looking_into_a_recording_loads_only_what_reads_it(project_root: Path) -> None:
+    shown, modules = loaded("inspect", str(project_root / "recordings" / "kf_cube.mcap"))
+    assert "integrity: verified" in shown
+    assert not modules & (HEAVY - {"scipy"})
 
 
 def test_usage_errors_are_one_line_with_the_nearest_name() -> None:

@@ -1,5 +1,7 @@
 """Factorisation: right solutions, refused indefinite matrices, an order that saves fill."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,10 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from validate.errors import SceneError
+from validate.fem import factor
 from validate.fem.assemble import stiffness
-from validate.fem.factor import factorise
+from validate.fem.factor import Factor, factorise
+from validate.fem.frontal import Fronts
 from validate.fem.ordering import nested_dissection
 from validate.fem.system import build
 from validate.scene.scene import Material, Scene, Support
@@ -40,10 +44,10 @@ def test_solves_random_definite_systems(seed: int, nodes: int, per_node: int) ->
     A = random_spd(seed, nodes, per_node)
     rng = np.random.default_rng(seed)
     node = np.repeat(np.arange(nodes), per_node)
-    factor = factorise(A, node, rng.normal(size=(nodes, 3)))
+    found = factorise(A, node, rng.normal(size=(nodes, 3)))
     x = rng.normal(size=(len(node), 2))
-    assert factor.solve(A @ x) == pytest.approx(x, abs=1e-9)
-    assert factor.solve(A @ x[:, 0]) == pytest.approx(x[:, 0], abs=1e-9)
+    assert found.solve(A @ x) == pytest.approx(x, abs=1e-9)
+    assert found.solve(A @ x[:, 0]) == pytest.approx(x[:, 0], abs=1e-9)
 
 
 def test_nodes_may_be_missing_and_out_of_order() -> None:
@@ -122,12 +126,45 @@ def test_nested_dissection_is_a_permutation(seed: int, n: int, d: int, level: bo
     rng = np.random.default_rng(seed)
     graph = sparse.csr_array(sparse.random_array((n, n), density=min(1.0, 6 / n), rng=rng))
     places = np.zeros((n, d)) if level else rng.integers(0, 5, (n, d)).astype(float)
-    order = nested_dissection(graph, places)
-    assert np.array_equal(np.sort(order), np.arange(n))
+    found = nested_dissection(graph, places)
+    assert np.array_equal(np.sort(found.order), np.arange(n))
+    assert found.stops[-1] == n
+    assert sum(found.children) == len(found.stops) - 1  # one tree: all parts but the last are taken
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(st.integers(0, 2**31), st.integers(1, 300), st.integers(1, 3), st.booleans())
+def test_fronts_solve_as_the_sparse_factor_does(
+    seed: int, nodes: int, per_node: int, apart: bool
+) -> None:
+    """Bodies that hang together, or fall into parts: then separators are empty."""
+    A = random_spd(seed, nodes, per_node)
+    A = sparse.csr_array(sparse.diags_array(A.diagonal())) if apart else A
+    rng = np.random.default_rng(seed)
+    node = np.repeat(np.arange(nodes), per_node)
+    places = rng.normal(size=(nodes, 3))
+    x = rng.normal(size=(len(node), 2))
+    with mock.patch.object(factor, "FRONTAL", 0):
+        found = factorise(A, node, places)
+    assert isinstance(found, Fronts)
+    assert found.solve(A @ x) == pytest.approx(x, abs=1e-9)
+    assert found.solve(A @ x[:, 0]) == pytest.approx(x[:, 0], abs=1e-9)
+    assert found.solve(A @ x) == pytest.approx(factorise(A, node, places).solve(A @ x), abs=1e-9)
+
+
+def test_large_grids_are_solved_by_fronts_and_indefinite_ones_refused() -> None:
+    A, places = grid_laplacian(18)
+    x = np.arange(len(places), dtype=float)
+    found = factorise(A, np.arange(len(places)), places)
+    assert isinstance(found, Fronts)
+    assert found.solve(A @ x) == pytest.approx(x, rel=1e-12)
+    with pytest.raises(SceneError, match="not positive definite"):
+        factorise(A - 2.0 * sparse.eye_array(len(places)), np.arange(len(places)), places)
 
 
 def test_nested_dissection_saves_fill_on_a_grid() -> None:
     A, places = grid_laplacian(14)
     natural = splu(A.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0).L.nnz
-    ours = factorise(A, np.arange(len(places)), places).lu.L.nnz
-    assert ours < 0.5 * natural
+    ours = factorise(A, np.arange(len(places)), places)
+    assert isinstance(ours, Factor)
+    assert ours.lu.L.nnz < 0.5 * natural

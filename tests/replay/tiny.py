@@ -110,15 +110,17 @@ class Breaking:
 
 @dataclass(frozen=True)
 class Breaks:
-    """A scheme whose step `at` fails."""
+    """A scheme whose step `at` fails; static ones do not count theirs, so 0 is their first."""
 
     dt: float = quantity(DT, "s", "time step")
     at: int = quantity(1, "1", "step that fails")
     ending: str = quantity("refused", "1", "its ending")
+    inner: Any = quantity(None, "1", "the scheme that fails; none: Newmark")
 
     def prepare(self, system: System) -> Stepper:
         ending: Any = self.ending
-        return Breaking(Newmark(self.dt).prepare(system), self.at, (ending, "told so"))
+        inner = self.inner or Newmark(self.dt)
+        return Breaking(inner.prepare(system), self.at, (ending, "told so"))
 
 
 def sets(card: Card, seen: Registered) -> dict[str, Any]:

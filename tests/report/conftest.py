@@ -1,11 +1,11 @@
 """The fluid phantom by its two cheapest methods, compared once for the tests of the report."""
 
 import pytest
-from validate.replay.run import compare
 
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options
+from validate.replay.road import compare
 
 
 @pytest.fixture(scope="session")

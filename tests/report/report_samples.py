@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from validate.register.observe import Hold, Registered, SignalObservation
 
 from validate.compare.effects import Change, Effect
 from validate.compare.published import Published
@@ -13,6 +12,9 @@ from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.verdict import Check
 from validate.parameters import Parameter
 from validate.recording.types import Clock, Recording, Signal, Source
+from validate.register.observation import Selection
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, driving
 from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells
 from validate.scene.scene import Drive, Material, Scene, Support
 from validate.solve.types import Outcome, Run, StepTimes, Trace
@@ -96,9 +98,11 @@ def recording(name: str, seed: int) -> tuple[Recording, Registered]:
         clock={"load_cell": clock},
         metadata={"specimen": {"height_m": "0.02", "origin": "/srv/private/file.csv"}},
     )
-    seen = SignalObservation("force.plate", "stage.force", TIMES, force, "N", 0.02)
-    holds = (Hold("0mm", 0.0, 0.0), Hold("2mm", PRESS, 1.0))
-    return made, Registered(stage, holds, None, None, (seen,))
+    seen = SignalObservation(
+        "load_cell", "validates", TIMES, force[:, None], "N", 0.02, "force.plate", "stage.force"
+    )
+    rest, loaded = (Selection(f"{q}mm", np.array([t])) for q, t in ((0, 0.0), (2, 1.0)))
+    return made, Registered((driving(made, "stage", "m"), seen), (loaded,), rest)
 
 
 def small_result() -> Result:

@@ -10,11 +10,12 @@ import pytest
 from PIL import Image, ImageSequence
 from report_samples import small_result
 
+from validate.compare.exhibit import Animation
 from validate.compare.result import Result
 from validate.report.animation import moving_outline
 from validate.report.encode import gif
 from validate.report.loads import at_times, held, in_steps
-from validate.report.page import Animation
+from validate.report.observed import driven, holds
 from validate.report.write import write_report
 
 BLACK = 60  # of 255; the measured points at a load are darker, between two they are not
@@ -22,8 +23,7 @@ BLACK = 60  # of 255; the measured points at a load are darker, between two they
 
 @pytest.fixture(scope="module")
 def animation(result: Result) -> Animation:
-    made = moving_outline(result, result.methods[0])
-    assert made is not None
+    (made,) = moving_outline(result.methods[0])
     return made
 
 
@@ -31,11 +31,11 @@ def test_between_loads_linear_in_the_stage(result: Result) -> None:
     run, seen = result.methods[0].run, result.methods[0].registered[0]
     found = in_steps(seen, run, 8)
     assert len(found) == 3 * 8 + 1
-    assert [i.hold for i in found if i.hold] == list(seen.holds)
+    assert [i.hold for i in found if i.hold] == list(holds(seen))
     assert all(np.array_equal(i.u, u) for i, u in zip(found[::8], run.u, strict=True))
     a, middle, b = found[8], found[12], found[16]
     assert middle.hold is None
-    assert middle.stage == pytest.approx((a.stage + b.stage) / 2)
+    assert middle.drive == pytest.approx((a.drive + b.drive) / 2)
     assert middle.u == pytest.approx((a.u + b.u) / 2, abs=1e-15)
 
 
@@ -44,17 +44,19 @@ def test_at_a_time_the_stage_of_that_time_counts(result: Result) -> None:
     times = np.array([0.0, 8.0, 13.5, 99.0])  # before, while moving, at a load, after
     found = at_times(seen, run, times)
     assert [i.t for i in found] == [3.5, 8.0, 13.5, 23.5, 33.5]
-    stage = float(np.interp(8.0, seen.stage.t, seen.stage.y[:, 0]))
-    share = (stage - seen.holds[0].stage) / (seen.holds[1].stage - seen.holds[0].stage)
+    rest, first = (h.drive for h in holds(seen)[:2])
+    share = (float(driven(seen, 8.0)) - rest) / (first - rest)
     assert 0.1 < share < 0.9
     assert found[1].u == pytest.approx((1 - share) * run.u[0] + share * run.u[1], abs=1e-15)
 
 
 def test_never_beyond_what_was_computed(result: Result) -> None:
-    """A stage that overshoots between two loads is not extrapolated."""
+    """A drive that overshoots between two loads is not extrapolated."""
     run, seen = result.methods[0].run, result.methods[0].registered[0]
-    over = replace(seen.stage, y=np.where(np.abs(seen.stage.t - 8.0)[:, None] < 1, 0.02, 0.0))
-    (_, instant, *_) = at_times(replace(seen, stage=over), run, np.array([8.0]))
+    (stage,) = seen.drives
+    over = replace(stage, y=np.where(np.abs(stage.t - 8.0)[:, None] < 1, 0.02, stage.y))
+    others = tuple(o for o in seen.observations if o is not stage)
+    (_, instant, *_) = at_times(replace(seen, observations=(over, *others)), run, np.array([8.0]))
     assert instant.u == pytest.approx(run.u[1], abs=1e-15)
 
 
@@ -97,7 +99,7 @@ def test_measured_points_fade_between_loads(animation: Animation) -> None:
 
 
 def test_words(animation: Animation) -> None:
-    assert "interpolated linearly in stage displacement" in animation.caption
+    assert "interpolated linearly in the drive" in animation.caption
     assert "The still picture shows 9 mm." in animation.caption
     assert "mm" in animation.caption
     assert animation.alt.startswith("Animation: the measured outline points over the simulated")
@@ -129,7 +131,7 @@ def test_in_the_report(result: Result, tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_nothing_to_show(result: Result) -> None:
     small = small_result()
-    assert moving_outline(small, small.methods[0]) is None
+    assert moving_outline(small.methods[0]) == ()
     one = result.methods[0]
     rest = replace(one, runs=(replace(one.run, at=one.run.at[:1], u=one.run.u[:1]),))
-    assert moving_outline(result, rest) is None
+    assert moving_outline(rest) == ()

@@ -11,12 +11,12 @@ import pytest
 from report_samples import small_result
 
 from validate.report import gl
-from validate.report.body import Body, body
-from validate.report.cut import cut
+from validate.report.bodies import _without_gl
+from validate.report.body import ShownBody, shown_body
 
 
-def cube_body() -> Body:
-    found = body(small_result())
+def cube_body() -> ShownBody:
+    found = shown_body(small_result())
     assert found is not None
     return found
 
@@ -39,9 +39,9 @@ def test_plates_lie_outside() -> None:
 
 def test_drawn_body_follows_the_displacement() -> None:
     one = cube_body()
-    two = cut(replace(one, u=2 * one.u))
-    assert two.pixels.shape == cut(one).pixels.shape
-    assert (two.pixels != cut(one).pixels).any()
+    two = _without_gl(replace(one, u=2 * one.u))
+    assert two.pixels.shape == _without_gl(one).pixels.shape
+    assert (two.pixels != _without_gl(one).pixels).any()
 
 
 def test_no_gl_by_variable(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,9 +77,9 @@ from report_samples import small_result
 from validate.report import gl
 if not gl.available():
     raise SystemExit(3)
-from validate.report.body import body
+from validate.report.body import shown_body
 from validate.report.renders import renders
-one = body(small_result())
+one = shown_body(small_result())
 for factor in (1.0, 2.0):
     np.savez(f"{sys.argv[1]}/{factor:g}.npz",
              **{p.name: p.pixels for p in renders(replace(one, u=factor * one.u))})

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from validate.papers.accuracy.rod import bending_rod
-from validate.report.body import Body
-from validate.report.cut import _cut_polygons
+from validate.report.body import ShownBody
+from validate.report.cut import _polygons
 from validate.report.skin import skins
 
 ROD = bending_rod(3)
@@ -22,10 +22,23 @@ def test_the_skin_has_two_triangles_a_side() -> None:
 def test_a_cut_shows_the_whole_section() -> None:
     still, up, along = np.zeros((len(ROD.mesh.nodes), 3)), np.eye(3)[2], np.eye(3)[0]
     middle = np.array([250.0, 125.0, 125.0])
-    body = Body(
-        "rod", "", "", ROD.mesh, still, (), None, None, (0.0, 0.0), middle, np.eye(3)[1], up, along
+    body = ShownBody(
+        "rod",
+        "",
+        "",
+        ROD.mesh,
+        still,
+        (),
+        None,
+        None,
+        (0.0, 0.0),
+        middle,
+        np.eye(3)[1],
+        "",
+        up,
+        along,
     )
-    polygons, _ = _cut_polygons(body, np.eye(3)[1])
+    polygons, _ = _polygons(body, np.eye(3)[1])
     area = 0.0
     for x, y in (p.T for p in polygons):
         area += abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2

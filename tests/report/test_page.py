@@ -10,8 +10,11 @@ from report_samples import BLIND, CHECK, bare_result, small_result
 
 from validate.compare.effects import Change
 from validate.compare.result import Result
-from validate.report.html import SECTIONS, page
-from validate.report.page import Section
+from validate.report.exhibits import DrawnExhibit, draw_all
+from validate.report.html import page
+from validate.report.sections import exhibits
+from validate.report.tables import shown
+from validate.report.verdicts import band
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -21,9 +24,15 @@ def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
 
 
-def made(result: Result) -> tuple[dict[str, Section], str]:
-    found = {name: s for name, make in SECTIONS if (s := make(result)) is not None}
-    return found, page(result, tuple(found.values()), CREATED)
+def made(result: Result) -> tuple[dict[str, DrawnExhibit], str]:
+    drawn = draw_all(result, exhibits(result, lambda _: None))
+    return {d.exhibit.anchor: d for d in drawn if d.shown}, page(
+        result, drawn, CREATED, band(result)
+    )
+
+
+def empty(result: Result) -> str:
+    return page(result, (), CREATED, band(result))
 
 
 class _Tags(HTMLParser):
@@ -74,8 +83,11 @@ def test_sections_when_nothing_finished() -> None:
 
 def test_all_recordings_are_drawn() -> None:
     found, _ = made(small_result())
-    (picture,) = found["curves"].pictures
-    assert "2 recordings" in picture.caption
+    level, off = found["curves"].exhibit.charts
+    assert "2 recordings" in level.caption
+    labels = [s.label for s in level.series if s.style == "points"]
+    assert labels == ["measured, cube_a", "measured, cube_b"]
+    assert off.linear == pytest.approx(0.04)
 
 
 @pytest.mark.parametrize(
@@ -86,21 +98,21 @@ def test_all_recordings_are_drawn() -> None:
 def test_band_says_the_verdict_in_words_and_colour(verdict: str, word: str, colour: str) -> None:
     result = small_result()
     method = replace(result.methods[0], checks=(replace(CHECK, verdict=verdict),))
-    text = page(replace(result, methods=(method,)), (), CREATED)
+    text = empty(replace(result, methods=(method,)))
     assert f'class="band {colour}" id="verdict"><b>{word}:' in text
     assert unescape(text).count(result.sentence) == 1
 
 
 def test_nothing_checked_is_undecided() -> None:
-    assert "<b>Undecided:" in page(bare_result(), (), CREATED)
+    assert "<b>Undecided:" in empty(bare_result())
 
 
 @pytest.mark.parametrize("anchor", ["quick", "twin", "same-model"])
 def test_notices_only_where_they_apply(anchor: str) -> None:
     plain = small_result()
     told = replace(plain, quick=True, twin_notice="It is a twin.", same_model=True)
-    assert f'id="{anchor}"' not in page(plain, (), CREATED)
-    assert f'id="{anchor}"' in page(told, (), CREATED)
+    assert f'id="{anchor}"' not in empty(plain)
+    assert f'id="{anchor}"' in empty(told)
 
 
 def test_names_are_escaped() -> None:
@@ -119,8 +131,8 @@ def test_every_picture_has_words_and_units() -> None:
 
 def test_check_row_shows_two_u_val_and_its_parts() -> None:
     found, _ = made(small_result())
-    table = next(p for p in found["checks"].parts if p.kind == "table")
-    assert [c.text for c in table.rows[0]] == [
+    (table,) = found["checks"].exhibit.tables
+    assert [shown(c) for c in table.rows[0]] == [
         "soft", "force.plate@2mm", "N",
         "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
         "✓ agrees", "|E| is 0.5 u_val",
@@ -129,10 +141,10 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
 
 def test_sentences_say_what_can_and_cannot_be_told_apart() -> None:
     found, _ = made(small_result())
-    (items,) = (p for p in found["discrimination"].parts if p.kind == "items")
-    assert "can tell it apart, by force.plate" in items.texts[0]
-    assert "cannot be told apart" in items.texts[1]
-    assert "would decide: a better cell" in items.texts[1]
+    first, second = found["discrimination"].exhibit.words
+    assert "can tell it apart, by force.plate" in first
+    assert "cannot be told apart" in second
+    assert "would decide: a better cell" in second
 
 
 def test_references_without_noise_are_no_sensors() -> None:
@@ -145,16 +157,16 @@ def test_references_without_noise_are_no_sensors() -> None:
     )
     soft = replace(soft, residuals={**soft.residuals, noiseless.name: noiseless})
     found, _ = made(replace(result, effects=(effect, BLIND), methods=(soft,)))
-    tables = [p for p in found["discrimination"].parts if p.kind == "table"]
+    tables = found["discrimination"].exhibit.tables
     assert tables[0].headings == ("effect", "force.plate")
-    assert [c.text for c in tables[0].rows[0]] == ["modulus: E 10 % higher", "✓ 7.0"]
-    assert [c.text for c in tables[0].rows[1]] == ["nu: nu 0.45", "0.1"]
-    assert [row[1].mark for row in tables[0].rows] == ["good", ""]
+    assert [shown(c) for c in tables[0].rows[0]] == ["modulus: E 10 % higher", "✓ 7.0"]
+    assert [shown(c) for c in tables[0].rows[1]] == ["nu: nu 0.45", "0.1"]
+    assert [getattr(row[1], "emphasis", None) for row in tables[0].rows] == ["good", ""]
 
 
 def test_a_line_on_another_is_named() -> None:
     result = small_result()
     twin = replace(result.methods[0], name="twin", label="the same again", accepted=False)
     found, _ = made(replace(result, methods=(*result.methods, twin)))
-    (picture,) = found["curves"].pictures
+    picture, _ = found["curves"].pictures
     assert "lying on another line: the same again (on soft <cube>)" in picture.caption

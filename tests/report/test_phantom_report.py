@@ -8,15 +8,16 @@ from pathlib import Path
 import jsonschema
 import pytest
 from report_samples import CHECK
-from validate.compare.outline import normal_distances
-from validate.replay.run import compare
 
 from validate.compare.result import Result
+from validate.register.outline_geometry import normal_distances
 from validate.replay.options import Options
-from validate.report.html import SECTIONS
+from validate.replay.road import compare
+from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.observed import outline_seen
-from validate.report.page import Section
+from validate.report.sections import SECTIONS, exhibits
 from validate.report.store import document, schema
+from validate.report.tables import shown as read
 
 
 @pytest.fixture(scope="module")
@@ -33,29 +34,32 @@ def result(project_root: Path) -> Result:
 
 
 @pytest.fixture(scope="module")
-def sections(result: Result) -> dict[str, Section]:
+def sections(result: Result) -> dict[str, DrawnExhibit]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VALIDATE_NO_GL", "1")
-        return {name: s for name, make in SECTIONS if (s := make(result)) is not None}
+        drawn = draw_all(result, exhibits(result, lambda _: None))
+    return {d.exhibit.anchor: d for d in drawn if d.shown}
 
 
-def test_all_sections_that_apply(result: Result, sections: dict[str, Section]) -> None:
-    left_out = {name for name, _ in SECTIONS} - set(sections) - {"published"}
-    assert left_out == {"checks", "exhibits"}
+def test_all_sections_that_apply(result: Result, sections: dict[str, DrawnExhibit]) -> None:
+    left_out = {make.__name__ for make in SECTIONS} - set(sections) - {"published"}
+    assert left_out == {"checks"}
     assert ("published" in sections) == bool(result.published)
 
 
-def test_pictures_of_the_paper(sections: dict[str, Section]) -> None:
+def test_pictures_of_the_paper(sections: dict[str, DrawnExhibit]) -> None:
     names = {p.name for s in sections.values() for p in s.pictures}
     assert names == {
-        "outlines", "outline_models", "markers", "marker_rise", "curve_force_plate",
-        "curve_pressure", "curve_volume_ratio", "errors_over_noise", "cut", "registration",
+        "outline", "outlines", "chart_outline_errors", "markers", "markers_across",
+        "errors_over_noise",
+        "chart_curve_force_plate", "chart_curve_force_plate_error", "chart_curve_pressure",
+        "chart_curve_pressure_error", "chart_volume_ratio", "cut", "registration",
     }  # fmt: skip
 
 
-def test_top_left_is_the_score(result: Result, sections: dict[str, Section]) -> None:
-    table = next(p for p in sections["outlines"].parts if p.kind == "table")
-    shown = {row[0].text: row[-1].text for row in table.rows}
+def test_top_left_is_the_score(result: Result, sections: dict[str, DrawnExhibit]) -> None:
+    (table,) = sections["outlines"].exhibit.tables
+    shown = {read(row[0]): read(row[-1]) for row in table.rows}
     scores = {s.name: s.value for s in result.methods[0].scores}
     simulated = 1e3 * scores["contour.top_left.simulated@9mm"]
     assert float(shown["P1 with fluid"]) == pytest.approx(simulated, abs=0.005)

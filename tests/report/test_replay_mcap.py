@@ -17,15 +17,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from report_samples import bare_result, small_result
-from validate.compare.outline import normal_distances
 
 from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Frames
+from validate.register.outline_geometry import normal_distances
 from validate.register.plane import from_image
-from validate.report import replay_mcap, replay_signals
+from validate.report import observed, replay_mcap, replay_signals
 from validate.report.foxglove_schemas import DEFINITIONS
 from validate.report.replay_mcap import tracks, views, write_replay
 from validate.scene.mesh import boundary_facets
@@ -134,10 +134,10 @@ def test_tf_comes_first(path: Path) -> None:
 
 def test_forces_and_pressures_are_those_compared(messages: Messages, result: Result) -> None:
     run, seen = result.methods[0].run, result.methods[0].registered[0]
-    for s, name in zip(seen.signals, ("force", "pressure"), strict=True):
+    for s, name in zip(observed.signals(seen), ("force", "pressure"), strict=True):
         for who, y, sd in (("measured", s.y, s.sd), ("simulated", run.traces[s.trace].y, 0.0)):
             found = [c for _, c in messages[f"/{name}/{who}"]]
-            assert [c["values"] for c in found] == [[v] for v in y.tolist()]
+            assert [c["values"] for c in found] == np.reshape(y, (-1, 1)).tolist()
             assert {(c["unit"], c["sd"]) for c in found} == {(s.unit, sd)}
 
 
@@ -157,7 +157,7 @@ def test_our_reader_reads_the_outlines_that_were_judged(path: Path, result: Resu
 def test_a_measured_marker_lands_where_the_comparison_has_it(
     messages: Messages, result: Result
 ) -> None:
-    seen = result.methods[0].registered[0].markers
+    seen = observed.markers(result.methods[0].registered[0])
     assert seen is not None
     T = parent_from(messages, "pen")
     for i, (_, content) in enumerate(messages["/markers/measured"]):
@@ -190,7 +190,7 @@ def test_simulated_less_measured_markers_are_the_residual(
 
 
 def test_outlines_to_look_at_lie_in_the_image_plane(messages: Messages, result: Result) -> None:
-    seen = result.methods[0].registered[0].outline
+    seen = observed.outline(result.methods[0].registered[0])
     assert seen is not None
     T = parent_from(messages, "image")
     for i, (ns, content) in enumerate(messages["/outline/simulated"]):
@@ -262,7 +262,7 @@ def test_what_it_was_made_from(path: Path, result: Result) -> None:
     record = found["validate.replay"]
     assert (record["experiment"], record["method"]) == ("fluid_phantom", "p1_fluid")
     assert (record["thinned"], record["left_out"]) == ("nothing", "other methods: p1_dry")
-    assert "linearly in stage displacement" in record["interpolated"]
+    assert "linearly in the drive" in record["interpolated"]
 
 
 def test_same_result_same_bytes(result: Result, path: Path, tmp_path: Path) -> None:
@@ -418,12 +418,13 @@ def test_a_signal_without_a_trace_is_named(tmp_path: Path) -> None:
 def test_a_scaled_registration_leaves_markers_in_the_scene(result: Result) -> None:
     """A transform of Foxglove has no scale: the markers are put where the comparison has them."""
     one = result.methods[0]
-    seen = one.registered[0].markers
+    seen = observed.markers(one.registered[0])
     assert seen is not None
     transform = replace(seen.registration.transform, s=1.01)
     registration = replace(seen.registration, transform=transform)
     scaled = replace(seen, registration=registration)
-    registered = replace(one.registered[0], markers=scaled)
+    others = (o for o in one.registered[0].observations if o is not seen)
+    registered = replace(one.registered[0], observations=(*others, scaled))
     methods = (replace(one, registered=(registered,)),)
     (view,) = views(replace(result, methods=methods))
     found = {t.topic: t for t in tracks(view)}

@@ -5,12 +5,12 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from report_samples import scene as cube_scene
 
-from validate.report.skin import Skin, skins
+from validate.report.skin import SurfacePart, skins
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Material, Scene
 
 
-def edges(skin: Skin) -> dict[tuple[int, int], int]:
+def edges(skin: SurfacePart) -> dict[tuple[int, int], int]:
     found: dict[tuple[int, int], int] = {}
     for a, b, c in skin.triangles.tolist():
         for edge in ((a, b), (b, c), (c, a)):

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 from report_samples import small_result
 
+from validate.compare.exhibit import Exhibit
 from validate.compare.result import Result
 from validate.errors import UsageError
-from validate.report import write
-from validate.report.page import Section
+from validate.report import sections
 from validate.report.write import write_report
 
 CREATED = "2026-11-21T04:00:00Z"
@@ -32,13 +32,13 @@ def test_files_without_gl(tmp_path: Path) -> None:
     folder = path.parent
     names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     assert names >= {
-        "report.html", "results.json", "runs/soft.npz", "runs/stiff.npz", "figures/cut.png",
-        "figures/curve_force_plate.png", "tables/scores.csv", "tables/checks.csv",
+        "report.html", "results.json", "runs/soft.npz", "runs/stiff.npz", "figures/map_body.png",
+        "figures/chart_curve_force_plate.png", "tables/scores.csv", "tables/checks.csv",
         "tables/effects.csv", "tables/published.csv", "tables/load_displacement.csv",
     }  # fmt: skip
     assert "libegl1 and libgl1-mesa-dri" in path.read_text()
     assert json.loads((folder / "results.json").read_text())["experiment"] == "cube"
-    assert steps[0] == "tables and runs"
+    assert steps[0] == "runs"
     assert steps[-1] == "page"
     assert [p.name for p in folder.parent.iterdir()] == ["cube"]
 
@@ -59,7 +59,7 @@ def test_tables_are_si(tmp_path: Path) -> None:
         (a, b) for a in ("cube_a", "cube_b") for b in ("measured", "soft", "stiff")
     }
     last = [r for r in rows if r["who"] == "soft"][-1]
-    assert float(last["stage_m"]) == pytest.approx(0.002)
+    assert float(last["drive_m"]) == pytest.approx(0.002)
     assert float(last["value"]) == pytest.approx(4.0)
 
 
@@ -80,10 +80,10 @@ def test_failing_figure_leaves_the_old_report(
     write_report(small_result(), folder, created=CREATED)
     before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
-    def fails(_: Result) -> Section:
+    def fails(_: Result) -> Exhibit:
         raise RuntimeError("no figure today")
 
-    monkeypatch.setattr(write, "SECTIONS", (*write.SECTIONS[:2], ("broken", fails)))
+    monkeypatch.setattr(sections, "SECTIONS", (*sections.SECTIONS[:2], fails))
     with pytest.raises(RuntimeError, match="no figure today"):
         write_report(replace(small_result(), title="Second"), folder, created=CREATED)
     assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before

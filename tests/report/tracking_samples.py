@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from validate.register.observe import Hold, Registered, observe_markers
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series
@@ -13,6 +12,9 @@ from validate.compare.score import run_scores, scores_of
 from validate.compare.track import track_error, track_scores
 from validate.compare.verdict import Check
 from validate.recording.types import Markers, Recording, Signal, Source
+from validate.register.markers import observe_markers
+from validate.register.registered import Registered
+from validate.register.signals import driving
 from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support
 from validate.solve.types import Ending, Outcome, Run, StepTimes, Trace
@@ -65,8 +67,7 @@ def seen() -> tuple[Recording, Registered]:
     )  # fmt: skip
     layout = {name: np.array(point) for name, point in NODES.items()}
     observed = observe_markers(markers, layout, body().mesh, method="rigid", sampling="barycentric")
-    holds = (Hold("rest", 0.0, float(T[0])), Hold("end", 0.0, float(T[-1])))
-    return recording, Registered(push, holds, observed, None, ())
+    return recording, Registered((driving(recording, "push", "N"), observed))
 
 
 def traces(scale: float, count: int) -> dict[str, Trace]:

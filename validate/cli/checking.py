@@ -4,11 +4,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from validate.catalogue import experiment_files
 from validate.cli.display import console, progress, shown, table
 from validate.cli.main import FAILED
 from validate.compare.published import Published
 from validate.compare.result import Result
-from validate.replay.find import experiment_files, find
+from validate.replay.find import find
 from validate.replay.options import Options
 from validate.replay.road import compare
 

@@ -1,15 +1,13 @@
 """Tables and progress bars on the terminal; plain lines when it is not one."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
-
-from validate.replay.options import Report
 
 
 def console(*, error: bool = False) -> Console:
@@ -29,8 +27,11 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Report]:
-    """A bar with the time left on standard error; silent when that is no terminal."""
+def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar with the time left on standard error; silent when that is no terminal.
+
+    Yields what a road reports to: done, total, what comes next.
+    """
     screen = Console(stderr=True)
     with Progress(
         TextColumn(title),

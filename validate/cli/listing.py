@@ -1,4 +1,4 @@
-"""`validate list`."""
+"""`validate list NAME`: one experiment with every parameter."""
 
 import json
 from pathlib import Path
@@ -7,25 +7,17 @@ from typing import Any
 from validate.cli.display import console, table
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
-from validate.replay.find import experiment_files, find, load_file
+from validate.replay.find import find
 
 
-def show(name: str | None, as_json: bool) -> None:
-    """Prints the experiments, or one with every parameter."""
-    start = Path.cwd()
-    if name is None:
-        found = [load_file(path) for path in experiment_files(start).values()]
-        document: Any = [_summary(e) for e in found]
-        if not as_json:
-            rows = [[e.name, e.title, e.source, str(len(e.methods))] for e in found]
-            console().print(table("Experiments", ["name", "what", "source", "methods"], rows))
-    else:
-        experiment = find(name, start)
-        document = _summary(experiment) | _details(experiment)
-        if not as_json:
-            _print(experiment)
+def show(name: str, as_json: bool) -> None:
+    """Prints parameters, methods and accepted limits of an experiment."""
+    experiment = find(name, Path.cwd())
     if as_json:
+        document = _summary(experiment) | _details(experiment)
         print(json.dumps(document, indent=2, allow_nan=False))
+    else:
+        _print(experiment)
 
 
 def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:

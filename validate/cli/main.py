@@ -65,9 +65,13 @@ def cli() -> None:
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def list_(name: str | None, as_json: bool) -> None:
     """Experiments; with NAME its parameters, methods, scores and source."""
+    if name is None:
+        from validate.cli import names
+
+        return names.show(as_json)
     from validate.cli import listing
 
-    listing.show(name, as_json)
+    return listing.show(name, as_json)
 
 
 @cli.command("run")
@@ -183,9 +187,9 @@ def choose(name: str, **options: Any) -> int:
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def inspect(file: Path, as_json: bool) -> None:
     """What a recording holds: topics, clocks, rates, gaps, units, defects."""
-    from validate.cli import recordings
+    from validate.cli import inspecting
 
-    recordings.inspect(file, as_json)
+    inspecting.inspect(file, as_json)
 
 
 @cli.command("import")
@@ -245,9 +249,9 @@ def new(name: str, source: Path, out: Path | None) -> None:
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 def record(name: str, out: Path, values: tuple[str, ...]) -> None:
     """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
-    from validate.cli import recordings
+    from validate.cli import making
 
-    recordings.record(name, out, values)
+    making.record(name, out, values)
 
 
 def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:

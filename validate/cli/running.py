@@ -4,11 +4,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
+from validate.catalogue import experiment_files
 from validate.cli.display import console, progress, relative, shown, table
 from validate.cli.main import FAILED, pairs
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
-from validate.replay.find import experiment_files, find, root_of
+from validate.replay.find import find, root_of
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.report.write import write_report

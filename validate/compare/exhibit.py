@@ -1,38 +1,70 @@
-"""What a result shows beside its scores, as plain data: number tables, charts, maps on the mesh."""
+"""What a report shows, as plain data: sentences, tables, charts, maps on the mesh, pictures."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
 from validate.scene.mesh import Mesh
 
 Entry = float | int | str | None
+Emphasis = Literal["", "good", "bad", "open", "strong"]
+Pixels = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class TableCell:
+    """An entry that says more: its SI unit ("": the number is as shown) and how it stands out.
+
+    `text` is how it reads, where that is not the rule; an emphasis never replaces words. A number
+    that is not finite is none.
+    """
+
+    value: Entry
+    unit: str = ""
+    text: str = ""
+    emphasis: Emphasis = ""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.value, float) and not math.isfinite(self.value):
+            object.__setattr__(self, "value", None)
+
+
+def plain(entry: Entry | TableCell) -> Entry:
+    """The entry itself, whatever else a cell says of it."""
+    return entry.value if isinstance(entry, TableCell) else entry
 
 
 @dataclass(frozen=True)
 class NumberTable:
     """Rows under headings that carry their units; None where there is no number, and `note` why.
 
-    Values are as shown (mm where the heading says mm); `name` is the file's in tables/.
+    Values are as shown (mm where the heading says mm) but for cells with a unit, which are SI.
+    `name` is the file's in tables/; empty: only on the page, its numbers stand in another table.
+    `folded` tables are opened by their reader.
     """
 
     name: str
     title: str
     headings: tuple[str, ...]
-    rows: tuple[tuple[Entry, ...], ...]
+    rows: tuple[tuple[Entry | TableCell, ...], ...]
     note: str = ""
+    folded: bool = False
 
     def __post_init__(self) -> None:
+        named = f"table '{self.name or self.title}'"
         for row in self.rows:
             if len(row) != len(self.headings):
                 raise ComparisonError(
-                    f"table '{self.name}': a row of {len(row)} under {len(self.headings)} headings"
+                    f"{named}: a row of {len(row)} under {len(self.headings)} headings"
                 )
-            if any(isinstance(v, float) and not np.isfinite(v) for v in row):
-                raise ComparisonError(f"table '{self.name}': a number is not finite in {row[0]}")
+            if any(isinstance(v, float) and not math.isfinite(v) for v in row):
+                raise ComparisonError(f"{named}: a number is not finite in {row[0]}")
 
 
 @dataclass(frozen=True)
@@ -54,7 +86,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
-    """One picture: axes with units, series, and named levels (horizontal lines)."""
+    """One picture: axes with units, series, and named levels (horizontal lines).
+
+    `linear`: y is linear between -linear and linear and logarithmic beyond (0: `log` alone counts).
+    """
 
     name: str
     title: str
@@ -64,6 +99,7 @@ class Chart:
     levels: tuple[tuple[str, float], ...] = ()
     log: Literal["", "x", "y", "xy"] = ""
     caption: str = ""
+    linear: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -163,8 +199,44 @@ class RegimeMap:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """pixels (h, w, 3) sRGB with what it shows (caption) and the same in words (alt).
+
+    `photo` pictures are shaded renders, which a lossy code may touch; the others are line art.
+    """
+
+    name: str
+    caption: str
+    alt: str
+    pixels: Pixels
+    photo: bool = False
+
+
+@dataclass(frozen=True)
+class Animation:
+    """frames (h, w, 3) sRGB shown in turn for `milliseconds` each, again and again.
+
+    The first frame stands for all of them where nothing moves: on paper.
+    """
+
+    name: str
+    caption: str
+    alt: str
+    frames: tuple[Pixels, ...]
+    milliseconds: tuple[int, ...]
+
+    @property
+    def still(self) -> Picture:
+        """The first frame as a picture."""
+        return Picture(self.name, self.caption, self.alt, self.frames[0])
+
+
+@dataclass(frozen=True)
 class Exhibit:
-    """A part of a report: its sentences, then tables, charts, heats, maps, regimes in order."""
+    """A part of a report: its sentences, then pictures, tables, charts, heats, regimes, maps.
+
+    `data` are tables for files only: the numbers behind what is shown, SI with a column of units.
+    """
 
     anchor: str
     title: str
@@ -174,3 +246,11 @@ class Exhibit:
     maps: tuple[NodeMap, ...] = ()
     heats: tuple[Heat, ...] = ()
     regimes: tuple[RegimeMap, ...] = ()
+    pictures: tuple[Picture | Animation, ...] = ()
+    data: tuple[NumberTable, ...] = ()
+
+
+def captioned(exhibit: Exhibit, captions: Mapping[str, str]) -> Exhibit:
+    """The exhibit with a sentence under each of its charts that is named."""
+    charts = (replace(c, caption=captions.get(c.name, c.caption)) for c in exhibit.charts)
+    return replace(exhibit, charts=tuple(charts))

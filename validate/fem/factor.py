@@ -8,7 +8,10 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.ordering import nested_dissection
+from validate.fem.frontal import Fronts, fronts
+from validate.fem.ordering import Dissection, nested_dissection
+
+FRONTAL = 5000  # unknowns from which dense fronts are faster
 
 
 @dataclass(frozen=True)
@@ -28,13 +31,18 @@ class Factor:
         return x
 
 
-def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor:
+def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor | Fronts:
     """Factorises A (m, m); unknown i belongs to mesh node `node[i]` at `places[node[i]]` m.
 
     Raises `SceneError` when A is not positive definite: SuperLU itself would go on silently.
     Without pivoting U's diagonal holds the pivots, whose signs are the inertia of A.
     """
-    factor, pivots = _factorised(A, elimination_order(A, node, places))
+    dissection = _dissected(A, node, places)
+    if len(node) > FRONTAL:
+        found = fronts(A, dissection.order, dissection.stops, dissection.children)
+        if found is not None:
+            return found
+    factor, pivots = _factorised(A, dissection.order)
     if pivots.min() <= 1e-13 * pivots.max():
         raise _not_definite(float(pivots.min() / pivots.max()), int((pivots <= 0).sum()))
     return factor
@@ -67,14 +75,22 @@ def _factorised(A: sparse.csr_array, order: Ints) -> tuple[Factor, Floats]:
 
 def elimination_order(A: sparse.csr_array, node: Ints, places: Floats) -> Ints:
     """Nested dissection of the unknowns (m,) by their nodes; holds for every A of one pattern."""
+    return _dissected(A, node, places).order
+
+
+def _dissected(A: sparse.csr_array, node: Ints, places: Floats) -> Dissection:
+    """The dissection of the nodes, told by unknowns."""
     used, local = np.unique(node, return_inverse=True)
     links = A.tocoo()
     ones = np.ones(links.nnz, dtype=np.int8)
     shape = (len(used), len(used))
     graph = sparse.csr_array((ones, (local[links.row], local[links.col])), shape=shape)
+    nodes = nested_dissection(graph, places[used])
     rank = np.empty(len(used), dtype=np.int64)
-    rank[nested_dissection(graph, places[used])] = np.arange(len(used))
-    return np.argsort(rank[local], kind="stable")
+    rank[nodes.order] = np.arange(len(used))
+    order = np.argsort(rank[local], kind="stable")
+    stops = np.searchsorted(rank[local][order], nodes.stops)
+    return Dissection(order, stops, nodes.children)
 
 
 def _not_definite(smallest: float, count: int) -> SceneError:

@@ -1,5 +1,7 @@
 """Nested dissection of a mesh graph by coordinates: the elimination order that keeps fill low."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
 
@@ -8,31 +10,49 @@ from validate.arrays import Floats, Ints
 _LEAF = 48  # nodes; below this the order within hardly matters
 
 
-def nested_dissection(graph: sparse.csr_array, places: Floats) -> Ints:
-    """A permutation (n,) of the nodes: halves first, their separator last, recursively.
+@dataclass(frozen=True)
+class Dissection:
+    """A permutation `order` (n,) of the nodes in parts: halves first, their separator last.
+
+    Part i is `order[stops[i - 1]:stops[i]]` and separates `children[i]` parts (with all that those
+    separate) before it from each other: a tree in postorder.
+    """
+
+    order: Ints
+    stops: Ints
+    children: tuple[int, ...]
+
+
+def nested_dissection(graph: sparse.csr_array, places: Floats) -> Dissection:
+    """Halves of the nodes, their halves, and so on.
 
     `graph` (n, n) links neighbouring nodes, `places` (n, d) m are their coordinates.
     Source: George (1973), with coordinate bisection.
     """
     side = np.zeros(len(places), dtype=np.int8)
-    order: list[Ints] = []
-    _dissect(graph, places, np.arange(len(places)), side, order)
-    return np.concatenate(order)
+    parts: list[tuple[Ints, int]] = []
+    _dissect(graph, places, np.arange(len(places)), side, parts)
+    order = np.concatenate([nodes for nodes, _ in parts])
+    stops = np.cumsum([len(nodes) for nodes, _ in parts])
+    return Dissection(order, stops, tuple(children for _, children in parts))
 
 
 def _dissect(
-    graph: sparse.csr_array, places: Floats, nodes: Ints, side: np.ndarray, order: list[Ints]
+    graph: sparse.csr_array,
+    places: Floats,
+    nodes: Ints,
+    side: np.ndarray,
+    parts: list[tuple[Ints, int]],
 ) -> None:
     if len(nodes) <= _LEAF:
-        order.append(nodes)
+        parts.append((nodes, 0))
         return
     low, high = _halves(places, nodes)
     separator = _touching(graph, low, high, side)
-    inner = low[~separator]
-    for part in (inner, high):
-        if len(part):
-            _dissect(graph, places, part, side, order)
-    order.append(low[separator])
+    halves = [half for half in (low[~separator], high) if len(half)]
+    for half in halves:
+        _dissect(graph, places, half, side, parts)
+    parts.append((low[separator], len(halves)))
 
 
 def _halves(places: Floats, nodes: Ints) -> tuple[Ints, Ints]:

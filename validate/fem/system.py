@@ -16,6 +16,7 @@ from validate.errors import SceneError
 from validate.fem.assemble import lumped, mass, stiffness, stiffness_damping
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
 from validate.fem.factor import Factor, factorise
+from validate.fem.frontal import Fronts
 from validate.fem.loads import load_columns
 from validate.scene.scene import Drive, Scene
 
@@ -61,7 +62,7 @@ class System:
         """The unknowns that supports, pins and drives prescribe."""
         return np.setdiff1d(np.arange(len(self.moves)), self.free)
 
-    def factor(self) -> Factor:
+    def factor(self) -> Factor | Fronts:
         """Factorisation of K over the free unknowns; `SceneError` if not positive definite."""
         d = self.scene.mesh.dimension
         free = self.K[self.free][:, self.free]
@@ -133,13 +134,13 @@ def responses(system: System) -> Responses:
     return Responses(system.scene, fields, _reactions(system, columns, loads), volumes)
 
 
-def _driven_field(system: System, factor: Factor, move: Floats) -> Floats:
+def _driven_field(system: System, factor: Factor | Fronts, move: Floats) -> Floats:
     u = move.copy()
     u[system.free] = factor.solve(-(system.K @ move)[system.free])
     return u
 
 
-def _loaded_field(system: System, factor: Factor, load: Floats) -> Floats:
+def _loaded_field(system: System, factor: Factor | Fronts, load: Floats) -> Floats:
     u = np.zeros_like(load)
     u[system.free] = factor.solve(load[system.free])
     return u

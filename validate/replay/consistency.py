@@ -23,6 +23,11 @@ _HELD = 1e-12  # m: a component without error and without doubt is held, and no 
 # m: what a filter that claims no doubt at all is taken to claim; an error beside it is far over-
 # confident, whatever this is.
 _LEAST_SD = 1e-9
+_NEES = (
+    " and NEES at the nodes (error against the twin's truth over the filter's own standard "
+    "deviation)"
+)
+_CORRELATED = "NEES of one run is correlated in time, which widens its spread beyond the band."
 _HEADS = (
     "case", "filter", "what", "per dof / 1", "95 % band from / 1", "to / 1", "steps", "dof",
     "verdict", "alarm",
@@ -39,14 +44,15 @@ def consistency_exhibit(
         return None
     rows = [row for f in filters.values() for row in _rows(f)]
     rows += [row for case in others.values() for f in case.values() for row in _rows(f)]
+    true = any(row[2] != "NIS" for row in rows)
     table = NumberTable(
         "consistency",
-        "NIS (innovations) and NEES at the nodes (error against the twin's truth over the filter's "
-        "own standard deviation), per degree of freedom, with the 95 % chi-square band: above it a "
-        "filter is over-confident, below it under-confident.",
-        _HEADS, tuple(rows),
-        "NEES of one run is correlated in time, which widens its spread beyond the band.",
-    )  # fmt: skip
+        f"NIS (innovations){_NEES if true else ''}, per degree of freedom, with the 95 % "
+        "chi-square band: above it a filter is over-confident, below it under-confident.",
+        _HEADS,
+        tuple(rows),
+        _CORRELATED if true else "",
+    )
     white = NumberTable(
         "whiteness",
         f"Whiteness of the innovations, Ljung-Box over {_LAGS} lags: a small p means that the "

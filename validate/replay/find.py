@@ -1,23 +1,14 @@
-"""Experiment files: found from the current folder upward, then in the clone that is installed."""
+"""Experiments by name or by file: the one that is asked for is run, and only that."""
 
 import importlib.util
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from validate.catalogue import experiment_files
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
-
-
-def experiment_files(start: Path) -> dict[str, Path]:
-    """Experiment name -> file, of the nearest `experiments/` folder."""
-    for folder in _folders(start):
-        files = {f.stem: f for f in sorted(folder.glob("*.py")) if not f.stem.startswith("_")}
-        if files:
-            return files
-    raise UsageError("no experiments/ folder here or above, and none in the installed clone")
 
 
 def find(name: str, start: Path) -> Experiment:
@@ -56,9 +47,3 @@ def root_of(experiment: Experiment, start: Path) -> Path:
     """The clone an experiment belongs to, else the folder the command was called from."""
     path = experiment.path
     return path.parents[1] if path is not None and path.parent.name == "experiments" else start
-
-
-def _folders(start: Path) -> Iterator[Path]:
-    for folder in (start, *start.parents):
-        yield folder / "experiments"
-    yield Path(__file__).resolve().parents[2] / "experiments"

@@ -5,6 +5,7 @@ One for every experiment, at holds or over time, with a twin's truth beside or w
 
 from collections.abc import Mapping
 
+from validate.compare.exhibit import captioned
 from validate.compare.published import Published
 from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import MethodResult, Result
@@ -56,7 +57,10 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         seed=experiment.seed,
         twin_notice=experiment.twin_notice,
         inputs=_inputs(experiment),
-        exhibits=(*standard_exhibits(experiment, main, others), *told.exhibits),
+        exhibits=tuple(
+            captioned(exhibit, experiment.captions)
+            for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
+        ),
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from validate.errors import ComparisonError
 from validate.recording.types import Recording
 from validate.replay.experiment import Case, Experiment, Variant
 from validate.replay.followed import MAIN, Followed, Truth
@@ -65,7 +66,10 @@ class Road:
             theirs = case.change(self.parameters)
             recordings, true, _ = self._made(experiment.load(theirs, folder_of(experiment)), theirs)
         else:
-            assert experiment.twin is not None
+            if experiment.twin is None:
+                raise ComparisonError(
+                    f"case '{case.name}' is not shipped, and no twin is declared that records it"
+                )
             true = case.change(self._true)
             recordings = (experiment.twin.record(true, self.tell),)
         return {

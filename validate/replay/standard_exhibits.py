@@ -1,7 +1,6 @@
-"""What every experiment over time shows: displacements, errors, what each method cost."""
+"""What every experiment shows: displacements, errors, other cases, what each method cost."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -21,17 +20,18 @@ def standard_exhibits(
 ) -> tuple[Exhibit, ...]:
     """Displacements and errors on the recorded case, other cases, speeds, maps, consistency.
 
-    None of an experiment at holds: its displacements are those of loads, which reports draw.
+    Of an experiment at holds only other cases and consistency: reports draw its loads.
     """
-    if not any(f.over_time for f in main.values()):
-        return ()
-    shown = {n: f for n, f in main.items() if f.shown}
-    found = [_displacements(experiment, shown)] if shown else []
-    if others:
-        found.append(_other_cases(experiment, main, others))
-    found.append(_speeds(experiment, main))
-    rest = (_maps(shown), consistency_exhibit(main, others, experiment.accepted))
-    return (*found, *(exhibit for exhibit in rest if exhibit))
+    over_time = any(f.over_time for f in main.values())
+    shown = {n: f for n, f in main.items() if f.shown and over_time}
+    found = (
+        _displacements(experiment, shown) if shown else None,
+        _other_cases(experiment, main, others) if others else None,
+        _speeds(experiment, main) if over_time else None,
+        _maps(shown),
+        consistency_exhibit(main, others, experiment.accepted),
+    )
+    return tuple(exhibit for exhibit in found if exhibit)
 
 
 def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
@@ -43,10 +43,7 @@ def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
 def _displacements(experiment: Experiment, shown: Mapping[str, Followed]) -> Exhibit:
     first, axis = next(iter(shown.values())), experiment.axis
     probes = first.scored or first.shown
-    charts = [
-        replace(chart, caption=experiment.captions.get(chart.name, ""))
-        for chart in (_track_chart(shown, probe, axis) for probe in probes)
-    ]
+    charts = [_track_chart(shown, probe, axis) for probe in probes]
     scored = {n: f for n, f in shown.items() if f.scored}
     charts += [_error_chart(scored, probe, axis) for probe in probes if scored]
     words = (
@@ -147,15 +144,17 @@ def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: C
             ended = followed.run.outcome.state
             nis = nis_of(followed)
             rows.append((name, followed.label, *shown, nis.mean if nis else None, ended))
+    kind = "truth" if probes else "case"
+    errors = "RMSE over the range of the reference, per node, and " if probes else ""
     table = NumberTable(
         "cases",
-        "Every other case: RMSE over the range of the reference, per node, and "
-        "NIS per degree of freedom (1: consistent; far above: the model class is wrong).",
-        ("truth", "method", *(f"{p} NRMSE / %" for p in probes), "NIS per dof / 1", "ended"),
+        f"Every other case: {errors}NIS per degree of freedom (1: consistent; far above: the model "
+        "class is wrong).",
+        (kind, "method", *(f"{p} NRMSE / %" for p in probes), "NIS per dof / 1", "ended"),
         tuple(rows),
     )
     words = tuple(f"{case.name}: {case.doc}" for case in experiment.cases if case.name in others)
-    return Exhibit("cases", "Other truths than the recorded one", words, tables=(table,))
+    return Exhibit("cases", f"Other {kind}s than the recorded one", words, tables=(table,))
 
 
 def _speeds(experiment: Experiment, main: Mapping[str, Followed]) -> Exhibit:

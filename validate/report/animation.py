@@ -7,12 +7,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
-from validate.compare.result import MethodResult, Result
-from validate.register.observe import nearest_sample
+from validate.compare.exhibit import Animation
+from validate.compare.result import MethodResult
 from validate.report.loads import HOW, Instant, in_steps
-from validate.report.numbers import spaced
-from validate.report.observed import outline_seen
-from validate.report.page import Animation
+from validate.report.numbers import fixed_with_unit, spaced
+from validate.report.observed import drive, holds, outline_seen
 from validate.report.style import ACCEPTED, MEASURED, film
 
 _MM = 1e3
@@ -31,30 +30,31 @@ class _Shot:
     title: str
 
 
-def moving_outline(result: Result, method: MethodResult) -> Animation | None:
+def moving_outline(method: MethodResult) -> tuple[Animation, ...]:
     """The last load first, as the still; then from rest through all loads. None without loads."""
-    seen, registered = outline_seen(method), method.registered[0]
-    count = min(len(registered.holds), len(method.run.u))
+    seen = outline_seen(method)
+    count = min(len(holds(method.registered[0])), len(method.run.u)) if method.registered else 0
     if seen is None or count < 2:
-        return None
-    instants = in_steps(registered, method.run, max(1, round(_STEPS / (count - 1))))
+        return ()
     shots, measured = list[_Shot](), seen.outlines[0]
-    for instant in instants:
+    for instant in in_steps(method.registered[0], method.run, max(1, round(_STEPS / (count - 1)))):
         if instant.hold is not None:
-            measured = seen.outlines[nearest_sample(seen.t, instant.t, "outlines")]
+            measured = seen.measured(instant.t)
         shots.append(_shot(seen.simulated(instant.u), measured, instant))
-    shots = [shots[-1], *shots[:-1]]
+    return (_film([shots[-1], *shots[:-1]], method.label, drive(method.registered[0]).name),)
+
+
+def _film(shots: list[_Shot], label: str, driven: str) -> Animation:
     times = [_STILL, *(_HELD if shot.held else _MOVING for shot in shots[1:])]
-    label = method.label
     return Animation(
         "outline",
-        "The outline through the load, again and again, image coordinates in mm, the probe above. "
+        "The outline through the load, again and again, image coordinates in mm. "
         "Points: measured at the load in the title (black) or at the load before (grey). "
         f"Line: section of {label}, computed at the loads, {HOW}. Thin line: measured at rest. "
         f"The still picture shows {shots[0].title}.",
         f"Animation: the measured outline points over the simulated outline of {label} from rest "
         f"to {shots[0].title}; the still picture shows the last load.",
-        film(lambda figure: _paint(figure, shots, label), len(shots), 4.6, 4.4),
+        film(lambda figure: _paint(figure, shots, label, driven), len(shots), 4.6, 4.4),
         tuple(times),
     )
 
@@ -63,12 +63,12 @@ def _shot(simulated: Floats, measured: Floats, instant: Instant) -> _Shot:
     if instant.hold is not None:
         title = spaced(instant.hold.label)
     else:
-        title = f"{_MM * instant.stage:.1f} mm, interpolated"
+        title = f"{fixed_with_unit(instant.drive, instant.unit, 1)}, interpolated"
     closed = np.vstack([simulated, simulated[:1]])
     return _Shot(_MM * closed, _MM * measured, instant.hold is not None, title)
 
 
-def _paint(figure: Figure, shots: list[_Shot], label: str) -> Callable[[int], None]:
+def _paint(figure: Figure, shots: list[_Shot], label: str, driven: str) -> Callable[[int], None]:
     ax = figure.subplots()
     rest = np.vstack([shots[1].measured, shots[1].measured[:1]])
     ax.plot(*rest.T, color="#9A9A9A", lw=0.8, label="measured at rest")
@@ -77,8 +77,8 @@ def _paint(figure: Figure, shots: list[_Shot], label: str) -> Callable[[int], No
     everything = np.vstack([o for s in shots for o in (s.simulated, s.measured)])
     low, high = everything.min(axis=0), everything.max(axis=0)
     ax.set_xlim(low[0] - 3, high[0] + 3)
-    ax.set_ylim(high[1] + 3, low[1] - 3)  # the probe is above
-    ax.set(xlabel="x lateral / mm", ylabel="y depth / mm", aspect="equal")
+    ax.set_ylim(high[1] + 3, low[1] - 3)  # rows of an image count downward
+    ax.set(xlabel="image x / mm", ylabel="image y / mm", aspect="equal")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
     def turn(i: int) -> None:
@@ -86,6 +86,6 @@ def _paint(figure: Figure, shots: list[_Shot], label: str) -> Callable[[int], No
         line.set_data(*shot.simulated.T)
         points.set_data(*shot.measured.T)
         points.set_color(MEASURED if shot.held else _BEFORE)
-        ax.set_title(f"stage at {shot.title}")
+        ax.set_title(f"{driven} at {shot.title}")
 
     return turn

@@ -6,10 +6,10 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
-from validate.register.observe import Hold
 from validate.report.numbers import significant, spaced, with_unit
-from validate.report.observed import at_loads, shown_method
+from validate.report.observed import Held, holds, outline, shown_method
 from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene, Weight
 
 _MM = 1e3
 
@@ -24,12 +24,13 @@ class Plate:
 
 
 @dataclass(frozen=True)
-class Body:
+class ShownBody:
     """A mesh at rest with displacements u (n, 3) mm at `load`, opened by a plane or whole.
 
-    The part on the side of `normal` (3,) beyond `origin` (3,) mm is taken away; None: whole.
-    `part` says when symmetry leaves out the rest of it. `up` (3,) is the camera's; pressure Pa is
-    None without a cavity, `pressures` its range Pa.
+    The part on the side of `normal` (3,) beyond `origin` (3,) mm is taken away; None: whole; `cut`
+    says where. `part` says when symmetry leaves out the rest of it. `up` (3,) is the camera's,
+    `toward` (3,) where it is driven to; pressure Pa is None without a cavity, `pressures` its range
+    Pa.
     """
 
     label: str
@@ -43,11 +44,12 @@ class Body:
     pressures: tuple[float, float]
     origin: Floats
     normal: Floats | None
+    cut: str
     up: Floats
     toward: Floats
 
 
-def body(result: Result) -> Body | None:
+def shown_body(result: Result) -> ShownBody | None:
     """The accepted method's body at its last load, or where a run over time moves it most.
 
     None in 2-D or when nothing finished.
@@ -61,10 +63,9 @@ def body(result: Result) -> Body | None:
     frame, load = _frame(method)
     nodes = _MM * scene.mesh.nodes
     wall = nodes[scene.mesh.facet_nodes(cavity.facets)] if cavity else nodes
-    normal = _normal(result) if cavity else None
-    # Without a plate that is driven, z is upward.
-    toward = np.array(scene.drives[0].direction if scene.drives else (0.0, 0.0, -1.0))
-    return Body(
+    toward = _toward(scene)
+    normal, cut = _opened(result, toward) if cavity else (None, "")
+    return ShownBody(
         label=method.label,
         part=f" One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
         load=load,
@@ -76,6 +77,7 @@ def body(result: Result) -> Body | None:
         pressures=(0.0, max(float(trace.y.max()), 1.0)) if trace else (0.0, 1.0),
         origin=0.5 * (wall.min(axis=0) + wall.max(axis=0)),
         normal=normal,
+        cut=f"{cavity.name} in {cut}" if cavity else "",
         up=normal if normal is not None else -toward,
         toward=toward,
     )
@@ -84,26 +86,35 @@ def body(result: Result) -> Body | None:
 def _frame(method: MethodResult) -> tuple[int, str]:
     """The last load; of a run over time the frame with the largest displacement."""
     run = method.run
-    if at_loads(method):
-        holds = method.registered[0].holds
-        frame = min(len(holds), len(run.u)) - 1
-        return frame, _load(holds[frame])
+    loads = holds(method.registered[0]) if method.registered else ()
+    if loads:
+        frame = min(len(loads), len(run.u)) - 1
+        return frame, _load(loads[frame])
     largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
     return largest, f"t = {significant(float(run.t[run.at[largest]]))} s"
 
 
-def _load(hold: Hold) -> str:
-    """The load in words; a label without a number is replaced by the stage's position."""
-    return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.stage, "m")
+def _load(hold: Held) -> str:
+    """The load in words; a label without a number is replaced by the drive's."""
+    return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.drive, hold.unit)
 
 
-def _normal(result: Result) -> Floats:
-    """The image plane's normal, turned upward; y without images."""
-    seen = result.registered[0].outline if result.registered else None
+def _toward(scene: Scene) -> Floats:
+    """Where the body is driven to, else where its weight pulls; without either the last axis is
+    drawn upward."""
+    weights = [load.direction for load in scene.loads if isinstance(load, Weight)]
+    drives = [drive.direction for drive in scene.drives]
+    return np.array([*drives, *weights, (0.0, 0.0, -1.0)][0])
+
+
+def _opened(result: Result, toward: Floats) -> tuple[Floats, str]:
+    """The normal of the plane that opens the body, its largest part positive, and the plane in
+    words: that of the images, without any one along the drive."""
+    seen = outline(result.registered[0]) if result.registered else None
     if seen is None:
-        return np.array([0.0, 1.0, 0.0])
+        return np.roll(np.abs(toward), 1), "a plane along the drive"
     normal = seen.pose[:3, 2]
-    return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
+    return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))])), "the image plane"
 
 
 def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:

@@ -10,23 +10,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from validate.compare.exhibit import Chart, Series
+from validate.compare.exhibit import Chart, Picture, Series
 from validate.compare.result import Result
-from validate.report.page import Picture
-from validate.report.style import MEASURED, NOISE, PALETTE, Look, draw, free_look, looks
+from validate.report.style import MEASURED, NOISE, PALETTE, Style, draw, free_look, looks
 
 _WIDTH, _HEIGHT = 8.6, 4.3  # inches without the legend
 _LEGEND_WIDTH = 96  # characters of a legend's row at this width
 _FEW = 16  # points of a line that are marked, so that a sweep shows what was run
 _MANY = 400  # points drawn smaller from here on
 _SPARSE = 60  # points that lie on the lines; more of them would hide these
+_SHADES = (MEASURED, "#5F5F5F", "#8C8C8C", "#AFAFAF")  # of several recordings
 _GAP = 0.058  # between the names of two levels, share of the axes' height
 
 
 @dataclass(frozen=True)
 class _Drawn:
     series: Series
-    look: Look
+    look: Style
 
 
 def picture(result: Result, chart: Chart) -> Picture:
@@ -61,26 +61,31 @@ def _styled(result: Result, chart: Chart) -> list[_Drawn]:
     return [_Drawn(s, pairs[id(s)]) for s in chart.series]
 
 
-def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Look]]:
+def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Style]]:
     known = _known(result)
     unknown = [s for s in series if s.label not in known and not _is_given(s, series)]
     taken = {known[s.label].colour for s in series if s.label in known}
     free = [c for c in PALETTE if c not in taken] or list(PALETTE)
     if len(unknown) > len(free):  # a sweep: its order becomes the order of the colours
-        shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(unknown)))
-        free = [mpl.colors.to_hex(c) for c in shades]
+        ramp = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(unknown)))
+        free = [mpl.colors.to_hex(c) for c in ramp]
     others = {id(s): free_look(i, free[i]) for i, s in enumerate(unknown)}
-    return [(s, known.get(s.label) or others.get(id(s)) or _given(s)) for s in series]
+    logs = (s for s in series if s.style == "points" and _is_given(s, series))
+    shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
+    return [
+        (s, known.get(s.label) or others.get(id(s)) or _given(s, shades.get(id(s), MEASURED)))
+        for s in series
+    ]
 
 
-def _given(series: Series) -> Look:
-    """A reference is a wide grey line under the others, what was measured black points."""
+def _given(series: Series, shade: str) -> Style:
+    """A reference is a wide grey line under the others, what was measured dark points."""
     if series.style == "line":
-        return Look("#9A9A9A", "-", "o", 3.6)
-    return Look(MEASURED, "-", "o", 1.2)
+        return Style("#9A9A9A", "-", "o", 3.6)
+    return Style(shade, "-", "o", 1.2)
 
 
-def _known(result: Result) -> Mapping[str, Look]:
+def _known(result: Result) -> Mapping[str, Style]:
     styles = looks(result)
     return {**styles, **{m.label: styles[m.name] for m in result.methods}}
 
@@ -93,9 +98,9 @@ def _is_given(one: Series, series: list[Series]) -> bool:
     return alone or "measured" in one.label.lower()
 
 
-def _of_band(band: Series, lines: Mapping[str, Look]) -> Look:
+def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
     own = [name for name in lines if band.label.startswith(name)]
-    return lines[max(own, key=len)] if own else Look(NOISE, "-", "o", 0.0)
+    return lines[max(own, key=len)] if own else Style(NOISE, "-", "o", 0.0)
 
 
 # --- drawing -------------------------------------------------------------------------------------
@@ -107,6 +112,10 @@ def _fill(figure: Figure, chart: Chart, drawn: list[_Drawn]) -> None:
         ax.set_xscale("log", nonpositive="mask")
     if "y" in chart.log:
         ax.set_yscale("log", nonpositive="mask")
+    if chart.linear:
+        ax.set_yscale("symlog", linthresh=chart.linear, linscale=0.7)
+        ax.yaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "−"))
+        ax.axhline(0, color=MEASURED, lw=0.8)
     for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
         _draw_one(ax, d)
     ax.set(xlabel=chart.x, ylabel=chart.y)

@@ -1,207 +1,176 @@
-"""Curves over the stage's displacement: force, pressure, volume, and model less measurement."""
+"""Curves over the drive's displacement: what was measured, the models, and their difference."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
 from validate.compare.result import MethodResult, Result
-from validate.register.observe import Registered, SignalObservation
-from validate.report.observed import finished
-from validate.report.page import Picture, Section, section
-from validate.report.style import MEASURED, NOISE, Look, draw, looks
-from validate.solve.types import Run
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
+from validate.report.numbers import scale, shown_unit
+from validate.report.observed import distinct, drive, driven, finished, signals
 
 _MM = 1e3
-_AXIS = {"Pa": ("kPa", 1e-3), "m": ("mm", 1e3)}
-_APART = 0.01  # share of a signal's range below which two models draw one line
-_GREYS = ("#000000", "#5F5F5F", "#8C8C8C", "#AFAFAF")
+_AXIS = {"Pa": ("kPa", 1e-3)}
+_ON_ANOTHER = 0.01  # share of a signal's range below which two models draw one line
+_HEAD = ("recording", "who", "quantity", "t_s", "drive_m", "value", "unit")
+Log = tuple[int, Registered, SignalObservation]  # which recording, and its signal
 
 
 @dataclass(frozen=True)
 class _Line:
-    """A model's values y (nt,) at its own samples, with the stage q mm and the error, per log.
+    """A model's values y (nt,) at the samples of each log, the drive q mm there, and the error.
 
     Laws reach different strains, so every method has its own samples.
     """
 
     method: MethodResult
-    look: Look
     q: tuple[Floats, ...]
     y: tuple[Floats, ...]
     off: tuple[Floats, ...]
 
 
-def curves(result: Result) -> Section | None:
-    """A picture per recorded signal, one of the volume.
-
-    None when no method finished, and where the stage is no displacement: a load over time.
-    """
-    if not result.registered or not finished(result):
+def curves(result: Result) -> Exhibit | None:
+    """Charts of every recorded signal and of the volume where displacements drive."""
+    if any(drive(r).unit != "m" for r in result.registered):
         return None
-    if any(r.stage.unit != "m" for r in result.registered):
-        return None
-    quantities = dict.fromkeys(s.quantity for r in result.registered for s in r.signals)
-    return section(
-        "curves",
-        "Load and displacement",
-        *(_signal(result, quantity) for quantity in quantities),
-        _volume(result),
-    )
+    quantities = dict.fromkeys(s.quantity for r in result.registered for s in signals(r))
+    charts = [c for q in quantities for c in _signal(result, q)]
+    rows = tuple(_samples(result))
+    return Exhibit(
+        "curves", "Load and displacement", charts=(*charts, *_volume(result)),
+        data=(NumberTable("load_displacement", "Load and displacement", _HEAD, rows),),
+    )  # fmt: skip
 
 
-def _observations(result: Result, quantity: str) -> list[tuple[int, Registered, SignalObservation]]:
-    """The recordings' signals, from the method that was compared over the longest way."""
-    seen = [m for m in finished(result) if _signals(m, quantity)]
-    if not seen:
-        return []
-    return _signals(max(seen, key=lambda m: float(m.registered[0].stage.y.max())), quantity)
+def _samples(result: Result) -> Iterator[tuple[str | TableCell, ...]]:
+    """Every recorded sample and every method's value at its time."""
+    for i, registered in enumerate(result.registered):
+        name = result.recordings[i].name if i < len(result.recordings) else str(i + 1)
+        for s in signals(registered):
+            answers = [(m.name, m.runs[i]) for m in result.methods]
+            found = [("measured", s.y[:, 0])]
+            found += [(who, np.interp(s.t, run.t, run.traces[s.trace].y)) for who, run in answers
+                      if run.finished and s.trace in run.traces]  # fmt: skip
+            q = driven(registered, s.t)
+            for who, y in found:
+                for numbers in zip(s.t.tolist(), q.tolist(), y.tolist(), strict=True):
+                    yield name, who, s.quantity, *map(TableCell, numbers), s.unit
 
 
-def _signals(
-    method: MethodResult, quantity: str
-) -> list[tuple[int, Registered, SignalObservation]]:
+# --- one signal ----------------------------------------------------------------------------------
+
+
+def _signal(result: Result, quantity: str) -> tuple[Chart, ...]:
+    lines, hidden = _lines(result, quantity)
+    if not lines:
+        return ()
+    longest = max(lines, key=lambda line: max(float(q.max()) for q in line.q))
+    logs = _logs(longest.method, quantity)
+    unit, name = logs[0][2].unit, quantity.replace(".", "_")
+    unit, factor = _AXIS.get(unit, (shown_unit(unit), scale(unit)))
+    count = f"{len(logs)} recordings" if len(logs) > 1 else "one recording"
+    q, noise = f"{drive(logs[0][1]).name} / mm", 2 * factor * max(s.sd for _, _, s in logs)
+    level = Chart(
+        f"curve_{name}", f"{quantity}, measured and simulated", q, f"{quantity} / {unit}",
+        (*_measured(result, logs, factor), *(s for line in lines for s in _level(line, factor))),
+        caption=f"Points: every sample of {count}.{_band_words(lines)}{_left_out(hidden)}",
+    )  # fmt: skip
+    ends = np.array([f(q) for f in (np.min, np.max) for q in [np.hstack(longest.q)]])
+    band = Series("± 2 sd of one sample", ends, 0 * ends - noise, "band", 0 * ends + noise)
+    off = Chart(
+        f"curve_{name}_error", f"{quantity}, model less measurement", q,
+        f"simulated − measured / {unit}",
+        (band, *(s for line in lines for s in _off(line, factor))), linear=noise,
+        caption="Outside of the grey band the axis is logarithmic.",
+    )  # fmt: skip
+    return level, off
+
+
+def _logs(method: MethodResult, quantity: str) -> list[Log]:
+    """The recordings' signals of a quantity, as the method was compared with them."""
     return [
         (i, r, s)
         for i, r in enumerate(method.registered)
-        for s in r.signals
+        for s in signals(r)
         if s.quantity == quantity
     ]
 
 
-def _signal(result: Result, quantity: str) -> Picture | None:
-    seen = _observations(result, quantity)
-    lines, hidden = _lines(result, quantity, seen) if seen else ([], [])
-    left_out = f" Not drawn, lying on another line: {'; '.join(hidden)}." if hidden else ""
-    if not lines:
+def _lines(result: Result, quantity: str) -> tuple[list[_Line], list[str]]:
+    """Lines to draw, and the methods whose line lies on one of them."""
+    made = [line for m in finished(result) if (line := _line(m, quantity)) is not None]
+    if not made:
+        return [], []
+    span = max(float(np.ptp(s.y)) for line in made for _, _, s in _logs(line.method, quantity))
+    pairs = [(line.method, np.hstack(line.y)) for line in made]
+    on = distinct(pairs, _ON_ANOTHER * span)
+    drawn = [line for line in made if line.method.name not in on]
+    labels = {m.name: m.label for m in result.methods}
+    return drawn, [f"{labels[one]} (on {other.label})" for one, other in on.items()]
+
+
+def _line(method: MethodResult, quantity: str) -> _Line | None:
+    logs = _logs(method, quantity)
+    if not logs or any(s.trace not in method.runs[i].traces for i, _, s in logs):
         return None
-    unit, factor = _AXIS.get(seen[0][2].unit, (seen[0][2].unit, 1.0))
-    pixels = draw(lambda f: _two(f, quantity, seen, lines, unit, factor), 10.4, 4.6)
-    names = ", ".join(line.method.label for line in lines)
-    count = f"{len(seen)} recordings" if len(seen) > 1 else "one recording"
-    return Picture(
-        f"curve_{quantity.replace('.', '_')}",
-        f"Left: {quantity} in {unit} against stage displacement in mm, "
-        f"every sample of {count} (points) and the models (lines). Right: model less measurement; "
-        "grey: ± 2 standard deviations of one sample; outside of it the axis is logarithmic."
-        f"{_band_words(lines)}{left_out}",
-        f"{quantity} against stage displacement: measured and {names}, with the "
-        "differences beside.",
-        pixels,
+    runs = [method.runs[i] for i, _, _ in logs]
+    q = tuple(_MM * driven(r, s.t) for _, r, s in logs)
+    y = tuple(
+        np.interp(s.t, run.t, run.traces[s.trace].y)
+        for run, (_, _, s) in zip(runs, logs, strict=True)
     )
+    return _Line(method, q, y, tuple(a - s.y[:, 0] for a, (_, _, s) in zip(y, logs, strict=True)))
+
+
+def _measured(result: Result, logs: list[Log], factor: float) -> Iterator[Series]:
+    for i, registered, s in logs:
+        label = f"measured, {result.recordings[i].name}" if len(logs) > 1 else "measured"
+        yield Series(label, _MM * driven(registered, s.t), factor * s.y[:, 0], "points")
+
+
+def _level(line: _Line, factor: float) -> Iterator[Series]:
+    """The model's line of every log; about the first the uncertainty of its modulus."""
+    label, wide = line.method.label, 2 * line.method.band
+    if wide:
+        y = factor * line.y[0]
+        yield Series(f"{label} ± {100 * wide:.0f} %", line.q[0], y * (1 - wide), "band",
+                     y * (1 + wide))  # fmt: skip
+    for q, y in zip(line.q, line.y, strict=True):
+        yield Series(label, q, factor * y)
+
+
+def _off(line: _Line, factor: float) -> Iterator[Series]:
+    for q, off in zip(line.q, line.off, strict=True):
+        yield Series(line.method.label, q, factor * off)
 
 
 def _band_words(lines: list[_Line]) -> str:
-    bands = {line.method.band for line in lines} - {0.0}
-    if not bands:
+    if not any(line.method.band for line in lines):
         return ""
-    shares = ", ".join(f"{200 * band:.0f} %" for band in sorted(bands))
-    return f" Shaded about each line: ± {shares}, two standard uncertainties of the modulus."
+    return " Shaded about a line: two standard uncertainties of the modulus."
 
 
-def _lines(
-    result: Result, quantity: str, seen: Sequence[tuple[int, Registered, SignalObservation]]
-) -> tuple[list[_Line], list[str]]:
-    """Lines to draw, and the methods whose line lies on one of them."""
-    styles, kept, hidden = looks(result), list[_Line](), list[str]()
-    scale = max((float(np.ptp(s.y)) for _, _, s in seen), default=0.0)
-    for method in finished(result):
-        own = _signals(method, quantity)
-        if not own or any(x.trace not in method.runs[i].traces for i, _, x in own):
-            continue
-        q = tuple(_stage(r, x.t) for _, r, x in own)
-        y = tuple(_at_samples(method.runs[i], x) for i, _, x in own)
-        off = tuple(yi - x.y for yi, (_, _, x) in zip(y, own, strict=True))
-        same = next((k for k in kept if _apart(y, k.y) <= _APART * scale), None)
-        if same is None:
-            kept.append(_Line(method, styles[method.name], q, y, off))
-        else:
-            hidden.append(f"{method.label} (on {same.method.label})")
-    return kept, hidden
+def _left_out(hidden: list[str]) -> str:
+    return f" Not drawn, lying on another line: {'; '.join(hidden)}." if hidden else ""
 
 
-def _at_samples(run: Run, seen: SignalObservation) -> Floats:
-    return np.asarray(np.interp(seen.t, run.t, run.traces[seen.trace].y))
+# --- volume --------------------------------------------------------------------------------------
 
 
-def _apart(one: tuple[Floats, ...], other: tuple[Floats, ...]) -> float:
-    """Largest difference of two lines; infinite when they do not cover the same samples."""
-    if any(len(a) != len(b) for a, b in zip(one, other, strict=True)):
-        return float("inf")
-    return max(float(np.abs(a - b).max()) for a, b in zip(one, other, strict=True))
-
-
-def _two(
-    figure: Figure,
-    quantity: str,
-    seen: Sequence[tuple[int, Registered, SignalObservation]],
-    lines: list[_Line],
-    unit: str,
-    factor: float,
-) -> None:
-    left, right = figure.subplots(1, 2)
-    noise = 2 * factor * max(s.sd for _, _, s in seen)
-    right.axhspan(-noise, noise, color=NOISE, lw=0)
-    right.axhline(0, color=MEASURED, lw=0.8)
-    for j, (_, registered, s) in enumerate(seen):
-        q = _stage(registered, s.t)
-        label = "measured" if j == 0 else None
-        left.plot(q, factor * s.y, ".", color=_GREYS[j % len(_GREYS)], ms=3, label=label, zorder=3)
-    for line in lines:
-        style = {"color": line.look.colour, "ls": line.look.dash, "lw": line.look.width}
-        for j, (q, y, off) in enumerate(zip(line.q, line.y, line.off, strict=True)):
-            _plot(left, q, factor * y, line.method.label if j == 0 else None, style)
-            _plot(right, q, factor * off, None, {**style, "lw": 0.9})
-        if line.method.band:
-            y, wide = factor * line.y[0], 2 * line.method.band
-            left.fill_between(line.q[0], y * (1 - wide), y * (1 + wide), color=line.look.colour,
-                              alpha=0.15, lw=0)  # fmt: skip
-    left.set(xlabel="stage displacement / mm", ylabel=f"{quantity} / {unit}")
-    right.set(xlabel="stage displacement / mm", ylabel=f"model − measured / {unit}")
-    if noise > 0:
-        right.set_yscale("symlog", linthresh=noise, linscale=0.7)
-        right.yaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "−"))
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-
-
-def _plot(ax: Axes, x: Floats, y: Floats, label: str | None, style: dict[str, object]) -> None:
-    ax.plot(x, y, label=label, **style)  # type: ignore[arg-type]
-
-
-def _stage(registered: Registered, t: Floats) -> Floats:
-    """Stage position mm at times t (nt,) s."""
-    return np.asarray(_MM * np.interp(t, registered.stage.t, registered.stage.y[:, 0]))
-
-
-def _volume(result: Result) -> Picture | None:
-    names = [
-        (m, [n for n in m.run.traces if n.endswith(".volume_ratio")]) for m in finished(result)
-    ]
-    drawn = [(m, n) for m, found in names for n in found]
-    if not drawn:
-        return None
-    pixels = draw(lambda f: _volume_axes(f, result, drawn), 7.0, 3.9)
-    return Picture(
-        "curve_volume_ratio",
-        "Cavity volume over its rest volume against stage displacement in mm, by model. An "
-        "incompressible fluid holds it at 1; without fluid it falls.",
-        "Cavity volume ratio against stage displacement for every model.",
-        pixels,
+def _volume(result: Result) -> tuple[Chart, ...]:
+    series = tuple(
+        Series(m.label, _MM * driven(result.registered[0], m.run.t), trace.y)
+        for m in finished(result)
+        for name, trace in m.run.traces.items()
+        if name.endswith(".volume_ratio")
     )
-
-
-def _volume_axes(figure: Figure, result: Result, drawn: list[tuple[MethodResult, str]]) -> None:
-    ax, styles = figure.subplots(), looks(result)
-    for method, name in reversed(drawn):
-        look, run = styles[method.name], method.run
-        ax.plot(_stage(result.registered[0], run.t), run.traces[name].y, color=look.colour,
-                ls=look.dash, lw=look.width, label=method.label)  # fmt: skip
-    ax.set(xlabel="stage displacement / mm", ylabel="volume / rest volume")
-    low, high = ax.get_ylim()
-    if high - low < 0.01:  # an axis of rounding errors would look like an effect
-        ax.set_ylim(0.99, 1.01)
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=2)
+    if not series:
+        return ()
+    caption = "An incompressible fluid holds it at 1; without fluid it falls."
+    q = f"{drive(result.registered[0]).name} / mm"
+    title = "Cavity volume over its rest volume"
+    return (Chart("volume_ratio", title, q, "volume / rest volume", series, caption=caption),)

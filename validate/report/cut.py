@@ -1,35 +1,30 @@
-"""The body drawn by matplotlib, for machines that cannot render: a cut or the outer surface."""
+"""The opened body drawn by matplotlib, for machines that cannot render."""
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats, Ints
-from validate.report.body import Body
-from validate.report.page import Picture
+from validate.compare.exhibit import Picture
+from validate.report.body import ShownBody
 from validate.report.style import draw
-from validate.scene.mesh import boundary_facets
 
 _MM = 1e3
 
 
-def cut(body: Body) -> Picture:
-    """Displacement magnitude on the cut (with a cavity) or on the side seen, deformed, mm."""
-    pixels = draw(lambda f: _axes(f, body), 6.0, 5.4)
-    what = (
-        "cut through the inclusion in the image plane" if body.normal is not None else "side view"
-    )
+def cut(body: ShownBody, normal: Floats) -> Picture:
+    """Displacement magnitude where the plane across `normal` opens the body, deformed, mm."""
     pressure = "" if body.pressure is None else f" Cavity pressure {body.pressure:.4g} Pa."
     words = (
-        f"{body.label} at {body.load}: {what}, deformed true to scale, coloured by the "
-        f"displacement magnitude in mm.{pressure}{body.part}"
+        f"{body.label} at {body.load}: cut through {body.cut}, deformed true to scale, coloured by "
+        f"the displacement magnitude in mm.{pressure}{body.part}"
     )
+    pixels = draw(lambda f: _axes(f, body, normal), 6.0, 5.4)
     return Picture("cut", words, "Section: " + words, pixels, photo=True)
 
 
-def _axes(figure: Figure, body: Body) -> None:
-    normal = body.normal
-    polygons, size = _side_polygons(body) if normal is None else _cut_polygons(body, normal)
+def _axes(figure: Figure, body: ShownBody, normal: Floats) -> None:
+    polygons, size = _polygons(body, normal)
     ax = figure.subplots()
     drawn = PolyCollection(
         polygons, array=size, cmap="viridis", edgecolors="#30303055", linewidths=0.3
@@ -41,22 +36,19 @@ def _axes(figure: Figure, body: Body) -> None:
     pad = 0.06 * np.ptp(points, axis=0).max()
     ax.set_xlim(points[:, 0].min() - pad, points[:, 0].max() + pad)
     ax.set_ylim(points[:, 1].min() - pad, points[:, 1].max() + pad)
-    right, upward = ("xyz"[int(np.argmax(np.abs(a)))] for a in _screen(body))
+    right, upward = ("xyz"[int(np.argmax(np.abs(a)))] for a in _screen(body, normal))
     ax.set(xlabel=f"{right} / mm", ylabel=f"{upward} / mm", aspect="equal")
     figure.colorbar(drawn, ax=ax, label="displacement / mm")
     if body.pressure is not None:
         ax.set_title(f"cavity pressure {body.pressure:.0f} Pa")
 
 
-def _screen(body: Body) -> tuple[Floats, Floats]:
-    """Directions to the right and upward on paper, for a cut (seen along -normal) or a side."""
-    along = np.abs(body.toward)
-    if body.normal is not None:
-        return along, np.abs(np.cross(body.normal, body.toward))
-    return np.abs(np.roll(along, 1)), along
+def _screen(body: ShownBody, normal: Floats) -> tuple[Floats, Floats]:
+    """Directions to the right and upward on paper, seen along -normal."""
+    return np.abs(body.toward), np.abs(np.cross(normal, body.toward))
 
 
-def _cut_polygons(body: Body, normal: Floats) -> tuple[list[Floats], Floats]:
+def _polygons(body: ShownBody, normal: Floats) -> tuple[list[Floats], Floats]:
     """Polygons where the plane cuts the cells, and the mean displacement in each, mm."""
     nodes, u = _MM * body.mesh.nodes, body.u
     height = (nodes - body.origin) @ normal
@@ -64,7 +56,7 @@ def _cut_polygons(body: Body, normal: Floats) -> tuple[list[Floats], Floats]:
     corners = body.mesh.simplices
     sides = height[corners] > 0
     crossed = corners[sides.any(axis=1) & ~sides.all(axis=1)]
-    right, upward = _screen(body)
+    right, upward = _screen(body, normal)
     polygons, size = [], []
     for cell in crossed:
         points, moved = _crossing(cell, height, nodes, u)
@@ -82,18 +74,3 @@ def _crossing(cell: Ints, height: Floats, nodes: Floats, u: Floats) -> tuple[Flo
     i, j = i[passing], j[passing]
     s = (height[i] / (height[i] - height[j]))[:, None]
     return nodes[i] + s * (nodes[j] - nodes[i]), u[i] + s * (u[j] - u[i])
-
-
-def _side_polygons(body: Body) -> tuple[list[Floats], Floats]:
-    """Facets that face the viewer, from the far ones to the near ones."""
-    facets = boundary_facets(body.mesh.corners, 3)
-    right, upward = _screen(body)
-    view = np.cross(right, upward)
-    points = (_MM * body.mesh.nodes + body.u)[facets]
-    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    facing = normals @ view > 0
-    points, facets = points[facing], facets[facing]
-    order = np.argsort((points @ view).mean(axis=1))
-    flat = np.stack([points @ right, points @ upward], axis=2)[order]
-    size = np.linalg.norm(body.u, axis=1)[facets].mean(axis=1)[order]
-    return list(flat), size

@@ -1,5 +1,6 @@
 """What this recording can tell apart: errors against noise, effects against sensors, sentences."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,24 +9,17 @@ from scipy.special import chdtri
 
 from validate.arrays import rms
 from validate.compare.effects import TELLS_APART, Change, Effect
+from validate.compare.exhibit import Exhibit, NumberTable, Picture, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.report.numbers import at_load, fixed, scale, shown_unit, text, with_unit
 from validate.report.observed import finished, last_residual
-from validate.report.page import (
-    Cell,
-    Items,
-    Paragraph,
-    Picture,
-    Section,
-    Table,
-    cells,
-    section,
-)
 from validate.report.style import MEASURED, NOISE, draw, looks
 
 _DECIMALS = {"m": 2, "N": 3, "Pa": 0}
-_BUDGET = ("contour", "marker.inplane", "marker.vertical", "force.plate", "pressure")
+_EFFECTS = (
+    "effect", "doc", "quantity", "rms", "max", "unit", "separation", "seen", "would_see",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,16 +32,16 @@ class _Row:
     ratios: tuple[tuple[MethodResult, float], ...]
 
 
-def discrimination(result: Result) -> Section | None:
+def discrimination(result: Result) -> Exhibit:
     """Errors over noise, the discrimination matrix, the error budget and what follows from them."""
     effects = _recorded(result)
-    return section(
+    return Exhibit(
         "discrimination",
         "What this recording can tell apart",
-        _sentences(effects),
-        _noise_picture(result),
-        _matrix(effects),
-        _budget(effects),
+        tuple(map(_sentence, effects)),
+        (_matrix(effects), _budget(effects)) if effects else (),
+        pictures=_over_noise(result),
+        data=(_all_changes(result.effects),),
     )
 
 
@@ -61,14 +55,27 @@ def _recorded(result: Result) -> tuple[Effect, ...]:
     )
 
 
-def _noise_picture(result: Result) -> Picture | None:
+def _all_changes(effects: tuple[Effect, ...]) -> NumberTable:
+    rows = tuple(
+        (e.name, e.doc, c.name, TableCell(c.rms), TableCell(c.max), c.unit,
+         TableCell(c.separation), c.name in e.seen_by, "; ".join(e.would_see))
+        for e in effects
+        for c in e.changes
+    )  # fmt: skip
+    return NumberTable("effects", "Effects", _EFFECTS, rows)
+
+
+# --- errors over noise ---------------------------------------------------------------------------
+
+
+def _over_noise(result: Result) -> tuple[Picture, ...]:
     rows = _rows(result)
     if not rows:
-        return None
+        return ()
     pixels = draw(lambda f: _dots(f, result, rows), 9.0, 1.5 + 0.42 * len(rows))
     over_time = all(r.load == "all" for m in finished(result) for r in m.residuals.values())
     where = at_load("all") if over_time else "at the last load"
-    return Picture(
+    shown = Picture(
         "errors_over_noise",
         f"Rms error of every model {where} over the rms that measurement noise alone gives "
         "(no unit, logarithmic). Grey: where noise alone puts 95 % of repetitions (chi-square with "
@@ -77,21 +84,22 @@ def _noise_picture(result: Result) -> Picture | None:
         "Dot chart: rms error over measurement noise for each quantity and model.",
         pixels,
     )
+    return (shown,)
 
 
 def _rows(result: Result) -> list[_Row]:
     done = finished(result)
     quantities = dict.fromkeys(r.quantity for m in done for r in m.residuals.values() if r.sd > 0)
-    rows = []
-    for quantity in quantities:
-        pairs = [(m, last_residual(m, quantity)) for m in done]
-        seen = [(m, r) for m, r in pairs if r is not None]
-        ratios = tuple((m, rms(r.values) / _noise(r)) for m, r in seen)
-        first = seen[0][1]
-        dof = first.values.size
-        low, high = (float(np.sqrt(chdtri(dof, p) / dof)) for p in (0.975, 0.025))
-        rows.append(_Row(quantity, with_unit(_noise(first), first.unit), (low, high), ratios))
-    return rows
+    return [_row(done, quantity) for quantity in quantities]
+
+
+def _row(done: Iterable[MethodResult], quantity: str) -> _Row:
+    seen = [(m, r) for m in done if (r := last_residual(m, quantity)) is not None]
+    ratios = tuple((m, rms(r.values) / _noise(r)) for m, r in seen)
+    first = seen[0][1]
+    dof = first.values.size
+    low, high = (float(np.sqrt(chdtri(dof, p) / dof)) for p in (0.975, 0.025))
+    return _Row(quantity, with_unit(_noise(first), first.unit), (low, high), ratios)
 
 
 def _noise(residual: Residual) -> float:
@@ -122,25 +130,24 @@ def _dots(figure: Figure, result: Result, rows: list[_Row]) -> None:
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
+# --- effects against sensors ---------------------------------------------------------------------
+
+
 def _quantity(change: Change) -> str:
     return change.name.split("@")[0]
 
 
-def _largest(effect: Effect, quantity: str) -> Change | None:
-    """The load at which an effect is seen best in a quantity."""
-    found = [c for c in effect.changes if _quantity(c) == quantity]
-    return max(found, key=lambda c: c.separation, default=None)
+def _quantities(effects: Iterable[Effect]) -> list[str]:
+    return list(dict.fromkeys(_quantity(c) for e in effects for c in e.changes))
 
 
-def _matrix(effects: tuple[Effect, ...]) -> Table | None:
-    if not effects:
-        return None
-    sensors = list(dict.fromkeys(_quantity(c) for e in effects for c in e.changes))
+def _matrix(effects: tuple[Effect, ...]) -> NumberTable:
+    sensors = _quantities(effects)
     rows = tuple(
-        (Cell(f"{e.name}: {e.doc}"), *(_separation(_largest(e, q)) for q in sensors))
-        for e in effects
+        (f"{e.name}: {e.doc}", *(_separation(_largest(e, q)) for q in sensors)) for e in effects
     )
-    return Table(
+    return NumberTable(
+        "",
         "Separation of each effect in each recorded quantity at the load where it is largest: the "
         "rms change over the uncertainty that averaging leaves (no unit). Above 2 (coloured, with "
         "a tick) the recording sees the effect.",
@@ -149,54 +156,57 @@ def _matrix(effects: tuple[Effect, ...]) -> Table | None:
     )
 
 
-def _separation(change: Change | None) -> Cell:
+def _largest(effect: Effect, quantity: str) -> Change | None:
+    """The load at which an effect is seen best in a quantity."""
+    found = [c for c in effect.changes if _quantity(c) == quantity]
+    return max(found, key=lambda c: c.separation, default=None)
+
+
+def _separation(change: Change | None) -> TableCell | None:
     if change is None:
-        return Cell("–")
-    if change.separation > TELLS_APART:
-        return Cell(f"✓ {_figure(change.separation)}", "good")
-    return Cell(_figure(change.separation))
-
-
-def _figure(separation: float) -> str:
-    return fixed(separation, 1) if separation < 10 else text(separation, digits=2)
-
-
-def _budget(effects: tuple[Effect, ...]) -> Table | None:
-    if not effects:
         return None
+    size = change.separation
+    words = fixed(size, 1) if size < 10 else text(size, digits=2)
+    return TableCell(size, text=words, emphasis="good" if size > TELLS_APART else "")
+
+
+def _budget(effects: tuple[Effect, ...]) -> NumberTable:
     load = effects[0].changes[-1].name.split("@")[-1] if effects[0].changes else ""
-    found = dict.fromkeys(_quantity(c) for e in effects for c in e.changes)
-    columns = [q for q in _BUDGET if q in found] or list(found)
-    changes = [[_change(e, f"{q}@{load}") for q in columns] for e in effects]
-    used = [i for i in range(len(columns)) if any(row[i] for row in changes)]
-    rows = []
-    for effect, row in zip(effects, changes, strict=True):
-        figures = [_moved(row[i], columns[i]) for i in used]
-        seen = ", ".join(dict.fromkeys(n.split("@")[0] for n in effect.seen_by)) or "none"
-        would = ", ".join(effect.would_see) or "none of those listed"
-        rows.append((Cell(f"{effect.name}: {effect.doc}"), *figures, *cells(seen, would)))
-    units = [next((shown_unit(c.unit) for r in changes if (c := r[i])), "") for i in used]
-    heads = [f"{columns[i]} / {u}" for i, u in zip(used, units, strict=True)]
-    return Table(
+    moved = {(e.name, _quantity(c)): c for e in effects for c in e.changes
+             if c.name.endswith(f"@{load}")}  # fmt: skip
+    columns = [q for q in _whole(_quantities(effects)) if any(key[1] == q for key in moved)]
+    units = [next(c.unit for (_, name), c in moved.items() if name == q) for q in columns]
+    rows = tuple(
+        (f"{e.name}: {e.doc}", *(_moved(moved.get((e.name, q))) for q in columns),
+         ", ".join(_seen(e)) or "none", ", ".join(e.would_see) or "none of those listed")
+        for e in effects
+    )  # fmt: skip
+    heads = (f"{q} / {shown_unit(unit)}" for q, unit in zip(columns, units, strict=True))
+    return NumberTable(
+        "",
         f"Error budget: what each effect moves {at_load(load)}; rms and, in brackets, largest "
-        "change; a force or pressure has one value.",
+        "change of what has more than one value.",
         ("effect", *heads, "seen by (any load)", "a sensor that would see it"),
-        tuple(rows),
-        words=(0, len(used) + 1, len(used) + 2),
+        rows,
     )
 
 
-def _change(effect: Effect, name: str) -> Change | None:
-    return next((c for c in effect.changes if c.name == name), None)
+def _whole(quantities: Sequence[str]) -> list[str]:
+    """Those that are no part of another: "a.b" is one of "a"; the matrix has all of them."""
+    return [q for q in quantities if not any(q.startswith(f"{other}.") for other in quantities)]
 
 
-def _moved(change: Change | None, quantity: str) -> Cell:
+def _seen(effect: Effect) -> list[str]:
+    return list(dict.fromkeys(name.split("@")[0] for name in effect.seen_by))
+
+
+def _moved(change: Change | None) -> TableCell | None:
     if change is None:
-        return Cell("–")
-    size = _rounded(change.rms, change.unit)
-    if quantity in ("force.plate", "pressure"):
-        return Cell(size)
-    return Cell(f"{size} ({_rounded(change.max, change.unit)})")
+        return None
+    words = _rounded(change.rms, change.unit)
+    if change.max > (1 + 1e-9) * change.rms:
+        words += f" ({_rounded(change.max, change.unit)})"
+    return TableCell(change.rms, text=words)
 
 
 def _rounded(value: float, unit: str) -> str:
@@ -209,15 +219,11 @@ def _rounded(value: float, unit: str) -> str:
     return fixed(shown, decimals) if shown >= smallest / 2 else f"< {fixed(smallest, decimals)}"
 
 
-def _sentences(effects: tuple[Effect, ...]) -> Items | Paragraph | None:
-    if not effects:
-        return None
-    return Items(tuple(_sentence(e) for e in effects))
+# --- in words ------------------------------------------------------------------------------------
 
 
 def _sentence(effect: Effect) -> str:
-    seen = list(dict.fromkeys(name.split("@")[0] for name in effect.seen_by))
-    opening = f"{effect.name.capitalize()} ({effect.doc})"
+    opening, seen = f"{effect.name.capitalize()} ({effect.doc})", _seen(effect)
     if seen:
         return f"{opening}: this recording can tell it apart, by {_listed(seen)}."
     best = max(effect.changes, key=lambda c: c.separation, default=None)
@@ -232,5 +238,5 @@ def _sentence(effect: Effect) -> str:
     return f"{opening}: cannot be told apart{size}, nor would any sensor listed decide."
 
 
-def _listed(names: list[str] | tuple[str, ...]) -> str:
+def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]

@@ -1,11 +1,11 @@
-"""Pictures as files and as data URIs: PNG in the folder, the smaller WebP in the page."""
+"""Pictures as files and as data URIs: PNG and GIF in the folder, the smaller WebP in the page."""
 
 import base64
 from io import BytesIO
 
 from PIL import Image
 
-from validate.report.page import Animation, Picture
+from validate.compare.exhibit import Animation, Picture
 
 _GIF_COLOURS = 32  # line art: few colours and the steps between them
 
@@ -18,17 +18,6 @@ def png(picture: Picture) -> bytes:
     out = BytesIO()
     image.save(out, "PNG", optimize=True)
     return out.getvalue()
-
-
-def data_uri(picture: Picture) -> str:
-    """The picture as a WebP data URI: lossless for line art."""
-    out = BytesIO()
-    image = Image.fromarray(picture.pixels)
-    if picture.photo:
-        image.save(out, "WEBP", quality=86, method=4)
-    else:
-        image.save(out, "WEBP", lossless=True, quality=60, method=4)
-    return "data:image/webp;base64," + base64.b64encode(out.getvalue()).decode("ascii")
 
 
 def gif(animation: Animation) -> bytes:
@@ -44,6 +33,15 @@ def gif(animation: Animation) -> bytes:
     return out.getvalue()
 
 
-def gif_uri(animation: Animation) -> str:
-    """The animation as a GIF data URI."""
-    return "data:image/gif;base64," + base64.b64encode(gif(animation)).decode("ascii")
+def uri(picture: Picture | Animation) -> str:
+    """A data URI: GIF of what moves, else WebP, lossless for line art."""
+    if isinstance(picture, Animation):
+        return _data("gif", gif(picture))
+    out = BytesIO()
+    how = {"quality": 86} if picture.photo else {"lossless": True, "quality": 60}
+    Image.fromarray(picture.pixels).save(out, "WEBP", method=4, **how)
+    return _data("webp", out.getvalue())
+
+
+def _data(kind: str, content: bytes) -> str:
+    return f"data:image/{kind};base64," + base64.b64encode(content).decode("ascii")

@@ -68,7 +68,7 @@ def outline(ns: int, frame: str, name: str, points: Floats, colour: Rgba, **note
 
 
 def spheres(
-    ns: int, frame: str, name: str, centres: Floats, diameter: float, colour: Rgba, **notes: str
+    ns: int, frame: str, name: str, centres: Floats, colour: Rgba, *, diameter: float, **notes: str
 ) -> Json:
     """An entity: equal spheres at centres (k, 2 or 3) m; those with NaN (not seen) are left out."""
     there = centres[np.isfinite(centres).all(axis=1)]

@@ -7,9 +7,8 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Heat
+from validate.compare.exhibit import Heat, Picture
 from validate.report.numbers import significant
-from validate.report.page import Picture
 from validate.report.style import draw
 
 _CELL = (0.78, 0.42)  # inches of a square that holds its number

@@ -1,63 +1,34 @@
-"""The page from its sections, by jinja2."""
+"""The page from drawn exhibits, by jinja2."""
 
+from collections.abc import Iterable
 from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined
 
 from validate.compare.result import Result
-from validate.report import (
-    bodies,
-    curves,
-    discrimination,
-    exhibits,
-    markers,
-    outlines,
-    provenance,
-    registration,
-    score_tables,
-    verdicts,
-)
-from validate.report.encode import data_uri, gif_uri
-from validate.report.page import Section, SectionOf
-
-SECTIONS: tuple[tuple[str, SectionOf], ...] = (
-    ("checks", verdicts.checks),
-    ("exhibits", exhibits.exhibits),
-    ("outlines", outlines.outlines),
-    ("markers", markers.markers),
-    ("curves", curves.curves),
-    ("discrimination", discrimination.discrimination),
-    ("body", bodies.bodies),
-    ("methods", score_tables.side_by_side),
-    ("published", score_tables.published),
-    ("identified", score_tables.identified),
-    ("scores", score_tables.scores),
-    ("registration", registration.registration),
-    ("recording", provenance.recording),
-    ("parameters", provenance.parameters),
-)
+from validate.report.encode import uri
+from validate.report.exhibits import DrawnExhibit
+from validate.report.tables import caption, shown, word_columns
 
 
 def page(
-    result: Result,
-    shown: tuple[Section, ...],
-    created: str,
-    band: tuple[str, str] | None = None,
+    result: Result, exhibits: Iterable[DrawnExhibit], created: str, band: tuple[str, str]
 ) -> str:
     """The whole report as one HTML text that needs no other file and no script.
 
-    `band` is the colour class and the word before the sentence; None: by the checks.
+    `band` is the colour class and the word before the result's sentence.
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True,
                               lstrip_blocks=True)  # fmt: skip
-    environment.filters["data_uri"] = data_uri
-    environment.filters["gif_uri"] = gif_uri
-    environment.filters["breakable"] = _breakable
-    source = files("validate.report").joinpath("report.html").read_text(encoding="utf-8")
-    colour, word = band or verdicts.band(result)
-    return environment.from_string(source).render(
-        result=result, sections=shown, created=created, colour=colour, word=word
+    environment.filters.update(
+        uri=uri, caption=caption, shown=shown, word_columns=word_columns, breakable=_breakable
     )
+    source = files("validate.report").joinpath("report.html").read_text(encoding="utf-8")
+    colour, word = band
+    return environment.from_string(source).render(
+        result=result, exhibits=[e for e in exhibits if e.shown], created=created, colour=colour,
+        word=word,
+    )  # fmt: skip
 
 
 def _breakable(name: str) -> str:

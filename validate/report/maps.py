@@ -8,15 +8,14 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats, Ints
-from validate.compare.exhibit import NodeMap
+from validate.compare.exhibit import NodeMap, Picture
 from validate.report.numbers import scale, shown_unit
-from validate.report.page import Picture
 from validate.report.style import draw
 from validate.scene.mesh import Mesh, boundary_facets
 
 Range = tuple[float, float]
 _MM = 1e3
-# Seen from the corner of +x, -y and above: right and upward on paper, for the flat drawing.
+# Every map is seen from the corner of +x, -y and +z, z upward on paper: its triad says so.
 TOWARD_EYE = np.array([0.62, -1.0, 0.62]) / np.linalg.norm([0.62, -1.0, 0.62])
 
 

@@ -1,4 +1,6 @@
-"""Markers on the top face: vectors, positions and vertical rise (paper 000, figures 8 and 9)."""
+"""Markers at the loads: vectors and positions in their plane, and what they do across it."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -6,86 +8,111 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
+from validate.compare.exhibit import Exhibit, Picture
 from validate.compare.result import MethodResult, Result
-from validate.register.observe import Hold, MarkerObservation, nearest_sample
+from validate.register.markers import MarkerObservation
+from validate.register.observation import nearest_sample
 from validate.report.numbers import spaced, with_unit
-from validate.report.observed import at_loads, distinct, markers_seen, shown_method
-from validate.report.page import Picture, Section, section
-from validate.report.style import ACCEPTED, MEASURED, Look, draw, looks
+from validate.report.observed import (
+    Held,
+    axis_label,
+    distinct,
+    finished,
+    holds,
+    markers_seen,
+    shown_method,
+)
+from validate.report.plane import flattest
+from validate.report.style import ACCEPTED, MEASURED, Style, draw, looks
 
 _MM = 1e3
-_PLANE = [0, 2]  # the top face: x along the stage, z lateral
-_UP = 1
+_BANDS = 7  # groups of neighbours that a line joins
 
 
-def markers(result: Result) -> Section | None:
-    """Vectors and positions at every load, rise against x; None without markers at loads."""
+@dataclass(frozen=True)
+class _Seen:
+    """The markers, the loads after rest, and the axes that the markers spread along or lie across.
+
+    `across` is None in 2-D; labels of all axes say along which the body is driven.
+    """
+
+    markers: MarkerObservation
+    rest: Held
+    loaded: tuple[Held, ...]
+    plane: list[int]
+    across: int | None
+    labels: tuple[str, ...]
+
+    def at(self, hold: Held) -> Floats:
+        """The measured positions (k, d) m."""
+        return np.asarray(self.markers.x[nearest_sample(self.markers.t, hold.t, "markers")])
+
+
+def markers(result: Result) -> Exhibit | None:
+    """Vectors and positions at every load, motion across their plane; None without loads."""
     judged = shown_method(result)
     seen = markers_seen(judged) if judged else None
-    if seen is None or judged is None or not at_loads(judged):
+    at = holds(judged.registered[0]) if judged and seen else ()
+    if seen is None or judged is None or len(at) < 2:
         return None
-    if len(result.registered[0].holds) < 2:
-        return None
-    holds = result.registered[0].holds
-    return section(
-        "markers",
-        "Markers on the top face",
-        _plane(seen, judged, holds),
-        _rise(result, seen, holds),
-    )
+    rest, *loaded = at
+    plane, across = flattest(seen.rest)
+    labels = tuple(axis_label(judged.scene, i) for i in range(seen.rest.shape[1]))
+    shown = _Seen(seen, rest, tuple(loaded), plane, across, labels)
+    pictures = (_in_plane(shown, judged), *_across(result, shown))
+    return Exhibit("markers", "Markers", pictures=pictures)
 
 
-def _measured(seen: MarkerObservation, hold: Hold) -> Floats:
-    return np.asarray(seen.x[nearest_sample(seen.t, hold.t, "markers")])
+# --- in their plane ------------------------------------------------------------------------------
 
 
-def _plane(seen: MarkerObservation, judged: MethodResult, holds: tuple[Hold, ...]) -> Picture:
-    count = len(holds) - 1
-    pixels = draw(lambda f: _plane_panels(f, seen, judged, holds), 3.3 * count + 0.6, 8.2)
+def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
+    count = len(seen.loaded)
+    along = "" if seen.across is None else f", seen along {'xyz'[seen.across]}"
     return Picture(
         "markers",
-        "The top face from above, x along the stage, z lateral, mm. Upper row: displacement from "
+        f"The markers in the plane of {' and '.join('xyz'[i] for i in seen.plane)}{along}, mm. "
+        "Upper row: displacement from "
         f"rest, measured (black) and {judged.label} (blue), drawn to scale. Lower row: measured "
-        f"positions as circles of the declared noise ({with_unit(seen.sd, 'm')} per axis), the "
-        "simulated ones as dots. About four dots in ten fall inside their circle when the "
+        f"positions as circles of the declared noise ({with_unit(seen.markers.sd, 'm')} per axis), "
+        "the simulated ones as dots. About four dots in ten fall inside their circle when the "
         "model is right.",
         f"Marker displacement vectors and positions for {count} loads, measured and simulated.",
-        pixels,
+        draw(lambda f: _panels(f, seen, judged), 3.3 * count + 0.6, 8.2),
     )
 
 
-def _plane_panels(
-    figure: Figure, seen: MarkerObservation, judged: MethodResult, holds: tuple[Hold, ...]
-) -> None:
-    axes = figure.subplots(2, len(holds) - 1, sharex=True, sharey=True, squeeze=False)
-    start = _measured(seen, holds[0])
-    for i, hold in enumerate(holds[1:], start=1):
-        simulated, measured = seen.simulated(judged.run.u[i]), _measured(seen, hold)
-        upper, lower = axes[:, i - 1]
-        _vectors(upper, start, measured - start, MEASURED, "measured")
-        _vectors(upper, seen.rest, simulated - seen.rest, ACCEPTED, judged.label)
-        _circles(lower, measured, seen.sd)
-        lower.plot(*(_MM * simulated[:, _PLANE]).T, ".", color=ACCEPTED, ms=4.5, label=judged.label)
+def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
+    axes = figure.subplots(2, len(seen.loaded), sharex=True, sharey=True, squeeze=False)
+    start, rest = _MM * seen.at(seen.rest)[:, seen.plane], _MM * seen.markers.rest[:, seen.plane]
+    for i, hold in enumerate(seen.loaded):
+        simulated = _MM * seen.markers.simulated(judged.run.u[i + 1])[:, seen.plane]
+        measured = _MM * seen.at(hold)[:, seen.plane]
+        upper, lower = axes[:, i]
+        _vectors(upper, start, measured, MEASURED, "measured")
+        _vectors(upper, rest, simulated, ACCEPTED, judged.label)
+        _circles(lower, measured, _MM * seen.markers.sd)
+        lower.plot(*simulated.T, ".", color=ACCEPTED, ms=4.5, label=judged.label)
         upper.set_title(spaced(hold.label))
-        lower.set_xlabel("x along the stage / mm")
+        lower.set_xlabel(seen.labels[seen.plane[0]])
         for ax in (upper, lower):
             ax.set_aspect("equal")
     for ax in axes[:, 0]:
-        ax.set_ylabel("z lateral / mm")
+        ax.set_ylabel(seen.labels[seen.plane[1]])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
 
 
-def _vectors(ax: Axes, start: Floats, moved: Floats, colour: str, label: str) -> None:
-    x, d = _MM * start[:, _PLANE], _MM * moved[:, _PLANE]
+def _vectors(ax: Axes, start: Floats, end: Floats, colour: str, label: str) -> None:
     ax.quiver(
-        *x.T, *d.T, angles="xy", scale_units="xy", scale=1, color=colour, label=label,
-        width=0.005, headwidth=3.5, headlength=4, zorder=3 if colour == ACCEPTED else 2,
+        *start.T, *(end - start).T, angles="xy", scale_units="xy", scale=1, color=colour,
+        label=label, width=0.005, headwidth=3.5, headlength=4,
+        zorder=3 if colour == ACCEPTED else 2,
     )  # fmt: skip
 
 
 def _circles(ax: Axes, centres: Floats, sd: float) -> None:
-    there = _MM * centres[np.isfinite(centres).all(axis=1)][:, _PLANE]
-    size = np.full(len(there), 2 * _MM * sd)
+    there = centres[np.isfinite(centres).all(axis=1)]
+    size = np.full(len(there), 2 * sd)
     ax.add_collection(
         EllipseCollection(
             size, size, np.zeros(len(there)), units="xy", offsets=there,
@@ -95,49 +122,54 @@ def _circles(ax: Axes, centres: Floats, sd: float) -> None:
     ax.plot(*there.T, ",", color="none")
 
 
-def _rise(result: Result, seen: MarkerObservation, holds: tuple[Hold, ...]) -> Picture:
-    styles = looks(result)
-    drawn = [(m, styles[m.name]) for m in distinct(result, "marker.vertical")]
-    pixels = draw(
-        lambda f: _rise_panels(f, result, seen, holds, drawn), 3.3 * (len(holds) - 1) + 0.6, 3.9
-    )
-    names = ", ".join(m.label for m, _ in drawn)
-    return Picture(
-        "marker_rise",
-        "Vertical rise of the markers from rest against their x, mm. Bars: ± 1 standard deviation "
-        "of a measured rise (√2 times the declared noise). Each model's line joins the mean of "
-        "markers of equal rank in x; the rise tells slipping from bonded plates best.",
-        f"Vertical rise of the markers against x for each load: measured and {names}.",
-        pixels,
-    )
+# --- across it -----------------------------------------------------------------------------------
 
 
-def _rise_panels(
-    figure: Figure,
-    result: Result,
-    seen: MarkerObservation,
-    holds: tuple[Hold, ...],
-    drawn: list[tuple[MethodResult, Look]],
+def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
+    if seen.across is None:
+        return ()
+    c, styles = seen.across, looks(result)
+    own = {m.name: o for m in finished(result) if (o := markers_seen(m)) is not None}
+    known = [m for m in finished(result) if m.name in own]
+    on = distinct(
+        [(m, own[m.name].positions.apply(m.run.u[len(seen.loaded)])[:, c]) for m in known]
+    )
+    drawn = [(m, styles[m.name]) for m in known if m.name not in on]
+    x, names = "xyz"[seen.plane[0]], ", ".join(m.label for m, _ in drawn)
+    made = Picture(
+        "markers_across",
+        f"Displacement of the markers along {'xyz'[c]} from rest against their {x}, mm. Bars: ± 1 "
+        "standard deviation of a measured displacement (√2 times the declared noise). Each model's "
+        f"line joins the mean of markers of equal rank in {x}.",
+        f"Displacement of the markers along {'xyz'[c]} against {x} for each load: measured and "
+        f"{names}.",
+        draw(lambda f: _across_panels(f, seen, c, drawn), 3.3 * len(seen.loaded) + 0.6, 3.9),
+    )
+    return (made,)
+
+
+def _across_panels(
+    figure: Figure, seen: _Seen, c: int, drawn: list[tuple[MethodResult, Style]]
 ) -> None:
-    axes = figure.subplots(1, len(holds) - 1, sharex=True, sharey=True, squeeze=False)[0]
-    x, start = _MM * seen.rest[:, 0], _measured(seen, holds[0])[:, _UP]
-    for i, (ax, hold) in enumerate(zip(axes, holds[1:], strict=True), start=1):
-        rise = _MM * (_measured(seen, hold)[:, _UP] - start)
-        ax.errorbar(x, rise, np.sqrt(2) * _MM * seen.sd, fmt=".", color=MEASURED, ecolor="#A0A0A0",
-                    ms=4, lw=0.8, label="measured")  # fmt: skip
+    axes = figure.subplots(1, len(seen.loaded), sharex=True, sharey=True, squeeze=False)[0]
+    x, start = _MM * seen.markers.rest[:, seen.plane[0]], seen.at(seen.rest)[:, c]
+    for i, (ax, hold) in enumerate(zip(axes, seen.loaded, strict=True), start=1):
+        ax.errorbar(x, _MM * (seen.at(hold)[:, c] - start), np.sqrt(2) * _MM * seen.markers.sd,
+                    fmt=".", color=MEASURED, ecolor="#A0A0A0", ms=4, lw=0.8,
+                    label="measured")  # fmt: skip
         for method, look in drawn:
             own = markers_seen(method)
-            if own is not None:
-                there, mean = _banded(x, _MM * own.rows.apply(method.run.u[i])[:, _UP])
-                ax.plot(there, mean, color=look.colour, ls=look.dash, lw=look.width,
-                        marker=look.point, ms=4, label=method.label)  # fmt: skip
-        ax.set_title(spaced(hold.label))
-        ax.set_xlabel("x along the stage / mm")
-    axes[0].set_ylabel("vertical rise / mm")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+            assert own is not None
+            line = _banded(x, _MM * own.positions.apply(method.run.u[i])[:, c])
+            ax.plot(*line, color=look.colour, ls=look.dash, lw=look.width, marker=look.point, ms=4,
+                    label=method.label)  # fmt: skip
+        ax.set(title=spaced(hold.label), xlabel=seen.labels[seen.plane[0]])
+    axes[0].set_ylabel(f"displacement along {'xyz'[c]} / mm")
+    columns = min(4, len(seen.loaded) + 1)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns)
 
 
 def _banded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Means over groups of neighbours in x, about seven of them."""
-    groups = np.array_split(np.argsort(x, kind="stable"), min(7, len(x)))
+    """Means over groups of neighbours in x."""
+    groups = np.array_split(np.argsort(x, kind="stable"), min(_BANDS, len(x)))
     return np.array([x[g].mean() for g in groups]), np.array([y[g].mean() for g in groups])

@@ -51,6 +51,11 @@ def fixed(value: float, decimals: int) -> str:
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
+def fixed_with_unit(value: float, unit: str, decimals: int) -> str:
+    """`value` (SI) with fixed decimals in the shown unit, and the unit."""
+    return f"{fixed(value * scale(unit), decimals)} {shown_unit(unit)}"
+
+
 def rate(hz: float | None) -> str:
     """A rate in Hz or kHz, whichever reads better; a dash for None."""
     if hz is None or not math.isfinite(hz):

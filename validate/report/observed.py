@@ -1,13 +1,83 @@
-"""Picks that all figures share: which methods to draw, and a method's view of the measurement."""
+"""What sections and replays ask of a registered recording, and which methods they show.
 
-from validate.arrays import rms
+Nothing else in this package opens a `Registered`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
-from validate.register.observe import Hold, MarkerObservation, OutlineObservation
-from validate.report.loads import at_holds
+from validate.register.markers import MarkerObservation
+from validate.register.outlines import OutlineObservation
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
+from validate.scene.scene import Scene
 from validate.solve.types import Run, StepTimes
 
 _APART = 0.08  # share of the largest difference below which two methods draw one line
+_ALONG = 0.9  # part of a drive's direction above which it moves along an axis
+
+
+# --- a registered recording ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Held:
+    """A load at which everything was measured: label such as "3mm", drive in SI `unit`, time s."""
+
+    label: str
+    drive: float
+    unit: str
+    t: float
+
+
+def drive(registered: Registered) -> SignalObservation:
+    """The first signal that drives."""
+    return registered.drives[0]
+
+
+def driven(registered: Registered, t: Floats | float) -> Floats:
+    """The first drive (SI) at times s, interpolated."""
+    return np.asarray(np.interp(t, registered.t, registered.inputs[:, 0]))
+
+
+def holds(registered: Registered) -> tuple[Held, ...]:
+    """The single instants at which everything was measured, in time; none of a run over time.
+
+    Where there are any, the output frames of a run are at them.
+    """
+    compared = [s for s in (registered.rest, *registered.selections) if s is not None]
+    times = [(float(s.t[0]), s.label) for s in compared if s.t is not None and len(s.t) == 1]
+    unit = drive(registered).unit
+    return tuple(Held(label, registered.stage(t), unit, t) for t, label in sorted(times))
+
+
+def signals(registered: Registered) -> tuple[SignalObservation, ...]:
+    """The signals that a run's traces predict."""
+    return registered.of(SignalObservation)
+
+
+def outline(registered: Registered) -> OutlineObservation | None:
+    """The first stream of outlines."""
+    return next(iter(registered.of(OutlineObservation)), None)
+
+
+def markers(registered: Registered) -> MarkerObservation | None:
+    """The first set of markers."""
+    return next(iter(registered.of(MarkerObservation)), None)
+
+
+def axis_label(scene: Scene, axis: int) -> str:
+    """An axis of the scene's frame with its unit, and which drive moves along it."""
+    along = [d.name for d in scene.drives if abs(d.direction[axis]) > _ALONG]
+    return f"{'xyz'[axis]}{f' (along {along[0]})' if along else ''} / mm"
+
+
+# --- the methods of a result ---------------------------------------------------------------------
 
 
 def finished(result: Result) -> tuple[MethodResult, ...]:
@@ -18,19 +88,17 @@ def finished(result: Result) -> tuple[MethodResult, ...]:
 
 def shown_method(result: Result) -> MethodResult | None:
     """The accepted method, or without one the first that finished; None when none did."""
-    done = finished(result)
-    return done[0] if done else None
+    return next(iter(finished(result)), None)
 
 
-def loaded_holds(result: Result) -> tuple[Hold, ...]:
-    """The loads of the first recording after rest."""
-    return result.registered[0].holds[1:] if result.registered else ()
+def outline_seen(method: MethodResult) -> OutlineObservation | None:
+    """The outlines with the wall of the method's own mesh; None without them or a whole run."""
+    return outline(method.registered[0]) if method.registered and method.run.finished else None
 
 
-def at_loads(method: MethodResult) -> bool:
-    """The method's fields are those at the first recording's loads, not frames over time."""
-    seen = method.registered[0] if method.registered else None
-    return seen is not None and at_holds(seen, method.run)
+def markers_seen(method: MethodResult) -> MarkerObservation | None:
+    """The markers with the rows of the method's own mesh; None without them or a whole run."""
+    return markers(method.registered[0]) if method.registered and method.run.finished else None
 
 
 def timed(run: Run) -> StepTimes | None:
@@ -44,29 +112,26 @@ def last_residual(method: MethodResult, quantity: str) -> Residual | None:
     return found[-1] if found else None
 
 
-def distinct(result: Result, quantity: str) -> tuple[MethodResult, ...]:
-    """Finished methods whose lines for a quantity do not lie on each other at the last load."""
-    pairs = [(m, last_residual(m, quantity)) for m in finished(result)]
-    drawn = [(m, r) for m, r in pairs if r is not None]
-    largest = max((_apart(a, b) for _, a in drawn for _, b in drawn), default=0.0)
-    kept: list[tuple[MethodResult, Residual]] = []
-    for method, residual in drawn:
-        if all(_apart(residual, other) > _APART * largest for _, other in kept) or not kept:
-            kept.append((method, residual))
-    return tuple(m for m, _ in kept)
+def distinct(
+    lines: Sequence[tuple[MethodResult, Floats]], apart: float | None = None
+) -> dict[str, MethodResult]:
+    """By name the methods whose line is drawn by another's, and that other.
+
+    Lines of one shape differ when any value does by more than `apart` (None: a share of the
+    largest difference).
+    """
+    if apart is None:
+        apart = _APART * max(_between(a, b) for _, a in lines for _, b in lines)
+    kept: list[tuple[MethodResult, Floats]] = []
+    on: dict[str, MethodResult] = {}
+    for method, line in lines:
+        other = next((m for m, drawn in kept if _between(line, drawn) <= apart), None)
+        if other is None:
+            kept.append((method, line))
+        else:
+            on[method.name] = other
+    return on
 
 
-def _apart(one: Residual, other: Residual) -> float:
-    if one.values.shape != other.values.shape:
-        return float("inf")
-    return rms(one.values - other.values)
-
-
-def outline_seen(method: MethodResult) -> OutlineObservation | None:
-    """The outlines with the wall of the method's own mesh; None without them or a whole run."""
-    return method.registered[0].outline if method.registered and method.run.finished else None
-
-
-def markers_seen(method: MethodResult) -> MarkerObservation | None:
-    """The markers with the rows of the method's own mesh; None without them or a whole run."""
-    return method.registered[0].markers if method.registered and method.run.finished else None
+def _between(one: Floats, other: Floats) -> float:
+    return float(np.abs(one - other).max()) if one.shape == other.shape else float("inf")

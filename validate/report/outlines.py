@@ -1,188 +1,199 @@
-"""Outlines of the inclusion in the image, measured and simulated (paper 000, figure 7)."""
+"""Outlines of a cavity in the image, measured and simulated."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
-from validate.compare.outline import angular_points, enclosed
-from validate.compare.residual import TOP_LEFT
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Picture, Series, TableCell
+from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
-from validate.register.observe import Hold, OutlineObservation, nearest_sample
+from validate.register.outline_geometry import angular_points, enclosed, normal_distances
+from validate.register.outlines import Corner, OutlineObservation
 from validate.report.animation import moving_outline
-from validate.report.numbers import shown_unit, spaced, text
-from validate.report.observed import at_loads, distinct, outline_seen, shown_method
-from validate.report.page import Cell, Picture, Section, Table, section
-from validate.report.style import ACCEPTED, MEASURED, NOISE, Look, draw, looks
+from validate.report.numbers import shown_unit, spaced
+from validate.report.observed import (
+    Held,
+    distinct,
+    finished,
+    holds,
+    outline_seen,
+    shown_method,
+)
+from validate.report.style import ACCEPTED, MEASURED, Style, draw, looks
 
 _MM = 1e3
+_GREY = "#9A9A9A"
 
 
 @dataclass(frozen=True)
-class _Drawn:
-    """A method's sections (k, 2) m at the holds."""
+class _Outlines:
+    """The loads and the measured outlines (k, 2) m at them."""
+
+    seen: OutlineObservation
+    holds: tuple[Held, ...]
+    measured: tuple[Floats, ...]
+
+    @property
+    def loads(self) -> str:
+        return ", ".join(spaced(h.label) for h in self.holds)
+
+
+@dataclass(frozen=True)
+class _Sections:
+    """A method's sections (k, 2) m with the image plane at the loads."""
 
     method: MethodResult
-    look: Look
+    look: Style
     sections: tuple[Floats, ...]
 
 
-def outlines(result: Result) -> Section | None:
+def outlines(result: Result) -> Exhibit | None:
     """Outlines at every load, rivals and errors at the last one; None without outlines at loads."""
     judged = shown_method(result)
     seen = outline_seen(judged) if judged else None
-    if seen is None or judged is None or not at_loads(judged):
+    at = holds(judged.registered[0]) if judged and seen else ()
+    if seen is None or judged is None or not at:
         return None
-    holds = result.registered[0].holds
-    measured = tuple(seen.outlines[nearest_sample(seen.t, h.t, "outlines")] for h in holds)
-    drawn = _drawn(result, len(holds))
-    return section(
+    measured = _Outlines(seen, at, tuple(seen.measured(h.t) for h in at))
+    drawn = _drawn(result, measured)
+    first = next(d for d in drawn if d.method is judged)
+    return Exhibit(
         "outlines",
-        "Outlines of the inclusion",
-        moving_outline(result, judged),
-        _by_load(holds, measured, next(d for d in drawn if d.method is judged)),
-        _at_last(holds[-1], measured[-1], drawn, seen),
-        _top_left_table(result, holds),
+        "Outlines in the image",
+        tables=tuple(t for c in seen.corners if (t := _corner_table(result, at[1:], c))),
+        charts=(_at_last(measured, drawn),),
+        pictures=(*moving_outline(judged), _by_load(measured, first, drawn)),
     )
 
 
-def _drawn(result: Result, count: int) -> list[_Drawn]:
+def _drawn(result: Result, measured: _Outlines) -> list[_Sections]:
+    """Methods whose outlines do not lie on each other at the last load."""
     styles, found = looks(result), []
-    for method in distinct(result, "contour"):
+    for method in finished(result):
         seen = outline_seen(method)
         if seen is not None:
-            sections = tuple(seen.simulated(u) for u in method.run.u[:count])
-            found.append(_Drawn(method, styles[method.name], sections))
-    return found
+            sections = tuple(seen.simulated(u) for u in method.run.u[: len(measured.holds)])
+            found.append(_Sections(method, styles[method.name], sections))
+    on = distinct([(d.method, _off(d, measured)) for d in found])
+    return [d for d in found if d.method.name not in on]
+
+
+def _off(drawn: _Sections, measured: _Outlines) -> Floats:
+    """Distances (k,) m of the section from the measured points at the last load, outward."""
+    return normal_distances(drawn.sections[-1], measured.measured[-1])
 
 
 def _closed(points: Floats) -> Floats:
     return np.asarray(_MM * np.vstack([points, points[:1]]))
 
 
-def _by_load(holds: tuple[Hold, ...], measured: tuple[Floats, ...], judged: _Drawn) -> Picture:
-    pixels = draw(
-        lambda figure: _panels(figure, holds, measured, judged), 2.6 * len(holds) + 0.4, 4.3
+# --- every load ----------------------------------------------------------------------------------
+
+
+def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> Picture:
+    width = 2.6 * len(measured.holds) + 0.4
+    label, loads = judged.method.label, measured.loads
+    ringed = "".join(
+        f" Ringed: the image angle {np.rad2deg(c.angle):.0f}°, {c.quantity}; its displacement "
+        "from rest stands in the table."
+        for c in measured.seen.corners
     )
-    loads = ", ".join(spaced(h.label) for h in holds)
     return Picture(
         "outlines",
-        f"Outlines in image coordinates at {loads} stage displacement: x lateral, y depth below "
-        f"the probe, mm. Points: measured outline; line: section of {judged.method.label} with the "
-        "image plane; grey line: measured rest outline. Ringed: the top left corner (225°), whose "
-        "displacement from rest is written below (the paper's figure 7 and its 3.3 and 3.71 mm).",
-        f"Measured outline points and the simulated section of {judged.method.label}, one panel "
-        f"per load ({loads}), probe at the top.",
-        pixels,
+        f"Outlines in image coordinates at {loads}, mm. Points: measured outline; line: section of "
+        f"{label} with the image plane; grey line: measured rest outline; in the last "
+        f"panel also the other models, but for those whose line would lie on another's.{ringed}",
+        f"Measured outline points and the simulated section of {label}, one panel per load "
+        f"({loads}).",
+        draw(lambda figure: _panels(figure, measured, judged, drawn), width, 4.5),
     )
 
 
-def _panels(
-    figure: Figure, holds: tuple[Hold, ...], measured: tuple[Floats, ...], judged: _Drawn
-) -> None:
-    axes = figure.subplots(1, len(holds), sharex=True, sharey=True, squeeze=False)[0]
-    everything = _MM * np.vstack([*measured, *judged.sections])
+def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> None:
+    count, rest = len(measured.holds), _closed(measured.measured[0])
+    axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
+    for i, (ax, hold) in enumerate(zip(axes, measured.holds, strict=True)):
+        ax.plot(*rest.T, color=_GREY, lw=0.8, label="measured at rest")
+        ax.plot(*(_MM * measured.measured[i]).T, ".", color=MEASURED, ms=3, label="measured")
+        for d in drawn if i == count - 1 else [judged]:
+            _section(ax, d, i)
+        for corner in measured.seen.corners:
+            _ring(ax, corner, (measured.measured[i], judged.sections[i]))
+        ax.set(title=spaced(hold.label), aspect="equal", xlabel="image x / mm")
+    everything = _MM * np.vstack([*measured.measured, *judged.sections])
     low, high = everything.min(axis=0), everything.max(axis=0)
-    for i, (ax, hold) in enumerate(zip(axes, holds, strict=True)):
-        rest = _closed(measured[0])
-        ax.plot(rest[:, 0], rest[:, 1], color="#9A9A9A", lw=0.8, label="measured at rest")
-        ax.plot(*(_MM * measured[i]).T, ".", color=MEASURED, ms=3, label="measured")
-        line = _closed(judged.sections[i])
-        ax.plot(line[:, 0], line[:, 1], color=ACCEPTED, label=judged.method.label)
-        _mark_top_left(ax, measured, judged, i)
-        ax.set_title(spaced(hold.label))
-        ax.set_aspect("equal")
-        ax.set_xlabel("x lateral / mm")
-        ax.axhline(0, color="#5A5A5A", lw=3)
-        ax.text(0.98, 1.2, "probe", transform=ax.get_yaxis_transform(), va="top", ha="right")
-    axes[0].set_ylabel("y depth / mm")
     axes[0].set_xlim(low[0] - 3, high[0] + 3)
-    axes[0].set_ylim(high[1] + 9, -0.7)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    axes[0].set_ylim(high[1] + 3, low[1] - 3)  # rows of an image count downward
+    axes[0].set_ylabel("image y / mm")
+    handles, labels = axes[-1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(count + 1, 4))
 
 
-def _mark_top_left(ax: Axes, measured: tuple[Floats, ...], judged: _Drawn, i: int) -> None:
-    angle = np.array([TOP_LEFT])
-    at = [angular_points(o, angle)[0] for o in (measured[i], judged.sections[i])]
-    start = [angular_points(o, angle)[0] for o in (measured[0], judged.sections[0])]
-    ax.plot(*(_MM * at[0]), "o", mfc="none", mec=MEASURED, ms=8)
-    ax.plot(*(_MM * at[1]), "o", mfc="none", mec=ACCEPTED, ms=8)
-    if i == 0:
-        return
-    moved = [float(np.linalg.norm(a - s)) for a, s in zip(at, start, strict=True)]
-    words = f"top left moved\nmeasured {text(moved[0], 'm')} mm\nsimulated {text(moved[1], 'm')} mm"
-    ax.text(0.04, 0.03, words, transform=ax.transAxes, va="bottom", fontsize=8)
+def _section(ax: Axes, drawn: _Sections, i: int) -> None:
+    look = drawn.look
+    ax.plot(*_closed(drawn.sections[i]).T, color=look.colour, ls=look.dash, lw=look.width,
+            label=drawn.method.label)  # fmt: skip
 
 
-def _at_last(
-    hold: Hold, measured: Floats, drawn: list[_Drawn], seen: OutlineObservation
-) -> Picture:
-    pixels = draw(lambda figure: _zoom_and_errors(figure, hold, measured, drawn, seen), 10.4, 4.9)
-    names = ", ".join(d.method.label for d in drawn)
-    return Picture(
-        "outline_models",
-        f"The outline at {spaced(hold.label)} by model. Left: image coordinates, mm. Right: "
-        "distance of the simulated outline from each measured point, mm, outward positive, against "
-        "the polar angle in the image; grey: ± 2 standard deviations of one measured point. Models "
-        "whose line would lie on another's are left out.",
-        f"Measured outline at {spaced(hold.label)} with the sections of {names}, and their "
-        "distances from the measured points around the outline.",
-        pixels,
-    )
+def _ring(ax: Axes, corner: Corner, pair: tuple[Floats, Floats]) -> None:
+    for points, colour in zip(pair, (MEASURED, ACCEPTED), strict=True):
+        at = _MM * angular_points(points, np.array([corner.angle]))[0]
+        ax.plot(*at, "o", mfc="none", mec=colour, ms=8)
 
 
-def _zoom_and_errors(
-    figure: Figure, hold: Hold, measured: Floats, drawn: list[_Drawn], seen: OutlineObservation
-) -> None:
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1.35))
-    left.plot(*(_MM * measured).T, ".", color=MEASURED, ms=4.5, label="measured")
-    away = measured - enclosed(measured)[1]
-    angle = np.rad2deg(np.mod(np.arctan2(away[:, 1], away[:, 0]), 2 * np.pi))
-    order = np.argsort(angle)
-    right.axhspan(-2 * _MM * seen.sd, 2 * _MM * seen.sd, color=NOISE, lw=0)
-    right.axhline(0, color=MEASURED, lw=0.8)
-    for d in drawn:
-        line = _closed(d.sections[-1])
-        width = 0.6 * d.look.width if d.look.colour != ACCEPTED else d.look.width
-        left.plot(
-            *line.T, color=d.look.colour, ls=d.look.dash, lw=max(width, 1), label=d.method.label
-        )
-        off = _MM * d.method.residuals[f"contour@{hold.label}"].values[:, 0]
-        right.plot(angle[order], off[order], color=d.look.colour, ls=d.look.dash, lw=d.look.width)
-    left.set(xlabel="x lateral / mm", ylabel="y depth / mm", aspect="equal")
-    left.invert_yaxis()
-    right.set(xlabel="image angle / ° (270° faces the probe)", ylabel="simulated − measured / mm")
-    right.set_xlim(0, 360)
-    right.set_xticks(range(0, 361, 45))
-    right.axvline(np.rad2deg(TOP_LEFT), color="#9A9A9A", lw=0.8, ls=":")
-    right.text(np.rad2deg(TOP_LEFT) + 3, 0.985, "top left", color="#5A5A5A", va="top",
-               transform=right.get_xaxis_transform())  # fmt: skip
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+def _residual(method: MethodResult, corner: Corner, hold: Held) -> Residual | None:
+    return method.residuals.get(f"{corner.quantity}@{hold.label}")
 
 
-def _top_left_table(result: Result, holds: tuple[Hold, ...]) -> Table | None:
-    rows = []
-    for method in result.methods:
-        found = [method.residuals.get(f"contour.top_left@{h.label}") for h in holds[1:]]
-        if any(r is not None for r in found):
-            rows.append(
-                (Cell(method.label), *(Cell(text(r.simulated if r else None, "m")) for r in found))
-            )
+def _corner_table(result: Result, loaded: tuple[Held, ...], corner: Corner) -> NumberTable | None:
+    """What every method says of a corner beside what was measured."""
+    found = {m.label: [_residual(m, corner, h) for h in loaded] for m in result.methods}
+    rows = {label: row for label, row in found.items() if any(row)}
     if not rows:
         return None
-    first = [
-        next((m.residuals[k] for m in result.methods if k in m.residuals), None)
-        for k in (f"contour.top_left@{h.label}" for h in holds[1:])
-    ]
-    measured = (
-        Cell("measured", "strong"),
-        *(Cell(text(r.measured if r else None, "m"), "strong") for r in first),
+    first = [next((r for r in column if r), None) for column in zip(*rows.values(), strict=True)]
+    definition = next(r.definition for r in first if r)
+    return NumberTable(
+        "",
+        f"{corner.quantity} / {shown_unit('m')}: {definition}.",
+        ("", *(spaced(h.label) for h in loaded)),
+        (
+            (TableCell("measured", emphasis="strong"), *(_moved(r, "measured") for r in first)),
+            *((label, *(_moved(r, "simulated") for r in row)) for label, row in rows.items()),
+        ),
     )
-    return Table(
-        f"Displacement of the top left corner (225°) from rest, {shown_unit('m')}.",
-        ("", *(spaced(h.label) for h in holds[1:])),
-        (measured, *rows),
-    )
+
+
+def _moved(residual: Residual | None, who: Literal["measured", "simulated"]) -> TableCell | None:
+    return TableCell(getattr(residual, who), "m") if residual else None
+
+
+# --- every method at the last load ---------------------------------------------------------------
+
+
+def _at_last(measured: _Outlines, drawn: list[_Sections]) -> Chart:
+    """Distances from the measured points around the outline."""
+    points, two = measured.measured[-1], np.full(2, 2 * _MM * measured.seen.sd)
+    angle = _angles(points)
+    order = np.argsort(angle)
+    band = Series("± 2 sd of one point", np.array([0.0, 360.0]), -two, "band", two)
+    return Chart(
+        "outline_errors",
+        f"Distance of the simulated outline from each measured point at "
+        f"{spaced(measured.holds[-1].label)}",
+        "image angle / °",
+        "simulated − measured / mm",
+        (band, *(Series(d.method.label, angle[order], _MM * _off(d, measured)[order])
+                 for d in drawn)),
+        caption="Outward positive. Models whose line would lie on another's are left out.",
+    )  # fmt: skip
+
+
+def _angles(points: Floats) -> Floats:
+    """Polar angles (k,) degrees in the image about the middle of the area inside."""
+    away = points - enclosed(points)[1]
+    return np.asarray(np.rad2deg(np.mod(np.arctan2(away[:, 1], away[:, 0]), 2 * np.pi)))

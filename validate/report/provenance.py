@@ -1,73 +1,58 @@
 """Where the numbers come from: recordings, their streams and clocks, parameters, environment."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
+from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.result import Result
 from validate.recording.types import Recording
 from validate.report.environment import environment, file_name, without_folder
 from validate.report.numbers import text, with_unit
-from validate.report.page import Cell, Section, Table, cells, section
+
+_STREAMS = (
+    "topic", "kind", "unit", "noise", "samples", "rate / Hz", "duration / s", "gaps",
+    "longest gap / s", "duplicates",
+)  # fmt: skip
+_FEW = 12  # metadata entries that are shown unfolded
 
 
-def recording(result: Result) -> Section | None:
+def recording(result: Result) -> Exhibit | None:
     """Files with hashes, streams with clocks, metadata records."""
     if not result.recordings:
         return None
-    return section(
-        "recording",
-        "Recording",
-        _files(result.recordings),
-        *(_streams(r, len(result.recordings) > 1) for r in result.recordings),
-        *(t for r in result.recordings if (t := _metadata(r)) is not None),
-    )
+    several = len(result.recordings) > 1
+    tables = [_files(result.recordings)]
+    tables += [_streams(r, several) for r in result.recordings]
+    tables += [_metadata(r) for r in result.recordings if any(r.metadata.values())]
+    return Exhibit("recording", "Recording", (), tuple(tables))
 
 
-def _files(recordings: tuple[Recording, ...]) -> Table:
+def _files(recordings: tuple[Recording, ...]) -> NumberTable:
     rows = tuple(
-        cells(
-            file_name(r.source.path),
-            text(r.source.bytes),
-            r.source.sha256 or "none",
-            r.source.integrity,
-        )
-        for r in recordings
+        (file_name(s.path), s.bytes, s.sha256 or "none", s.integrity)
+        for s in (r.source for r in recordings)
     )
-    return Table("Inputs.", ("file", "bytes", "SHA-256", "integrity"), rows, words=(0, 2, 3))
+    return NumberTable("", "Inputs.", ("file", "bytes", "SHA-256", "integrity"), rows)
 
 
-def _streams(record: Recording, several: bool) -> Table:
-    rows = []
-    for kind, found in _kinds(record).items():
-        for topic, (unit, sd, count) in found.items():
-            rows.append((*cells(topic, kind, unit, sd, count), *_clock(record, topic)))
+def _streams(record: Recording, several: bool) -> NumberTable:
     name = f" of {record.name}" if several else ""
-    return Table(
-        f"Streams{name}. Noise: declared standard deviation; gaps: steps over three median steps.",
-        ("topic", "kind", "unit", "noise", "samples", "rate / Hz", "duration / s", "gaps",
-         "longest gap / s", "duplicates"),
-        tuple(rows),
-        words=(0, 1, 2),
-        folded=several,
-    )  # fmt: skip
+    title = (
+        f"Streams{name}. Noise: declared standard deviation; gaps: steps over three median steps."
+    )
+    rows = tuple((*row, *_clock(record, str(row[0]))) for row in _kinds(record))
+    return NumberTable("", title, _STREAMS, rows, folded=several)
 
 
-def _kinds(record: Recording) -> dict[str, dict[str, tuple[str, str, str]]]:
-    """Unit as recorded, noise as shown, samples, by kind and topic."""
-    return {
-        "signal": {
-            k: (s.unit, with_unit(s.sd, s.unit, 2), str(len(s.t)))
-            for k, s in record.signals.items()
-        },
-        "markers": {
-            k: ("m", with_unit(m.sd, "m"), f"{len(m.t)} × {len(m.names)}")
-            for k, m in record.markers.items()
-        },
-        "outlines": {
-            k: ("m", with_unit(c.sd, "m"), f"{len(c.t)} × {_points(c.outlines)}")
-            for k, c in record.contours.items()
-        },
-        "frames": {k: ("1", "–", str(len(f.t))) for k, f in record.frames.items()},
-    }
+def _kinds(record: Recording) -> Iterator[tuple[Entry, ...]]:
+    """Topic, kind, unit as recorded, noise as shown, samples."""
+    for k, s in record.signals.items():
+        yield k, "signal", s.unit, with_unit(s.sd, s.unit, 2), str(len(s.t))
+    for k, m in record.markers.items():
+        yield k, "markers", "m", with_unit(m.sd, "m"), f"{len(m.t)} × {len(m.names)}"
+    for k, c in record.contours.items():
+        yield k, "outlines", "m", with_unit(c.sd, "m"), f"{len(c.t)} × {_points(c.outlines)}"
+    for k, f in record.frames.items():
+        yield k, "frames", "1", None, str(len(f.t))
 
 
 def _points(outlines: tuple[object, ...]) -> str:
@@ -75,59 +60,39 @@ def _points(outlines: tuple[object, ...]) -> str:
     return str(sizes[0]) if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
 
 
-def _clock(record: Recording, topic: str) -> tuple[Cell, ...]:
+def _clock(record: Recording, topic: str) -> tuple[Entry | TableCell, ...]:
     clock = record.clock.get(topic)
     if clock is None:
-        return cells(*["–"] * 5)
-    return cells(
-        text(clock.rate_hz),
-        text(clock.duration, "1", 4),
-        str(clock.gaps),
-        text(clock.longest_gap),
-        str(clock.duplicates),
-    )
+        return (None,) * 5
+    lasts = TableCell(clock.duration, text=text(clock.duration, "1", 4))
+    longest = TableCell(clock.longest_gap, "1")
+    return TableCell(clock.rate_hz, "1"), lasts, clock.gaps, longest, clock.duplicates
 
 
-def _metadata(record: Recording) -> Table | None:
+def _metadata(record: Recording) -> NumberTable:
     rows = tuple(
-        cells(name, key, str(without_folder(value)))
+        (name, key, str(without_folder(value)))
         for name, found in record.metadata.items()
         for key, value in found.items()
     )
-    if not rows:
-        return None
-    return Table(
-        f"Metadata records of {record.name}.",
-        ("record", "key", "value"),
-        rows,
-        words=(0, 1, 2),
-        folded=len(rows) > 12,
-    )
+    title = f"Metadata records of {record.name}."
+    return NumberTable("", title, ("record", "key", "value"), rows, folded=len(rows) > _FEW)
 
 
-def parameters(result: Result) -> Section | None:
+def parameters(result: Result) -> Exhibit:
     """Every parameter with the value used."""
     rows = tuple(
-        cells(p.path, _plain(p.default), "" if p.unit == "1" else p.unit, p.doc)
+        (p.path, _plain(p.default), "" if p.unit == "1" else p.unit, p.doc)
         for p in result.parameters
     )
-    table = Table(
-        "Parameters as used, SI. Change one with --set path=value.",
-        ("path", "value", "unit", "meaning"),
-        rows,
-        words=(0, 2, 3),
-        folded=True,
-    )
+    used = NumberTable(
+        "", "Parameters as used, SI. Change one with --set path=value.",
+        ("path", "value", "unit", "meaning"), rows, folded=True,
+    )  # fmt: skip
     seed = f"{result.seed}" if result.seed is not None else "none"
-    extra = {"seed": seed, **environment()}
-    return section(
-        "parameters", "Parameters and environment", table if rows else None, _pairs(extra)
-    )
-
-
-def _pairs(values: Mapping[str, str]) -> Table:
-    rows = tuple(cells(k, v) for k, v in values.items())
-    return Table("Environment.", ("", "value"), rows, words=(0, 1))
+    around = tuple({"seed": seed, **environment()}.items())
+    tables = (*((used,) if rows else ()), NumberTable("", "Environment.", ("", "value"), around))
+    return Exhibit("parameters", "Parameters and environment", (), tables)
 
 
 def _plain(value: object) -> str:

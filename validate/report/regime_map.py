@@ -14,8 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Mark, Panel, RegimeMap
-from validate.report.page import Picture
+from validate.compare.exhibit import Mark, Panel, Picture, RegimeMap
 from validate.report.style import draw
 
 _COLOURS = ("#56B4E9", "#CFE8F7", "#D55E00", "#7F7F7F")  # Okabe-Ito, the second a paler first

@@ -1,50 +1,46 @@
 """How the measurement was brought into the scene's frame, and what that leaves."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from matplotlib.figure import Figure
 
-from validate.arrays import Floats, rms
+from validate.arrays import rms
+from validate.compare.exhibit import Entry, Exhibit, NumberTable, Picture, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import max_length
-from validate.register.observe import MarkerObservation
+from validate.register.markers import MarkerObservation
 from validate.register.quality import Registration
-from validate.report.numbers import shown_unit, text, with_unit
-from validate.report.page import (
-    Cell,
-    Items,
-    Paragraph,
-    Picture,
-    Section,
-    Table,
-    cells,
-    section,
-)
+from validate.report.numbers import shown_unit, with_unit
+from validate.report.observed import markers
+from validate.report.plane import flattest
 from validate.report.style import MEASURED, draw
 
 _MM = 1e3
 _MAGNIFIED = 5.0
 _NAMED = 60  # markers; the names of more would hide each other
+_CLEAN = ("No findings: no outlier, no mirror image, no permuted labels.",)
 
 
-def registration(result: Result) -> Section | None:
+def registration(result: Result) -> Exhibit:
     """Method, FRE, FLE, predicted TRE, residuals of every marker; rest residuals."""
-    seen = result.registered[0].markers if result.registered else None
-    return section(
+    seen = markers(result.registered[0]) if result.registered else None
+    rest = (_rest(result.rest),) if result.rest else ()
+    if seen is None:
+        return Exhibit("registration", "Registration", (), rest)
+    return Exhibit(
         "registration",
         "Registration",
-        _quality(result, seen) if seen else None,
-        _findings(seen.registration) if seen else None,
-        _vectors(seen.registration) if seen else None,
-        _rest(result.rest),
-        _residuals(seen) if seen else None,
+        seen.registration.findings or _CLEAN,
+        (_quality(result, seen), *rest, _residuals(result)),
+        pictures=(_vectors(seen.registration),),
     )
 
 
-def _quality(result: Result, seen: MarkerObservation) -> Table:
+def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
     found = seen.registration
-    centre = target(result)
-    rows = [
+    rows = (
         ("method", found.method, "fitted once, on the rest state, then frozen"),
         ("markers in the fit", str(found.k_effective), f"{len(found.missing)} not seen, "
          f"{len(found.excluded)} excluded, {len(found.outliers)} outliers"),
@@ -52,101 +48,88 @@ def _quality(result: Result, seen: MarkerObservation) -> Table:
         ("FRE", with_unit(found.fre, "m"), "rms residual at the markers; no measure of accuracy"),
         ("FLE", with_unit(found.fle, "m"), "rms localisation error of one marker, from the FRE"),
         ("TRE at the markers", with_unit(float(rms(seen.tre[:, None])), "m"), "predicted, rms"),
-    ]  # fmt: skip
-    if centre is not None:
-        tre = float(found.tre_at(centre[None])[0])
-        rows.append(
-            ("TRE at the inclusion", with_unit(tre, "m"), "predicted at the cavity's centre")
-        )
-    return Table(
-        "Marker registration.",
-        ("", "value", "meaning"),
-        tuple(cells(*r) for r in rows),
-        words=(0, 2),
-    )
+        *_target(result, found),
+    )  # fmt: skip
+    return NumberTable("", "Marker registration.", ("", "value", "meaning"), rows)
 
 
-def target(result: Result) -> Floats | None:
-    """The centre (3,) m of the first cavity of the first scene; None without one."""
-    for method in result.methods:
-        if method.scene.cavities:
-            nodes = method.scene.mesh.facet_nodes(method.scene.cavities[0].facets)
-            return np.asarray(method.scene.mesh.nodes[nodes].mean(axis=0))
-    return None
-
-
-def _findings(found: Registration) -> Items | Paragraph:
-    if found.findings:
-        return Items(found.findings)
-    return Paragraph("No findings: no outlier, no mirror image, no permuted labels.")
+def _target(result: Result, found: Registration) -> Iterator[tuple[str, str, str]]:
+    """The error predicted at the centre of every cavity of the first scene."""
+    scene = result.methods[0].scene
+    for cavity in scene.cavities:
+        nodes = scene.mesh.nodes[scene.mesh.facet_nodes(cavity.facets)]
+        tre = float(found.tre_at(nodes.mean(axis=0)[None])[0])
+        yield f"TRE at {cavity.name}", with_unit(tre, "m"), "predicted at the cavity's centre"
 
 
 def _vectors(found: Registration) -> Picture:
-    pixels = draw(lambda f: _vector_axes(f, found), 6.4, 5.2)
-    seen = "y" if found.markers.shape[1] == 3 else "the normal of their plane"
+    plane, across = flattest(found.markers)
+    along = "the normal of their plane" if across is None else "xyz"[across]
     return Picture(
         "registration",
         "Registration residuals of the markers at rest, mapped less target, in mm, seen along "
-        f"{seen}; arrows magnified {_MAGNIFIED:g} times. A pattern "
+        f"{along}; arrows magnified {_MAGNIFIED:g} times. A pattern "
         "(all outward, all turned) would mean a wrong scale or rotation; noise has none.",
         "Arrows of the registration residual at each marker, without a common direction if only "
         "noise is left.",
-        pixels,
+        draw(lambda f: _vector_axes(f, found, plane), 6.4, 5.2),
     )
 
 
-def _vector_axes(figure: Figure, found: Registration) -> None:
+def _vector_axes(figure: Figure, found: Registration, plane: list[int]) -> None:
     ax = figure.subplots()
-    axes = [0, 2] if found.markers.shape[1] == 3 else [0, 1]
-    x, r = _MM * found.markers[:, axes], _MAGNIFIED * _MM * found.residuals[:, axes]
+    x, r = _MM * found.markers[:, plane], _MAGNIFIED * _MM * found.residuals[:, plane]
     ax.quiver(*x.T, *r.T, angles="xy", scale_units="xy", scale=1, color=MEASURED, width=0.004)
     ax.plot(*x.T, ".", color="#D55E00", ms=4)
-    named = zip(found.names, x, strict=True) if len(x) <= _NAMED else ()
-    for name, (a, b) in named:
+    for name, (a, b) in zip(found.names, x, strict=True) if len(x) <= _NAMED else ():
         ax.annotate(name, (a, b), xytext=(2, -8), textcoords="offset points", fontsize=6.5,
                     color="#5A5A5A")  # fmt: skip
+    across, up = ("xyz"[i] for i in plane)
     ax.set_title(f"residuals, magnified {_MAGNIFIED:g} times")
-    ax.set(xlabel="x / mm", ylabel=f"{'z' if axes[1] == 2 else 'y'} / mm", aspect="equal")
+    ax.set(xlabel=f"{across} / mm", ylabel=f"{up} / mm", aspect="equal")
     ax.margins(0.12)
 
 
-def _rest(rest: tuple[Residual, ...]) -> Table | None:
-    if not rest:
-        return None
-    rows = tuple(
-        (
-            *cells(r.name, shown_unit(r.unit), text(rms(r.values), r.unit)),
-            *cells(text(max_length(r.values), r.unit)),
-            *cells(text(float(np.sqrt(r.values.shape[1])) * r.sd, r.unit), str(r.count)),
-        )
-        for r in rest
-    )
-    return Table(
+def _rest(rest: tuple[Residual, ...]) -> NumberTable:
+    return NumberTable(
+        "",
         "What registration and geometry leave at rest, before any load; noise: the rms that a "
         "perfect model would show.",
         ("residual", "unit", "rms", "max", "noise", "values"),
-        rows,
-        words=(0, 1),
+        tuple(
+            (r.name, shown_unit(r.unit), *(TableCell(v, r.unit) for v in _statistics(r)), r.count)
+            for r in rest
+        ),
     )
 
 
-def _residuals(seen: MarkerObservation) -> Table:
-    found = seen.registration
-    outliers = {o.name for o in found.outliers}
-    rows = tuple(
-        (
-            Cell(name),
-            *(Cell(text(v, "m")) for v in r),
-            Cell(text(float(np.linalg.norm(r)), "m")),
-            Cell("outlier" if name in outliers else "", "bad" if name in outliers else ""),
-        )
-        for name, r in zip(found.names, found.residuals, strict=True)
-    )
-    columns = "xyz"[: found.residuals.shape[1]]
-    return Table(
-        "Registration residual of every marker, mm.",
-        ("marker", *columns, "length", ""),
-        rows,
-        words=(0, len(columns) + 2),
+def _statistics(r: Residual) -> tuple[float, float, float]:
+    return rms(r.values), max_length(r.values), float(np.sqrt(r.values.shape[1])) * r.sd
+
+
+def _residuals(result: Result) -> NumberTable:
+    """Where every marker lies and what its registration leaves, of every recording."""
+    return NumberTable(
+        "registration",
+        "Registration residual of every marker.",
+        ("recording", "marker", "x", "y", "z", "residual_x", "residual_y", "residual_z", "length",
+         "unit", "finding"),
+        tuple(
+            row
+            for recording, registered in zip(result.recordings, result.registered, strict=False)
+            if (seen := markers(registered)) is not None
+            for row in _rows(recording.name, seen.registration)
+        ),
         folded=True,
-    )
+    )  # fmt: skip
+
+
+def _rows(recording: str, found: Registration) -> Iterator[tuple[Entry | TableCell, ...]]:
+    outliers = {o.name for o in found.outliers}
+    for name, at, off in zip(found.names, found.markers, found.residuals, strict=True):
+        three = (v for vector in (at, off) for v in (*vector.tolist(), None)[:3])
+        lengths = (*three, float(np.linalg.norm(off)))
+        bad = name in outliers
+        said = TableCell("outlier" if bad else "", emphasis="bad" if bad else "")
+        unit = TableCell("m", text=shown_unit("m"))
+        yield recording, name, *(TableCell(v, "m") for v in lengths), unit, said

@@ -1,19 +1,21 @@
 """Off-screen renders of the simulated body by pyvista. Import only after `gl.available()`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
-from validate.report.body import Body
-from validate.report.page import Picture, Pixels
+from validate.arrays import Floats, Ints
+from validate.compare.exhibit import Picture, Pixels
+from validate.report.body import ShownBody
 from validate.scene.shape_functions import EDGES
 
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
 )
-SIZE = [1100, 760]
+_SIZE = (1100, 760)
 _CELL = {4: 10, 8: 12, 10: 24}  # VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA: local order as ours
 BAR: dict[str, Any] = {
     "vertical": True,
@@ -36,8 +38,8 @@ class _View:
     edges: bool = False
 
 
-def renders(body: Body) -> tuple[Picture, ...]:
-    """The body opened and deformed, from above at rest and deformed, and with element edges.
+def renders(body: ShownBody) -> tuple[Picture, ...]:
+    """The body opened and deformed, against the cut at rest and deformed, with element edges.
 
     Two of them for a whole body without plates.
     """
@@ -46,7 +48,7 @@ def renders(body: Body) -> tuple[Picture, ...]:
     )  # fmt: skip
     whole = body.normal is None
     plates = "; plates grey" if body.plates else ""
-    opened = "whole" if whole else "cut open through the inclusion in the image plane"
+    opened = "whole" if whole else f"cut open through {body.cut}"
     cut = "" if whole else " at and behind the cut"
     flat = "from the side" if whole else "against the cut"
     deformed = (
@@ -67,15 +69,44 @@ def renders(body: Body) -> tuple[Picture, ...]:
     )  # fmt: skip
     alone = whole and not body.plates  # then nothing shows how far it moved from rest
     return tuple(
-        Picture(name, words, "Render: " + words, _shot(body, view), photo=True)
+        _picture(name, words, body, view)
         for name, words, view in ((deformed, mesh) if alone else (deformed, rest, across, mesh))
     )
 
 
-def _shot(body: Body, view: _View) -> Pixels:
-    plotter: Any = pv.Plotter(off_screen=True, window_size=SIZE, lighting="light kit")
+def _picture(name: str, words: str, body: ShownBody, view: _View) -> Picture:
+    pixels = shot(lambda plotter: _fill(plotter, body, view), _SIZE)
+    return Picture(name, words, "Render: " + words, pixels, photo=True)
+
+
+def shot(fill: Callable[[Any], None], size: tuple[int, int]) -> Pixels:
+    """Pixels (h, w, 3) of a plotter of size (w, h) that `fill` fills and aims."""
+    plotter: Any = pv.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
+    fill(plotter)
+    pixels = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
+    plotter.close()
+    return pixels[..., :3].copy()
+
+
+def aim(plotter: Any, middle: Floats, away: Floats, up: Floats, size: float, scale: float) -> None:
+    """A camera without perspective on `middle` from the direction `away`; `scale` of `size` fills
+    half the height."""
+    plotter.camera.focal_point = tuple(middle)
+    plotter.camera.position = tuple(middle + 3 * size * away / np.linalg.norm(away))
+    plotter.camera.up = tuple(up)
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = scale * size
+    plotter.camera.clipping_range = (0.1 * size, 10 * size)
+
+
+def triangulated(nodes: Floats, triangles: Ints) -> Any:
+    """Triangles (t, 3) between nodes (n, 3) as pyvista has them."""
+    return pv.PolyData(nodes, np.hstack([np.full((len(triangles), 1), 3), triangles]).ravel())
+
+
+def _fill(plotter: Any, body: ShownBody, view: _View) -> None:
     _add_body(plotter, body, view.scale, view.edges)
     _add_wall(plotter, body, view.scale, view.edges)
     for plate in body.plates:
@@ -86,12 +117,9 @@ def _shot(body: Body, view: _View) -> Pixels:
             box = box.clip(normal=body.normal, origin=body.origin)
         plotter.add_mesh(box, color="#A9B0B7", ambient=0.3)
     _aim(plotter, body, view.oblique)
-    pixels = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
-    plotter.close()
-    return pixels[..., :3].copy()
 
 
-def _add_body(plotter: Any, body: Body, scale: float, edges: bool) -> None:
+def _add_body(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
     count = body.mesh.cells.shape[1]
     packed = np.hstack([np.full((len(body.mesh.cells), 1), count), body.mesh.cells]).ravel()
     kinds = np.full(len(body.mesh.cells), _CELL[count], dtype=np.uint8)
@@ -118,7 +146,7 @@ def _decimals(top: float) -> str:
     return f"%.{max(1, 1 - int(np.floor(np.log10(top))))}f" if top > 1e-5 else "%.1e"
 
 
-def _add_wall(plotter: Any, body: Body, scale: float, edges: bool) -> None:
+def _add_wall(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
     if body.cavity is None:
         return
     facets = body.mesh.facets[body.cavity]
@@ -127,8 +155,7 @@ def _add_wall(plotter: Any, body: Body, scale: float, edges: bool) -> None:
     if edges and body.normal is not None:  # whole triangles, as the elements beside them
         below = (nodes - body.origin) @ body.normal < 0
         triangles = triangles[below[triangles].any(axis=1)]
-    faces = np.hstack([np.full((len(triangles), 1), 3), triangles]).ravel()
-    wall = pv.PolyData(nodes, faces)
+    wall = triangulated(nodes, triangles)
     wall.point_data["u"] = body.u
     if body.normal is not None and not edges:
         wall = wall.clip(normal=body.normal, origin=body.origin)
@@ -163,7 +190,7 @@ def _quarters() -> list[list[int]]:
 _QUARTERS = _quarters()
 
 
-def _aim(plotter: Any, body: Body, oblique: bool) -> None:
+def _aim(plotter: Any, body: ShownBody, oblique: bool) -> None:
     """A camera fixed by the body at rest, so that a wrong size shows.
 
     Without plates to see it by, the deformed body is kept in the picture.
@@ -182,10 +209,5 @@ def _aim(plotter: Any, body: Body, oblique: bool) -> None:
     above = (0.95, 0.9, 0.3) if opened else (0.45, 1.0, 0.55)
     away = above[0] * up + above[1] * side + above[2] * along if oblique else flat
     drop = 0.16 * size if oblique and opened else 0.0  # the upper half is gone
-    plotter.camera.focal_point = tuple(middle - drop * up)
-    plotter.camera.position = tuple(middle - drop * up + 3 * size * away / np.linalg.norm(away))
-    plotter.camera.up = tuple(up if oblique else flat_up)
     scale = 0.42 if not oblique else 0.47 if opened else 0.56
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = scale * size
-    plotter.camera.clipping_range = (0.1 * size, 10 * size)
+    aim(plotter, middle - drop * up, away, up if oblique else flat_up, size, scale)

@@ -2,8 +2,8 @@
 
 Topics, after /<recording> where there are several; X is `measured` or `simulated`:
 
-    /stage/measured        validate.Signal           the drive, m or N
-    /force/X, /pressure/X  validate.Signal           every sample as compared, every step
+    /<drive>/measured      validate.Signal           what drives, m or N
+    /<signal>/X            validate.Signal           every sample as compared, every step
     /outline/X             validate.Contour          image plane, as judged; simulated at the loads
     /outline/X/scene       foxglove.SceneUpdate      the same as lines, the simulated one moving
     /markers/X             validate.Markers          with names; simulated at the loads
@@ -137,8 +137,7 @@ def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track
     others = [m.name for m in result.methods if m is not method]
     if others:
         yield f"other methods: {', '.join(others)}"
-    numbers = [t.topic for t in found if t.schema in _NUMBERS]
-    topics = [topic for topic in numbers if not topic.endswith("/stage/measured")]
+    topics = [t.topic for t in found if t.schema in _NUMBERS and not t.given]
     for topic in topics:
         other = topic.replace("/measured", "/simulated")
         if other not in topics:

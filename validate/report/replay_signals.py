@@ -1,12 +1,16 @@
-"""Topics of a replay that are no geometry: stage, force, pressure and images over time."""
+"""Topics of a replay that are no geometry: signals and images over time."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.metadata import CALIBRATION, CALIBRATION_KEYS
-from validate.recording.mcap.schemas import IMAGE, SIGNAL, Json, image_message, signal_message
+from validate.recording.mcap.schemas import IMAGE, SIGNAL, image_message, signal_message
 from validate.recording.types import Frames
+from validate.report.observed import holds
+from validate.report.observed import signals as scalar_signals
 from validate.report.replay_view import Track, View, pose_records
 
 _SAMPLES = 4000  # messages of one signal, at most
@@ -14,20 +18,25 @@ _IMAGE_BYTES = 1_500_000  # of one stream of images, about
 
 
 def signals(view: View) -> list[Track]:
-    """The stage as measured; every signal as compared, and the run's trace that predicts it."""
-    seen = view.registered
-    stage = seen.stage
-    found = [_signal(view, "/stage/measured", stage.t, stage.y[:, 0], stage.unit, stage.sd)]
-    for s, name in zip(seen.signals, _names([s.quantity for s in seen.signals]), strict=True):
-        found.append(_signal(view, f"/{name}/measured", s.t, s.y, s.unit, s.sd))
+    """What drives as measured; every signal as compared, and the run's trace that predicts it."""
+    drives, seen = view.registered.drives, scalar_signals(view.registered)
+    names = _names([*(d.name.strip("/") for d in drives), *(s.quantity for s in seen)])
+    found = [
+        replace(
+            _signal(view, f"/{name}/measured", s.t, s.y, s.unit, s.sd), given=s.role == "drives"
+        )
+        for s, name in zip((*drives, *seen), names, strict=True)
+    ]
+    for s, name in zip(seen, names[len(drives) :], strict=True):
         if view.run is not None and s.trace in view.run.traces:
-            trace = view.run.traces[s.trace]
-            found.append(_signal(view, f"/{name}/simulated", view.run.t, trace.y, trace.unit, 0.0))
+            trace, t = view.run.traces[s.trace], view.run.t
+            simulated = f"/{name}/simulated"
+            found.append(_signal(view, simulated, t, trace.y[:, None], trace.unit, 0.0))
     return found
 
 
 def _names(quantities: list[str]) -> list[str]:
-    """ "force.plate" is "force" when no other force is measured, else "force/plate"."""
+    """ "force.plate" is "force" when nothing else is a force, else "force/plate"."""
     first = [q.split(".")[0] for q in quantities]
     return [
         f if first.count(f) == 1 else q.replace(".", "/")
@@ -36,14 +45,11 @@ def _names(quantities: list[str]) -> list[str]:
 
 
 def _signal(view: View, topic: str, t: Floats, y: Floats, unit: str, sd: float) -> Track:
-    topic, frame = view.prefix + topic, view.registered.stage.frame
     every = one_in(len(t), _SAMPLES // view.coarse)
-    ns, kept = view.ns(t[::every], topic), y[::every]
-
-    def message(i: int) -> Json:
-        return signal_message(int(ns[i]), frame, unit, kept[i : i + 1], sd)
-
-    return Track(topic, SIGNAL, ns, message, thinned(every, len(t), "samples"))
+    kept, frame, note = y[::every], view.drive_frame, thinned(every, len(t), "samples")
+    return view.track(
+        topic, SIGNAL, t[::every], lambda ns, i: signal_message(ns, frame, unit, kept[i], sd), note
+    )
 
 
 def images(view: View) -> list[Track]:
@@ -51,28 +57,25 @@ def images(view: View) -> list[Track]:
     streams = view.recording.frames
     several = len(streams) > 1
     return [
-        _images(view, f"{view.prefix}/image/{topic.strip('/')}/measured", frames)
-        if several
-        else _images(view, f"{view.prefix}/image/measured", frames)
-        for topic, frames in streams.items()
+        _images(view, f"/image/{topic.strip('/')}/measured" if several else "/image/measured", f)
+        for topic, f in streams.items()
     ]
 
 
 def _images(view: View, topic: str, frames: Frames) -> Track:
     size = max(1, len(encode_png(frames.images[0])) * 4 // 3)  # base64
     every = one_in(len(frames.t), _IMAGE_BYTES // view.coarse // size)
-    at_loads = {int(np.abs(frames.t - hold.t).argmin()) for hold in view.registered.holds}
+    at_loads = {int(np.abs(frames.t - hold.t).argmin()) for hold in holds(view.registered)}
     kept = sorted({*range(0, len(frames.t), every), *at_loads})
-    ns = view.ns(frames.t[kept], topic)
-
-    def message(i: int) -> Json:
-        return image_message(int(ns[i]), frames.frame, frames.images[kept[i]])
-
     scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
-    calibration = (CALIBRATION + topic, {key: repr(scale) for key, scale in scales})
-    records = (*pose_records(topic, frames.pose), calibration)
-    note = thinned(every, len(frames.t), "images, and those at the loads")
-    return Track(topic, IMAGE, ns, message, note, records)
+    named = view.prefix + topic
+    calibration = (CALIBRATION + named, {key: repr(scale) for key, scale in scales})
+    return view.track(
+        topic, IMAGE, frames.t[kept],
+        lambda ns, i: image_message(ns, frames.frame, frames.images[kept[i]]),
+        thinned(every, len(frames.t), "images, and those at the loads"),
+        (*pose_records(named, frames.pose), calibration),
+    )  # fmt: skip
 
 
 def one_in(count: int, most: int) -> int:

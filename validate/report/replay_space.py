@@ -4,8 +4,9 @@ Numbers (`validate.Contour`, `validate.Markers`) are those of the comparison, at
 and at the loads; `.../scene` topics are to look at and add interpolated instants.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import matplotlib as mpl
@@ -14,15 +15,15 @@ import numpy as np
 from validate.arrays import Floats
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
 from validate.recording.types import Markers
-from validate.register.observe import MarkerObservation
-from validate.report import foxglove
+from validate.report import foxglove, observed
 from validate.report.foxglove import Rgba
 from validate.report.foxglove_schemas import SCENE, TRANSFORMS
 from validate.report.replay_signals import one_in, thinned
 from validate.report.replay_view import Track, View, load_of, pose_records
-from validate.report.skin import OUTSIDE, skins
+from validate.report.skin import OUTSIDE, SurfacePart, skins
 
 Who = Literal["measured", "simulated"]
+Times = Floats | list[float]
 COLOURS: dict[Who, Rgba] = {  # both seen on dark and on light
     "measured": Rgba(0.902, 0.624, 0.0),
     "simulated": Rgba(0.337, 0.706, 0.914),
@@ -36,12 +37,13 @@ _MARKER_FRAMES = 1500  # instants of measured markers, at most
 
 def transforms(view: View, others: Sequence[Track]) -> list[Track]:
     """Image and marker frames in the scene's, once, at the first time of the `others`."""
-    seen, children = view.registered, list[tuple[str, Floats]]()
-    if seen.outline is not None:
-        children.append((view.local("image"), seen.outline.pose))
+    children = list[tuple[str, Floats]]()
+    image, seen = observed.outline(view.registered), observed.markers(view.registered)
+    if image is not None:
+        children.append((view.local("image"), image.pose))
     recorded = _recorded(view)
-    if recorded is not None and seen.markers is not None:
-        children.append((view.local(recorded.frame), seen.markers.registration.transform.matrix))
+    if recorded is not None and seen is not None:
+        children.append((view.local(recorded.frame), seen.registration.transform.matrix))
     if not children:
         return []
     start = min(int(t.ns[0]) for t in others)
@@ -52,89 +54,105 @@ def transforms(view: View, others: Sequence[Track]) -> list[Track]:
     return [Track(f"{view.prefix}/tf", TRANSFORMS, np.array([start]), message)]
 
 
-# --- outlines ------------------------------------------------------------------------------------
+# --- outlines and markers ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What becomes four topics: `t` (n,) s and the measured samples, and how a run is sampled.
+
+    `number` makes the message of a sample from (ns, frame, sample, sd), `look` the entity that
+    shows it from (ns, frame, name, sample, colour).
+    """
+
+    name: str
+    schema: str
+    t: Floats
+    measured: Sequence[Floats]
+    simulated: Callable[[Floats], Floats]
+    sd: float
+    number: Callable[[int, str, Floats, float], Json]
+    look: Callable[..., Json]
+    frames: tuple[tuple[str, str], tuple[str, str]]  # measured, simulated; of numbers, to look at
+    note: str = ""
+    pose: Floats | None = None
 
 
 def outlines(view: View) -> list[Track]:
     """All measured outlines; the simulated ones at the loads; both as lines, simulated moving."""
-    seen = view.registered.outline
+    seen = observed.outline(view.registered)
     if seen is None:
         return []
-    words = ["as measured"] * len(seen.t)
-    found = [
-        _contours(view, "measured", seen.t, seen.outlines, seen.sd, seen.pose),
-        _lines(view, "measured", seen.t, seen.outlines, words),
-    ]
-    if view.held():
-        at, moving = view.held(), view.moving()
-        judged = [seen.simulated(i.u) for i in at]
-        drawn = [seen.simulated(i.u) for i in moving]
-        words = [load_of(i) for i in moving]
-        found += [
-            _contours(view, "simulated", [i.t for i in at], judged, 0.0, seen.pose),
-            _lines(view, "simulated", [i.t for i in moving], drawn, words),
-        ]
-    return found
-
-
-def _contours(
-    view: View, who: Who, t: Floats | list[float], points: Sequence[Floats], sd: float, pose: Floats
-) -> Track:
-    topic, frame = f"{view.prefix}/outline/{who}", view.frame
-    ns = view.ns(t, topic)
-
-    def message(i: int) -> Json:
-        return contour_message(int(ns[i]), frame, points[i], sd)
-
-    return Track(topic, CONTOUR, ns, message, records=pose_records(topic, pose))
-
-
-def _lines(
-    view: View, who: Who, t: Floats | list[float], points: Sequence[Floats], loads: Sequence[str]
-) -> Track:
-    topic, frame, name = f"{view.prefix}/outline/{who}/scene", view.local("image"), f"outline {who}"
-    ns = view.ns(t, topic)
-
-    def message(i: int) -> Json:
-        line = foxglove.outline(int(ns[i]), frame, name, points[i], COLOURS[who], load=loads[i])
-        return foxglove.scene_update(line)
-
-    return Track(topic, SCENE, ns, message)
-
-
-# --- markers -------------------------------------------------------------------------------------
+    frames = view.frame, view.local("image")
+    kind = _Kind(
+        "outline", CONTOUR, seen.t, seen.outlines, seen.simulated, seen.sd, contour_message,
+        foxglove.outline, (frames, frames), pose=seen.pose,
+    )  # fmt: skip
+    return _tracks(view, kind)
 
 
 def markers(view: View) -> list[Track]:
     """Measured markers in their own frame where it is known; the simulated ones in the scene's."""
-    seen = view.registered.markers
+    seen = observed.markers(view.registered)
     if seen is None:
         return []
-    recorded = _recorded(view)
-    frame = view.local(recorded.frame) if recorded else view.frame
-    x, words = (recorded.x if recorded else seen.x), ["as measured"] * len(seen.t)
+    recorded, names = _recorded(view), seen.names
+    own = view.local(recorded.frame) if recorded else view.frame
     every = one_in(len(seen.t), _MARKER_FRAMES // view.coarse)
-    t, x, words = seen.t[::every], x[::every], words[::every]
-    note = thinned(every, len(seen.t), "instants")
+    x = (recorded.x if recorded else seen.x)[::every]
+    size = _BALL * float(np.ptp(seen.rest, axis=0).max()) or _ONE_BALL
+    kind = _Kind(
+        "markers", MARKERS, seen.t[::every], list(x), seen.simulated, seen.sd,
+        lambda ns, frame, x, sd: markers_message(ns, frame, names, x, sd),
+        partial(foxglove.spheres, diameter=size), ((own, own), (view.frame, view.frame)),
+        thinned(every, len(seen.t), "instants"),
+    )  # fmt: skip
+    return _tracks(view, kind)
+
+
+def _tracks(view: View, kind: _Kind) -> list[Track]:
+    """Measured samples as numbers and to look at; simulated ones at the loads, and moving."""
+    (numbers, look), (simulated, moving) = kind.frames
+    words = ["as measured"] * len(kind.t)
     found = [
-        replace(_named(view, "measured", frame, t, x, seen), note=note),
-        replace(_balls(view, "measured", frame, t, x, seen, words), note=note),
+        _numbers(view, kind, "measured", numbers, kind.t, kind.measured),
+        _looks(view, kind, "measured", look, kind.t, kind.measured, words),
     ]
-    if view.held():
-        at, moving = view.held(), view.moving()
-        judged = np.array([seen.simulated(i.u) for i in at])
-        drawn = np.array([seen.simulated(i.u) for i in moving])
-        words = [load_of(i) for i in moving]
+    if at := view.held():
+        between = view.moving()
+        judged, drawn = ([kind.simulated(i.u) for i in instants] for instants in (at, between))
+        words = [load_of(i) for i in between]
         found += [
-            _named(view, "simulated", view.frame, [i.t for i in at], judged, seen),
-            _balls(view, "simulated", view.frame, [i.t for i in moving], drawn, seen, words),
+            _numbers(view, kind, "simulated", simulated, [i.t for i in at], judged),
+            _looks(view, kind, "simulated", moving, [i.t for i in between], drawn, words),
         ]
     return found
 
 
+def _numbers(view: View, kind: _Kind, who: Who, frame: str, t: Times, x: Sequence[Floats]) -> Track:
+    topic, known = f"/{kind.name}/{who}", who == "measured"
+    sd, note = (kind.sd, kind.note) if known else (0.0, "")
+    records = () if kind.pose is None else pose_records(view.prefix + topic, kind.pose)
+    return view.track(
+        topic, kind.schema, t, lambda ns, i: kind.number(ns, frame, x[i], sd), note, records
+    )
+
+
+def _looks(
+    view: View, kind: _Kind, who: Who, frame: str, t: Times, x: Sequence[Floats], loads: list[str]
+) -> Track:
+    name, colour = f"{kind.name} {who}", COLOURS[who]
+    note = kind.note if who == "measured" else ""
+
+    def message(ns: int, i: int) -> Json:
+        return foxglove.scene_update(kind.look(ns, frame, name, x[i], colour, load=loads[i]))
+
+    return view.track(f"/{kind.name}/{who}/scene", SCENE, t, message, note)
+
+
 def _recorded(view: View) -> Markers | None:
     """The markers as recorded, in their own frame; None when no shift and turn leads from it."""
-    seen = view.registered.markers
+    seen = observed.markers(view.registered)
     if seen is None or seen.registration.transform.s != 1.0:  # a transform of Foxglove has no scale
         return None
     for stream in view.recording.markers.values():
@@ -143,63 +161,26 @@ def _recorded(view: View) -> Markers | None:
     return None
 
 
-def _named(
-    view: View, who: Who, frame: str, t: Floats | list[float], x: Floats, seen: MarkerObservation
-) -> Track:
-    topic, sd = f"{view.prefix}/markers/{who}", seen.sd if who == "measured" else 0.0
-    ns = view.ns(t, topic)
-
-    def message(i: int) -> Json:
-        return markers_message(int(ns[i]), frame, seen.names, x[i], sd)
-
-    return Track(topic, MARKERS, ns, message)
-
-
-def _balls(
-    view: View,
-    who: Who,
-    frame: str,
-    t: Floats | list[float],
-    x: Floats,
-    seen: MarkerObservation,
-    loads: Sequence[str],
-) -> Track:
-    topic, name = f"{view.prefix}/markers/{who}/scene", f"markers {who}"
-    ns, size = view.ns(t, topic), _BALL * float(np.ptp(seen.rest, axis=0).max()) or _ONE_BALL
-
-    def message(i: int) -> Json:
-        colour, load = COLOURS[who], loads[i]
-        return foxglove.scene_update(
-            foxglove.spheres(int(ns[i]), frame, name, x[i], size, colour, load=load)
-        )
-
-    return Track(topic, SCENE, ns, message)
-
-
 # --- the simulated surface -----------------------------------------------------------------------
 
 
 def surface(view: View) -> list[Track]:
     """Outside (see-through) and cavity walls, deformed; none without a run or of a 2-D mesh."""
     moving = view.moving()
-    if view.method is None or not moving:
+    parts = skins(view.method.scene, _TRIANGLES // view.coarse) if view.method and moving else ()
+    if view.method is None or not parts:
         return []
-    scene, topic = view.method.scene, f"{view.prefix}/surface/simulated"
-    parts = skins(scene, _TRIANGLES // view.coarse)
-    if not parts:
-        return []
-    ns, frame = view.ns([i.t for i in moving], topic), view.frame
-    top = max(float(np.linalg.norm(i.u, axis=1).max()) for i in moving)
+    scene, top = view.method.scene, max(float(np.linalg.norm(i.u, axis=1).max()) for i in moving)
     notes = {"colour": f"displacement, viridis from 0 to {1e3 * top:.3g} mm"}
     if scene.copies > 1:
         notes["part"] = f"one of {scene.copies} symmetric parts"
 
-    def message(i: int) -> Json:
+    def message(ns: int, i: int) -> Json:
         u, said = moving[i].u, {"load": load_of(moving[i])} | notes
         return foxglove.scene_update(
             *(
                 foxglove.surface(
-                    int(ns[i]), frame, f"surface {part.name}",
+                    ns, view.frame, f"surface {part.name}",
                     scene.mesh.nodes[part.nodes] + u[part.nodes], part.triangles,
                     _shades(u[part.nodes], top, part.name), **said,
                 )
@@ -207,11 +188,16 @@ def surface(view: View) -> list[Track]:
             )
         )  # fmt: skip
 
+    note = ", ".join(_left_out(parts, len(moving), len(view.held())))
+    return [view.track("/surface/simulated", SCENE, [i.t for i in moving], message, note)]
+
+
+def _left_out(parts: Sequence[SurfacePart], shown: int, frames: int) -> Iterator[str]:
     drawn, whole = sum(len(p.triangles) for p in parts), sum(p.whole for p in parts)
-    notes_of = [f"{drawn} of {whole} triangles"] if drawn < whole else []
-    if len(moving) < len(view.held()):
-        notes_of.append(f"{len(moving)} of {len(view.held())} output frames")
-    return [Track(topic, SCENE, ns, message, ", ".join(notes_of))]
+    if drawn < whole:
+        yield f"{drawn} of {whole} triangles"
+    if shown < frames:
+        yield f"{shown} of {frames} output frames"
 
 
 def _shades(u: Floats, top: float, part: str) -> Floats:

@@ -11,9 +11,10 @@ from validate.recording.mcap.metadata import POSE, POSE_KEY
 from validate.recording.mcap.schemas import Json
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
-from validate.register.observe import Registered
-from validate.report.loads import HOW, Instant, at_holds, at_times, held
-from validate.report.numbers import significant, spaced
+from validate.register.registered import Registered
+from validate.report.loads import HOW, Instant, at_times, held
+from validate.report.numbers import fixed_with_unit, significant, spaced
+from validate.report.observed import drive, holds, outline
 from validate.solve.types import Run
 
 Records = tuple[tuple[str, dict[str, str]], ...]
@@ -24,7 +25,8 @@ _INSTANTS = 60  # instants of what is only looked at: interpolated, or frames of
 class Track:
     """A topic: its schema's name, times ns (n,) int64, the message of number i.
 
-    `note` says what was thinned; `records` are the metadata records that belong to it.
+    `note` says what was thinned; `records` are the metadata records that belong to it; a run is
+    `given` what drives it, and predicts the others.
     """
 
     topic: str
@@ -33,6 +35,7 @@ class Track:
     message: Callable[[int], Json]
     note: str = ""
     records: Records = ()
+    given: bool = False
 
 
 @dataclass(frozen=True)
@@ -51,22 +54,37 @@ class View:
 
     @property
     def frame(self) -> str:
-        """The scene's frame: the one that images are posed in, else the stage's."""
-        seen = self.registered.outline
+        """The scene's frame: the one that images are posed in, else the drive's."""
+        seen = outline(self.registered)
         if seen is not None:
             for contours in self.recording.contours.values():
                 if np.array_equal(contours.t, seen.t):
                     return contours.frame
-        return self.registered.stage.frame
+        return self.drive_frame
+
+    @property
+    def drive_frame(self) -> str:
+        """The frame of the first signal that drives."""
+        return self.recording.signals[drive(self.registered).name].frame
 
     def local(self, name: str) -> str:
         """The name of a frame of this recording only, never the scene's."""
         named = f"{self.prefix[1:]}/{name}" if self.prefix else name
         return f"{named} as recorded" if named == self.frame else named
 
-    def ns(self, t: Floats | Sequence[float], topic: str) -> Ints:
-        """Times (n,) s on the recording's clock, int64 ns."""
-        return stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), topic)
+    def track(
+        self,
+        topic: str,
+        schema: str,
+        t: Floats | Sequence[float],
+        message: Callable[[int, int], Json],
+        note: str = "",
+        records: Records = (),
+    ) -> Track:
+        """A topic (its prefix added) at times (n,) s: message(ns, i) is that of number i."""
+        named = self.prefix + topic
+        ns = stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), named)
+        return Track(named, schema, ns, lambda i: message(int(ns[i]), i), note, records)
 
     def held(self) -> tuple[Instant, ...]:
         """What the run computed, at the loads or over time; empty without a run."""
@@ -86,7 +104,7 @@ class View:
 
 def over_time(view: View) -> bool:
     """The run's fields are output frames at their own times, not those at loads."""
-    return view.run is not None and not at_holds(view.registered, view.run)
+    return view.run is not None and not holds(view.registered)
 
 
 def load_of(instant: Instant) -> str:
@@ -95,7 +113,7 @@ def load_of(instant: Instant) -> str:
         return spaced(instant.hold.label)
     if instant.computed:
         return f"t = {significant(instant.t, 4)} s"
-    return f"{1e3 * instant.stage:.2f} mm, {HOW}"
+    return f"{fixed_with_unit(instant.drive, instant.unit, 2)}, {HOW}"
 
 
 def pose_records(topic: str, pose: Floats) -> Records:

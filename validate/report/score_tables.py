@@ -1,46 +1,71 @@
 """Tables of scores: methods side by side, every score by load, identified and printed figures."""
 
 import re
+from collections.abc import Iterable, Mapping
 
+from validate.compare.exhibit import Emphasis, Entry, Exhibit, NumberTable, TableCell
 from validate.compare.published import Published
+from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
-from validate.report.numbers import at_load, duration, rate, shown_unit, spaced, text
+from validate.report.numbers import at_load, duration, rate, shown_unit, spaced
 from validate.report.observed import timed
-from validate.report.page import Cell, Items, Mark, Section, Table, cells, section
+from validate.report.tables import unit_cell
 
 _COSTS = ("setup", "step.p50", "step.p99", "updates.max")
 _COLUMNS = 12  # errors side by side that a page shows without scrolling far
 _OVER_TIME = re.compile(r"^[^@]*\.n?rmse$").match
-_MARKS: dict[str, Mark] = {
+_PRINTED: dict[str, Emphasis] = {
     "reproduced": "good",
     "not reproduced": "bad",
     "not reproducible as printed": "open",
     "not comparable": "open",
 }
+_SCORE = ("name", "value", "unit", "count", "against", "definition")
+_RESIDUAL = ("method", "quantity", "load", "point", "a", "b", "c", "length", "sd", "unit")
+_PUBLISHED = ("figure", "ours", "theirs", "tolerance", "unit", "verdict", "reason", "source")
+Found = Mapping[str, Mapping[str, Score]]  # by row, then by column
 
 
-def side_by_side(result: Result) -> Section | None:
+# --- methods side by side ------------------------------------------------------------------------
+
+
+def methods(result: Result) -> Exhibit:
     """How each method ended, what it cost and its errors, at the last load or over time."""
-    cost = Table(
+    cost = NumberTable(
+        "",
         "How each method ended and what it cost. Rate: 1 over the median time of one step; set-up: "
         "what is done once (mesh, assembly, factorisation). Times are of this machine.",
         ("method", "name", "ended", "rate", "p99 of a step", "updates", "set-up"),
         tuple(_cost_row(m) for m in result.methods),
-        words=(0, 1, 2),
     )
-    return section("methods", "Models side by side", cost, _at_last(result), _tracked(result))
+    tables = (cost, *_at_last(result), *_tracked(result))
+    return Exhibit("methods", "Models side by side", (), tables)
 
 
-def _at_last(result: Result) -> Table | None:
+def _cost_row(method: MethodResult) -> tuple[Entry | TableCell, ...]:
+    times, setup = timed(method.run), method.run.setup_s
+    steps, slow = (times.rate_hz, times.p99) if times else (None, None)
+    updates = next((s.value for s in method.scores if s.name == "updates.max"), None)
+    end = next((r.outcome for r in method.runs if not r.finished), method.run.outcome)
+    ended = "finished" if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
+    return (
+        TableCell(method.label + (" (checked)" if method.accepted else ""), emphasis="strong"),
+        method.name,
+        ended,
+        TableCell(steps, text=rate(steps)),
+        TableCell(slow, text=duration(slow)),
+        TableCell(updates, "1"),
+        TableCell(setup, text=duration(setup)),
+    )
+
+
+def _at_last(result: Result) -> tuple[NumberTable, ...]:
     """Rms and scalar errors against the recording at the last load of any method."""
     found: dict[str, str] = {}
     for method in result.methods:
         last = {r.quantity: r for r in method.residuals.values()}
-        for residual in last.values():
-            scalar = residual.values.shape == (1, 1)
-            statistic = "" if scalar else ".rms"
-            found[f"{residual.quantity}{statistic}@{residual.load}"] = residual.unit
+        found |= {_error_name(r): r.unit for r in last.values()}
     loads = dict.fromkeys(name.partition("@")[2] for name in found)
     held = ", ".join(spaced(load) for load in loads if load != "all")
     where = [f"at the last load ({held})"] if held else []
@@ -48,7 +73,12 @@ def _at_last(result: Result) -> Table | None:
     return _errors(result, found, f"against the recording {' and '.join(where)}")
 
 
-def _tracked(result: Result) -> Table | None:
+def _error_name(residual: Residual) -> str:
+    statistic = "" if residual.values.shape == (1, 1) else ".rms"
+    return f"{residual.quantity}{statistic}@{residual.load}"
+
+
+def _tracked(result: Result) -> tuple[NumberTable, ...]:
     """Errors over time at named points against what their scores name."""
     scores = [s for m in result.methods for s in m.scores if _OVER_TIME(s.name)]
     against = " and ".join(dict.fromkeys(s.against for s in scores))
@@ -56,107 +86,75 @@ def _tracked(result: Result) -> Table | None:
     return _errors(result, names, f"against the {against} {at_load('all')}")
 
 
-def _errors(result: Result, found: dict[str, str], where: str) -> Table | None:
-    """One row per method, one column per score of that name and SI unit; None without any."""
+def _errors(result: Result, found: dict[str, str], where: str) -> tuple[NumberTable, ...]:
+    """One row per method, one column per score of that name and SI unit; none without any."""
     if not found:
-        return None
-    shown = list(found.items())[:_COLUMNS]
-    more = f" {len(found) - _COLUMNS} more stand under All scores." if len(found) > _COLUMNS else ""
-    heads = (f"{name.partition('@')[0]} / {shown_unit(unit)}" for name, unit in shown)
-    return Table(
-        f"Errors {where}.{more}",
-        ("method", *(h.removesuffix(" / ") for h in heads)),
-        tuple(_error_row(m, [name for name, _ in shown]) for m in result.methods),
-    )
+        return ()
+    shown = list(found)[:_COLUMNS]
+    left = len(found) - _COLUMNS
+    more = f" {left} more stand under All scores." if left > 0 else ""
+    heads = (f"{n.partition('@')[0]} / {shown_unit(found[n])}".removesuffix(" / ") for n in shown)
+    rows = tuple(_error_row(m, shown) for m in result.methods)
+    return (NumberTable("", f"Errors {where}.{more}", ("method", *heads), rows),)
 
 
-def _cost_row(method: MethodResult) -> tuple[Cell, ...]:
-    times = timed(method.run)
-    updates = next((s.value for s in method.scores if s.name == "updates.max"), None)
-    end = next((r.outcome for r in method.runs if not r.finished), method.run.outcome)
-    ended = "finished" if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
-    return (
-        Cell(method.label + (" (checked)" if method.accepted else ""), "strong"),
-        *cells(
-            method.name,
-            ended,
-            rate(times.rate_hz if times else None),
-            duration(times.p99 if times else None),
-            text(updates),
-            duration(method.run.setup_s),
-        ),
-    )
-
-
-def _error_row(method: MethodResult, names: list[str]) -> tuple[Cell, ...]:
+def _error_row(method: MethodResult, names: list[str]) -> tuple[TableCell | None, ...]:
     values = {s.name: s for s in method.scores}
-    errors = [values.get(name) for name in names]
-    return Cell(method.label, "strong"), *(Cell(_value(e)) for e in errors)
+    return TableCell(method.label, emphasis="strong"), *(_value(values.get(n)) for n in names)
 
 
-def scores(result: Result) -> Section | None:
+def _value(score: Score | None) -> TableCell | None:
+    return TableCell(float(score.value), score.unit) if score else None
+
+
+# --- every score ---------------------------------------------------------------------------------
+
+
+def scores(result: Result) -> Exhibit:
     """Every score of every method, rows quantity and statistic, columns loads; those over time."""
-    return section(
-        "scores",
-        "All scores",
-        _over_time(result),
-        *(t for m in result.methods if (t := _scores_of(m)) is not None),
-    )
+    tables = (*_over_time(result), *(t for m in result.methods for t in _of_method(m)))
+    return Exhibit("scores", "All scores", (), tables, data=(_scores(result), _residuals(result)))
 
 
-def _over_time(result: Result) -> Table | None:
+def _over_time(result: Result) -> tuple[NumberTable, ...]:
     """Scores without a load, one column per method; what a method cost stands elsewhere."""
     by_name: dict[str, dict[str, Score]] = {}
     for method in result.methods:
         for score in method.scores:
             if "@" not in score.name and score.name not in _COSTS:
                 by_name.setdefault(score.name, {})[method.name] = score
-    if not by_name:
-        return None
-    rows = tuple(
-        (
-            *cells(name, shown_unit(next(iter(found.values())).unit)),
-            *(Cell(_value(found.get(m.name))) for m in result.methods),
-            Cell(", ".join(dict.fromkeys(str(s.count) for s in found.values()))),
-        )
-        for name, found in by_name.items()
-    )
-    return Table(
-        "Over the whole run, every method.",
-        ("score", "unit", *(m.name for m in result.methods), "values"),
-        rows,
-        words=(0, 1),
-    )
+    columns = {m.name: m.name for m in result.methods}
+    return _by_column("Over the whole run, every method.", "score", columns, by_name)
 
 
-def _scores_of(method: MethodResult) -> Table | None:
+def _of_method(method: MethodResult) -> tuple[NumberTable, ...]:
     by_name: dict[str, dict[str, Score]] = {}
-    for score in method.scores:
+    for score in sorted(method.scores, key=lambda s: _group(s.name.partition("@")[0])):
         name, at, load = score.name.partition("@")
         if at:
             by_name.setdefault(name, {})[load] = score
-    if not by_name:
-        return None
-    loads = list(dict.fromkeys(load for found in by_name.values() for load in found))
+    loads = dict.fromkeys(s.name.partition("@")[2] for s in method.scores if "@" in s.name)
+    columns = {load: spaced(load) for load in loads}
+    title = f"{method.label} ({method.name})"
+    return _by_column(title, "quantity.statistic", columns, by_name, folded=not method.accepted)
+
+
+def _by_column(
+    title: str, head: str, columns: Mapping[str, str], found: Found, *, folded: bool = False
+) -> tuple[NumberTable, ...]:
+    """One row a name with its unit, its values under the columns' texts, and counts."""
     rows = tuple(
-        (
-            *cells(name, shown_unit(next(iter(found.values())).unit)),
-            *(Cell(_value(found.get(load))) for load in loads),
-            Cell(", ".join(dict.fromkeys(str(s.count) for s in found.values()))),
-        )
-        for name, found in sorted(by_name.items(), key=lambda item: _group(item[0]))
-    )
-    return Table(
-        f"{method.label} ({method.name})",
-        ("quantity.statistic", "unit", *(spaced(load) for load in loads), "values"),
-        rows,
-        words=(0, 1),
-        folded=not method.accepted,
-    )
+        (name, shown_unit(next(iter(own.values())).unit), *(_value(own.get(c)) for c in columns),
+         _counts(own.values()))
+        for name, own in found.items()
+    )  # fmt: skip
+    heads = (head, "unit", *columns.values(), "values")
+    return (NumberTable("", title, heads, rows, folded=folded),) if rows else ()
 
 
-def _value(score: Score | None) -> str:
-    return text(score.value, score.unit) if score else "–"
+def _counts(found: Iterable[Score]) -> TableCell:
+    counts = list(dict.fromkeys(s.count for s in found))
+    return TableCell(counts[0], text=", ".join(map(str, counts)))
 
 
 def _group(name: str) -> str:
@@ -164,47 +162,53 @@ def _group(name: str) -> str:
     return re.sub(r"\.(rms|max|mean|bias|simulated|measured)$", "", name)
 
 
-def identified(result: Result) -> Section | None:
-    """What was identified from the recordings, and the experiment's notes."""
+def _scores(result: Result) -> NumberTable:
+    rows = tuple((m.name, *_score_row(s)) for m in result.methods for s in m.scores)
+    return NumberTable("scores", "Scores", ("method", "score", *_SCORE[1:]), rows)
+
+
+def _score_row(s: Score) -> tuple[Entry | TableCell, ...]:
+    return s.name, TableCell(s.value, s.unit), unit_cell(s.unit), s.count, s.against, s.definition
+
+
+def _residuals(result: Result) -> NumberTable:
+    """Every compared point: its components and their length."""
     rows = tuple(
-        (
-            *cells(s.name, text(s.value, s.unit), shown_unit(s.unit), str(s.count)),
-            *cells(s.against, s.definition),
-        )
-        for s in result.identified
-    )
-    table = Table(
-        "Identified from the recordings.",
-        ("name", "value", "unit", "values", "against", "definition"),
-        rows,
-        words=(0, 2, 4, 5),
-    )
-    return section(
-        "identified",
-        "Identified parameters and notes",
-        table if rows else None,
-        Items(result.notes) if result.notes else None,
-    )
+        (m.name, r.quantity, r.load, i, *(*point, None, None)[:3], sum(v * v for v in point) ** 0.5,
+         TableCell(r.sd), r.unit)
+        for m in result.methods
+        for r in m.residuals.values()
+        for i, point in enumerate(r.values.tolist())
+    )  # fmt: skip
+    return NumberTable("residuals", "Residuals", _RESIDUAL, rows)
 
 
-def published(result: Result) -> Section | None:
+# --- identified and printed figures --------------------------------------------------------------
+
+
+def identified(result: Result) -> Exhibit:
+    """What was identified from the recordings, and the experiment's notes."""
+    rows = tuple(_score_row(s) for s in result.identified)
+    table = NumberTable("identified", "Identified from the recordings.", _SCORE, rows)
+    title = "Identified parameters and notes"
+    return Exhibit("identified", title, result.notes, (table,) if rows else ())
+
+
+def published(result: Result) -> Exhibit | None:
     """Printed figures beside ours; None without any (a quick run has none)."""
     if not result.published:
         return None
-    table = Table(
-        f"Figures printed in {result.source}, beside ours.",
-        ("figure", "ours", "theirs", "tolerance", "unit", "verdict", "reason", "place"),
-        tuple(_printed(p) for p in result.published),
-        words=(0, 4, 5, 6, 7),
-    )
-    return section("published", "Published figures", table)
+    title = f"Figures printed in {result.source}, beside ours."
+    table = NumberTable("published", title, _PUBLISHED, tuple(map(_printed, result.published)))
+    return Exhibit("published", "Published figures", (), (table,))
 
 
-def _printed(figure: Published) -> tuple[Cell, ...]:
-    values = (text(v, figure.unit) for v in (figure.ours, figure.theirs, figure.tolerance))
+def _printed(figure: Published) -> tuple[Entry | TableCell, ...]:
     return (
-        Cell(figure.name),
-        *cells(*values, shown_unit(figure.unit)),
-        Cell(figure.verdict, _MARKS[figure.verdict]),
-        *cells(figure.reason, figure.source),
+        figure.name,
+        *(TableCell(v, figure.unit) for v in (figure.ours, figure.theirs, figure.tolerance)),
+        unit_cell(figure.unit),
+        TableCell(figure.verdict, emphasis=_PRINTED[figure.verdict]),
+        figure.reason,
+        figure.source,
     )

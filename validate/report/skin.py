@@ -18,7 +18,7 @@ _FEWEST = 8  # triangles that a thinned part keeps, to remain a body
 
 
 @dataclass(frozen=True)
-class Skin:
+class SurfacePart:
     """One part of a surface: `nodes` (v,) of the mesh, triangles (t, 3) between them.
 
     `whole` counts the triangles before thinning.
@@ -30,7 +30,7 @@ class Skin:
     whole: int
 
 
-def skins(scene: Scene, most: int) -> tuple[Skin, ...]:
+def skins(scene: Scene, most: int) -> tuple[SurfacePart, ...]:
     """The outside and every cavity wall, about `most` triangles in all; none of a 2-D mesh."""
     mesh = scene.mesh
     if mesh.dimension != 3:
@@ -49,10 +49,10 @@ def _without(facets: Ints, others: list[Ints]) -> Ints:
     return np.asarray(facets[np.array(kept)])
 
 
-def _skin(mesh: Mesh, name: str, triangles: Ints, share: float) -> Skin:
+def _skin(mesh: Mesh, name: str, triangles: Ints, share: float) -> SurfacePart:
     drawn = triangles if share >= 1 else _thinned(mesh.nodes, triangles, share)
     nodes, local = np.unique(drawn, return_inverse=True)
-    return Skin(name, nodes, local.reshape(-1, 3), len(triangles))
+    return SurfacePart(name, nodes, local.reshape(-1, 3), len(triangles))
 
 
 def _thinned(nodes: Floats, triangles: Ints, share: float) -> Ints:

@@ -7,7 +7,6 @@ only, charts thinned, both rounded to seven digits; runs/ and tables/ hold every
 import json
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -17,19 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, rms
-from validate.compare.effects import Effect
 from validate.compare.published import Published
+from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Check
-from validate.recording.types import Source
-from validate.report.environment import environment, file_name, without_folder
+from validate.report.environment import environment, file_name
 from validate.report.observed import timed
+from validate.report.plain import Json, members, recorded
 from validate.report.store_exhibits import exhibits, rounded
-from validate.solve.types import Run, StepTimes
+from validate.solve.types import Run
 
 SCHEMA_VERSION = 1
-Json = dict[str, Any]
 _STEPS = 1000  # a run over time with more of them gives its traces at the output frames only
 _FRAMES = 100  # fewer frames than these are loads, which traces are not thinned to
 _VALUES = 60_000  # of all traces together: about 800 kB
@@ -67,18 +65,15 @@ def document(result: Result, created: str) -> Json:
         "twin_notice": result.twin_notice,
         "seed": result.seed,
         "notes": list(result.notes),
-        "inputs": [_input(r.source) for r in result.recordings],
+        "inputs": [members(r.source) | {"path": file_name(r.source.path)}
+                   for r in result.recordings],
         "parameters": {
-            p.path: {"value": _plain(p.default), "unit": p.unit} for p in result.parameters
+            p.path: {"value": recorded(p.default), "unit": p.unit} for p in result.parameters
         },
         "environment": environment(),
         "methods": [_method(m, result, share) for m in result.methods],
-        "effects": [_effect(e) for e in result.effects],
-        "rest": [
-            {"name": r.name, "unit": r.unit, "sd": _finite(r.sd), "count": r.count,
-             "rms": _finite(rms(r.values))}
-            for r in result.rest
-        ],
+        "effects": recorded(result.effects),
+        "rest": [_rest(r) for r in result.rest],
         "identified": [_score(s) for s in result.identified],
         "published": [_published(p) for p in result.published],
         "uncertain_inputs": list(result.inputs),
@@ -115,23 +110,18 @@ def write_runs(result: Result, folder: Path) -> None:
             np.savez_compressed(out, allow_pickle=False, **arrays)
 
 
-def _input(source: Source) -> Json:
-    return {"path": file_name(source.path), "sha256": source.sha256, "bytes": source.bytes,
-            "integrity": source.integrity}  # fmt: skip
-
-
 def _method(method: MethodResult, result: Result, share: _Share) -> Json:
-    first = method.run
+    first, times = method.run, timed(method.run)
     end = next((r.outcome for r in method.runs if not r.finished), first.outcome)
     names = [r.name for r in result.recordings]
     return {
         "name": method.name,
         "label": method.label,
         "accepted": method.accepted,
-        "outcome": {"state": end.state, "step": end.step, "why": end.why},
-        "setup_s": _finite(first.setup_s),
-        "step_s": _times(timed(first)),
-        "rate_hz": _finite(times.rate_hz) if (times := timed(first)) else None,
+        "outcome": recorded(end),
+        "setup_s": recorded(first.setup_s),
+        "step_s": recorded(times),
+        "rate_hz": recorded(times.rate_hz) if times else None,
         **_traced(first, share),
         "further_runs": [
             {"recording": name, "outcome": run.outcome.state, **_traced(run, share)}
@@ -143,12 +133,6 @@ def _method(method: MethodResult, result: Result, share: _Share) -> Json:
             _published(p) for p in result.published if p.name.startswith(f"{method.name}: ")
         ],
     }  # fmt: skip
-
-
-def _times(times: StepTimes | None) -> Json | None:
-    if times is None:
-        return None
-    return {"p50": times.p50, "p99": times.p99, "max": times.max, "n": times.n}
 
 
 def _traced(run: Run, share: _Share) -> Json:
@@ -175,74 +159,22 @@ def _share(result: Result) -> _Share:
 
 
 def _score(score: Score) -> Json:
-    return {
-        "name": score.name,
-        **_number("value", score.value),
-        "unit": score.unit,
-        "count": score.count,
-        "against": score.against,
-        "definition": score.definition,
-    }
+    why = {} if math.isfinite(score.value) else {"why": f"not finite ({score.value})"}
+    return members(score) | why
 
 
 def _check(check: Check) -> Json:
-    compared = check.count > 0
-    parts = ("u_val", "u_D", "u_num", "u_input")
-    return {
-        "name": check.name,
-        "value": _finite(check.value) if compared else None,
-        "limit": _finite(check.limit),
-        **{p: _finite(getattr(check, p)) if compared else None for p in parts},
-        "unit": check.unit,
-        "count": check.count,
-        "verdict": check.verdict,
-        "why": check.why,
-    }
+    """A check that compared nothing has no error and no uncertainty."""
+    parts = ("value", "u_val", "u_D", "u_num", "u_input")
+    return members(check) | ({} if check.count else dict.fromkeys(parts))
 
 
 def _published(figure: Published) -> Json:
-    return {
-        "name": figure.name,
-        "ours": _finite(figure.ours),
-        "theirs": _finite(figure.theirs),
-        "tolerance": _finite(figure.tolerance),
-        "unit": figure.unit,
-        "verdict": figure.verdict,
-        "reason": figure.reason,
-        "source": figure.source,
-        "expected": _finite(figure.expected),
-        "drift": _finite(figure.drift),
-        "fault": figure.fault,
-    }
+    return members(figure) | {"fault": figure.fault}
 
 
-def _effect(effect: Effect) -> Json:
+def _rest(r: Residual) -> Json:
     return {
-        "name": effect.name,
-        "doc": effect.doc,
-        "changes": [
-            {"name": c.name, "rms": _finite(c.rms), "max": _finite(c.max), "unit": c.unit,
-             "separation": _finite(c.separation)}
-            for c in effect.changes
-        ],
-        "seen_by": list(effect.seen_by),
-        "would_see": list(effect.would_see),
+        "name": r.name, "unit": r.unit, "sd": recorded(r.sd), "count": r.count,
+        "rms": recorded(rms(r.values)),
     }  # fmt: skip
-
-
-def _finite(value: float | None) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
-
-
-def _number(key: str, value: float) -> Mapping[str, Any]:
-    if math.isfinite(value):
-        return {key: float(value)}
-    return {key: None, "why": f"not finite ({value})"}
-
-
-def _plain(value: object) -> Any:
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, float):
-        return _finite(value)
-    return without_folder(value)

@@ -1,14 +1,13 @@
 """The exhibits in results.json: tables whole, charts thinned, maps by their extremes."""
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series
+from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series, plain
+from validate.report.plain import Json, members, recorded
 
-Json = dict[str, Any]
 _POINTS = 2000  # of one series, at most
 _ALL_POINTS = 30_000  # of all series together: about 600 kB
 _FEWEST = 20  # points that a series keeps however many there are
@@ -33,23 +32,12 @@ def exhibits(found: tuple[Exhibit, ...]) -> list[Json]:
 
 
 def _table(table: NumberTable) -> Json:
-    return {
-        "name": table.name,
-        "title": table.title,
-        "headings": list(table.headings),
-        "rows": [list(row) for row in table.rows],
-        "note": table.note,
-    }
+    rows = [[recorded(plain(entry)) for entry in row] for row in table.rows]
+    return members(table, "name", "title", "headings", "note") | {"rows": rows}
 
 
 def _chart(chart: Chart, most: int) -> Json:
-    return {
-        "name": chart.name,
-        "title": chart.title,
-        "x": chart.x,
-        "y": chart.y,
-        "log": chart.log,
-        "caption": chart.caption,
+    return members(chart, "name", "title", "x", "y", "log", "caption") | {
         "levels": [{"name": name, "y": float(y)} for name, y in chart.levels],
         "series": [_series(s, most) for s in chart.series],
     }
@@ -64,14 +52,9 @@ def _series(series: Series, most: int) -> Json:
 
 
 def _map(shown: NodeMap) -> Json:
-    return {
-        "name": shown.name,
-        "title": shown.title,
-        "unit": shown.unit,
-        "nodes": len(shown.values),
-        "min": float(shown.values.min()),
-        "max": float(shown.values.max()),
-    }
+    v = shown.values
+    ends = {"nodes": len(v), "min": float(v.min()), "max": float(v.max())}
+    return members(shown, "name", "title", "unit") | ends
 
 
 def thinned(y: Floats, most: int) -> Ints:

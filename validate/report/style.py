@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from validate.compare.exhibit import Pixels
 from validate.compare.result import Result
-from validate.report.page import Pixels
 
 MEASURED = "#000000"
 ACCEPTED = "#0072B2"
@@ -39,7 +39,7 @@ _DPI = 130
 
 
 @dataclass(frozen=True)
-class Look:
+class Style:
     """The colour, dash and point of a method, the same in every figure of a report."""
 
     colour: str
@@ -48,26 +48,26 @@ class Look:
     width: float
 
 
-def looks(result: Result) -> dict[str, Look]:
+def looks(result: Result) -> dict[str, Style]:
     """By method: accepted ones blue and solid, rivals in the other colours and dashed."""
-    found: dict[str, Look] = {}
+    found: dict[str, Style] = {}
     rivals = 0
     for method in result.methods:
         if method.accepted and not any(m.colour == ACCEPTED for m in found.values()):
-            found[method.name] = Look(ACCEPTED, "-", "o", 1.8)
+            found[method.name] = Style(ACCEPTED, "-", "o", 1.8)
             continue
         i = rivals % len(_RIVALS)
         other = (rivals + rivals // len(_RIVALS)) % len(_DASHES)  # a second round looks different
-        found[method.name] = Look(_RIVALS[i], _DASHES[other], _POINTS[other], 1.2)
+        found[method.name] = Style(_RIVALS[i], _DASHES[other], _POINTS[other], 1.2)
         rivals += 1
     return found
 
 
-def free_look(i: int, colour: str) -> Look:
+def free_look(i: int, colour: str) -> Style:
     """The look of line i that is no method: the first solid, the others dashed in turn."""
     if i == 0:
-        return Look(colour, "-", "o", 1.5)
-    return Look(colour, _DASHES[(i - 1) % len(_DASHES)], _POINTS[(i - 1) % len(_POINTS)], 1.4)
+        return Style(colour, "-", "o", 1.5)
+    return Style(colour, _DASHES[(i - 1) % len(_DASHES)], _POINTS[(i - 1) % len(_POINTS)], 1.4)
 
 
 def film(

@@ -5,9 +5,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from validate.catalogue import experiment_files
 from validate.compare.exhibit import Exhibit
 from validate.compare.result import Result
-from validate.replay.find import experiment_files
 from validate.report.study_page import Row as TableRow
 from validate.report.study_page import StudyPage, write_study_page
 from validate.study.choose import Choice, error_of

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import rms
-from validate.compare.exhibit import Entry, Exhibit, NumberTable
+from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
 from validate.papers.ekf_nfem.tables import locking_table, readings_table, steps_table
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
@@ -35,7 +35,7 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
     numbers = {
         "nodes": float(len(explicit.scene.mesh.nodes)),
         "cells": float(len(explicit.scene.mesh.cells)),
-        "locking": float(locked.rows[-1][1] or 0.0),
+        "locking": float(plain(locked.rows[-1][1]) or 0.0),
     }
     if share is not None:
         numbers["kinetic_share"] = share

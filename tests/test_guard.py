@@ -1,0 +1,153 @@
+"""The guard of results: what it reads of a report, what it calls equal, and how it ends."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from click.testing import CliRunner
+
+
+@pytest.fixture(scope="module")
+def guard(project_root: Path) -> ModuleType:
+    path = project_root / "benchmarks" / "guard.py"
+    spec = importlib.util.spec_from_file_location("guard", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["guard"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def score(name: str, value: float | None, unit: str = "m") -> dict[str, object]:
+    return {"name": name, "value": value, "unit": unit}
+
+
+def report(folder: Path, value: float = 1e-3) -> Path:
+    """A run with a score, two timings, a check, a figure; a study with a table of cells."""
+    check = {"name": "tip.rms@all", "value": 1e-4, "u_val": 2e-4, "limit": 1e-3, "unit": "m"}
+    figure = {"name": "nodes", "ours": 8.0, "theirs": 9.0, "tolerance": None, "unit": "1"}
+    timed = [score("step.p50", 1.0, "s"), score("updates.rate", 3.0, "Hz")]
+    method = {
+        "name": "fem",
+        "scores": [score("tip.rms@all", value), score("tip.bias@all", None), *timed],
+        "checks": [check],
+        "published": [figure],
+    }
+    run, study = folder / "run" / "rod", folder / "study" / "rod" / "study-tradeoff"
+    for place in (run, study):
+        (place / "tables").mkdir(parents=True)
+    document = {"methods": [method], "published": [], "identified": []}
+    (run / "results.json").write_text(json.dumps(document), "utf-8")
+    (run / "tables" / "effects.csv").write_text(
+        "effect,doc,quantity,rms,max,unit,separation\nfluid,none,contour@3mm,1e-4,2e-4,m,3.0\n"
+    )
+    (study / "results.json").write_text("{}", "utf-8")
+    (study / "tables" / "cells.csv").write_text(
+        "solver,law,element,mesh,dt_s,time_s,error_m,front\nmodal,linear,P2,4,0.01,3e-5,1e-4,True\n"
+    )
+    return folder
+
+
+NAMES = {
+    "run/rod: fem score tip.rms@all",
+    "run/rod: fem check tip.rms@all value",
+    "run/rod: fem check tip.rms@all u_val",
+    "run/rod: fem check tip.rms@all limit",
+    "run/rod: fem published nodes ours",
+    "run/rod: fem published nodes theirs",
+    "run/rod: effect fluid contour@3mm rms",
+    "run/rod: effect fluid contour@3mm max",
+    "run/rod: effect fluid contour@3mm separation",
+    "study/rod/study-tradeoff: cells [modal, linear, P2, 4, 0.01] error_m",
+}
+
+
+def test_it_holds_every_result_and_no_time(guard: ModuleType, tmp_path: Path) -> None:
+    assert set(guard.collect(report(tmp_path))) == NAMES
+
+
+@pytest.mark.parametrize(
+    ("change", "differ"),
+    [(1 + 1e-9, 1), (1 + 1e-11, 0), (float("nan"), 1)],
+)
+def test_equal_is_within_the_tenth_digit(
+    guard: ModuleType, tmp_path: Path, change: float, differ: int
+) -> None:
+    a = guard.collect(report(tmp_path / "a"))
+    b = guard.collect(report(tmp_path / "b", value=1e-3 * change))
+    assert len(guard.compared(a, b).differ) == differ
+
+
+def test_roundoff_of_what_is_nearly_zero_is_of_its_quantity_s_scale(guard: ModuleType) -> None:
+    scale = guard.Entry(2.0, "tip", "m")
+    a = {"large": scale, "small": guard.Entry(1e-14, "tip", "m")}
+    within = {"large": scale, "small": guard.Entry(1.9e-12, "tip", "m")}
+    other = {"large": scale, "small": guard.Entry(1.9e-12, "tip", "N")}
+    assert guard.compared(a, within).differ == ()
+    assert guard.compared({"small": a["small"]}, {"small": within["small"]}).differ == ("small",)
+    assert guard.compared(a, {**other, "small": guard.Entry(3e-12, "tip", "m")}).differ == (
+        "small",
+    )
+
+
+def test_words_differ_when_they_are_not_the_same(guard: ModuleType) -> None:
+    a, b = guard.Entry("stable", "regime", ""), guard.Entry("unstable", "regime", "")
+    assert guard.compared({"x": a}, {"x": b}).differ == ("x",)
+
+
+def stored(guard: ModuleType, folder: Path) -> str:
+    out = folder.with_suffix(".json")
+    assert CliRunner().invoke(guard.main, ["collect", str(folder), "-o", str(out)]).exit_code == 0
+    return str(out)
+
+
+def test_it_ends_with_1_on_a_difference_and_on_what_is_missing(
+    guard: ModuleType, tmp_path: Path
+) -> None:
+    first = stored(guard, report(tmp_path / "a"))
+    moved = stored(guard, report(tmp_path / "b", value=2e-3))
+    less = report(tmp_path / "c")
+    (less / "run" / "rod" / "tables" / "effects.csv").unlink()
+    ends = {
+        other: CliRunner().invoke(guard.main, ["compare", first, other])
+        for other in (first, moved, stored(guard, less))
+    }
+    assert [done.exit_code for done in ends.values()] == [0, 1, 1]
+    last = [done.output.splitlines()[-1] for done in ends.values()]
+    assert last == [
+        "10 equal, 0 differ, 0 missing, 0 new",
+        "9 equal, 1 differ, 0 missing, 0 new",
+        "7 equal, 0 differ, 3 missing, 0 new",
+    ]
+
+
+def test_what_was_renamed_on_purpose_is_compared_under_its_new_name(
+    guard: ModuleType, tmp_path: Path
+) -> None:
+    a, b = tmp_path / "a.json", tmp_path / "b.json"
+    guard.write({"run/rod: fem score tip.rms": guard.Entry(1.0, "tip", "m")}, a)
+    guard.write({"run/rod: plain_fem score tip.rms": guard.Entry(1.0, "tip", "m")}, b)
+    names = tmp_path / "renames"
+    compare = ["compare", str(a), str(b)]
+    assert CliRunner().invoke(guard.main, compare).exit_code == 1
+    names.write_text("fem plain_fem\n", "utf-8")
+    assert CliRunner().invoke(guard.main, [*compare, "--renames", str(names)]).exit_code == 0
+
+
+def test_a_folder_without_a_report_is_refused(guard: ModuleType, tmp_path: Path) -> None:
+    done = CliRunner().invoke(guard.main, ["collect", str(tmp_path), "-o", str(tmp_path / "x")])
+    assert done.exit_code == 2
+    assert "no report" in done.output
+
+
+def test_it_makes_every_experiment_and_every_kind_of_study(guard: ModuleType) -> None:
+    made = list(guard.commands(Path("out"), quick_studies=True))
+    assert made[0][:2] == ["run", "--all"]
+    assert {arguments[1] for arguments in made[1:]} == {
+        "stability", "tradeoff", "choose", "filters",
+    }  # fmt: skip
+    assert all("--quick" in arguments for arguments in made[1:])

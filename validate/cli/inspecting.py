@@ -1,0 +1,54 @@
+"""`validate inspect`: what a recording holds; loads what reads the file and nothing else."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+from validate.cli.display import console, table
+from validate.recording.preflight import Inspection, Topic, inspect_recording
+
+
+def inspect(file: Path, as_json: bool) -> None:
+    """Prints what an MCAP file holds."""
+    found = inspect_recording(file)
+    if as_json:
+        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+    else:
+        _print(found)
+
+
+def _print(found: Inspection) -> None:
+    screen = console()
+    head = ["topic", "kind", "schema (encoding)", "n", "duration s", "rate Hz", "gaps", "unit"]
+    rows = [_row(topic) for topic in found.topics]
+    screen.print(table(found.source.path, [*head, "frame"], rows))
+    screen.print(_head(found), soft_wrap=True)
+    for line in found.clock_offsets:
+        screen.print(line, soft_wrap=True)
+    screen.print(f"defects: {len(found.defects)}")
+    for defect in found.defects:
+        screen.print(f"  {defect}", soft_wrap=True)
+
+
+def _row(topic: Topic) -> list[str]:
+    clock = topic.clock
+    duration = "-" if clock is None else f"{clock.duration:.3f}"
+    rate = "-" if clock is None or clock.rate_hz is None else f"{clock.rate_hz:.4g}"
+    gaps = "-" if clock is None else str(clock.gaps)
+    schema = f"{topic.schema or '-'} ({topic.schema_encoding or '-'}/{topic.message_encoding})"
+    return [
+        topic.name, topic.kind, schema, str(topic.count), duration, rate, gaps,
+        topic.unit or "-", topic.frame or "-",
+    ]  # fmt: skip
+
+
+def _head(found: Inspection) -> str:
+    start = [t.first_ns for t in found.topics if t.first_ns is not None]
+    when = datetime.fromtimestamp(min(start) / 1e9, UTC).isoformat() if start else "-"
+    return (
+        f"\n{found.messages} messages from {when}; {found.attachments} attachments; metadata: "
+        f"{', '.join(found.metadata) or 'none'}\n"
+        f"{found.source.bytes} bytes in {found.chunks} chunks ({', '.join(found.compressions)}), "
+        f"library '{found.library}', profile '{found.profile}'\n"
+        f"integrity: {found.source.integrity}; sha256 {found.source.sha256}"
+    )

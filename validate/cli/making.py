@@ -1,0 +1,32 @@
+"""`validate record`: the synthetic recording of an experiment."""
+
+from pathlib import Path
+
+from validate.cli.display import progress
+from validate.cli.main import pairs
+from validate.cli.recordings import written as say
+from validate.errors import UsageError
+from validate.parameters import with_values
+from validate.recording.digest import digest, to_text
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.replay.find import find
+from validate.replay.remade import stamped
+
+
+def record(name: str, out: Path, values: tuple[str, ...]) -> None:
+    """Makes an experiment's twin recording, with a JSON beside it of what must be read."""
+    experiment = find(name, Path.cwd())
+    twin = experiment.twin
+    if twin is None:
+        raise UsageError(f"experiment '{name}' has no synthetic recording; its data are measured")
+    parameters = with_values(experiment.parameters, pairs(values, "--set"))
+    with progress(f"record {name}") as bar:
+        done = iter(range(10))
+        made = twin.record(parameters, lambda text: bar(next(done), 3, text))
+    if twin.truth is not None:
+        made = stamped(made, parameters)
+    write_recording(made, out)
+    written = read_recording(out)
+    out.with_suffix(".json").write_text(to_text(digest(written)), "utf-8")
+    say(written, out)
