@@ -101,7 +101,7 @@ def test_a_scheme_of_drives_and_loads_steps_and_says_what_its_states_mean(
 def test_a_scheme_of_drives_and_loads_refuses_fluid(scheme: type[Scheme], system: System) -> None:
     with pytest.raises(
         SceneError,
-        match="knows no fluid in cavities; .* use ExactPressure or",
+        match=r"knows no fluid in cavities; .* use ExactPressure or",
     ):
         scheme().prepare(system)
 
