@@ -33,6 +33,11 @@ class Handles:
         return not _refused(self, scene)
 
 
+LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
+LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False)
+LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, loads=False)
+
+
 class Handling(Protocol):
     """Settings that declare what they handle."""
 

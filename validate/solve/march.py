@@ -78,7 +78,7 @@ def march(
 
 
 @dataclass(frozen=True)
-class _Walk:
+class _Kept:
     """What is kept of the steps: numbers, seconds, probes (p, d) m, and fields at the frames."""
 
     updates: list[int] = field(default_factory=list)
@@ -89,8 +89,8 @@ class _Walk:
     sd: list[Floats] = field(default_factory=list)
 
 
-def _walk(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> tuple[_Walk, Outcome]:
-    walk, state, rows = _Walk(), stepper.rest(), _probe_rows(stepper)
+def _walk(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> tuple[_Kept, Outcome]:
+    walk, state, rows = _Kept(), stepper.rest(), _probe_rows(stepper)
     for i, value in enumerate(inputs):
         start = perf_counter()
         state = stepper.step(state, value)
