@@ -6,9 +6,14 @@ beside it stand truths on a finer mesh and with smaller steps.
 
 from pathlib import Path
 
+import numpy as np
+
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
+from validate.papers.swinging_ladder import swinging_trial
+from validate.recording.types import Recording
 from validate.replay.experiment import Case, Experiment
+from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, Trial, turned
 from validate.replay.method import Method
 from validate.replay.paper_002 import rod_published
 from validate.replay.paper_002_rod import tell
@@ -69,6 +74,32 @@ CASES = (
          changed("twin", finer=20), methods=tuple(FIVE)),
 )  # fmt: skip
 
+COARSE = turned(MP3, 3)
+
+
+def trial(recording: Recording, parameters: Parameters, quick: bool) -> Trial:
+    return swinging_trial(
+        bending_rod(1),
+        (2, 1, 1),
+        (1 / 15, 1 / 30, 1 / 60),
+        np.arange(0.2, 4.1 if quick else 8.1, 0.2),
+        gravity_inputs,
+        quick,
+    )
+
+
+LADDER = Ladder(
+    trial,
+    StabilityBody(
+        "paper 002's rod (hexahedra)",
+        bending_rod,
+        COARSE,
+        (2, 3, 4),
+        STEP,
+        (PaperSetting("002 MP3", "paper 002, section IV.B", COARSE, STEP),),
+    ),
+)
+
 EXPERIMENT = Experiment(
     name="bending_rod",
     title="Solvers against the implicit run on a rod that bends under gravity",
@@ -87,6 +118,7 @@ EXPERIMENT = Experiment(
     exhibits=tell,
     published=rod_published,
     frames=FRAMES,
+    ladder=LADDER,
     twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
         "markers. Errors are between solvers; no tissue was measured."

@@ -24,6 +24,7 @@ from validate.register.follow import follow_signal
 from validate.register.registered import Registered
 from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
 from validate.replay.followed import Truth, truth_of
+from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, Turned
 from validate.replay.method import Method
 from validate.replay.paper_003 import published_cube, tell_cube
 from validate.scene.box import box
@@ -242,6 +243,31 @@ CASES = (
 )
 
 
+def coarse_cube(n: int, material: Material) -> Scene:
+    return Scene(
+        box((SIDE, SIDE, SIDE), (n, n, n)),
+        material,
+        (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "x0", (-1.0, 0.0, 0.0)),),
+    )
+
+
+COARSE = Turned(30e3, 0.49, 1000.0, 0.0, 0.0, 4)
+CONE = replace(COARSE, E=3 * 22.081e3, nu=0.5, rho=1060.0)
+LADDER = Ladder(
+    body=StabilityBody(
+        "paper 003's cube, coarser (tetrahedra)",
+        coarse_cube,
+        COARSE,
+        (3, 4, 5),
+        0.001,
+        (
+            PaperSetting("003 cube", "paper 003, coarser mesh", COARSE, 0.001),
+            PaperSetting("003 cone", "paper 003, the cone's material here", CONE, 1e-4),
+        ),
+    )
+)
+
 EXPERIMENT = Experiment(
     name="ekf_cube",
     title="Extended Kalman filter on a St. Venant-Kirchhoff cube",
@@ -256,6 +282,7 @@ EXPERIMENT = Experiment(
     sets=sets,
     axis="x",
     reference="nfem",
+    ladder=LADDER,
     cases=CASES,
     exhibits=tell_cube,
     published=published_cube,

@@ -19,6 +19,7 @@ from validate.compare.effects import Sensor
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.identify.interval import profile_interval
+from validate.papers.phantom_ladder import phantom_trial
 from validate.parameters import quantity, require_ranges
 from validate.recording.images.outline import outlines_of
 from validate.recording.mcap.read import read_recording
@@ -40,6 +41,7 @@ from validate.replay.experiment import (
     Uncertainty,
     Variant,
 )
+from validate.replay.ladder import Ladder, Trial
 from validate.replay.method import Method
 from validate.replay.paper_000 import figures
 from validate.replay.solved import solve
@@ -462,6 +464,10 @@ def _quick(p: Parameters) -> Parameters:
     return replace(p, mesh=coarse, loads=p.loads[:1])
 
 
+def trial(recording: Recording, parameters: Parameters, quick: bool) -> Trial:
+    return phantom_trial(build, METHODS["p1_fluid"].scene, recording, parameters, quick)
+
+
 EXPERIMENT = Experiment(
     name="fluid_phantom",
     title="Fluid inclusion in a gelatin phantom under plate compression",
@@ -483,6 +489,7 @@ EXPERIMENT = Experiment(
     sensors=ADDED_SENSORS,
     published=figures,
     identify=identify,
+    ladder=Ladder(trial),
     quick=_quick,
     twin=Twin(
         record,

@@ -27,6 +27,7 @@ from validate.register.follow import follow_signal
 from validate.register.registered import Registered
 from validate.replay.experiment import Case, Change, Experiment, Progress, Twin
 from validate.replay.followed import Truth, truth_of
+from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, Turned
 from validate.replay.method import Method
 from validate.replay.paper_001 import published, tell
 from validate.scene.box import box, centroids
@@ -301,6 +302,28 @@ CASES = (
 )  # fmt: skip
 
 
+def block(n: int, material: Material) -> Scene:
+    """The block, n cells across its 4 mm."""
+    return Scene(
+        box((0.004, 0.004, 0.007), (n, n, round(7 * n / 4))),
+        material,
+        (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+    )
+
+
+PRINTED_BODY = Turned(10e3, 0.47, 1068.0, 0.0, 0.1, 4)
+LADDER = Ladder(
+    body=StabilityBody(
+        "paper 001's block (tetrahedra)",
+        block,
+        PRINTED_BODY,
+        (2, 3, 4),
+        0.002,
+        (PaperSetting("001", "paper 001, section 4", PRINTED_BODY, 0.002),),
+    )
+)
+
 EXPERIMENT = Experiment(
     name="kf_cube",
     title="Kalman filter finite elements on a block under traction",
@@ -318,6 +341,7 @@ EXPERIMENT = Experiment(
     sets=sets,
     axis="z",
     reference="fem",
+    ladder=LADDER,
     cases=CASES,
     exhibits=tell,
     published=published,

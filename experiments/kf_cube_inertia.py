@@ -7,12 +7,19 @@ its axis at 12 Hz, and the twin takes ten steps in one of the models'.
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.reduced_kf import ReducedKf
+from validate.papers.swinging_ladder import swinging_trial
+from validate.recording.types import Recording
 from validate.replay.experiment import Case
 from validate.replay.find import load_file
+from validate.replay.ladder import Ladder, Trial, marker_noise
 from validate.replay.method import Method
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
@@ -53,6 +60,19 @@ def _named(name: str) -> Case:
     return replace(case, methods=RIVALS)
 
 
+def trial(recording: Recording, parameters: Any, quick: bool) -> Trial:
+    p = parameters
+    base = CREEPING.build(recording, p, METHODS["average"].scene)
+    force = p.loading.traction * float(np.prod(base.mesh.nodes.max(axis=0)[:2]))
+
+    def inputs(t: Floats) -> Floats:
+        return np.asarray(force * (t < p.loading.off + 1e-9)[:, None])
+
+    frames = np.arange(0.016, 0.5 if quick else 0.97, 0.016)
+    steps = (0.004, 0.002, 0.001)
+    return swinging_trial(base, (1, 1, 2), steps, frames, inputs, quick, marker_noise(recording))
+
+
 EXPERIMENT = replace(
     CREEPING,
     name="kf_cube_inertia",
@@ -68,6 +88,7 @@ EXPERIMENT = replace(
     reference="average",
     cases=tuple(_named(name) for name in ("stiff_model", "layer", "sparse")),
     exhibits=None,
+    ladder=Ladder(trial),
     published=None,
     twin=replace(
         _twin,

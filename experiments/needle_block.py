@@ -11,6 +11,7 @@ from pathlib import Path
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.replay.experiment import Case, Experiment
+from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, turned
 from validate.replay.method import Method
 from validate.replay.paper_002 import needle_published
 from validate.replay.paper_002_needle import tell
@@ -28,7 +29,7 @@ from validate.replay.solver_benchmark import (
     solvers,
 )
 from validate.scene.needle import MP1, MP2, STEP, needle_block, needle_depth
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Load, Material, Scene
 from validate.solve.modal import Modal
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "needle_block.mcap"
@@ -69,6 +70,22 @@ CASES = (
          changed("body", plane="stress"), methods=tuple(FIVE)),
 )  # fmt: skip
 
+MEDIUM = turned(MP1, 10)
+LADDER = Ladder(
+    body=StabilityBody(
+        "paper 002's block (unit square, quadrilaterals in plane strain)",
+        needle_block,
+        MEDIUM,
+        (6, 10, 14, 20),
+        STEP,
+        (
+            PaperSetting("002 MP1", "paper 002, section IV.A", MEDIUM, STEP),
+            PaperSetting("002 MP2", "paper 002, section IV.A", turned(MP2, 10), STEP),
+        ),
+        Load("shear", "x1", (0.0, 1.0)),
+    )
+)
+
 EXPERIMENT = Experiment(
     name="needle_block",
     title="Solvers against the implicit run on a block poked by a needle",
@@ -90,6 +107,7 @@ EXPERIMENT = Experiment(
     exhibits=tell,
     published=needle_published,
     frames=FRAMES,
+    ladder=LADDER,
     twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
         "markers. Errors are between solvers; no tissue was measured."

@@ -12,6 +12,9 @@ import jsonschema
 import numpy as np
 import pytest
 from scipy import sparse
+from validate.study.base_scenes import BASE_SCENES, base_scene, squeezed
+from validate.study.stored_stability import write_stability
+from validate.study.variants import VariantCell, drift_variant, step_grid, variant_cells
 
 from validate.errors import SceneError, UsageError
 from validate.fem.critical import cell_altitudes
@@ -23,7 +26,6 @@ from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.newmark import Newmark
 from validate.study import precision
 from validate.study import stability as stability_module
-from validate.study.base_scenes import BASE_SCENES, base_scene, squeezed
 from validate.study.precision import drift
 from validate.study.stability import SCHEMES, Stability, points, stability
 from validate.study.stability_cell import (
@@ -35,8 +37,6 @@ from validate.study.stability_cell import (
     write_variant,
 )
 from validate.study.stepping import misprint_limit
-from validate.study.stored_stability import write_stability
-from validate.study.variants import VariantCell, drift_variant, step_grid, variant_cells
 
 W, ALPHA, BETA = 30.0, 0.7, 0.02
 

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 from study_samples import experiment_file
-from validate.replay.tracking import Tracking
 
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
+from validate.replay.tracking import Tracking
+from validate.study.filter_plan import FilterPlan, plan
 from validate.study.filters import run_line
-from validate.study.plan import Plan, plan
 from validate.study.sweep import axes
 
 
@@ -22,7 +22,7 @@ def pulled(tmp_path_factory: pytest.TempPathFactory) -> Tracking:
     return found
 
 
-def planned(pulled: Tracking, *sweeps: str, **options: object) -> Plan:
+def planned(pulled: Tracking, *sweeps: str, **options: object) -> FilterPlan:
     seeds = options.pop("seeds", 3)
     return plan(pulled, Options(**{"values": {}, **options}), axes(sweeps), seeds)  # type: ignore[arg-type]
 
@@ -32,7 +32,7 @@ def test_an_axis_of_one_method_multiplies_its_cells_only(pulled: Tracking) -> No
     found = planned(pulled, *sweeps, methods=("kf", "plain"))
     assert [c.method for c in found.cells].count("kf") == 6
     assert [c.method for c in found.cells].count("plain") == 2
-    assert found.job.seeds == (5, 6, 7)
+    assert found.seeds == (5, 6, 7)
 
 
 def test_swept_methods_are_the_methods(pulled: Tracking) -> None:

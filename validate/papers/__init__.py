@@ -1,0 +1,1 @@
+"""What belongs to one paper: bodies, twins, printed figures. Nothing below imports it."""
