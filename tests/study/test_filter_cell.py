@@ -9,10 +9,10 @@ from study_samples import experiment_file
 
 from validate.compare.track import rmse, track_error
 from validate.errors import UsageError
+from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
-from validate.replay.run import compare
-from validate.replay.tracking import Tracking
+from validate.replay.road import compare
 from validate.study.engine import Plan, Where, finish
 from validate.study.filter_cell import Bench, open_bench, run_cell
 from validate.study.filter_plan import FilterPlan, plan
@@ -22,18 +22,16 @@ from validate.study.sweep import axes
 
 
 @pytest.fixture(scope="module")
-def pulled(tmp_path_factory: pytest.TempPathFactory) -> Tracking:
-    found = load_file(experiment_file(tmp_path_factory.mktemp("cell")))
-    assert isinstance(found, Tracking)
-    return found
+def pulled(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return load_file(experiment_file(tmp_path_factory.mktemp("cell")))
 
 
-def planned(pulled: Tracking, *sweeps: str, **values: str) -> FilterPlan:
+def planned(pulled: Experiment, *sweeps: str, **values: str) -> FilterPlan:
     texts = {k.replace("__", "."): v for k, v in values.items()}
     return plan(pulled, Options(texts, ("kf",)), axes(sweeps), 3)
 
 
-def first(pulled: Tracking, *sweeps: str, **values: str) -> FilterScores:
+def first(pulled: Experiment, *sweeps: str, **values: str) -> FilterScores:
     made = planned(pulled, *sweeps, **values)
     return run_cell(Bench(pulled, made.job), made.cells[0])
 
@@ -45,7 +43,7 @@ def record(made: FilterPlan, folder: Path) -> Record[FilterScores]:
 
 
 def test_shared_gains_give_the_scores_of_single_runs(
-    pulled: Tracking, monkeypatch: pytest.MonkeyPatch
+    pulled: Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     together = first(pulled)
     assert together.shared
@@ -62,7 +60,7 @@ def test_shared_gains_give_the_scores_of_single_runs(
     assert len(set(together.scores["top.rmse"])) == 3  # every seed has its own noise
 
 
-def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Tracking) -> None:
+def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Experiment) -> None:
     scores = {s.name: s.value for s in compare(pulled, Options({}, ("kf",))).methods[0].scores}
     found = first(pulled).scores
     for name in ("top.rmse", "side.rmse", "nis.per_dof"):
@@ -82,13 +80,13 @@ def test_the_pooled_error_is_that_of_all_probes() -> None:
     assert found["a.rmse"] == rmse(one)
 
 
-def test_seeds_that_miss_different_samples_run_one_by_one(pulled: Tracking) -> None:
+def test_seeds_that_miss_different_samples_run_one_by_one(pulled: Experiment) -> None:
     found = first(pulled, twin__missing="0.3")
     assert not found.shared
     assert found.nis_dof < 3 * 3 * 40
 
 
-def test_a_failure_is_a_record_with_one_line(pulled: Tracking, tmp_path: Path) -> None:
+def test_a_failure_is_a_record_with_one_line(pulled: Experiment, tmp_path: Path) -> None:
     refused = record(planned(pulled, "methods.kf.Q=-1,1e-11"), tmp_path)
     assert "variance Q = -1 m2" in refused.refused
     crashed = record(planned(pulled, methods__kf__trap="raise"), tmp_path)
@@ -96,14 +94,14 @@ def test_a_failure_is_a_record_with_one_line(pulled: Tracking, tmp_path: Path) -
     assert crashed.value is None
 
 
-def test_a_changed_file_stops_the_study(pulled: Tracking, tmp_path: Path) -> None:
+def test_a_changed_file_stops_the_study(pulled: Experiment, tmp_path: Path) -> None:
     made = planned(pulled)
     with pytest.raises(UsageError, match="not the file that the study began with"):
         record(replace(made, job=replace(made.job, sha256="0")), tmp_path)
 
 
 def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
-    pulled: Tracking, tmp_path: Path
+    pulled: Experiment, tmp_path: Path
 ) -> None:
     made = planned(pulled)
     found = record(made, tmp_path)

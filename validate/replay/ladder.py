@@ -175,7 +175,7 @@ class PaperSetting:
 
     label: str
     source: str
-    body: Turned
+    variant: Turned
     dt: float
 
 

@@ -76,7 +76,7 @@ def _papers(study: Stability) -> Exhibit:
 
 
 def _paper_rows(study: Stability, paper: PaperSetting) -> Iterator[tuple[Entry, ...]]:
-    cell = _cell(study, paper.body)
+    cell = _cell(study, paper.variant)
     if cell is None:
         return
     record = study.done.records[cell.key]
@@ -162,9 +162,9 @@ def _panel(
 def _marks(study: Stability, name: str, rows: list[Turned]) -> Iterator[Mark]:
     """Papers' settings whose value of this quantity is a row, or lies between two of E."""
     for paper in study.base.papers:
-        at = _row_of(name, paper.body, rows)
+        at = _row_of(name, paper.variant, rows)
         if at is not None:
-            on_map = any(_alike(paper.body, v, name) for v in rows)
+            on_map = any(_alike(paper.variant, v, name) for v in rows)
             yield Mark(paper.label, paper.dt, at, on_map)
 
 

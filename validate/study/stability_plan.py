@@ -61,7 +61,7 @@ def stability_cells(
     """
     steps = tuple(step_grid(base.dt, quick).tolist())
     drifting = drift_variant(base)
-    wanted = [base.base, *(p.body for p in base.papers), drifting, *_swept(base, quick)]
+    wanted = [base.base, *(p.variant for p in base.papers), drifting, *_swept(base, quick)]
     impossible = {replace(base.base, **{k: v}): word for k, v, word in IMPOSSIBLE}  # type: ignore[arg-type]
     impossible[replace(base.base, mesh=2 * base.meshes[-1])] = "unknowns"
     bare = (
