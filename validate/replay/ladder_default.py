@@ -27,7 +27,7 @@ from validate.replay.ladder import (
 )
 from validate.replay.ladder_solvers import (
     ORDERS,
-    exact_in_time,
+    exact_in_ramps,
     still,
     still_best,
     still_pair,
@@ -102,7 +102,7 @@ def _trial(own: OwnBody, quick: bool) -> Trial:
         frames=frames,
         points=_points(own, meshes, reference),
         reference=reference,
-        best=exact_in_time if loading.dynamic else still_best(bool(own.scene.cavities)),
+        best=exact_in_ramps if loading.dynamic else still_best(bool(own.scene.cavities)),
         solvers=solvers,
         pair=pair,
         dynamic=loading.dynamic,
@@ -172,17 +172,23 @@ def _steps_and_frames(loading: _Loading, quick: bool) -> tuple[tuple[float, ...]
 def _solvers(
     own: OwnBody, meshes: Mapping[str, tuple[int, ...]], steps: tuple[float, ...], loading: _Loading
 ) -> tuple[tuple[Solver, ...], LawPair]:
-    """All that know the scene's kind, and what its law costs on the coarsest mesh."""
+    """All that handle the scene, and what its law costs on the coarsest mesh."""
     levels = next(iter(meshes.values()))
     element, coarse, medium = list(meshes)[-1], levels[0], levels[len(levels) // 2]
     own_law = own.scene.material.law
     law: LawName = "neo_hooke" if own_law == "linear" else own_law
     if loading.dynamic:
         pair = swinging_pair(element, coarse, steps[0], law)
-        return swinging(steps, coarse, medium, law), pair
-    cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
-    pair = still_pair(element, coarse, steps[0], cavities, law)
-    return still(cavities, steps[0], table, medium, coarse, law), pair
+        every = swinging(steps, coarse, medium, law)
+    else:
+        cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
+        pair = still_pair(element, coarse, steps[0], cavities, law)
+        every = still(cavities, steps[0], table, medium, coarse, law)
+    return tuple(s for s in every if _handles(s, steps[0], own.scene)), pair
+
+
+def _handles(solver: Solver, dt: float, scene: Scene) -> bool:
+    return solver.make(dt).handles.covers(with_law(scene, solver.law))
 
 
 def _points(

@@ -29,6 +29,11 @@ def exact_in_time(dt: float) -> Scheme:
     return Modal(dt, modes=_MODES, propagate="constant")
 
 
+def exact_in_ramps(dt: float) -> Scheme:
+    """Without error for loads that change linearly within a step."""
+    return Modal(dt, modes=_MODES, propagate="linear")
+
+
 def swinging(
     steps: tuple[float, ...], small: int, medium: int, law: LawName = "neo_hooke"
 ) -> tuple[Solver, ...]:

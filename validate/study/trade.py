@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from validate.arrays import Floats, rms
 from validate.errors import ComparisonError
 from validate.replay.experiment import Experiment
