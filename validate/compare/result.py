@@ -13,7 +13,7 @@ from validate.compare.verdict import Check
 from validate.parameters import Parameter
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.scene.scene import Scene
+from validate.scene.material_point import AnyScene
 from validate.solve.types import Run
 
 
@@ -27,7 +27,7 @@ class MethodResult:
     name: str
     label: str
     accepted: bool
-    scene: Scene
+    scene: AnyScene
     registered: tuple[Registered, ...]
     runs: tuple[Run, ...]
     residuals: Mapping[str, Residual]

@@ -1,6 +1,6 @@
 """The warning that linear elements lock near incompressibility."""
 
-from validate.scene.scene import Scene
+from validate.scene.material_point import AnyScene, MaterialPoint
 
 LOCKING_FROM = 0.49  # P1 / P2 displacement of a pulled cube: .91 at nu .45, .82 at .49, .63 at .499
 _SHAPES = {
@@ -11,11 +11,13 @@ _SHAPES = {
 }
 
 
-def locking_warning(scene: Scene) -> str | None:
+def locking_warning(scene: AnyScene) -> str | None:
     """One line where pointwise linear cells have nu of .49 or more; None where they do not lock.
 
-    In plane stress nothing locks: the thickness gives way.
+    In plane stress nothing locks: the thickness gives way; a material point has no cells.
     """
+    if isinstance(scene, MaterialPoint):
+        return None
     nu = float(scene.per_cell(lambda m: m.nu).max())
     if nu < LOCKING_FROM or scene.mesh.order != 1 or scene.dilatation != "pointwise":
         return None

@@ -19,7 +19,7 @@ from validate.register.registered import Registered
 from validate.replay.followed import Cases, Truth
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
-from validate.scene.scene import Scene
+from validate.scene.material_point import AnyScene
 
 Change = Callable[[Any], Any]
 Progress = Callable[[str], None]
@@ -158,8 +158,8 @@ class Experiment:
     accepted: tuple[str, ...]
     accept: tuple[Accept, ...]
     load: Callable[[Any, Path], tuple[Recording, ...]]
-    build: Callable[[Recording, Any, Any], Scene]
-    place: Callable[[Recording, Any, Scene], Registered]
+    build: Callable[[Recording, Any, Any], AnyScene]
+    place: Callable[[Recording, Any, Any], Registered]
     sets: Callable[[Any, Registered], Mapping[str, Any]] = _sets_nothing
     identify: Callable[[Sequence[Recording], Any], Identified] | None = None
     uncertainty: Uncertainty | None = None

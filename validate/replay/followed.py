@@ -9,6 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.residual import Residual, reached_end
 from validate.register.registered import Registered
+from validate.scene.material_point import AnyScene
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.types import Run
@@ -51,7 +52,7 @@ class Followed:
     method: str
     label: str
     case: str
-    scene: Scene
+    scene: AnyScene
     registered: tuple[Registered, ...]
     runs: tuple[Run, ...]
     residuals: Mapping[str, Residual]

@@ -35,11 +35,15 @@ class Method:
         Filters get what moves freely of their markers. Raises `UsageError` where a user set one of
         the experiment's own settings to something else.
         """
-        settings = replace(self.settings, **self._taken(given))
+        settings = self.given(given)
         if not self.markers:
             return cast(Stepper, settings.prepare(system))
         looks = measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
         return cast(Stepper, settings.prepare(system, looks))
+
+    def given(self, given: Mapping[str, Any]) -> Any:
+        """The settings with those that the experiment itself gives."""
+        return replace(self.settings, **self._taken(given))
 
     def _taken(self, given: Mapping[str, Any]) -> dict[str, Any]:
         defaults = {f.name: f.default for f in fields(self.settings)}

@@ -1,5 +1,6 @@
 """One method with one set of parameters on the recordings of a case: scene, runs, residuals."""
 
+from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
@@ -11,9 +12,10 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.followed import MAIN, Followed
 from validate.replay.method import Method
+from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.scene import Scene
-from validate.solve.march import march
-from validate.solve.types import Run, Stepper
+from validate.solve.march import march, run_scheme
+from validate.solve.types import Run, SceneSolver, Stepper
 
 
 def solve(
@@ -27,51 +29,62 @@ def solve(
     """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input."""
     start = perf_counter()
     scene = experiment.build(recordings[0], parameters, method.scene)
-    system = build_system(scene)
     built = perf_counter() - start
     seen = tuple(experiment.place(r, parameters, scene) for r in recordings)
-    steppers = _Prepared(experiment, method, parameters, system, built)
-    runs = tuple(_run(experiment, name, method, steppers, r) for r in seen)
-    found = [r for pair in zip(seen, runs, strict=True) for r in residuals(*pair)]
-    return Followed(name, _label(method, scene), case, scene, seen, runs, stacked(found))
+    runs = _Runs(experiment, name, method, parameters, scene, built)
+    done = tuple(runs.on(r) for r in seen)
+    found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
+    return Followed(name, _label(method, scene), case, scene, seen, done, stacked(found))
 
 
-class _Prepared:
-    """Prepares a scheme once for all recordings, a filter for each: it is given its looks."""
+class _Runs:
+    """Prepares a scheme once for all recordings, a filter for each: it is given its looks.
+
+    Set-up is the scene, its assembly and the preparation.
+    """
 
     def __init__(
-        self, experiment: Experiment, method: Method, parameters: Any, system: System, built: float
+        self,
+        experiment: Experiment,
+        name: str,
+        method: Method,
+        parameters: Any,
+        scene: AnyScene,
+        built: float,
     ) -> None:
-        self._experiment, self._method, self._parameters = experiment, method, parameters
-        self._system, self._built = system, built
-        self._shared: tuple[Stepper, float] | None = None
+        self._experiment, self._name, self._method = experiment, name, method
+        self._parameters, self._scene, self._built = parameters, scene, built
+        self._system: System | None = None
+        self._prepared: tuple[Stepper, float] | None = None
 
-    def on(self, seen: Registered) -> tuple[Stepper, float]:
-        """The stepper, and the seconds that set-up took."""
-        if self._shared is not None and not self._method.markers:
-            return self._shared
-        start = perf_counter()
+    def on(self, seen: Registered) -> Run:
+        """The run through the recorded inputs, as many of them as the method takes."""
+        method = self._method
+        every = slice(method.stride - 1, None, method.stride)
+        t, inputs = seen.t[every], seen.inputs[every]
+        steps = method.steps or len(t)
+        at = seen.frames(len(t), self._experiment.frames)
+        t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
-        stepper = self._method.prepare(self._system, seen, given)
-        self._shared = stepper, self._built + perf_counter() - start
-        return self._shared
+        if isinstance(method.settings, SceneSolver) or isinstance(self._scene, MaterialPoint):
+            return run_scheme(self._name, method.given(given), self._scene, t, inputs, at)
+        stepper, setup = self._stepper(self._scene, seen, given)
+        return march(self._name, stepper, t, inputs, at, setup)
+
+    def _stepper(
+        self, scene: Scene, seen: Registered, given: Mapping[str, Any]
+    ) -> tuple[Stepper, float]:
+        """The prepared stepper, and the seconds that took."""
+        if self._prepared is None or self._method.markers:
+            start = perf_counter()
+            self._system = self._system or build_system(scene)
+            stepper = self._method.prepare(self._system, seen, given)
+            self._prepared = stepper, self._built + perf_counter() - start
+        return self._prepared
 
 
-def _run(
-    experiment: Experiment, name: str, method: Method, steppers: _Prepared, seen: Registered
-) -> Run:
-    """The run through the recorded inputs, as many of them as the method takes."""
-    stepper, setup = steppers.on(seen)
-    every = slice(method.stride - 1, None, method.stride)
-    t, inputs = seen.t[every], seen.inputs[every]
-    steps = method.steps or len(t)
-    at = seen.frames(len(t), experiment.frames)
-    return march(name, stepper, t[:steps], inputs[:steps], at[at < steps], setup)
-
-
-def _label(method: Method, scene: Scene) -> str:
+def _label(method: Method, scene: AnyScene) -> str:
     """The method's label, and what it was run as where parameters changed that."""
-    order = getattr(method.scene, "order", scene.mesh.order)
-    return (
-        method.label if order == scene.mesh.order else f"{method.label} [order {scene.mesh.order}]"
-    )
+    own = scene.mesh.order
+    order = getattr(method.scene, "order", own)
+    return method.label if order == own else f"{method.label} [order {own}]"

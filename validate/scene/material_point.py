@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from validate.scene.scene import Material
+import numpy as np
+
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Cavity, Drive, Load, Material, Probe, Region, Scene, Weight
 
 StretchMode = Literal["uniaxial", "equibiaxial", "pure_shear"]
 
@@ -23,3 +26,34 @@ class MaterialPoint:
     def inputs(self) -> tuple[str, ...]:
         """Names of what a step is given: as `Scene.inputs`."""
         return ("stretch",)
+
+    # What a report, a score or a probe asks of any scene: a point has none of it.
+
+    @property
+    def mesh(self) -> Mesh:
+        """No nodes and no cells."""
+        return _NO_MESH
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        return ()
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        return ()
+
+    @property
+    def loads(self) -> tuple[Load | Weight, ...]:
+        return ()
+
+    @property
+    def cavities(self) -> tuple[Cavity, ...]:
+        return ()
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        return ()
+
+
+AnyScene = Scene | MaterialPoint
+_NO_MESH = Mesh(np.zeros((0, 2)), np.zeros((0, 3), dtype=np.int64), "tri3", {})

@@ -37,4 +37,5 @@ class StretchTest:
             found = dict.fromkeys(_UNITS, stretch)
         traces = {name: Trace(y, _UNITS[name]) for name, y in found.items()}
         traces[scene.inputs[0]] = Trace(stretch, "1")
+        traces["updates"] = Trace(np.zeros(len(t)), "1")
         return Run("", t, np.arange(len(t)), np.zeros((len(t), 0, 3)), traces, outcome, 0.0, None)

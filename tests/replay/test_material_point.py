@@ -1,0 +1,83 @@
+"""A material point walks the whole road: a stress-stretch record, no mesh, a report."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from validate.compare.verdict import Accept
+from validate.errors import SceneError
+from validate.parameters import quantity
+from validate.recording.types import Recording, Signal, Source
+from validate.register.registered import Registered
+from validate.register.signals import driving, validating
+from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.method import Method
+from validate.replay.options import Options
+from validate.replay.road import compare
+from validate.report.write import write_report
+from validate.scene.material_point import MaterialPoint
+from validate.scene.scene import Material
+from validate.solve.fluid import NoFluid
+from validate.solve.stretch_test import StretchTest
+
+MU, NU = 30e3, 0.4999
+STRETCH = np.linspace(1.0, 2.0, 41)
+
+
+@dataclass(frozen=True)
+class Rubber:
+    mu: float = quantity(MU, "Pa", "shear modulus")
+
+
+def recorded() -> Recording:
+    """Incompressible neo-Hooke in uniaxial tension, P = mu (l - 1/l^2), with 200 Pa of noise."""
+    noise = np.random.default_rng(4).normal(0, 200.0, len(STRETCH))
+    stress = MU * (STRETCH - STRETCH**-2) + noise
+    t = np.arange(len(STRETCH), dtype=float)
+    signals = {
+        "stretch": Signal(t, STRETCH[:, None], "1", 0.0, "machine"),
+        "stress": Signal(t, stress[:, None], "Pa", 200.0, "machine"),
+    }
+    return Recording("rubber", Source("x", "", 0, "x"), 0, signals=MappingProxyType(signals))
+
+
+def build(recording: Recording, card: Rubber, model: None) -> MaterialPoint:
+    return MaterialPoint(Material(2 * card.mu * (1 + NU), NU, "neo_hooke"), "uniaxial")
+
+
+def place(recording: Recording, card: Rubber, scene: object) -> Registered:
+    stress = validating(recording, "stress", "Pa", quantity="stress", trace="nominal_stress")
+    return Registered((driving(recording, "stretch", "1"), stress))
+
+
+POINT = Experiment(
+    "rubber", "a strip pulled", "this test", Rubber(), {"neo": Method("neo-Hooke", StretchTest())},
+    ("neo",), (Accept("stress", 5e3, "a tenth of the largest stress"),),
+    lambda card, folder: (recorded(),), build, place,
+    uncertainty=Uncertainty(
+        finer=lambda card: card,
+        refinement=lambda card: 1.0,
+        inputs=(Input("mu", lambda c: replace(c, mu=1.01 * c.mu), lambda c: 1.0, "modulus"),),
+        surrogate="neo",
+    ),
+    path=Path(__file__),
+)  # fmt: skip
+
+
+def test_stress_against_stretch_is_predicted_without_a_mesh(tmp_path: Path) -> None:
+    result = compare(POINT, Options({}))
+    (check,) = result.checks
+    assert (check.unit, check.count, check.verdict) == ("Pa", len(STRETCH), "agrees")
+    wrong = compare(POINT, Options({"mu": "33e3"}))
+    assert wrong.checks[0].verdict == "differs"
+    page = write_report(result, tmp_path / "rubber", created="2026-01-01T00:00:00+00:00")
+    assert "stress" in page.read_text("utf-8")
+
+
+def test_a_scheme_of_meshes_is_refused_on_a_point() -> None:
+    methods = {"neo": Method("linear", NoFluid())}
+    with pytest.raises(SceneError, match="mesh"):
+        compare(replace(POINT, methods=methods), Options({}))
