@@ -100,8 +100,8 @@ def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> 
     )
     return Picture(
         "outlines",
-        f"Outlines in image coordinates (mm) at {loads}. Points: measured outline; line: section of "
-        f"{label} with the image plane; grey line: measured rest outline; in the last "
+        f"Outlines in image coordinates (mm) at {loads}. Points: measured outline; line: section "
+        f"of {label} with the image plane; grey line: measured rest outline; in the last "
         f"panel also the other models, but for those whose line would lie on another's.{ringed}",
         f"Measured outline points and the simulated section of {label}, one panel per load "
         f"({loads}).",
