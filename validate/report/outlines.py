@@ -23,7 +23,7 @@ from validate.report.observed import (
     outline_seen,
     shown_method,
 )
-from validate.report.style import ACCEPTED, MEASURED, Style, draw, looks
+from validate.report.style import MEASURED, Style, draw, looks
 
 _MM = 1e3
 _GREY = "#9A9A9A"
@@ -100,12 +100,12 @@ def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> 
     )
     return Picture(
         "outlines",
-        f"Outlines in image coordinates at {loads}, mm. Points: measured outline; line: section of "
-        f"{label} with the image plane; grey line: measured rest outline; in the last "
+        f"Outlines in image coordinates (mm) at {loads}. Points: measured outline; line: section "
+        f"of {label} with the image plane; grey line: measured rest outline; in the last "
         f"panel also the other models, but for those whose line would lie on another's.{ringed}",
         f"Measured outline points and the simulated section of {label}, one panel per load "
         f"({loads}).",
-        draw(lambda figure: _panels(figure, measured, judged, drawn), width, 4.5),
+        draw(lambda figure: _panels(figure, measured, judged, drawn), width, 3.5),
     )
 
 
@@ -118,7 +118,8 @@ def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[
         for d in drawn if i == count - 1 else [judged]:
             _section(ax, d, i)
         for corner in measured.seen.corners:
-            _ring(ax, corner, (measured.measured[i], judged.sections[i]))
+            _ring(ax, corner, measured.measured[i], MEASURED)
+            _ring(ax, corner, judged.sections[i], judged.look.colour)
         image_axes(ax, (_MM * o for o in (*measured.measured, *judged.sections)))
         ax.set_title(spaced(hold.label))
         ax.label_outer()
@@ -132,10 +133,9 @@ def _section(ax: Axes, drawn: _Sections, i: int) -> None:
             label=drawn.method.label)  # fmt: skip
 
 
-def _ring(ax: Axes, corner: Corner, pair: tuple[Floats, Floats]) -> None:
-    for points, colour in zip(pair, (MEASURED, ACCEPTED), strict=True):
-        at = _MM * angular_points(points, np.array([corner.angle]))[0]
-        ax.plot(*at, "o", mfc="none", mec=colour, ms=8)
+def _ring(ax: Axes, corner: Corner, points: Floats, colour: str) -> None:
+    at = _MM * angular_points(points, np.array([corner.angle]))[0]
+    ax.plot(*at, "o", mfc="none", mec=colour, ms=8)
 
 
 def _residual(method: MethodResult, corner: Corner, hold: Held) -> Residual | None:
