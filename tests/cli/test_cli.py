@@ -11,6 +11,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from study_samples import experiment_file
 
 from validate.cli import checking
 from validate.cli import main as cli
@@ -249,3 +250,24 @@ def test_check_of_an_experiment_without_printed_figures_rests_on_its_checks(
     assert checking._holds(bare, declared=False)
     assert not checking._holds(bare, declared=True)
     assert not checking._holds(replace(bare, methods=()), declared=False)
+
+
+@pytest.mark.parametrize(
+    ("score", "code", "fault"),
+    [("kf:top.rmse", 0, ""), ("kf:top.rmsee", 1, "not computed: no score 'top.rmsee'")],
+)
+def test_check_fails_by_name_for_a_printed_figure_that_nothing_computes(
+    tmp_path: Path, score: str, code: int, fault: str
+) -> None:
+    file = experiment_file(tmp_path)
+    figure = f'Figure("the printed error", "{score}", 1.0, None, "m", "not comparable", "", "p. 1")'
+    text = file.read_text("utf-8").replace(
+        "EXPERIMENT = Experiment(",
+        "from validate.compare.published import Figure\n\n"
+        f"EXPERIMENT = Experiment(published=({figure},),",
+    )
+    file.write_text(text, "utf-8")
+    done, out, _ = here("check", str(file), "--json")
+    (found,) = json.loads(out)[0]["published"]
+    assert (done, found["name"], found["fault"]) == (code, "the printed error", fault)
+    assert "the printed error" in here("check", str(file))[1]
