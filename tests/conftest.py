@@ -1,6 +1,15 @@
-"""Shared fixtures: where real recordings lie, and a folder of this clone's own files."""
+"""Shared fixtures: where real recordings lie, this clone's own files, long runs made once.
+
+Tests run in one process a core. Those that share a long run are given to one of them, first of
+all; the others go file by file, so that what a module prepares is prepared once.
+"""
 
 import os
+
+# Before numpy is loaded: several processes of several threads each would quarrel over the cores.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -14,6 +23,14 @@ from validate.replay.options import Options
 from validate.replay.road import compare
 
 ROOT = Path(__file__).resolve().parents[1]
+LONG_RUNS = ("phantom_result", "whole")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        shared = next((name for name in LONG_RUNS if name in item.fixturenames), "")
+        item.add_marker(pytest.mark.xdist_group(shared or item.path.name))
+    items.sort(key=lambda item: not set(LONG_RUNS) & set(item.fixturenames))
 
 
 @pytest.fixture(scope="session")
