@@ -13,7 +13,7 @@ ACCUMULATORS = {"streams.py:Collected"}
 # Names that still stand for two things; none may come to them.
 TWICE = {
     "Bench", "Block", "Body", "Cell", "Clock", "Interval", "Modal", "ReducedModel", "Row", "Sensor",
-    "Solver", "Table", "TwinSettings", "Update", "Variant", "Walk", "_Drawn", "_Walk",
+    "Solver", "Table", "Update", "Variant", "Walk", "_Drawn", "_Walk",
 }  # fmt: skip
 
 
