@@ -20,6 +20,7 @@ from validate.papers.accuracy.benchmark import (
     solvers,
 )
 from validate.papers.accuracy.figures import ROD_FIGURES
+from validate.papers.accuracy.ladders import ROD_LADDER
 from validate.papers.accuracy.needle import STEP
 from validate.papers.accuracy.rod import MP3, SIZE, bending_rod, gravity_inputs
 from validate.papers.accuracy.rod_exhibits import tell
@@ -86,6 +87,7 @@ EXPERIMENT = Experiment(
     exhibits=tell,
     published=ROD_FIGURES,
     frames=FRAMES,
+    ladder=ROD_LADDER,
     twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
         "markers. Errors are between solvers; no tissue was measured."

@@ -13,6 +13,7 @@ from validate.estimate.reduced_ekf import ReducedEKF
 from validate.papers.ekf_nfem.cube import CubeMesh, PushedCube, build, place, record, sets, truth
 from validate.papers.ekf_nfem.cube_exhibits import tell_cube
 from validate.papers.ekf_nfem.figures import CUBE_FIGURES
+from validate.papers.ekf_nfem.ladder import CUBE_LADDER
 from validate.replay.cards import changed, shipped
 from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.method import Method
@@ -88,6 +89,7 @@ EXPERIMENT = Experiment(
     sets=sets,
     axis="x",
     reference="nfem",
+    ladder=CUBE_LADDER,
     cases=CASES,
     exhibits=tell_cube,
     published=CUBE_FIGURES,

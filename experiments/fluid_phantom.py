@@ -14,6 +14,7 @@ from validate.compare.verdict import Accept
 from validate.papers.fluid_inclusion.effects import EFFECTS, UNCERTAINTY
 from validate.papers.fluid_inclusion.figures import FIGURES
 from validate.papers.fluid_inclusion.friction import friction_from_rise
+from validate.papers.fluid_inclusion.ladder import LADDER
 from validate.papers.fluid_inclusion.phantom import Phantom, build, load, place, record
 from validate.papers.fluid_inclusion.phantom import PhantomModel as Model
 from validate.recording.types import Recording
@@ -79,6 +80,7 @@ EXPERIMENT = Experiment(
     sensors=ADDED_SENSORS,
     published=FIGURES,
     identify=identify,
+    ladder=LADDER,
     quick=_quick,
     twin=Twin(
         record,

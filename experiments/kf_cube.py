@@ -16,6 +16,7 @@ from validate.estimate.modal_kf import ModalKf
 from validate.estimate.reduced_kf import ReducedKf
 from validate.papers.kf_fem.block import PulledBlock, build, place, record, sets, truth
 from validate.papers.kf_fem.figures import FIGURES
+from validate.papers.kf_fem.ladders import PRINTED_LADDER
 from validate.papers.kf_fem.seeds import tell
 from validate.replay.cards import changed, shipped
 from validate.replay.experiment import Case, Experiment, Twin
@@ -107,6 +108,7 @@ EXPERIMENT = Experiment(
     sets=sets,
     axis="z",
     reference="fem",
+    ladder=PRINTED_LADDER,
     cases=CASES,
     exhibits=tell,
     published=FIGURES,

@@ -11,6 +11,7 @@ from pathlib import Path
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.reduced_kf import ReducedKf
+from validate.papers.kf_fem.ladders import SWINGING_LADDER
 from validate.replay.experiment import Case
 from validate.replay.find import load_file
 from validate.replay.method import Method
@@ -68,6 +69,7 @@ EXPERIMENT = replace(
     reference="average",
     cases=tuple(_named(name) for name in ("stiff_model", "layer", "sparse")),
     exhibits=None,
+    ladder=SWINGING_LADDER,
     published=(),
     twin=replace(
         _twin,

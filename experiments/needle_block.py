@@ -21,6 +21,7 @@ from validate.papers.accuracy.benchmark import (
     solvers,
 )
 from validate.papers.accuracy.figures import NEEDLE_FIGURES
+from validate.papers.accuracy.ladders import NEEDLE_LADDER
 from validate.papers.accuracy.needle import MP1, MP2, STEP, needle_block, needle_depth
 from validate.papers.accuracy.needle_exhibits import tell
 from validate.replay.cards import TimeSteps, changed, shipped
@@ -88,6 +89,7 @@ EXPERIMENT = Experiment(
     exhibits=tell,
     published=NEEDLE_FIGURES,
     frames=FRAMES,
+    ladder=NEEDLE_LADDER,
     twin=BENCHMARK.made(
         "The recording is a twin: the implicit method itself, as in the paper, plus noise of the "
         "markers. Errors are between solvers; no tissue was measured."

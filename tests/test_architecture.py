@@ -12,8 +12,8 @@ from phantoms import COARSE_GRID, phantom_mesh
 ACCUMULATORS = {"streams.py:Collected"}
 # Names that still stand for two things; none may come to them.
 TWICE = {
-    "Bench", "Block", "Body", "Cell", "Clock", "Interval", "Modal", "ReducedModel", "Row", "Sensor",
-    "Solver", "Table", "Update", "Variant", "Walk", "_Drawn", "_Walk",
+    "Bench", "Block", "Body", "Cell", "Clock", "Followed", "Interval", "Row", "Solver", "Table",
+    "Variant", "_Drawn", "_Walk",
 }  # fmt: skip
 
 

@@ -8,9 +8,20 @@ from numpy.polynomial.legendre import leggauss
 from phantoms import grid_mesh
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
+from skfem import (
+    Basis,
+    ElementTetP1,
+    ElementTetP2,
+    ElementTriP1,
+    ElementTriP2,
+    ElementVector,
+    asm,
+)
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.errors import SceneError
-from validate.fem.assemble import divergence, shape_gradients, stiffness
+from validate.fem.assemble import divergence, library_mesh, shape_gradients, stiffness
+from validate.scene.box import box
 from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
 from validate.scene.scene import Dilatation, Material, Scene
 from validate.scene.shape_functions import EDGES
@@ -39,6 +50,24 @@ def solve_with_edge_values(K: sparse.csr_array, mesh: Mesh, exact: np.ndarray) -
     u = np.where(inner, 0.0, exact.ravel())
     u[inner] = spsolve(K[inner][:, inner].tocsc(), -(K @ u)[inner])
     return u.reshape(-1, 3)
+
+
+@pytest.mark.parametrize(
+    ("size", "element"),
+    [
+        ((0.1, 0.2), ElementTriP1),
+        ((0.1, 0.2), ElementTriP2),
+        ((0.1, 0.2, 0.3), ElementTetP1),
+        ((0.1, 0.2, 0.3), ElementTetP2),
+    ],
+)
+def test_the_stiffness_of_simplices_is_scikit_fems(size: tuple[float, ...], element: type) -> None:
+    mesh = box(size, (2, 3, 2)[: len(size)])
+    mesh = quadratic(mesh) if element.__name__.endswith("P2") else mesh
+    basis = Basis(library_mesh(mesh), ElementVector(element()), intorder=2)
+    theirs = asm(linear_elasticity(*lame_parameters(2.0, 0.3)), basis)
+    ours = stiffness(Scene(mesh, Material(2.0, 0.3)))
+    assert np.abs((ours - theirs).toarray()).max() < 1e-14 * np.abs(theirs).max()
 
 
 @each_kind

@@ -259,7 +259,7 @@ def test_a_marker_that_no_probe_answers_is_a_note(road: Experiment) -> None:
 
 def test_a_check_that_compared_nothing_carries_the_unit_of_its_quantity() -> None:
     """A run that ends before it compared anything has failed in newtons and in metres."""
-    ended = replace(AT_HOLDS.methods["fem"], settings=Breaks(at=0, inner=NoFluid()))
+    ended = replace(AT_HOLDS.methods["fem"], settings=Breaks(inner=NoFluid()))
     result = compare(declared(AT_HOLDS, methods={"fem": ended}, uncertainty=FINER), Options({}))
     assert [(c.name, c.unit, c.count, c.verdict) for c in result.checks] == [
         ("node_B", "m", 0, "cannot decide"), ("force", "N", 0, "cannot decide"),

@@ -110,7 +110,7 @@ class Breaking:
 
 @dataclass(frozen=True)
 class Breaks:
-    """A scheme whose step `at` fails; static ones do not count theirs, so 0 is their first."""
+    """A scheme whose step `at` fails."""
 
     dt: float = quantity(DT, "s", "time step")
     at: int = quantity(1, "1", "step that fails")

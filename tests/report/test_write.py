@@ -2,6 +2,8 @@
 
 import csv
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -126,3 +128,15 @@ def test_an_unwritable_place(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match="cannot write beside"):
         write_report(small_result(), tmp_path / "file" / "cube", created=CREATED)
+
+
+def test_what_draws_is_imported_when_something_is_drawn() -> None:
+    heavy = ("matplotlib", "jinja2", "vtk", "pyvista", "PIL")
+    code = (
+        "import sys; import validate.report.write, validate.report.study_page; "
+        f"print([name for name in {heavy} if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert done.stdout.strip() == "[]"

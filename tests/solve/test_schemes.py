@@ -7,13 +7,15 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
+from validate.estimate.filters import FILTERS
 from validate.fem.system import System, build
 from validate.parameters import with_values
 from validate.scene.box import box
 from validate.scene.scene import Drive, LawName, Load, Material, Scene, Support
+from validate.solve.handles import INSTEAD
 from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton
-from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, LINEAR, SCHEMES
+from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, LINEAR, SCHEMES, SOLVERS
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
@@ -97,7 +99,10 @@ def test_a_scheme_of_drives_and_loads_steps_and_says_what_its_states_mean(
 
 @pytest.mark.parametrize("scheme", INERTIAL, ids=lambda s: s.__name__)
 def test_a_scheme_of_drives_and_loads_refuses_fluid(scheme: type[Scheme], system: System) -> None:
-    with pytest.raises(SceneError, match="know no fluid in cavities"):
+    with pytest.raises(
+        SceneError,
+        match=r"knows no fluid in cavities; .* use ExactPressure or",
+    ):
         scheme().prepare(system)
 
 
@@ -137,7 +142,7 @@ def test_dynamics_at_large_strain_refuse_cavities_and_the_linear_law(
 ) -> None:
     with pytest.raises(SceneError, match="no fluid in cavities"):
         scheme().prepare(large)
-    with pytest.raises(SceneError, match="law 'linear' has no form at large strain"):
+    with pytest.raises(SceneError, match="cannot solve the law 'linear', only svk, neo_hooke"):
         scheme().prepare(build(replace(pressed.scene, material=Material(1e4, 0.4, rho=1000.0))))
 
 
@@ -152,3 +157,29 @@ def test_every_setting_says_what_it_is_and_in_which_unit(kind: type[Scheme]) -> 
 @pytest.mark.parametrize("propagate", ["linear", "constant", "average", "generalised_alpha"])
 def test_every_propagation_of_modes_can_be_set_as_text(propagate: str) -> None:
     assert with_values(Modal(), {"propagate": propagate}).propagate == propagate
+
+
+def test_what_a_refusal_names_instead_handles_it() -> None:
+    """Every name is a scheme, solver or filter, and its `handles` has the part."""
+    known = {kind.__name__: kind.handles for kind in (*SCHEMES, *SOLVERS, *FILTERS)}
+    for part, names in INSTEAD.items():
+        for name in names:
+            h = known[name]
+            has = {
+                "mesh": h.mesh,
+                "point": not h.mesh,
+                "membranes": "membranes" in h.contact,
+                **{law: law in h.law for law in ("linear", "svk", "neo_hooke")},
+            }
+            assert has.get(part) or getattr(h, part, False), (part, name)
+
+
+def test_handles_cover_what_prepares(system: System, large: System, pressed: System) -> None:
+    """What `covers` promises of a scene is what `prepare` does."""
+    for scheme in SCHEMES:
+        for body in (system, large, pressed):
+            if scheme.handles.covers(body.scene):
+                continue
+            with pytest.raises(SceneError, match="; use "):
+                settings(scheme).prepare(body)
+    assert sum(s.handles.covers(pressed.scene) for s in SCHEMES) == len(INERTIAL)

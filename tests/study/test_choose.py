@@ -6,25 +6,25 @@ from dataclasses import replace
 import pytest
 
 from validate.errors import RecordingError, UsageError
+from validate.replay.ladder import Solver
 from validate.solve.newmark import Newmark
 from validate.solve.types import StepTimes
 from validate.study.choose import Wanted, meeting, misses, nearest, wanted
-from validate.study.trade import Cell, Row
-from validate.study.trade_scene import Solver
+from validate.study.trade import TradeRow
 
 WANTED = Wanted(0.5e-3, 1000.0)
 ANY = Solver("any", "prefactored", Newmark)
 
 
-def row(name: str, error: float | None, time: float, dt: float = 0.01) -> Row:
+def row(name: str, error: float | None, time: float, dt: float = 0.01) -> TradeRow:
     """A cell with an error in mm and a time in ms."""
     step = StepTimes(1e-3 * time, 1e-3 * time, 1e-3 * time, 9)
     value = None if error is None else 1e-3 * error
-    return Row(Cell(replace(ANY, name=name), "P1", 1, dt), step=step, total=value)
+    return TradeRow(replace(ANY, name=name), "P1", 1, dt, step=step, total=value)
 
 
-def names(rows: Sequence[Row]) -> list[str]:
-    return [r.cell.solver.name for r in rows]
+def names(rows: Sequence[TradeRow]) -> list[str]:
+    return [r.solver.name for r in rows]
 
 
 TABLE = (row("quick", 0.8, 0.1), row("good", 0.4, 0.5), row("best", 0.1, 0.9),
@@ -36,8 +36,7 @@ def test_the_fastest_that_meets_both_is_first() -> None:
 
 
 def test_what_leaves_out_a_part_of_the_scene_is_never_chosen() -> None:
-    cell = TABLE[1].cell
-    dry = replace(TABLE[1], cell=replace(cell, solver=replace(cell.solver, lacks="the fluid")))
+    dry = replace(TABLE[1], solver=replace(TABLE[1].solver, lacks="the fluid"))
     rows = (dry, TABLE[2])
     assert names(meeting(rows, WANTED, "total", dynamic=False)) == ["best"]
     assert nearest(rows, WANTED, "total", dynamic=False) is TABLE[2]
@@ -58,7 +57,7 @@ def test_where_nothing_meets_the_smaller_miss_is_nearest() -> None:
     hard = Wanted(0.04e-3, 1000.0)
     assert meeting(TABLE, hard, "total", dynamic=False) == []
     found = nearest(TABLE, hard, "total", dynamic=False)
-    assert found.cell.solver.name == "best"  # 2.5 times too wrong; slow is 3 times too slow
+    assert found.solver.name == "best"  # 2.5 times too wrong; slow is 3 times too slow
     assert misses(found, hard, "total", dynamic=False) == pytest.approx((2.5, 0.9))
 
 

@@ -2,18 +2,20 @@
 
 from collections.abc import Sequence
 
-from validate.study.outcome import CellResult
-from validate.study.plan import Cell
+from validate.study.filter_plan import FilterCell
 from validate.study.ranking import Ranking, dominator, rankings
+from validate.study.score import FilterScores
+from validate.study.store import Record
 
 
 def ranked(**cells: tuple[Sequence[float], float]) -> Ranking:
-    made = [Cell(name, (), (), name) for name in cells]
-    results = {
-        name: CellResult(name, {"e": tuple(scores)}, {"e": "m"}, step_s=step)
-        for name, (scores, step) in cells.items()
-    }
-    return rankings(made, results, "e")[0]
+    made = [FilterCell(name, (), (), key=name) for name in cells]
+    records = {name: record(name, scores, step) for name, (scores, step) in cells.items()}
+    return rankings(made, records, "e")[0]
+
+
+def record(key: str, scores: Sequence[float], step: float = 1.0) -> Record[FilterScores]:
+    return Record(key, FilterScores({"e": tuple(scores)}, {"e": "m"}, step_s=step))
 
 
 def test_the_least_mean_error_is_first_and_overlaps_are_named() -> None:
@@ -51,13 +53,17 @@ def test_a_cell_with_more_error_and_more_time_is_dominated() -> None:
 
 def test_conditions_are_ranked_apart_and_failures_are_rows() -> None:
     quiet, loud = (("twin.noise", "1"),), (("twin.noise", "2"),)
-    cells = [Cell("a", (), quiet, "1"), Cell("a", (), loud, "2"), Cell("b", (), loud, "3")]
-    results = {
-        "1": CellResult("1", {"e": (1.0,)}, {"e": "m"}),
-        "2": CellResult("2", {"e": (2.0,)}, {"e": "m"}),
-        "3": CellResult("3", failed="diverged at step 3"),
+    cells = [
+        FilterCell("a", (), quiet, key="1"),
+        FilterCell("a", (), loud, key="2"),
+        FilterCell("b", (), loud, key="3"),
+    ]
+    records = {
+        "1": record("1", [1.0]),
+        "2": record("2", [2.0]),
+        "3": Record[FilterScores]("3", refused="diverged at step 3"),
     }
-    one, two = rankings(cells, results, "e")
+    one, two = rankings(cells, records, "e")
     assert (len(one.rows), len(two.rows)) == (1, 1)
     assert two.failed == ((cells[2], "diverged at step 3"),)
 

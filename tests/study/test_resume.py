@@ -30,7 +30,7 @@ def test_a_killed_study_goes_on_without_repeating_cells(tmp_path: Path) -> None:
     _wait(lambda: len(list(cells.glob("*.json"))) >= 3)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
-    kept = {float(json.loads(f.read_text("utf-8"))["values"]["methods.kf.Q"])
+    kept = {float(dict(json.loads(f.read_text("utf-8"))["cell"]["settings"])["methods.kf.Q"])
             for f in cells.glob("*.json")}  # fmt: skip
     assert 3 <= len(kept) < VALUES
     (tmp_path / "runs").rename(tmp_path / "runs-before")

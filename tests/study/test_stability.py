@@ -3,9 +3,11 @@
 import csv
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import jsonschema
@@ -13,32 +15,55 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from validate.errors import SceneError, UsageError
+from validate.errors import SceneError
 from validate.fem.critical import cell_altitudes
 from validate.fem.system import build
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.ladder import StabilityBody, squeezed
 from validate.report.store import schema
 from validate.solve.amplification import amplification
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.newmark import Newmark
-from validate.study import precision
+from validate.study import precision, stability_page
 from validate.study import stability as stability_module
-from validate.study.base_scenes import BASE_SCENES, base_scene, squeezed
+from validate.study.engine import Finished, Job, Plan, Where, finish
 from validate.study.precision import drift
 from validate.study.stability import SCHEMES, Stability, points, stability
 from validate.study.stability_cell import (
-    VariantResult,
+    StabilityBench,
+    Stepped,
     frequencies,
     measured_limit,
-    read_variants,
-    run_variant,
-    write_variant,
+    run_cell,
+)
+from validate.study.stability_plan import (
+    StabilityCell,
+    drift_variant,
+    stability_cells,
+    step_grid,
 )
 from validate.study.stepping import misprint_limit
-from validate.study.stored_stability import write_stability
-from validate.study.variants import VariantCell, drift_variant, step_grid, variant_cells
+from validate.study.store import Record
+from validate.study.study_page import write_study
 
 W, ALPHA, BETA = 30.0, 0.7, 0.02
+ROOT = Path(__file__).parents[2]
+MAPPED = ("bending_rod", "ekf_cube", "kf_cube", "needle_block")
+JOB = Job("", "")
+
+
+@cache
+def mapped(name: str) -> Experiment:
+    return load_file(ROOT / "experiments" / f"{name}.py")
+
+
+def body(name: str) -> StabilityBody:
+    ladder = mapped(name).ladder
+    assert ladder is not None
+    assert ladder.body is not None
+    return ladder.body
 
 
 def crossing(scheme: str, w: float, alpha: float, beta: float, near: float) -> float | None:
@@ -99,21 +124,29 @@ def test_a_mode_walked_exactly_has_the_radius_of_its_decay() -> None:
         )
 
 
-def small(name: str = "needle_block", **changes: Any) -> VariantCell:
-    """A cell of a base scene's coarsest mesh with three steps."""
-    base = BASE_SCENES[name]
+def small(name: str = "needle_block", **changes: Any) -> StabilityCell:
+    """A cell of a body's coarsest mesh with three steps."""
+    base = body(name)
     variant = replace(base.base, mesh=base.meshes[0], **changes)
-    return VariantCell(name, variant, (base.dt / 100, base.dt, 30 * base.dt), False, "", "k")
+    return StabilityCell(variant, (base.dt / 100, base.dt, 30 * base.dt), key="k")
+
+
+def ran(cell: StabilityCell, name: str = "needle_block") -> Stepped:
+    return run_cell(StabilityBench(body(name)), cell)
+
+
+def finished(records: dict[str, Record[Stepped]]) -> Finished[Stepped]:
+    return Finished(records, 0, 0.0, "")
 
 
 @pytest.fixture(scope="module")
-def needle() -> VariantResult:
-    return run_variant(small())
+def needle() -> Stepped:
+    return ran(small())
 
 
-def test_the_cells_radii_are_those_of_the_schemes_themselves(needle: VariantResult) -> None:
+def test_the_cells_radii_are_those_of_the_schemes_themselves(needle: Stepped) -> None:
     cell = small()
-    system = build(base_scene("needle_block").build(cell.variant))
+    system = build(body("needle_block").build(cell.variant))
     settings = {
         "newmark_average": Newmark(),
         "generalised_alpha": Newmark(rule="generalised_alpha"),
@@ -131,7 +164,7 @@ def test_the_cells_radii_are_those_of_the_schemes_themselves(needle: VariantResu
 
 def test_central_difference_itself_turns_at_the_maps_limit() -> None:
     """The compiled kernel, a small kick: finite below the limit, over all bounds above."""
-    base = BASE_SCENES["ekf_cube"]
+    base = body("ekf_cube")
     scene = base.build(replace(base.base, mesh=2))
     large = replace(scene, material=replace(scene.material, law="svk"))
     system = build(large)
@@ -151,13 +184,13 @@ def test_central_difference_itself_turns_at_the_maps_limit() -> None:
 
 
 def test_limits_agree_to_two_percent_and_cells_cost_what_the_note_says(
-    needle: VariantResult,
+    needle: Stepped,
 ) -> None:
     limits = [(s.predicted, s.measured) for s in needle.schemes if s.predicted is not None]
     assert len(limits) == 5
     for predicted, measured in limits:
         assert measured == pytest.approx(predicted, rel=0.02)
-    stiff = run_variant(small(nu=0.4999))
+    stiff = ran(small(nu=0.4999))
     assert stiff.locking is not None
     assert needle.locking is not None
     assert stiff.locking < 0.1 * needle.locking < 0.1
@@ -175,7 +208,7 @@ def test_limits_agree_to_two_percent_and_cells_cost_what_the_note_says(
 
 def test_tetrahedra_with_stiffness_damping_agree_too() -> None:
     """The large-strain schemes' own limit, by Lanczos and with beta, against their maps."""
-    found = {s.scheme: s for s in run_variant(small("kf_cube")).schemes}
+    found = {s.scheme: s for s in ran(small("kf_cube"), "kf_cube").schemes}
     for name in ("central", "central_lagged", "newmark_misprinted"):
         assert found[name].measured == pytest.approx(found[name].predicted, rel=0.002)
     assert found["central_lagged"].measured < 1e-3 * found["central"].measured  # type: ignore
@@ -207,35 +240,36 @@ def test_energy_over_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_squeezed_cells_have_the_altitude_ratio_they_are_named_for() -> None:
-    mesh = BASE_SCENES["kf_cube"].build(BASE_SCENES["kf_cube"].base).mesh
+    scene = body("kf_cube").build(body("kf_cube").base)
+    mesh = scene.mesh
     flat = squeezed(mesh, 0.05)
     np.testing.assert_allclose(np.ptp(flat.nodes, axis=0), np.ptp(mesh.nodes, axis=0), rtol=1e-12)
     widths = np.diff(np.unique(flat.nodes[:, 0].round(9)))
     assert widths.min() / widths.max() == pytest.approx(0.05, rel=1e-3)
-    one = replace(BASE_SCENES["kf_cube"].build(BASE_SCENES["kf_cube"].base), mesh=flat)
+    one = replace(scene, mesh=flat)
     assert cell_altitudes(one).min() < 1.1 * widths.min()
 
 
 # --- the study -----------------------------------------------------------------------------------
 
 
-def in_process(work: Callable[..., Any], items: Any, where: Any, done: Callable[..., None]) -> None:
-    for item in items:
-        done(item, work(item))
+def needle_map(out: Path) -> Stability:
+    found = stability(mapped("needle_block"), out=out, where=Where(workers=0))
+    assert found is not None
+    return found
 
 
 @pytest.fixture
-def few(monkeypatch: pytest.MonkeyPatch) -> tuple[VariantCell, ...]:
-    """The base, nu = 0, and what must be refused, without a cluster."""
-    cells = variant_cells(BASE_SCENES["needle_block"], quick=True)
-    without_nu = replace(BASE_SCENES["needle_block"].base, nu=0.0)
+def few(monkeypatch: pytest.MonkeyPatch) -> tuple[StabilityCell, ...]:
+    """The base, nu = 0, and what must be refused."""
+    cells = stability_cells(body("needle_block"), JOB, quick=True)
+    without_nu = replace(body("needle_block").base, nu=0.0)
     monkeypatch.setattr("validate.study.precision.DRIFT_STEPS", 200)
     picked = [
         replace(cells[0], drift=True),
         *(c for c in cells if c.expected or c.variant == without_nu),
     ]
-    monkeypatch.setattr("validate.study.workers.run_each", in_process)
-    monkeypatch.setattr(stability_module, "variant_cells", lambda base, quick: tuple(picked))
+    monkeypatch.setattr(stability_module, "stability_cells", lambda *_: tuple(picked))
     return tuple(picked)
 
 
@@ -251,10 +285,11 @@ def leaves(content: Any) -> Iterator[Any]:
 
 
 def test_the_folder_has_no_number_that_is_not_finite(
-    few: tuple[VariantCell, ...], tmp_path: Path
+    few: tuple[StabilityCell, ...], tmp_path: Path
 ) -> None:
-    found = stability("needle_block", out=tmp_path)
-    page = write_stability(found, tmp_path / "needle_block" / "study-stability")
+    found = needle_map(tmp_path)
+    folder = tmp_path / "needle_block" / "study-stability"
+    page = write_study(found.experiment, stability_page.told(found), folder)
     content = json.loads((page.parent / "results.json").read_text("utf-8"))
     jsonschema.validate(content, schema())
     numbers = [v for v in leaves(content) if isinstance(v, float)]
@@ -276,60 +311,60 @@ def test_the_folder_has_no_number_that_is_not_finite(
 
 
 def test_a_second_call_runs_only_what_is_missing(
-    few: tuple[VariantCell, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    few: tuple[StabilityCell, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refused = tuple(c for c in few if c.expected)
-    monkeypatch.setattr(stability_module, "variant_cells", lambda base, quick: refused)
-    assert stability("needle_block", out=tmp_path).reused == 0
-    ran: list[VariantCell] = []
-
-    def counted(work: Any, items: Any, where: Any, done: Any) -> None:
-        ran.extend(items)
-        in_process(work, items, where, done)
-
-    monkeypatch.setattr("validate.study.workers.run_each", counted)
+    monkeypatch.setattr(stability_module, "stability_cells", lambda *_: refused)
+    assert needle_map(tmp_path).done.reused == 0
     kept = tmp_path / "needle_block" / "study-stability" / "cells"
     (kept / f"{refused[2].key}.json").write_text('{"key": 1', encoding="utf-8")
-    again = stability("needle_block", out=tmp_path)
-    assert again.reused == len(refused) - 1
-    assert ran == [refused[2]]
+    assert needle_map(tmp_path).done.reused == len(refused) - 1
 
 
-def test_results_come_back_as_they_were_kept(needle: VariantResult, tmp_path: Path) -> None:
-    cell = replace(small(), key="k")
-    write_variant(tmp_path, needle)
-    assert read_variants(tmp_path, [cell]) == {"k": needle}
+def test_results_come_back_as_they_were_kept(
+    needle: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = Plan(JOB, (small(),), lambda job: None, lambda bench, cell: needle, Stepped)
+    finish(plan, tmp_path, Where(workers=0))
+    again = finish(plan, tmp_path, Where(workers=0))
+    assert (again.reused, again.records["k"].value) == (1, needle)
 
 
-def fabricated(needle: VariantResult, off: float) -> Stability:
+def fabricated(needle: Stepped, off: float) -> Stability:
     """One finished cell whose first limit is measured `off` from the predicted one."""
     schemes = tuple(
         replace(s, measured=s.predicted * (1 + off)) if s.predicted else s for s in needle.schemes
     )
     cell = small()
-    result = replace(needle, schemes=schemes)
-    return Stability(BASE_SCENES["needle_block"], (cell,), {cell.key: result}, False, 0, 0.0, "")
+    done = finished({cell.key: Record(cell.key, replace(needle, schemes=schemes))})
+    return Stability(mapped("needle_block"), body("needle_block"), (cell,), done, quick=False)
 
 
 @pytest.mark.parametrize(("off", "holds"), [(0.019, True), (-0.019, True), (0.021, False)])
-def test_two_percent_is_the_rule(needle: VariantResult, off: float, holds: bool) -> None:
+def test_two_percent_is_the_rule(needle: Stepped, off: float, holds: bool) -> None:
     limits = [p for p in fabricated(needle, off).predictions if p.name.startswith("limit.explicit")]
     assert [p.holds for p in limits] == 4 * [holds]
     assert all(p.count == 1 for p in limits)
 
 
 def test_growth_where_none_is_predicted_a_missing_limit_and_few_points_fail(
-    needle: VariantResult,
+    needle: Stepped,
 ) -> None:
     study = fabricated(needle, 0.0)
     cell = study.cells[0]
-    broken = tuple(
-        replace(s, radii=(1.0, 1.0, 1.01), measured=None) for s in study.results[cell.key].schemes
+    broken = Record(
+        cell.key,
+        replace(
+            needle,
+            schemes=tuple(
+                replace(s, radii=(1.0, 1.0, 1.01), measured=None) for s in needle.schemes
+            ),
+        ),
     )
-    bad = replace(study, results={cell.key: replace(needle, schemes=broken)})
+    bad = replace(study, done=finished({cell.key: broken}))
     other = replace(cell, key="other")
-    both = {"other": needle, cell.key: replace(needle, schemes=broken)}
-    one_missing = replace(bad, cells=(cell, other), results=both)
+    both = finished({"other": Record("other", needle), cell.key: broken})
+    one_missing = replace(bad, cells=(cell, other), done=both)
     held = {p.name: p.holds for p in one_missing.predictions}
     assert not held["limit.explicit_lumped"]
     verdicts = {p.name: p.holds for p in bad.predictions}
@@ -341,22 +376,31 @@ def test_growth_where_none_is_predicted_a_missing_limit_and_few_points_fail(
 
 
 def test_a_variant_is_refused_for_its_own_reason_or_the_claim_fails() -> None:
-    wanted = [c for c in variant_cells(BASE_SCENES["ekf_cube"], quick=True) if c.expected]
-    results = {c.key: run_variant(c) for c in wanted}
-    assert all(results[c.key].refused for c in wanted)
-    study = Stability(BASE_SCENES["ekf_cube"], tuple(wanted), results, True, 0, 0.0, "")
-    assert {p.name: p.holds for p in study.predictions}["refusals"]
-    quiet = {**results, wanted[0].key: replace(results[wanted[0].key], refused="")}
-    assert not {p.name: p.holds for p in replace(study, results=quiet).predictions}["refusals"]
-    surprising = (replace(wanted[0], expected=""), *wanted[1:])
-    assert not {p.name: p.holds for p in replace(study, cells=surprising).predictions}["refusals"]
-    rows = list(points(wanted[0], results[wanted[0].key], ("central",)))
+    cells = stability_cells(body("ekf_cube"), JOB, quick=True)
+    wanted = tuple(c for c in cells if c.expected)
+    bench = StabilityBench(body("ekf_cube"))
+    with TemporaryDirectory() as folder:
+        plan = Plan(JOB, wanted, lambda job: bench, run_cell, Stepped)
+        done = finish(plan, Path(folder), Where(workers=0))
+    assert all(done.records[c.key].refused for c in wanted)
+    study = Stability(mapped("ekf_cube"), body("ekf_cube"), wanted, done, quick=True)
+    assert refusals(study)
+    first = wanted[0]
+    quiet = {**done.records, first.key: replace(done.records[first.key], refused="")}
+    assert not refusals(replace(study, done=finished(quiet)))
+    surprising = (replace(first, expected=""), *wanted[1:])
+    assert not refusals(replace(study, cells=surprising))
+    rows = list(points(first, done.records[first.key], ("central",)))
     assert {r.regime for r in rows} == {"refused"}
     assert all("Poisson ratio nu = 0.5" in r.why and r.radius is None for r in rows)
 
 
-def test_regimes_by_radius_and_by_turn(needle: VariantResult) -> None:
-    found = {(p.scheme, i % 3): p for i, p in enumerate(points(small(), needle, ()))}
+def refusals(study: Stability) -> bool:
+    return {p.name: p.holds for p in study.predictions}["refusals"]
+
+
+def test_regimes_by_radius_and_by_turn(needle: Stepped) -> None:
+    found = {(p.scheme, i % 3): p for i, p in enumerate(points(small(), Record("k", needle), ()))}
     assert found["newmark_average", 0].regime == "stable"
     assert found["newmark_average", 2].regime == "unresolved"
     assert "h too large to resolve" in found["newmark_average", 2].why
@@ -369,13 +413,13 @@ def test_grids_span_what_was_asked_for() -> None:
     steps = step_grid(0.002)
     assert steps[-1] / steps[0] == pytest.approx(1e6)
     assert steps[len(steps) // 2] == pytest.approx(0.002)
-    for base in BASE_SCENES.values():
-        variants = [c.variant for c in variant_cells(base)]
+    for base in map(body, MAPPED):
+        variants = [c.variant for c in stability_cells(base, JOB)]
         assert len(set(variants)) == len(variants)
         assert {0.0, 0.4999} <= {v.nu for v in variants}
         assert {200.0, 1e6} <= {v.E for v in variants}
         assert drift_variant(base) in variants
-        expected = {c.variant: c.expected for c in variant_cells(base)}
+        expected = {c.variant: c.expected for c in stability_cells(base, JOB)}
         for paper in base.papers:
             assert expected[paper.variant] == ("Poisson" if paper.label == "003 cone" else "")
             assert np.isclose(step_grid(base.dt), paper.dt).any()
@@ -383,19 +427,18 @@ def test_grids_span_what_was_asked_for() -> None:
         assert max(sizes) <= 1000
 
 
-def test_unknown_scenes_and_bodies_too_large_are_refused() -> None:
-    with pytest.raises(UsageError, match=r"no base scene 'kf_cub'.*kf_cube"):
-        stability("kf_cub")
-    base = BASE_SCENES["needle_block"]
+def test_bodies_too_large_are_refused() -> None:
+    base = body("needle_block")
     with pytest.raises(SceneError, match="unknowns at mesh 30: a stability map has at most 1000"):
         base.build(replace(base.base, mesh=30))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(2400)
-@pytest.mark.parametrize("name", sorted(BASE_SCENES))
+@pytest.mark.parametrize("name", MAPPED)
 def test_all_predictions_hold_on_the_map(name: str, tmp_path: Path) -> None:
     """One scene in full, the others in their quick form: four full maps take twenty minutes."""
-    found = stability(name, quick=name != "needle_block", out=tmp_path)
+    found = stability(mapped(name), quick=name != "needle_block", out=tmp_path)
+    assert found is not None
     assert [p.name for p in found.predictions if not p.holds] == []
     assert found.points > (20_000 if name == "needle_block" else 500)

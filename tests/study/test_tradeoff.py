@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from validate.cli import trading
+from validate.cli import studying
 from validate.cli.main import run
-from validate.errors import SceneError, UsageError
+from validate.errors import SceneError
 from validate.fem.factor import factorise
 from validate.fem.system import build
+from validate.replay.experiment import Experiment
+from validate.replay.ladder import LawPair, Solver, Trial
 from validate.scene.box import box
 from validate.scene.mesh import quadratic
 from validate.scene.scene import LawName, Load, Material, Scene, Support
@@ -23,12 +25,12 @@ from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
 from validate.study.choose import choose, principal_strains, wanted
 from validate.study.choose_exhibits import choose_exhibits
+from validate.study.engine import Job, Plan, Where, finish
 from validate.study.held import held_bytes
-from validate.study.trade import Cell, Row, Trade, front, trade
+from validate.study.trade import Trade, TradeRow, front, trade_cells, traded
+from validate.study.trade_cell import Measured, run_cell
 from validate.study.trade_exhibits import trade_exhibits
 from validate.study.trade_page import trade_document
-from validate.study.trade_scene import LawPair, Solver, TradeScene
-from validate.study.trade_scenes import trade_scene
 
 STEPS = (0.02, 0.01, 0.005)
 STATIC = Solver("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
@@ -46,9 +48,9 @@ def block(element: str, level: int, law: LawName) -> Scene:
     )
 
 
-def small() -> TradeScene:
-    return TradeScene(
-        "small", "A block", "test", block, lambda level: 0.1 / level,
+def small(job: Job | None = None) -> Trial:
+    return Trial(
+        block, lambda level: 0.1 / level,
         {"P1": (1, 2), "P2": (1,)}, {"P1": 2.0, "P2": 3.0}, STEPS,
         lambda t: np.full((len(t), 1), 0.8), np.arange(0.04, 0.21, 0.04),
         np.array([[0.05, 0.05, 0.1], [0.05, 0.05, 0.05]]), ("P2", 2),
@@ -68,77 +70,81 @@ def small() -> TradeScene:
 
 
 @pytest.fixture(scope="module")
-def traded() -> Trade:
-    return trade(small())
+def measured(phantom: Experiment, tmp_path_factory: pytest.TempPathFactory) -> Trade:
+    """The trade above, under the name of an experiment."""
+    cells = trade_cells(small(), Job("", ""))
+    plan = Plan(Job("", ""), cells, small, run_cell, Measured)
+    done = finish(plan, tmp_path_factory.mktemp("cells"), Where(workers=0))
+    return traded(replace(phantom, name="small"), small(), cells, done, quick=False)
 
 
-def rows_of(found: Trade, name: str, element: str = "P1", level: int = 2) -> list[Row]:
+def rows_of(found: Trade, name: str, element: str = "P1", level: int = 2) -> list[TradeRow]:
     return [
         r for r in found.rows
-        if (r.cell.solver.name, r.cell.element, r.cell.level) == (name, element, level)
+        if (r.solver.name, r.element, r.level) == (name, element, level)
     ]  # fmt: skip
 
 
-def test_every_solver_runs_on_every_mesh_element_and_step(traded: Trade) -> None:
-    assert len(traded.rows) == 3 * (1 + 1 + 3 + 3) + 1
-    assert all(r.step is not None and r.step.n > 0 for r in traded.rows if not r.failed)
-    assert [r.cell.dt for r in rows_of(traded, "average")] == list(STEPS)
+def test_every_solver_runs_on_every_mesh_element_and_step(measured: Trade) -> None:
+    assert len(measured.rows) == 3 * (1 + 1 + 3 + 3) + 1
+    assert all(r.step is not None and r.step.n > 0 for r in measured.rows if not r.failed)
+    assert [r.dt for r in rows_of(measured, "average")] == list(STEPS)
 
 
-def test_a_solver_without_error_leaves_the_meshes(traded: Trade) -> None:
+def test_a_solver_without_error_leaves_the_meshes(measured: Trade) -> None:
     for element, level in (("P1", 1), ("P1", 2), ("P2", 1)):
-        (row,) = rows_of(traded, "all modes", element, level)
+        (row,) = rows_of(measured, "all modes", element, level)
         assert row.solver_error == pytest.approx(0.0, abs=1e-12)
         assert row.error == pytest.approx(row.mesh_error)
         assert row.error is not None
-        assert 0 < row.error < traded.moved
+        assert 0 < row.error < measured.moved
 
 
-def test_the_step_error_is_of_second_order_and_the_mesh_rules(traded: Trade) -> None:
-    errors = [r.solver_error or 0.0 for r in rows_of(traded, "average")]
+def test_the_step_error_is_of_second_order_and_the_mesh_rules(measured: Trade) -> None:
+    errors = [r.solver_error or 0.0 for r in rows_of(measured, "average")]
     assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.3)
-    assert errors[2] < 0.1 * (rows_of(traded, "average")[2].mesh_error or 0.0)
-    ladder = next(x for x in traded.ladders if x.what.startswith("steps of average"))
+    assert errors[2] < 0.1 * (rows_of(measured, "average")[2].mesh_error or 0.0)
+    ladder = next(x for x in measured.refinements if x.what.startswith("steps of average"))
     assert ladder.found.order == pytest.approx(2.0, abs=0.6)
 
 
-def test_too_long_explicit_steps_are_rows_with_the_reason(traded: Trade) -> None:
-    failed = [r for r in traded.rows if r.cell.solver.name == "explicit" and r.failed]
+def test_too_long_explicit_steps_are_rows_with_the_reason(measured: Trade) -> None:
+    failed = [r for r in measured.rows if r.solver.name == "explicit" and r.failed]
     assert failed
     assert all("times the critical step" in r.failed and r.error is None for r in failed)
 
 
-def test_statics_assemble_no_mass_and_say_so(traded: Trade) -> None:
-    assert rows_of(traded, "static")[0].assembled == "K"
-    assert "M" in rows_of(traded, "average")[0].assembled
+def test_statics_assemble_no_mass_and_say_so(measured: Trade) -> None:
+    assert rows_of(measured, "static")[0].assembled == "K"
+    assert "M" in rows_of(measured, "average")[0].assembled
 
 
-def test_large_strain_is_held_against_its_own_truth(traded: Trade) -> None:
-    (large,) = rows_of(traded, "large", level=1)
-    linear = rows_of(traded, "average", level=1)[0]
-    assert traded.law_error > 0
+def test_large_strain_is_held_against_its_own_truth(measured: Trade) -> None:
+    (large,) = rows_of(measured, "large", level=1)
+    linear = rows_of(measured, "average", level=1)[0]
+    assert measured.law_error > 0
     # On the pair's own mesh and step the law's share cancels: what is left is the linear error.
     assert large.total == pytest.approx(linear.error, rel=1e-9)
 
 
-def test_a_trade_is_told_in_numbers_that_are_finite(traded: Trade) -> None:
-    made = trade_exhibits(traded)
+def test_a_trade_is_told_in_numbers_that_are_finite(measured: Trade) -> None:
+    made = trade_exhibits(measured)
     assert [e.anchor for e in made] == ["front", "shares", "costs", "convergence", "unscored"]
-    told = trade_document(traded)
-    assert len(told["cells"]) == len(traded.rows)
-    choice = choose(traded, wanted("1mm", "1Hz"))
+    told = trade_document(measured)
+    assert len(told["cells"]) == len(measured.rows)
+    choice = choose(measured, wanted("1mm", "1Hz"), False, lambda row, dt: row)
     assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
     assert [c.rung for c in choice.ladder if c.verdict == "nothing ran"] == ["condensed"]
 
 
 @pytest.fixture
-def measured(traded: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
+def commanded(measured: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command line's trade is the one above."""
-    monkeypatch.setattr(trading, "trade_scene", lambda name, quick: traded.scene)
-    monkeypatch.setattr(trading, "trade", lambda scene, **rest: traded)
+    monkeypatch.setattr(studying, "find", lambda name, start: measured.experiment)
+    monkeypatch.setattr(studying, "trade", lambda experiment, **rest: measured)
 
 
-@pytest.mark.usefixtures("measured")
+@pytest.mark.usefixtures("commanded")
 def test_choose_writes_its_folder_and_exits_by_its_verdict(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -159,7 +165,7 @@ def test_choose_writes_its_folder_and_exits_by_its_verdict(
     assert (folder / "figures" / "chart_choice.png").is_file()
 
 
-@pytest.mark.usefixtures("measured")
+@pytest.mark.usefixtures("commanded")
 def test_tradeoff_writes_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["study", "tradeoff", "small", "--out", str(tmp_path)]) == 0
     assert "the front runs from" in capsys.readouterr().out
@@ -177,19 +183,19 @@ def test_bad_input_exits_with_2_and_one_line(capsys: pytest.CaptureFixture[str])
     assert "bending_rod" in lines[1]
 
 
-def timed(name: str, error: float, time: float, solver: Solver = AVERAGE) -> Row:
+def timed(name: str, error: float, time: float, solver: Solver = AVERAGE) -> TradeRow:
     step = StepTimes(time, time, time, 9)
-    cell = Cell(replace(solver, name=name), "P1", 1, 0.01)
-    return Row(cell, step=step, error=error, total=error)
+    solver = replace(solver, name=name)
+    return TradeRow(solver, "P1", 1, 0.01, step=step, error=error, total=error)
 
 
 def test_the_front_by_hand() -> None:
     rows = (timed("fast", 4.0, 1.0), timed("mean", 2.0, 3.0), timed("slow", 1.0, 9.0),
             timed("beaten", 3.0, 4.0), timed("worst", 5.0, 20.0))  # fmt: skip
     found = front(rows, "error")
-    assert [r.cell.solver.name for r in found.rows] == ["fast", "mean", "slow"]
+    assert [r.solver.name for r in found.rows] == ["fast", "mean", "slow"]
     assert found.dominated == ("beaten", "worst")
-    assert [r.cell.solver.name for r in front(rows, "error", floor=2.5).rows] == ["fast", "mean"]
+    assert [r.solver.name for r in front(rows, "error", floor=2.5).rows] == ["fast", "mean"]
 
 
 def test_memory_counts_every_array_once() -> None:
@@ -207,8 +213,6 @@ def test_principal_strains_of_a_stretched_block() -> None:
     assert principal_strains(mesh, u) == pytest.approx(np.full(len(mesh.cells), 0.05))
 
 
-def test_steps_must_land_on_frames_and_names_be_known() -> None:
+def test_steps_must_land_on_frames() -> None:
     with pytest.raises(SceneError, match="do not land on the frames"):
         replace(small(), steps=(0.03,))
-    with pytest.raises(UsageError, match="bending_rod"):
-        trade_scene("bending_rood")

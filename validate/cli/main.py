@@ -113,11 +113,33 @@ def compare(runs: tuple[Path, ...], as_json: bool) -> None:
 
 @cli.group()
 def study() -> None:
-    """Many runs on a grid of values, on Dask; goes on where it was stopped."""
+    """Many runs of any experiment, on Dask; goes on where it was stopped."""
+
+
+def _studied(command: Any) -> Any:
+    """The argument and the options of every study."""
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else."),
+        click.option("--scheduler", default="", metavar="ADDRESS", help="A running scheduler."),
+        click.option("--workers", type=int, help="Local processes (0: this one; else one a core)."),
+        click.option(
+            "--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone)."
+        ),
+        click.option("--quick", is_flag=True, help="Coarser and fewer runs; a banner says so."),
+        click.argument("name", metavar="NAME|FILE.py"),
+    ):
+        command = option(command)
+    return command
+
+
+def _common(options: dict[str, Any]) -> Any:
+    """Takes the options of every study out of a command's."""
+    from validate.cli.studying import Common
+
+    return Common(**{k: options.pop(k) for k in Common.__dataclass_fields__})
 
 
 @study.command("filters")
-@click.argument("name", metavar="NAME|FILE.py")
 @click.option(
     "--sweep",
     "sweeps",
@@ -129,57 +151,42 @@ def study() -> None:
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
 @click.option("--by", default="all.rmse", show_default=True, metavar="SCORE", help="Rank by it.")
-@click.option("--quick", is_flag=True, help="Coarser and shorter; a banner says so.")
-@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
-@click.option("--workers", type=int, help="Local processes (default: one a core).")
-@click.option("--scheduler", default="", metavar="ADDRESS", help="A Dask scheduler that runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
-def filters(name: str, **options: Any) -> None:
+@_studied
+def filters(name: str, **options: Any) -> int:
     """Settings, rates, noise and seeds of filters: ranking, Pareto front, consistency."""
     from validate.cli import studying
 
-    studying.filters(name, **options)
+    return studying.filters(name, _common(options), **options)
 
 
 @study.command("stability")
-@click.argument("name", metavar="NAME")
-@click.option("--quick", is_flag=True, help="Fewer variants and steps; a banner says so.")
-@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
-@click.option("--workers", type=int, help="Local processes (default: one a core).")
-@click.option("--scheduler", default="", metavar="ADDRESS", help="A Dask scheduler that runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+@_studied
 def stability_(name: str, **options: Any) -> int:
     """Where every scheme is stable, over step, material, damping, cells and mesh."""
-    from validate.cli import stability
+    from validate.cli import studying
 
-    return stability.run(name, **options)
+    return studying.stability_map(name, _common(options))
 
 
 @study.command()
-@click.argument("name")
-@click.option("--quick", is_flag=True, help="Coarser and fewer meshes; a banner says so.")
-@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
-@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
-def tradeoff(name: str, **options: Any) -> None:
+@_studied
+def tradeoff(name: str, **options: Any) -> int:
     """Error against time per step: every solver, mesh, element and step; the Pareto front."""
-    from validate.cli import trading
+    from validate.cli import studying
 
-    trading.tradeoff(name, **options)
+    return studying.tradeoff(name, _common(options))
 
 
 @study.command()
-@click.argument("name")
 @click.option("--error", required=True, metavar="LENGTH", help="The largest error, as in 0.5mm.")
 @click.option("--rate", required=True, metavar="RATE", help="The least rate, as in 1000Hz.")
 @click.option("--declared-law", is_flag=True, help="Leave out what the linear law itself costs.")
-@click.option("--quick", is_flag=True, help="Coarser and fewer meshes; a banner says so.")
-@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
-@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+@_studied
 def choose(name: str, **options: Any) -> int:
     """The cheapest method that meets an error and a rate, or what comes nearest (exit code 1)."""
-    from validate.cli import trading
+    from validate.cli import studying
 
-    return trading.choosing(name, **options)
+    return studying.choosing(name, _common(options), **options)
 
 
 @cli.command()

@@ -1,58 +1,133 @@
-"""`validate study filters`."""
+"""`validate study filters|stability|tradeoff|choose`: runs, writes the folder, prints."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from validate.cli.display import console, progress, relative, table
 from validate.cli.main import pairs
 from validate.errors import UsageError
+from validate.replay.experiment import Experiment
 from validate.replay.find import find
+from validate.replay.options import Report
 from validate.report.numbers import MISSING, significant
-from validate.study.exhibits import RANKING, ranking_row
-from validate.study.filters import Study, cells_folder, study, study_folder
+from validate.study import filter_page, stability_page, still_page, trade_page
+from validate.study.choose import Choice, choose, error_of, wanted
+from validate.study.choose_exhibits import words
+from validate.study.engine import CELLS, Finished, Where, study_folder
+from validate.study.filter_exhibits import RANKING, ranking_row
+from validate.study.filters import FilterStudy, study
+from validate.study.gain import GainMap, gain_map
 from validate.study.ranking import Ranking
-from validate.study.stored_study import sentence, write_study
-from validate.study.wording import named
+from validate.study.stability import Stability, stability
+from validate.study.study_page import Told, write_study
+from validate.study.sweep import named
+from validate.study.trade import Trade, again, trade
 
+_OK, _FAILED = 0, 1
 _PLACES = 10  # of every ranking on the terminal
 _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
             "against #1", "NIS per dof / 1", "filter is", "step / ms",
             "gains repeat from step")  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Common:
+    """What every study is told: where its folder lies, where its cells run, how it prints."""
+
+    out: Path | None
+    quick: bool
+    workers: int | None
+    scheduler: str
+    as_json: bool
+
+    @property
+    def where(self) -> Where:
+        return Where(self.workers, self.scheduler)
+
+
 def filters(
     name: str,
+    common: Common,
     *,
     sweeps: tuple[str, ...],
     seeds: str,
     values: tuple[str, ...],
     methods: str,
     by: str,
-    quick: bool,
-    out: Path | None,
-    workers: int | None,
-    scheduler: str,
-    as_json: bool,
-) -> None:
-    """Runs the study, writes its folder and prints the rankings."""
+) -> int:
+    """Ranks filters; 0."""
     experiment = find(name, Path.cwd())
-    wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
-    settings, wanted_seeds = pairs(values, "--set"), seeds_of(seeds)
-    try:
-        with progress(f"{experiment.name}: study filters") as report:
-            found = study(
-                experiment, sweeps, methods=wanted, values=settings, seeds=wanted_seeds, by=by,
-                quick=quick, out=out, workers=workers, scheduler=scheduler, report=report,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        kept = sum(1 for _ in cells_folder(experiment, out).glob("*.json"))
-        screen = console(error=True)
-        screen.print(f"{kept} finished cells are kept; the same command goes on from there")
-        raise
-    page = write_study(found, study_folder(experiment, out))
-    if as_json:
-        print((page.parent / "results.json").read_text(encoding="utf-8"))
-    else:
-        _show(found, page)
+    chosen = tuple(m.strip() for m in methods.split(",") if m.strip())
+    with _running(experiment, "filters", "filters", common) as report:
+        found = study(
+            experiment, sweeps, methods=chosen, values=pairs(values, "--set"),
+            seeds=seeds_of(seeds), by=by, quick=common.quick, out=common.out, where=common.where,
+            report=report,
+        )  # fmt: skip
+    page = _written(experiment, filter_page.told(found), "filters", common)
+    if not common.as_json:
+        _show_filters(found)
+        _end(found.done, page)
+    return _OK
+
+
+def stability_map(name: str, common: Common) -> int:
+    """Maps where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
+    experiment = find(name, Path.cwd())
+    with _running(experiment, "stability", "stability", common) as report:
+        found = stability(
+            experiment, quick=common.quick, out=common.out, where=common.where, report=report
+        )
+        still = None
+        if found is None:
+            still = gain_map(experiment, out=common.out, where=common.where, report=report)
+    if found is None:
+        return _still(experiment, still, common)
+    page = _written(experiment, stability_page.told(found), "stability", common)
+    if not common.as_json:
+        _show_stability(found)
+        _end(found.done, page)
+    return _OK if found.passed else _FAILED
+
+
+def _still(experiment: Experiment, still: GainMap | None, common: Common) -> int:
+    """A static experiment: the gain of its loop, or that nothing is stepped."""
+    told = (
+        still_page.told_nothing(experiment, common.quick)
+        if still is None
+        else still_page.told_gain(still, common.quick)
+    )
+    page = _written(experiment, told, "stability", common)
+    if not common.as_json:
+        console().print(f"{told.sentence}\nreport: {relative(page)}", soft_wrap=True)
+    return _FAILED if told.passed is False else _OK
+
+
+def tradeoff(name: str, common: Common) -> int:
+    """Measures error against time; 0."""
+    found = _measured(name, common)
+    page = _written(found.experiment, trade_page.told(found), "tradeoff", common)
+    if not common.as_json:
+        _show_trade(found)
+        _end(found.done, page)
+    return _OK
+
+
+def choosing(name: str, common: Common, *, error: str, rate: str, declared_law: bool) -> int:
+    """Runs the pilots, climbs the ladder; 0 when a method meets both, else 1."""
+    want = wanted(error, rate)
+    found = _measured(name, common)
+    choice = choose(
+        found, want, declared_law, lambda row, dt: again(found, row, dt, common.out, common.where)
+    )
+    page = _written(found.experiment, trade_page.told_choice(choice), "choose", common)
+    if not common.as_json:
+        _show_choice(choice)
+        _end(found.done, page)
+    return _OK if choice.pick is not None else _FAILED
 
 
 def seeds_of(text: str) -> int | tuple[int, ...]:
@@ -64,30 +139,68 @@ def seeds_of(text: str) -> int | tuple[int, ...]:
     return numbers if len(numbers) > 1 else numbers[0]
 
 
-def _show(found: Study, page: Path) -> None:
-    screen = console()
-    for ranking in found.rankings:
-        under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        screen.print(table(f"Ranking by {found.by}{under}", _COLUMNS, _rows(ranking)))
-    for method, where, why in _failures(found):
-        screen.print(f"failed: {method} ({where}): {why}", soft_wrap=True)
-    cells, took = len(found.results), f"{found.seconds:.1f} s on {found.workers}"
-    screen.print(f"\n{sentence(found)}", soft_wrap=True)
-    for best in found.best:
-        screen.print(best.line, soft_wrap=True)
-    screen.print(
-        f"{cells} cells, {found.reused} of them finished before; {took}; report: {relative(page)}",
+# --- what all do ----------------------------------------------------------------------------------
+
+
+def _measured(name: str, common: Common) -> Trade:
+    experiment = find(name, Path.cwd())
+    with _running(experiment, "tradeoff", "pilot runs", common) as report:
+        return trade(
+            experiment, quick=common.quick, out=common.out, where=common.where, report=report
+        )
+
+
+@contextmanager
+def _running(experiment: Experiment, kind: str, title: str, common: Common) -> Iterator[Report]:
+    """A progress bar; an interruption says what is kept."""
+    try:
+        with progress(f"{experiment.name}: {title}") as report:
+            yield report
+    except KeyboardInterrupt:
+        cells = study_folder(experiment, kind, common.out) / CELLS
+        kept = sum(1 for _ in cells.glob("*.json"))
+        screen = console(error=True)
+        screen.print(f"{kept} finished cells are kept; the same command goes on from there")
+        raise
+
+
+def _written(experiment: Experiment, told: Told, kind: str, common: Common) -> Path:
+    """The page's path; prints results.json where that is asked for."""
+    page = write_study(experiment, told, study_folder(experiment, kind, common.out))
+    if common.as_json:
+        print((page.parent / "results.json").read_text(encoding="utf-8"))
+    return page
+
+
+def _end(done: Finished[Any], page: Path) -> None:
+    where = f" on {done.workers}" if done.workers else ""
+    console().print(
+        f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
+        f"{where}; report: {relative(page)}",
         soft_wrap=True,
     )
 
 
-def _rows(ranking: Ranking) -> list[list[str]]:
+# --- terminals ------------------------------------------------------------------------------------
+
+
+def _show_filters(found: FilterStudy) -> None:
+    screen = console()
+    for ranking in found.rankings:
+        under = f" with {named(ranking.condition)}" if ranking.condition else ""
+        screen.print(table(f"Ranking by {found.by}{under}", _COLUMNS, _places(ranking)))
+    failed = [pair for r in found.rankings for pair in r.failed]
+    for cell, why in failed[:_PLACES]:
+        screen.print(f"failed: {cell.method} ({named(cell.values)}): {why}", soft_wrap=True)
+    screen.print(f"\n{filter_page.sentence(found)}", soft_wrap=True)
+    for best in found.best:
+        screen.print(best.line, soft_wrap=True)
+
+
+def _places(ranking: Ranking) -> list[list[str]]:
     pick = [RANKING.index(c) for c in _COLUMNS]
-    shown = []
-    for r in ranking.rows[:_PLACES]:
-        row = ranking_row(r)
-        shown.append([_text(row[i]) for i in pick])
-    return shown
+    rows = [ranking_row(r) for r in ranking.rows[:_PLACES]]
+    return [[_text(row[i]) for i in pick] for row in rows]
 
 
 def _text(value: float | int | str | None) -> str:
@@ -96,6 +209,43 @@ def _text(value: float | int | str | None) -> str:
     return significant(value) if isinstance(value, float) else str(value)
 
 
-def _failures(found: Study) -> list[tuple[str, str, str]]:
-    rows = [(c, why) for r in found.rankings for c, why in r.failed]
-    return [(c.method, named(c.values), why) for c, why in rows[:_PLACES]]
+def _show_stability(found: Stability) -> None:
+    rows = [
+        [p.name, _text(p.value), significant(p.limit), str(p.count),
+         "holds" if p.holds else "FAILS"]
+        for p in found.predictions
+    ]  # fmt: skip
+    head = ("prediction", "worst / 1", "limit / 1", "count", "verdict")
+    screen = console()
+    screen.print(table("Predictions against measured radii", head, rows))
+    quick = "QUICK: fewer points; " if found.quick else ""
+    screen.print(f"\n{quick}{stability_page.sentence(found)}", soft_wrap=True)
+
+
+def _show_trade(found: Trade) -> None:
+    screen = console()
+    head = ("solver", "element", "mesh", "error / mm", "time / us")
+    for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
+        rows = [
+            [r.solver.name, r.element, str(r.level), significant(1e3 * float(getattr(r, by))),
+             significant(1e6 * (r.time_s or 0.0))]
+            for r in found.front(by).rows
+        ]  # fmt: skip
+        screen.print(table(title, head, rows))
+    for by in ("error", "total"):
+        if off := found.front(by).dominated:
+            screen.print(f"dominated ({by}): {'; '.join(off)}", soft_wrap=True)
+    screen.print(f"\n{trade_page.sentence(found)}", soft_wrap=True)
+
+
+def _show_choice(choice: Choice) -> None:
+    screen = console()
+    rows = [[f.name, f.value, f.means] for f in choice.facts]
+    screen.print(table("The scene's own numbers", ("what", "value", "asks for"), rows))
+    rows = []
+    for c in choice.ladder:
+        error = None if c.best is None else error_of(c.best, choice.by)
+        rows.append([c.rung, c.verdict, _text(None if error is None else 1e3 * error), c.evidence])
+    screen.print(table("The ladder", ("rung", "verdict", "error / mm", "evidence"), rows))
+    for line in (*choice.rejected, *words(choice)):
+        screen.print(line, soft_wrap=True)

@@ -50,7 +50,7 @@ class ExplicitCore(Protocol):
 
 
 @dataclass(frozen=True)
-class Followed:
+class AtInputs:
     """The core's memory, and the inputs (k + l,) at the end of the step."""
 
     memory: Any
@@ -78,7 +78,7 @@ class ExplicitFilterStepper:
 
     def rest(self) -> State:
         """U_0 = U_{-h} = 0."""
-        return State(0, Followed(self.core.start(), np.zeros(len(self.scene.inputs))))
+        return State(0, AtInputs(self.core.start(), np.zeros(len(self.scene.inputs))))
 
     def step(self, state: State, inputs: Floats) -> State:
         """`parts` explicit steps, each with an update where something was measured."""
@@ -96,7 +96,7 @@ class ExplicitFilterStepper:
                 memory, new = core.correct(memory, number, z)
                 found = replace(new, nis=found.nis + new.nis, dof=found.dof + new.dof)
         numbers = {**found.numbers(self.names), **core.numbers(memory)}
-        return State(state.k + 1, Followed(memory, inputs), numbers=numbers)
+        return State(state.k + 1, AtInputs(memory, inputs), numbers=numbers)
 
     def _failure(self, memory: Memory) -> tuple[Ending, str] | None:
         largest = kernel.farthest(memory.u)

@@ -6,7 +6,7 @@ are refused here, before the first step and after every one.
 
 import copy
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,7 +27,7 @@ from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_mo
 from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.types import Stepper
 
 Make = Callable[[LinearModel], Any]
@@ -122,13 +122,7 @@ class Guest:
     filters which draw from numpy's global generator.
     """
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",),
-        inertia=True,
-        cavities=False,
-        drives=False,
-        contact=GLUED,
-    )
+    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, drives=False)
 
     make: Make | str = quantity("KalmanFilter", "1", "name, or a function of the model")
     dt: float = quantity(0.002, "s", "time step")

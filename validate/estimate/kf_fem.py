@@ -37,7 +37,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic import reactions
 from validate.solve.excitation import Excitation, StartName, excitation
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.newmark_rule import Rule, RuleName, per_mode, propagation, rule_of
 from validate.solve.types import Stepper
 
@@ -53,9 +53,7 @@ class DisplacementNoise:
     displacement of each load as a whole, Q where it moves a measured component most.
     """
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
-    )
+    handles: ClassVar[Handles] = LINEAR_DYNAMICS
 
     dt: float = quantity(0.002, "s", "time step")
     Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, read as mm2")

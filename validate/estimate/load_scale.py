@@ -7,7 +7,7 @@ where the shape would swing, `prepare` refuses.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +20,7 @@ from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.types import Stepper
 
 _OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
@@ -31,13 +31,7 @@ class LoadScale:
     """`scale_sd` is the doubt of the scale at the start (1 = none), `walk` its growth per sqrt(s);
     `Q` m^2 the variance that a step adds to the amplitude, R m^2 (None: the measurements' own)."""
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",),
-        inertia=True,
-        cavities=False,
-        drives=False,
-        contact=GLUED,
-    )
+    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False, drives=False)
 
     dt: float = quantity(0.002, "s", "time step")
     scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")

@@ -5,7 +5,7 @@ product. The steady gain comes from the discrete Riccati equation.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -22,7 +22,7 @@ from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_mo
 from validate.estimate.small_state import CoreStepper
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.types import Stepper
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
@@ -37,13 +37,7 @@ class ReducedKf:
     at: sub-optimal at first, cheapest to prepare for long runs.
     """
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",),
-        inertia=True,
-        cavities=False,
-        drives=False,
-        contact=GLUED,
-    )
+    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, drives=False)
 
     dt: float = quantity(0.002, "s", "time step")
     modes: int = quantity(20, "1", "lowest modes kept")

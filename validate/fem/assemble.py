@@ -1,4 +1,4 @@
-"""Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7), by scikit-fem.
+"""Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7); masses by scikit-fem.
 
 The stiffness is pointwise or with nodal mean dilatation; materials may differ from cell to cell.
 """
@@ -16,29 +16,30 @@ from skfem import (
     ElementTetP2,
     ElementTriP1,
     ElementTriP2,
-    ElementVector,
     MeshHex,
     MeshQuad,
     MeshTet,
     MeshTri,
     asm,
 )
-from skfem.models.elasticity import lame_parameters, linear_elasticity
+from skfem.models.elasticity import lame_parameters
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.cells import rule, volumes_at
 from validate.fem.surface import surface_stiffness
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
+from validate.scene.shape_functions import simplex_slopes, symmetric_points
 
-# The library's mesh and element, the degrees that stiffness and mass are integrated to.
+# The library's mesh and element, and the degree that a mass is integrated to.
 _ELEMENTS = {
-    "tri3": (MeshTri, ElementTriP1, 1, 2),
-    "tri6": (MeshTri, ElementTriP2, 2, 4),
-    "tet4": (MeshTet, ElementTetP1, 1, 2),
-    "tet10": (MeshTet, ElementTetP2, 2, 4),
-    "quad4": (MeshQuad, ElementQuad1, 3, 3),  # 2 x 2 Gauss points
-    "hex8": (MeshHex, ElementHex1, 3, 3),
+    "tri3": (MeshTri, ElementTriP1, 2),
+    "tri6": (MeshTri, ElementTriP2, 4),
+    "tet4": (MeshTet, ElementTetP1, 2),
+    "tet10": (MeshTet, ElementTetP2, 4),
+    "quad4": (MeshQuad, ElementQuad1, 3),
+    "hex8": (MeshHex, ElementHex1, 3),
 }
 # Our corners in the order in which the library lists a hexahedron's.
 _HEXAHEDRON = (0, 4, 3, 1, 7, 5, 2, 6)
@@ -78,7 +79,7 @@ def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
     if any(m.rho is None for m in materials):
         raise SceneError("a dynamic scheme needs the density; set rho kg/m3 of every material")
     weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
-    basis = _basis(scene.mesh, vector=False)
+    basis = _basis(scene.mesh)
     _require_node_major(basis.doflocs, scene.mesh.nodes, 1)
     weight = scene.thickness * weight
     scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
@@ -129,18 +130,57 @@ def library_mesh(mesh: Mesh) -> Any:
     return _ELEMENTS[mesh.kind][0](np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
 
 
-def _basis(mesh: Mesh, *, vector: bool) -> Basis:
-    _, element, stiffness_degree, mass_degree = _ELEMENTS[mesh.kind]
-    if vector:
-        return Basis(library_mesh(mesh), ElementVector(element()), intorder=stiffness_degree)
+def _basis(mesh: Mesh) -> Basis:
+    _, element, mass_degree = _ELEMENTS[mesh.kind]
     return Basis(library_mesh(mesh), element(), intorder=mass_degree)
 
 
 def _assembled(mesh: Mesh, lam: Floats, mu: Floats) -> sparse.csr_array:
-    """Stiffness with the Lame constants (e,) Pa of every cell."""
-    basis = _basis(mesh, vector=True)
-    _require_node_major(basis.doflocs, mesh.nodes, mesh.dimension)
-    return sparse.csr_array(asm(linear_elasticity(lam[:, None], mu[:, None]), basis))
+    """Stiffness with the Lame constants (e,) Pa of every cell.
+
+    For shapes a, b with slopes g: K_ab = sum of w (lam g_a g_b^T + mu g_b g_a^T + mu g_a.g_b 1),
+    all of it from the sums of w g_ai g_bj. As scikit-fem's `linear_elasticity`, five times as fast.
+    """
+    slopes, weights = _slopes(mesh)
+    e, q, a, d = slopes.shape
+    g = slopes.reshape(e, q, a * d)
+    outer = (np.swapaxes(g * weights[..., None], 1, 2) @ g).reshape(e, a, d, a, d)
+    dots = np.einsum("eaibi->eab", outer)[:, :, None, :, None] * np.eye(d)[:, None, :]
+    lam, mu = (c[:, None, None, None, None] for c in (lam, mu))
+    cells = lam * outer + mu * (np.swapaxes(outer, 2, 4) + dots)
+    return _summed(mesh, cells.reshape(e, a * d, a * d))
+
+
+def _slopes(mesh: Mesh) -> tuple[Floats, Floats]:
+    """dN/dx (e, q, a, d) 1/m and weights times volume (e, q) m^d that integrate a stiffness."""
+    if mesh.bricks:
+        at = rule(mesh, 2)
+        dxi = np.linalg.inv(at.jacobians(mesh.nodes[mesh.cells]))
+        return np.einsum("qaj,eqji->eqai", at.dN, dxi), volumes_at(mesh, at)
+    slopes = point_slopes(mesh)
+    points = slopes.shape[1]
+    return slopes, np.repeat(cell_volumes(mesh)[:, None] / points, points, axis=1)
+
+
+def point_slopes(mesh: Mesh) -> Floats:
+    """dN/dx (e, q, a, d) 1/m of straight-sided simplices: linear at one point, quadratic at the
+    points of equal weight that integrate products of slopes."""
+    dL = shape_gradients(mesh)
+    if mesh.order == 1:
+        return dL[:, None]
+    d = mesh.dimension
+    slopes = simplex_slopes(2, symmetric_points(d, 2)[0])
+    return np.asarray((slopes.reshape(-1, d + 1) @ dL).reshape(len(dL), *slopes.shape[:2], d))
+
+
+def _summed(mesh: Mesh, K: Floats) -> sparse.csr_array:
+    """The matrices (e, k, k) of all cells in one (N, N), N = n d, node-major."""
+    d = mesh.dimension
+    unknowns = (mesh.cells[..., None] * d + np.arange(d)).reshape(len(K), -1).astype(np.int32)
+    rows, columns = (np.broadcast_to(u, K.shape).ravel()
+                     for u in (unknowns[:, :, None], unknowns[:, None, :]))  # fmt: skip
+    entries = sparse.coo_array((K.ravel(), (rows, columns)), shape=2 * (mesh.nodes.size,))
+    return sparse.csr_array(entries)
 
 
 def _require_node_major(places: Floats, nodes: Floats, per_node: int) -> None:

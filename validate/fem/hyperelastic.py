@@ -17,14 +17,13 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import shape_gradients
+from validate.fem.assemble import point_slopes
 from validate.fem.laws import green_strain, law_of, volume_change
 from validate.fem.nodal_mean import NodalMean
 from validate.fem.pattern import NodePattern
 from validate.fem.surface import foundation_stiffness
-from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
-from validate.scene.shape_functions import simplex_slopes, symmetric_points
 
 _BLOCK = 2048  # cells at a time: bounds the memory of the kernel's temporaries
 
@@ -57,7 +56,7 @@ class Body:
         averaged = scene.dilatation == "nodal_mean"
         self.mesh, self.law = mesh, law_of(scene.material, isochoric=averaged)
         self.mean = NodalMean(mesh, self.law, kappa) if averaged else None
-        self.gradients = _point_gradients(mesh)
+        self.gradients = point_slopes(mesh)
         springs = [foundation_stiffness(mesh, f) for f in scene.foundations]
         self.springs: sparse.csr_array | None = sum(springs[1:], springs[0]) if springs else None
         points = self.gradients.shape[1]
@@ -144,12 +143,3 @@ class Body:
         """Sums (n,) of what the cells (e, k) leave at their nodes."""
         cells, n = self.mesh.cells, len(self.mesh.nodes)
         return np.bincount(cells.ravel(), values.ravel(), n).astype(np.float64)
-
-
-def _point_gradients(mesh: Mesh) -> Floats:
-    """dN/dX (e, q, k, 3) 1/m at the quadrature points of straight-sided cells."""
-    dL = shape_gradients(mesh)
-    if mesh.order == 1:
-        return dL[:, None]
-    slopes = simplex_slopes(2, symmetric_points(3, 2)[0])
-    return np.asarray((slopes.reshape(-1, 4) @ dL).reshape(len(dL), *slopes.shape[:2], 3))

@@ -17,6 +17,7 @@ from validate.compare.verdict import Accept
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.followed import Cases, Truth
+from validate.replay.ladder import Ladder
 from validate.replay.method import Method
 from validate.scene.scene import Scene
 
@@ -146,6 +147,7 @@ class Experiment:
     `band` is the relative standard uncertainty of the force that the modulus brings. `axis` is the
     component that displacement charts follow, `reference` the method that speeds are compared with.
     `captions` are sentences under charts, by name; `frames` how many fields of a run are kept.
+    `ladder` is how it enters the studies; what it leaves out is derived from the scene.
     """
 
     name: str
@@ -172,6 +174,7 @@ class Experiment:
     axis: str = "z"
     reference: str = ""
     frames: int = 200
+    ladder: Ladder | None = None
     quick: Change = unchanged
     path: Path | None = field(default=None, compare=False)
 

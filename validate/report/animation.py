@@ -1,9 +1,10 @@
 """The outline through the load: the measured one over the simulated one, moving."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
@@ -64,8 +65,21 @@ def _shot(simulated: Floats, measured: Floats, instant: Instant) -> _Shot:
         title = spaced(instant.hold.label)
     else:
         title = f"{fixed_with_unit(instant.drive, instant.unit, 1)}, interpolated"
-    closed = np.vstack([simulated, simulated[:1]])
-    return _Shot(_MM * closed, _MM * measured, instant.hold is not None, title)
+    return _Shot(closed(simulated), _MM * measured, instant.hold is not None, title)
+
+
+def closed(points: Floats) -> Floats:
+    """An outline (k, 2) m as a closed line (k + 1, 2) mm."""
+    return np.asarray(_MM * np.vstack([points, points[:1]]))
+
+
+def image_axes(ax: Axes, outlines: Iterable[Floats]) -> None:
+    """Axes in image coordinates with some room about all outlines (k, 2) mm; rows of an image
+    count downward."""
+    everything = np.vstack(list(outlines))
+    (left, upper), (right, lower) = everything.min(axis=0) - 3, everything.max(axis=0) + 3
+    ax.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
+    ax.set(xlabel="image x / mm", ylabel="image y / mm")
 
 
 def _paint(figure: Figure, shots: list[_Shot], label: str, driven: str) -> Callable[[int], None]:
@@ -74,11 +88,7 @@ def _paint(figure: Figure, shots: list[_Shot], label: str, driven: str) -> Calla
     ax.plot(*rest.T, color="#9A9A9A", lw=0.8, label="measured at rest")
     (points,) = ax.plot([], [], ".", color=MEASURED, ms=4, label="measured")
     (line,) = ax.plot([], [], color=ACCEPTED, label=label)
-    everything = np.vstack([o for s in shots for o in (s.simulated, s.measured)])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    ax.set_xlim(low[0] - 3, high[0] + 3)
-    ax.set_ylim(high[1] + 3, low[1] - 3)  # rows of an image count downward
-    ax.set(xlabel="image x / mm", ylabel="image y / mm", aspect="equal")
+    image_axes(ax, (o for s in shots for o in (s.simulated, s.measured)))
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
     def turn(i: int) -> None:

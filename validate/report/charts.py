@@ -113,7 +113,7 @@ def _fill(figure: Figure, chart: Chart, drawn: list[_Drawn]) -> None:
     if "y" in chart.log:
         ax.set_yscale("log", nonpositive="mask")
     if chart.linear:
-        ax.set_yscale("symlog", linthresh=chart.linear, linscale=0.7)
+        ax.set_yscale("symlog", linthresh=chart.linear, linscale=1.0)
         ax.yaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "−"))
         ax.axhline(0, color=MEASURED, lw=0.8)
     for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
@@ -123,10 +123,10 @@ def _fill(figure: Figure, chart: Chart, drawn: list[_Drawn]) -> None:
     _readable(ax, chart)
     ax.set_title(chart.title, loc="left")
     handles, labels = ax.get_legend_handles_labels()
-    order = [labels.index(name) for name in dict.fromkeys(d.series.label for d in drawn)]
-    if len(order) > 1:
-        named = [labels[i] for i in order]
-        figure.legend([handles[i] for i in order], named, loc="outside lower center",
+    found = dict(zip(labels, handles, strict=True))  # of one name the upper one: a line, not a band
+    named = list(dict.fromkeys(d.series.label for d in drawn))
+    if len(named) > 1:
+        figure.legend([found[name] for name in named], named, loc="outside lower center",
                       ncols=_columns(named))  # fmt: skip
 
 

@@ -137,8 +137,7 @@ def _level(line: _Line, factor: float) -> Iterator[Series]:
     label, wide = line.method.label, 2 * line.method.band
     if wide:
         y = factor * line.y[0]
-        yield Series(f"{label} ± {100 * wide:.0f} %", line.q[0], y * (1 - wide), "band",
-                     y * (1 + wide))  # fmt: skip
+        yield Series(label, line.q[0], y * (1 - wide), "band", y * (1 + wide))
     for q, y in zip(line.q, line.y, strict=True):
         yield Series(label, q, factor * y)
 
@@ -149,9 +148,11 @@ def _off(line: _Line, factor: float) -> Iterator[Series]:
 
 
 def _band_words(lines: list[_Line]) -> str:
-    if not any(line.method.band for line in lines):
+    bands = {line.method.band for line in lines} - {0.0}
+    if not bands:
         return ""
-    return " Shaded about a line: two standard uncertainties of the modulus."
+    shares = ", ".join(f"{200 * band:.0f} %" for band in sorted(bands))
+    return f" Shaded about a line: ± {shares}, two standard uncertainties of the modulus."
 
 
 def _left_out(hidden: list[str]) -> str:

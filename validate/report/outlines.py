@@ -13,7 +13,7 @@ from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.register.outline_geometry import angular_points, enclosed, normal_distances
 from validate.register.outlines import Corner, OutlineObservation
-from validate.report.animation import moving_outline
+from validate.report.animation import closed, image_axes, moving_outline
 from validate.report.numbers import shown_unit, spaced
 from validate.report.observed import (
     Held,
@@ -87,10 +87,6 @@ def _off(drawn: _Sections, measured: _Outlines) -> Floats:
     return normal_distances(drawn.sections[-1], measured.measured[-1])
 
 
-def _closed(points: Floats) -> Floats:
-    return np.asarray(_MM * np.vstack([points, points[:1]]))
-
-
 # --- every load ----------------------------------------------------------------------------------
 
 
@@ -114,7 +110,7 @@ def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> 
 
 
 def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> None:
-    count, rest = len(measured.holds), _closed(measured.measured[0])
+    count, rest = len(measured.holds), closed(measured.measured[0])
     axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
     for i, (ax, hold) in enumerate(zip(axes, measured.holds, strict=True)):
         ax.plot(*rest.T, color=_GREY, lw=0.8, label="measured at rest")
@@ -123,19 +119,16 @@ def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[
             _section(ax, d, i)
         for corner in measured.seen.corners:
             _ring(ax, corner, (measured.measured[i], judged.sections[i]))
-        ax.set(title=spaced(hold.label), aspect="equal", xlabel="image x / mm")
-    everything = _MM * np.vstack([*measured.measured, *judged.sections])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    axes[0].set_xlim(low[0] - 3, high[0] + 3)
-    axes[0].set_ylim(high[1] + 3, low[1] - 3)  # rows of an image count downward
-    axes[0].set_ylabel("image y / mm")
+        image_axes(ax, (_MM * o for o in (*measured.measured, *judged.sections)))
+        ax.set_title(spaced(hold.label))
+        ax.label_outer()
     handles, labels = axes[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(count + 1, 4))
 
 
 def _section(ax: Axes, drawn: _Sections, i: int) -> None:
     look = drawn.look
-    ax.plot(*_closed(drawn.sections[i]).T, color=look.colour, ls=look.dash, lw=look.width,
+    ax.plot(*closed(drawn.sections[i]).T, color=look.colour, ls=look.dash, lw=look.width,
             label=drawn.method.label)  # fmt: skip
 
 

@@ -24,7 +24,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic import Moving, MovingStepper, reactions
 from validate.solve.excitation import DriveRates, StartName, excitation
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.linear_solvers import Diagonal, Solver
 from validate.solve.newmark_rule import rule_of
 from validate.solve.types import Ending, State, Stepper
@@ -43,9 +43,7 @@ class ExplicitLinear:
     until displacements are 100 times the body's size.
     """
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
-    )
+    handles: ClassVar[Handles] = LINEAR_DYNAMICS
 
     dt: float = quantity(1e-4, "s", "time step")
     mass: MassName = quantity("lumped", "1", "mass matrix")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, Protocol
 
 from validate.errors import SceneError
+from validate.scene.material_point import MaterialPoint
 from validate.scene.scene import LawName, Scene
 
 ContactName = Literal["foundations", "membranes"]
@@ -28,8 +29,13 @@ class Handles:
     contact: tuple[ContactName, ...] = ("foundations",)
     mesh: bool = True
 
-    def covers(self, scene: Scene) -> bool:
+    def covers(self, scene: Scene | MaterialPoint) -> bool:
         return not _refused(self, scene)
+
+
+LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
+LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False)
+LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
 
 class Handling(Protocol):
@@ -40,6 +46,8 @@ class Handling(Protocol):
 
 # Where to go instead: what handles the refused part, by name. A test asserts that each does.
 INSTEAD: Mapping[str, tuple[str, ...]] = {
+    "mesh": ("QuasiStatic", "StaticNewton"),
+    "point": ("StretchTest",),
     "linear": ("ExactPressure", "Newmark"),
     "svk": ("StaticNewton", "NewtonDynamics"),
     "neo_hooke": ("StaticNewton", "NewtonDynamics"),
@@ -50,7 +58,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def require_handled(scene: Scene, settings: Handling) -> None:
+def require_handled(scene: Scene | MaterialPoint, settings: Handling) -> None:
     """Raises `SceneError` that names what the settings cannot handle, and what can."""
     refused = _refused(settings.handles, scene)
     if refused:
@@ -59,11 +67,15 @@ def require_handled(scene: Scene, settings: Handling) -> None:
         raise SceneError(f"{name} {why}; use {others}")
 
 
-def _refused(handles: Handles, scene: Scene) -> tuple[str, str] | None:
+def _refused(handles: Handles, scene: Scene | MaterialPoint) -> tuple[str, str] | None:
     """The first part of a scene that is not handled, as a key of `INSTEAD` and in words."""
-    law = scene.material.law
+    law, point = scene.material.law, isinstance(scene, MaterialPoint)
+    if handles.mesh == point:
+        return ("point", "needs a mesh") if point else ("mesh", "solves a material point alone")
     if law not in handles.law:
         return law, f"cannot solve the law '{law}', only {', '.join(handles.law)}"
+    if isinstance(scene, MaterialPoint):
+        return None
     if scene.cavities and not handles.cavities:
         return "cavities", "knows no fluid in cavities; drop them from the scene"
     if scene.loads and not handles.loads:

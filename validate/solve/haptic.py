@@ -1,10 +1,7 @@
-"""Rates that hands and eyes need, and the force in between where a model cannot keep up."""
+"""Rates that hands and eyes need."""
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from validate.arrays import Floats, checked
 from validate.errors import UsageError
 
 HAPTIC_HZ = 1000.0  # force updates that a stiff contact needs to feel steady (paper 003, 3.5)
@@ -47,21 +44,5 @@ class RealTime:
 
     @property
     def haptic(self) -> bool:
-        """Whether every haptic tick gets a force of its own; else `extrapolate` fills in."""
+        """Whether every haptic tick gets a force of its own."""
         return self.factor >= 1 and self.force_hz >= HAPTIC_HZ
-
-
-def extrapolate(times: Floats, forces: Floats, t: float) -> Floats:
-    """The force (d,) N at t s, linearly from the last two of forces (k, d) at times (k,) s.
-
-    Paper 003, section 3.5: when 1 kHz is missed, force is extrapolated from previous steps. A
-    single force is held. Raises `UsageError` for times that do not rise or a t before the last.
-    """
-    at = checked(times, "times [s]", (None,), error=UsageError)
-    f = checked(forces, "forces [N]", (len(at), None), error=UsageError)
-    if len(at) == 0 or (len(at) > 1 and np.diff(at).min() <= 0) or t < at[-1]:
-        raise UsageError(f"force at t = {t:g} s from {len(at)} times: rising ones, none after t")
-    if len(at) == 1:
-        return np.asarray(f[0])
-    slope = (f[-1] - f[-2]) / (at[-1] - at[-2])
-    return np.asarray(f[-1] + (t - at[-1]) * slope)

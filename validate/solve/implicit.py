@@ -24,7 +24,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central import lumped_damping
-from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 RateRule = Literal["average", "backward_euler", "static"]
@@ -39,7 +39,7 @@ class NewtonDynamics:
     `cuts`: for load steps of statics; a dynamic step fails at once: take a smaller dt.
     """
 
-    handles: ClassVar[Handles] = Handles(LARGE, inertia=True, cavities=False, loads=True)
+    handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(0.01, "s", "time step")
     rule: RateRule = quantity("average", "1", "how v and a follow u; static: neither")

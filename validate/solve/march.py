@@ -1,7 +1,7 @@
 """The loop over steps, written once: it steps, times, traces and stops where a step fails."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -9,11 +9,47 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.fem.locate import Rows, barycentric_rows
+from validate.fem.system import build
+from validate.scene.material_point import MaterialPoint
 from validate.scene.scene import Scene, Weight
-from validate.solve.types import Outcome, Run, Stepper, StepTimes, Trace, Uncertain
+from validate.solve.handles import require_handled
+from validate.solve.types import (
+    Outcome,
+    Run,
+    SceneSolver,
+    Scheme,
+    Stepper,
+    StepTimes,
+    Trace,
+    Uncertain,
+)
 
 _UNTIMED = 20  # first steps left out of the step times: caches and allocators settle
 _AXES = "xyz"
+
+
+def run_scheme(
+    name: str,
+    settings: Scheme | SceneSolver,
+    scene: Scene | MaterialPoint,
+    t: Floats,
+    inputs: Floats,
+    at: Ints,
+) -> Run:
+    """A run by what steps through a scene, or by what solves it as a whole.
+
+    Raises `SceneError` for what the settings cannot handle.
+    """
+    if isinstance(settings, SceneSolver):
+        whole = settings.solve(scene, t, inputs)
+        kept = np.isin(whole.at, at)
+        sd = None if whole.sd is None else whole.sd[kept]
+        return replace(whole, method=name, at=whole.at[kept], u=whole.u[kept], sd=sd)
+    require_handled(scene, settings)
+    assert isinstance(scene, Scene)
+    start = perf_counter()
+    stepper = settings.prepare(build(scene))
+    return march(name, stepper, t, inputs, at, perf_counter() - start)
 
 
 def march(
@@ -42,7 +78,7 @@ def march(
 
 
 @dataclass(frozen=True)
-class _Walk:
+class _Kept:
     """What is kept of the steps: numbers, seconds, probes (p, d) m, and fields at the frames."""
 
     updates: list[int] = field(default_factory=list)
@@ -53,8 +89,8 @@ class _Walk:
     sd: list[Floats] = field(default_factory=list)
 
 
-def _walk(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> tuple[_Walk, Outcome]:
-    walk, state, rows = _Walk(), stepper.rest(), _probe_rows(stepper)
+def _walk(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> tuple[_Kept, Outcome]:
+    walk, state, rows = _Kept(), stepper.rest(), _probe_rows(stepper)
     for i, value in enumerate(inputs):
         start = perf_counter()
         state = stepper.step(state, value)

@@ -22,7 +22,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic import InertialStepper, Reactions, reactions
 from validate.solve.excitation import Excitation, Inputs, StartName, excitation
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.modal_walk import Walk, exact_walk, walk_by_rule
 from validate.solve.newmark_rule import RuleName, require_start, rule_of
 from validate.solve.types import State, Stepper
@@ -37,9 +37,7 @@ class Modal:
     "equilibrium" the loads of the first step already act at t = 0, with "zero" they rise there.
     """
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
-    )
+    handles: ClassVar[Handles] = LINEAR_DYNAMICS
 
     dt: float = quantity(0.002, "s", "time step")
     modes: int | None = quantity(None, "1", "lowest modes kept; none: all")

@@ -22,7 +22,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic import Moving, MovingStepper, reactions
 from validate.solve.excitation import DriveRates, StartName, excitation
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
 from validate.solve.newmark_rule import (
     Propagation,
@@ -47,9 +47,7 @@ class Newmark:
     which makes average acceleration ring with growing amplitude on a ramp.
     """
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",), inertia=True, cavities=False, loads=True, contact=GLUED
-    )
+    handles: ClassVar[Handles] = LINEAR_DYNAMICS
 
     dt: float = quantity(0.002, "s", "time step")
     rule: RuleName = quantity("average", "1", "how v and a follow u within a step")

@@ -19,7 +19,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
-from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.handles import LARGE_STATICS, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 _VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
@@ -35,7 +35,7 @@ class StaticNewton:
     tangent are counted anew when drives have moved so far.
     """
 
-    handles: ClassVar[Handles] = Handles(LARGE, inertia=False, cavities=True, loads=False)
+    handles: ClassVar[Handles] = LARGE_STATICS
 
     fluid: Literal["exact", "none"] = quantity("exact", "1", "keeps its volume, or is not there")
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")

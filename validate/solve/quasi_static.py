@@ -1,6 +1,6 @@
 """Statics at every step, K u = f: what a slow enough motion tends to. No mass is assembled."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import System
 from validate.solve.dynamic import InertialStepper, reactions
-from validate.solve.handles import GLUED, Handles, require_handled
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.types import State, Stepper
 
 
@@ -16,9 +16,7 @@ from validate.solve.types import State, Stepper
 class QuasiStatic:
     """Linear statics of drives and loads, by superposition of one solved column per input."""
 
-    handles: ClassVar[Handles] = Handles(
-        ("linear",), inertia=False, cavities=False, loads=True, contact=GLUED
-    )
+    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False)
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""

@@ -11,8 +11,9 @@ from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
+from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
-from validate.solve.types import Scheme
+from validate.solve.types import SceneSolver, Scheme
 
 SCHEMES: tuple[type[Scheme], ...] = (
     NoFluid,
@@ -27,6 +28,9 @@ SCHEMES: tuple[type[Scheme], ...] = (
     CentralDifference,
     NewtonDynamics,
 )
+
+# What solves a whole scene at once.
+SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest,)
 
 
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:

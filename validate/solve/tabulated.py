@@ -15,7 +15,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.scene.scene import Scene
-from validate.solve.handles import LARGE, Handles
+from validate.solve.handles import LARGE_STATICS, Handles
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _NODES = 4  # of the interpolation
@@ -26,7 +26,7 @@ _BEYOND = 0.01  # grid steps of extrapolation: the noise of a stage that stands 
 class Tabulated:
     """Settings: solves `inner` at whole multiples of `step` of the one drive."""
 
-    handles: ClassVar[Handles] = Handles(LARGE, inertia=False, cavities=True, loads=False)
+    handles: ClassVar[Handles] = LARGE_STATICS
 
     inner: Scheme
     step: float = field(metadata={"unit": "m", "doc": "between the loads that are solved"})

@@ -73,6 +73,16 @@ class Scheme(Protocol):
     def prepare(self, system: System) -> Stepper: ...
 
 
+@runtime_checkable
+class SceneSolver(Protocol):
+    """Settings that solve a whole scene for inputs (nt, k) at times t (nt,) s, a program of others
+    among them; the run has every step as an output frame, and no name yet."""
+
+    handles: ClassVar[Handles]
+
+    def solve(self, scene: Any, t: Floats, inputs: Floats) -> "Run": ...
+
+
 @dataclass(frozen=True)
 class StepTimes:
     """Seconds per step over `n` timed steps."""

@@ -6,7 +6,7 @@ it is run again with a new state at every tick of the rate before it is named.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,12 +17,12 @@ from validate.errors import UsageError
 from validate.fem.assemble import shape_gradients
 from validate.fem.modes import modes_of
 from validate.fem.system import build
+from validate.replay.ladder import RUNGS, Rung, Trial
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.fluid import ExactPressure
 from validate.solve.quasi_static import QuasiStatic
-from validate.study.trade import Row, Trade
-from validate.study.trade_scene import RUNGS, Rung, TradeScene
+from validate.study.trade import Trade, TradeRow
 from validate.units import si_factor
 
 _WATER = 1000.0  # kg/m3, of a soft tissue whose density nobody declared
@@ -34,6 +34,7 @@ _QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
 
 _LEFT_OUT = "left out: --declared-law judges the linear law only"
 
+Again = Callable[[TradeRow, float], TradeRow]
 Meets = Literal["meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran"]
 
 
@@ -66,7 +67,7 @@ class Climbed:
     rung: Rung
     run: int
     scored: int
-    best: Row | None
+    best: TradeRow | None
     verdict: Meets
     evidence: str
 
@@ -84,9 +85,9 @@ class Choice:
     by: str
     facts: tuple[Fact, ...]
     ladder: tuple[Climbed, ...]
-    pick: Row | None
-    confirmed: Row | None
-    nearest: Row
+    pick: TradeRow | None
+    confirmed: TradeRow | None
+    nearest: TradeRow
     rejected: tuple[str, ...]
 
 
@@ -114,12 +115,12 @@ def _split(text: str, option: str, example: str) -> tuple[float, str]:
 # --- which ---------------------------------------------------------------------------------------
 
 
-def error_of(row: Row, by: str) -> float | None:
+def error_of(row: TradeRow, by: str) -> float | None:
     value = getattr(row, by)
     return None if value is None else float(value)
 
 
-def misses(row: Row, want: Wanted, by: str, dynamic: bool) -> tuple[float, float]:
+def misses(row: TradeRow, want: Wanted, by: str, dynamic: bool) -> tuple[float, float]:
     """Error over the one wanted, and time over the one there is: both at most 1 where it meets.
 
     A scene with inertia must also keep up with the clock: a step within its own dt.
@@ -128,36 +129,41 @@ def misses(row: Row, want: Wanted, by: str, dynamic: bool) -> tuple[float, float
     if error is None or time is None:
         return np.inf, np.inf
     late = time * want.rate
-    return error / want.error, max(late, time / row.cell.dt) if dynamic else late
+    return error / want.error, max(late, time / row.dt) if dynamic else late
 
 
-def meeting(rows: Sequence[Row], want: Wanted, by: str, dynamic: bool) -> list[Row]:
+def meeting(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> list[TradeRow]:
     """The rows that meet both and leave nothing of the scene out, fastest first."""
-    whole = [r for r in rows if not r.cell.solver.lacks]
+    whole = [r for r in rows if not r.solver.lacks]
     good = [r for r in whole if max(misses(r, want, by, dynamic)) <= 1]
     return sorted(good, key=lambda r: r.time_s or 0.0)
 
 
-def nearest(rows: Sequence[Row], want: Wanted, by: str, dynamic: bool) -> Row:
+def nearest(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> TradeRow:
     """The row whose worse miss is least; raises `UsageError` when no row has an error."""
-    scored = [r for r in rows if error_of(r, by) is not None and not r.cell.solver.lacks]
+    scored = [r for r in rows if error_of(r, by) is not None and not r.solver.lacks]
     if not scored:
         raise UsageError(f"none of {len(rows)} pilot runs has an error; see 'study tradeoff'")
     return min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
 
 
-def choose(trade: Trade, want: Wanted, declared_law: bool = False) -> Choice:
-    """The choice from a measured trade."""
-    by, dynamic = "error" if declared_law else "total", trade.scene.dynamic
-    rows = [r for r in trade.rows if not declared_law or r.cell.solver.law == "linear"]
+def choose(trade: Trade, want: Wanted, declared_law: bool, again: Again) -> Choice:
+    """The choice from a measured trade; `again` runs a row's cell with another step s.
+
+    Where large strain could not be solved, what the declared law costs is not counted either.
+    """
+    declared_law = declared_law or trade.gap is None
+    by, dynamic = "error" if declared_law else "total", trade.trial.dynamic
+    rows = [r for r in trade.rows if not declared_law or r.solver.law == "linear"]
     rejected: list[str] = []
     pick = confirmed = None
     for row in meeting(rows, want, by, dynamic)[:_TRIES]:
-        again = _at_the_rate(trade, row, want)
-        if again is None or max(misses(again, want, by, dynamic)) <= 1:
-            pick, confirmed = row, again
+        dt = _rate_step(trade, row, want)
+        tried = None if dt is None else again(row, dt)
+        if tried is None or max(misses(tried, want, by, dynamic)) <= 1:
+            pick, confirmed = row, tried
             break
-        rejected.append(_refusal(again, by))
+        rejected.append(_refusal(tried, by))
     ladder = tuple(_climbed(trade, rung, rows, want, by) for rung in RUNGS)
     closest = nearest(rows, want, by, dynamic)
     return Choice(
@@ -165,33 +171,33 @@ def choose(trade: Trade, want: Wanted, declared_law: bool = False) -> Choice:
     )
 
 
-def _at_the_rate(trade: Trade, row: Row, want: Wanted) -> Row | None:
-    """The cell with steps no longer than a tick, where its own are longer and inertia matters."""
-    if not trade.scene.dynamic or row.cell.dt * want.rate <= 1 + 1e-9:
+def _rate_step(trade: Trade, row: TradeRow, want: Wanted) -> float | None:
+    """A step s no longer than a tick, where the row's own is longer and inertia matters."""
+    if not trade.trial.dynamic or row.dt * want.rate <= 1 + 1e-9:
         return None
-    apart = float(np.diff(trade.scene.frames).min())
-    return trade.again(replace(row.cell, dt=apart / np.ceil(apart * want.rate - 1e-9)))
+    apart = float(np.diff(trade.trial.frames).min())
+    return float(apart / np.ceil(apart * want.rate - 1e-9))
 
 
-def _refusal(row: Row, by: str) -> str:
+def _refusal(row: TradeRow, by: str) -> str:
     error, time = error_of(row, by), row.time_s
     if error is None or time is None:
-        return f"{row.label}: with a state every {1e3 * row.cell.dt:.3g} ms: {row.failed}"
+        return f"{row.label}: with a state every {1e3 * row.dt:.3g} ms: {row.failed}"
     return (
-        f"{row.label}: with a state every {1e3 * row.cell.dt:.3g} ms its error is "
+        f"{row.label}: with a state every {1e3 * row.dt:.3g} ms its error is "
         f"{1e3 * error:.3g} mm and a step takes {1e6 * time:.3g} us"
     )
 
 
-def _climbed(trade: Trade, rung: Rung, rows: Sequence[Row], want: Wanted, by: str) -> Climbed:
-    dynamic = trade.scene.dynamic
-    mine = [r for r in rows if r.cell.solver.rung == rung]
+def _climbed(trade: Trade, rung: Rung, rows: Sequence[TradeRow], want: Wanted, by: str) -> Climbed:
+    dynamic = trade.trial.dynamic
+    mine = [r for r in rows if r.solver.rung == rung]
     scored = [r for r in mine if error_of(r, by) is not None]
     if not scored:
         left = rung == "large strain" and len(rows) < len(trade.rows)
         why = _LEFT_OUT if left else _why_not(mine, dynamic)
         return Climbed(rung, len(mine), 0, None, "nothing ran", why)
-    lacks = scored[0].cell.solver.lacks
+    lacks = scored[0].solver.lacks
     if lacks:
         best = min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
         words = f"{evidence(best, by)}; never chosen: it leaves out {lacks}"
@@ -206,7 +212,7 @@ def _climbed(trade: Trade, rung: Rung, rows: Sequence[Row], want: Wanted, by: st
     return Climbed(rung, len(mine), len(scored), best, verdict, words)
 
 
-def evidence(row: Row, by: str) -> str:
+def evidence(row: TradeRow, by: str) -> str:
     """What a rung's best row reached, and what its error is made of."""
     error, time = error_of(row, by) or 0.0, row.time_s or np.nan
     words = f"{row.label}: {1e3 * error:.3g} mm at {1 / time:.3g} Hz"
@@ -215,7 +221,7 @@ def evidence(row: Row, by: str) -> str:
     return words
 
 
-def _why_not(mine: Sequence[Row], dynamic: bool) -> str:
+def _why_not(mine: Sequence[TradeRow], dynamic: bool) -> str:
     if mine:
         return f"all {len(mine)} cells failed, the first: {mine[0].failed}"
     if dynamic:
@@ -231,16 +237,16 @@ def _why_not(mine: Sequence[Row], dynamic: bool) -> str:
 
 def facts(trade: Trade, want: Wanted) -> tuple[Fact, ...]:
     """Loading against the lowest frequency, strain, law, Poisson ratio, fluid, noise."""
-    scene = trade.scene
-    level = scene.meshes["P1"][0]
-    body = scene.build("P1", level, "linear")
+    scene = trade.trial
+    element = "P1" if "P1" in scene.meshes else next(iter(scene.meshes))
+    body = scene.build(element, scene.meshes[element][0], "linear")
     return (
         _loading(scene, body), _strain(scene, body, trade), _poisson(body), _fluid(body),
         _noise(scene, want), _mesh(trade),
     )  # fmt: skip
 
 
-def _loading(scene: TradeScene, body: Scene) -> Fact:
+def _loading(scene: Trial, body: Scene) -> Fact:
     density = body.material.rho or _WATER
     solid = replace(body, cavities=(), material=replace(body.material, rho=density))
     modes = modes_of(build(solid), 1)
@@ -258,22 +264,25 @@ def _loading(scene: TradeScene, body: Scene) -> Fact:
                 slow)  # fmt: skip
 
 
-def _strain(scene: TradeScene, body: Scene, trade: Trade) -> Fact:
-    inputs = scene.inputs(scene.times(scene.steps[0]))
-    largest = inputs[int(np.argmax(np.abs(inputs).sum(axis=1)))]
+def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
     stepper = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
-    u = stepper.field(stepper.step(stepper.rest(), largest))
+    u = stepper.field(stepper.step(stepper.rest(), scene.largest_inputs))
     strain = principal_strains(body.mesh, u)
     peak, most = float(strain.max()), float(np.quantile(strain, 0.95))
-    cost = f"large strain changes the answer by {1e3 * trade.law_error:.3g} mm ({trade.law_words})"
+    cost = f"large strain was not solved ({trade.law_words})"
+    if trade.law_error is not None:
+        moved = f"{1e3 * trade.law_error:.3g} mm"
+        cost = f"large strain changes the answer by {moved} ({trade.law_words})"
     means = "within small strain" if peak < _SMALL_STRAIN else "large strain is on the ladder"
-    return Fact("strain level (static pilot, coarse P1)",
+    return Fact("strain level (static pilot, coarse mesh)",
                 f"peak {100 * peak:.2g} %, 95 % of cells below {100 * most:.2g} %",
                 f"{means}; measured, {cost}")  # fmt: skip
 
 
 def principal_strains(mesh: Mesh, u: Floats) -> Floats:
     """Largest |principal small strain| of every simplex (e,), from u (n, d) m at its corners."""
+    if mesh.bricks:
+        mesh = Mesh(mesh.nodes, mesh.simplices, "tri3" if mesh.dimension == 2 else "tet4")
     H = np.einsum("eai,eaj->eij", u[mesh.corners], shape_gradients(mesh))
     return np.asarray(np.abs(np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2)).max(axis=1))
 
@@ -292,7 +301,7 @@ def _fluid(body: Scene) -> Fact:
     return Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means)
 
 
-def _noise(scene: TradeScene, want: Wanted) -> Fact:
+def _noise(scene: Trial, want: Wanted) -> Fact:
     if scene.noise is None:
         return Fact("noise", "no recording", "nothing to say")
     sd, where = scene.noise
@@ -304,6 +313,6 @@ def _noise(scene: TradeScene, want: Wanted) -> Fact:
 
 def _mesh(trade: Trade) -> Fact:
     return Fact(
-        "reference", f"{trade.scene.reference[0]} mesh {trade.scene.reference[1]}, its own error "
+        "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its own error "
         f"about {1e3 * trade.floor:.2g} mm (Richardson)", "errors below it say nothing",
     )  # fmt: skip

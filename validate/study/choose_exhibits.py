@@ -7,7 +7,7 @@ import numpy as np
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.study.choose import Choice, error_of, meeting, misses
 from validate.study.ranking import SAME_TIME
-from validate.study.trade import Row
+from validate.study.trade import TradeRow
 from validate.study.trade_exhibits import trade_exhibits
 
 _MM, _US = 1e3, 1e6
@@ -38,32 +38,32 @@ def words(choice: Choice) -> Iterator[str]:
     floor = choice.trade.floor
     if want.error < floor:
         yield f"The reference is itself off by {_MM * floor:.2g} mm: no cell can show that."
-    what = "with what the linear law costs" if choice.by == "total" else "within the declared law"
+    what = "with what the linear law costs" if choice.by == "total" else "within the linear law"
     yield f"Errors are {what}; the rate is that of median steps with all displacements."
 
 
-def described(row: Row, choice: Choice) -> str:
+def described(row: TradeRow, choice: Choice) -> str:
     """A row by its numbers."""
     error, time = error_of(row, choice.by) or 0.0, row.time_s or 0.0
-    step = f", steps of {_MM * row.cell.dt:.3g} ms" if row.cell.solver.stepped else ""
+    step = f", steps of {_MM * row.dt:.3g} ms" if row.solver.stepped else ""
     return f"{row.label}{step}: {_MM * error:.3g} mm at {1 / time:.4g} Hz ({_US * time:.3g} us)"
 
 
 def _confirmed(choice: Choice) -> Iterator[str]:
     if choice.confirmed is not None:
-        ms = _MM * choice.confirmed.cell.dt
+        ms = _MM * choice.confirmed.dt
         yield (
             f"Run again with a new state every {ms:.3g} ms, as the rate asks: "
             f"{described(choice.confirmed, choice)}."
         )
-    elif choice.trade.scene.dynamic:
+    elif choice.trade.trial.dynamic:
         yield "Its own step is no longer than a tick of the rate."
 
 
 def _as_fast(choice: Choice) -> Iterator[str]:
     """A cell of less error whose time the clock can hardly tell from the pick's."""
     assert choice.pick is not None
-    dynamic = choice.trade.scene.dynamic
+    dynamic = choice.trade.trial.dynamic
     limit = SAME_TIME * (choice.pick.time_s or 0.0)
     rows = [r for r in _judged(choice) if (r.time_s or 0.0) <= limit]
     equal = meeting(rows, choice.wanted, choice.by, dynamic)
@@ -72,15 +72,15 @@ def _as_fast(choice: Choice) -> Iterator[str]:
         yield f"Within {SAME_TIME:g} times its time and less wrong: {described(best, choice)}."
 
 
-def _judged(choice: Choice) -> list[Row]:
+def _judged(choice: Choice) -> list[TradeRow]:
     """The rows that may be chosen."""
     laws = ("linear",) if choice.by == "error" else ("linear", "neo_hooke")
-    rows = [r for r in choice.trade.rows if r.cell.solver.law in laws]
-    return [r for r in rows if not r.cell.solver.lacks]
+    rows = [r for r in choice.trade.rows if r.solver.law in laws]
+    return [r for r in rows if not r.solver.lacks]
 
 
 def _missed(choice: Choice) -> str:
-    wrong, late = misses(choice.nearest, choice.wanted, choice.by, choice.trade.scene.dynamic)
+    wrong, late = misses(choice.nearest, choice.wanted, choice.by, choice.trade.trial.dynamic)
     if max(wrong, late) <= 1:
         return "it meets both at its own step, but not with a new state at every tick"
     error = f"its error is {wrong:.3g} times the one wanted"
@@ -89,7 +89,7 @@ def _missed(choice: Choice) -> str:
 
 
 def _one_sided(choice: Choice) -> Iterator[str]:
-    dynamic = choice.trade.scene.dynamic
+    dynamic = choice.trade.trial.dynamic
     miss = [(misses(r, choice.wanted, choice.by, dynamic), r) for r in _judged(choice)]
     exact = [r for (wrong, _), r in miss if wrong <= 1]
     quick = [(wrong, r) for (wrong, late), r in miss if late <= 1]
@@ -138,8 +138,8 @@ def _ladder(choice: Choice) -> NumberTable:
 def _chart(choice: Choice) -> Chart:
     by, want = choice.by, choice.wanted
     rows = [r for r in choice.trade.rows if error_of(r, by) and r.time_s]
-    rungs = dict.fromkeys(r.cell.solver.rung for r in rows)
-    series = [_series(rung, [r for r in rows if r.cell.solver.rung == rung], by) for rung in rungs]
+    rungs = dict.fromkeys(r.solver.rung for r in rows)
+    series = [_series(rung, [r for r in rows if r.solver.rung == rung], by) for rung in rungs]
     left = 0.5 * min(r.time_s or 1.0 for r in rows)
     low = 0.5 * min(error_of(r, by) or 1.0 for r in rows)
     x = _US * np.array([min(left, 0.5 / want.rate), 1 / want.rate, 1 / want.rate])
@@ -153,6 +153,6 @@ def _chart(choice: Choice) -> Chart:
     )  # fmt: skip
 
 
-def _series(label: str, rows: list[Row], by: str) -> Series:
+def _series(label: str, rows: list[TradeRow], by: str) -> Series:
     x = np.array([_US * (r.time_s or 0.0) for r in rows])
     return Series(label, x, np.array([_MM * (error_of(r, by) or 0.0) for r in rows]), "points")

@@ -6,27 +6,24 @@ print(found.best[0].line)
 """
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
-from validate.replay.find import find, root_of
-from validate.replay.options import Options
-from validate.study.outcome import CellResult, read_cells, write_cell
-from validate.study.plan import METHODS, Cell, Plan, plan
+from validate.replay.find import find
+from validate.replay.options import Options, Report
+from validate.study.engine import CELLS, Finished, Plan, Where, finish, study_folder
+from validate.study.filter_cell import open_bench, run_cell
+from validate.study.filter_plan import METHODS, FilterCell, FilterPlan, plan
 from validate.study.ranking import Ranked, Ranking, rankings, tied
-from validate.study.score import POOLED
+from validate.study.score import POOLED, FilterScores
 from validate.study.sweep import axes
 
-KIND = "study-filters"
-CELLS = "cells"
+KIND = "filters"
 SEEDS = 10  # common samples of the noise: a t interval of them is 2.3 standard errors wide
-
-Report = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -53,19 +50,13 @@ class Best:
 
 
 @dataclass(frozen=True)
-class Study:
-    """All cells with their results by key, and the rankings by the score `by`, one a condition.
+class FilterStudy:
+    """All cells with their records, and the rankings by the score `by`, one a condition."""
 
-    `reused` of them were finished before; `seconds` is what this call took.
-    """
-
-    plan: Plan
+    plan: FilterPlan
     by: str
-    results: Mapping[str, CellResult]
+    done: Finished[FilterScores]
     rankings: tuple[Ranking, ...]
-    reused: int
-    seconds: float
-    workers: str
 
     @property
     def best(self) -> tuple[Best, ...]:
@@ -86,83 +77,37 @@ def study(
     by: str = POOLED,
     quick: bool = False,
     out: Path | None = None,
-    workers: int | None = None,
-    scheduler: str = "",
+    where: Where | None = None,
     report: Report | None = None,
-) -> Study:
+) -> FilterStudy:
     """Runs what is not finished yet in `out`/<name>/study-filters/cells, and ranks everything.
 
     `sweeps` as for `--sweep`, `values` as for `--set`; `out` is the folder of the reports. Raises
     `UsageError` for bad names and values before anything runs, `ComparisonError` when no cell has
     a score.
     """
-    start = perf_counter()
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     planned = plan(found, Options(dict(values or {}), methods, quick), axes(sweeps), seeds)
-    folder = cells_folder(found, out)
-    folder.mkdir(parents=True, exist_ok=True)
-    before = read_cells(folder, planned.cells)
-    results, where = _finish(planned, folder, before, workers, scheduler, report or _silent)
-    _require_score(planned, results, by)
-    ranked = rankings(planned.cells, results, by)
-    seconds = perf_counter() - start
-    return Study(planned, by, results, ranked, len(before), seconds, where)
+    work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
+    done = finish(work, study_folder(found, KIND, out) / CELLS, where, report)
+    _require_score(done, by)
+    return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
 
 
-def _finish(
-    planned: Plan,
-    folder: Path,
-    before: Mapping[str, CellResult],
-    workers: int | None,
-    scheduler: str,
-    tell: Report,
-) -> tuple[dict[str, CellResult], str]:
-    """Runs the cells that are not in `before`, keeping each in `folder`; all results, and where."""
-    from validate.study.workers import Where, cores, run_all  # a second to import
-
-    results = dict(before)
-    left = [c for c in planned.cells if c.key not in before]
-
-    def done(cell: Cell, result: CellResult) -> None:
-        results[cell.key] = result
-        if result.lasting:
-            write_cell(folder, cell, result)
-        tell(len(results), len(planned.cells), cell.method)
-
-    tell(len(results), len(planned.cells), "workers")
-    run_all(planned.job, left, Where(workers, scheduler), done)
-    local = f"{workers or min(cores(), len(left))} local"
-    return results, f"Dask at {scheduler}" if scheduler else local
-
-
-def study_folder(experiment: Experiment, out: Path | None) -> Path:
-    """`out`/<name>/study-filters, by default in the reports/ of the experiment's clone."""
-    reports = out or root_of(experiment, Path.cwd()) / "reports"
-    return reports / experiment.name / KIND
-
-
-def cells_folder(experiment: Experiment, out: Path | None) -> Path:
-    return study_folder(experiment, out) / CELLS
-
-
-def _silent(done: int, total: int, text: str) -> None:
-    pass
-
-
-def _require_score(planned: Plan, results: Mapping[str, CellResult], by: str) -> None:
-    good = [r for r in results.values() if not r.failed]
+def _require_score(done: Finished[FilterScores], by: str) -> None:
+    good = [r.value for r in done.records.values() if r.value is not None]
     if not good:
-        first = next(iter(results.values()))
+        first = next(iter(done.records.values()))
         raise ComparisonError(
-            f"all {len(results)} cells failed, 0 compared; the first: {first.failed}"
+            f"all {len(done.records)} cells failed, 0 compared; the first: {first.why}"
         )
-    for result in good:
-        if by not in result.scores:
-            hint = nearest_names(by, set(result.scores))
+    for value in good:
+        if by not in value.scores:
+            hint = nearest_names(by, set(value.scores))
             raise UsageError(f"no score '{by}' to rank by; {hint}")
 
 
-def _best(planned: Plan, ranking: Ranking) -> Best:
+def _best(planned: FilterPlan, ranking: Ranking) -> Best:
     """The first filter (what has innovations); the first of all where there is none."""
     filters = [r for r in ranking.rows if r.result.nis is not None]
     rows = filters or list(ranking.rows)
@@ -171,7 +116,7 @@ def _best(planned: Plan, ranking: Ranking) -> Best:
     return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell))
 
 
-def _edges(planned: Plan, cell: Cell) -> tuple[str, ...]:
+def _edges(planned: FilterPlan, cell: FilterCell) -> tuple[str, ...]:
     """Swept settings of three and more numbers of which the cell has the least or the largest."""
     found = []
     for axis in planned.axes:
@@ -183,7 +128,7 @@ def _edges(planned: Plan, cell: Cell) -> tuple[str, ...]:
     return tuple(found)
 
 
-def run_line(planned: Plan, cell: Cell) -> str:
+def run_line(planned: FilterPlan, cell: FilterCell) -> str:
     """The `validate run` command of a cell, with the methods it is judged beside: the reference
     that speeds are compared with and those whose checks decide, as `cell` alone may have none."""
     experiment = planned.experiment

@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from validate.study.filter_plan import FilterCell
 from validate.study.interval import Interval, interval, paired
-from validate.study.outcome import CellResult
-from validate.study.plan import Cell
+from validate.study.score import FilterScores
+from validate.study.store import Record
 
 # Medians of one step on a machine that does other things too: closer than this is the same time.
 SAME_TIME = 1.25
@@ -24,8 +25,8 @@ class Ranked:
     """
 
     place: int
-    cell: Cell
-    result: CellResult
+    cell: FilterCell
+    result: FilterScores
     score: Interval
     overlaps: tuple[int, ...]
     from_best: Interval
@@ -40,7 +41,7 @@ class Ranking:
 
     condition: Condition
     rows: tuple[Ranked, ...]
-    failed: tuple[tuple[Cell, str], ...]
+    failed: tuple[tuple[FilterCell, str], ...]
 
     @property
     def front(self) -> tuple[Ranked, ...]:
@@ -50,37 +51,38 @@ class Ranking:
 
 
 def rankings(
-    cells: Sequence[Cell], results: Mapping[str, CellResult], by: str
+    cells: Sequence[FilterCell], records: Mapping[str, Record[FilterScores]], by: str
 ) -> tuple[Ranking, ...]:
     """One ranking per condition, in the order of the grid."""
     conditions = dict.fromkeys(c.condition for c in cells)
     return tuple(
-        _ranking(condition, [c for c in cells if c.condition == condition], results, by)
+        _ranking(condition, [c for c in cells if c.condition == condition], records, by)
         for condition in conditions
     )
 
 
 def _ranking(
-    condition: Condition, cells: Sequence[Cell], results: Mapping[str, CellResult], by: str
+    condition: Condition,
+    cells: Sequence[FilterCell],
+    records: Mapping[str, Record[FilterScores]],
+    by: str,
 ) -> Ranking:
-    done = [c for c in cells if c.key in results and not results[c.key].failed]
-    failed = [(c, results[c.key].failed) for c in cells if c.key in results and c not in done]
-    scores = {c.key: interval(results[c.key].scores[by]) for c in done}
-    order = sorted(done, key=lambda c: scores[c.key].mean)
-    rows = [
-        Ranked(
-            i + 1,
-            cell,
-            results[cell.key],
-            scores[cell.key],
-            _overlaps(i, [scores[c.key] for c in order]),
-            *tied(results[cell.key].scores[by], results[order[0].key].scores[by]),
-            _place_of_better(i, [results[c.key] for c in order], [scores[c.key] for c in order]),
-            results[cell.key].scores[by],
-        )
-        for i, cell in enumerate(order)
-    ]
-    return Ranking(condition, tuple(rows), tuple(failed))
+    found = [(c, value) for c in cells if (value := records[c.key].value) is not None]
+    failed = tuple((c, records[c.key].why) for c in cells if records[c.key].value is None)
+    order = sorted(found, key=lambda one: interval(one[1].scores[by]).mean)
+    scores = [value.scores[by] for _, value in order]
+    means = [interval(s) for s in scores]
+    times = [value.step_s or 0.0 for _, value in order]
+    rows = []
+    for i, (cell, value) in enumerate(order):
+        better = dominator(i, [m.mean for m in means], times)
+        rows.append(
+            Ranked(
+                i + 1, cell, value, means[i], _overlaps(i, means), *tied(scores[i], scores[0]),
+                None if better is None else better + 1, scores[i],
+            )
+        )  # fmt: skip
+    return Ranking(condition, tuple(rows), failed)
 
 
 def _overlaps(i: int, scores: Sequence[Interval]) -> tuple[int, ...]:
@@ -105,11 +107,3 @@ def dominator(i: int, errors: Sequence[float], times: Sequence[float]) -> int | 
         if j != i and (better or faster):
             return j
     return None
-
-
-def _place_of_better(
-    i: int, results: Sequence[CellResult], scores: Sequence[Interval]
-) -> int | None:
-    """The best-placed cell that dominates."""
-    found = dominator(i, [s.mean for s in scores], [r.step_s or 0.0 for r in results])
-    return None if found is None else found + 1

@@ -1,11 +1,13 @@
-"""Scores of one seed's run: errors along the experiment's axis at every probe, and NIS."""
+"""Scores of a filter study: errors along the experiment's axis at every probe, and NIS."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.track import rmse, track_error
+from validate.estimate.consistency import Consistency, nis_consistency
 
 POOLED = "all.rmse"
 NIS = "nis.per_dof"
@@ -13,6 +15,33 @@ WORDS = {
     POOLED: "root mean square error over all probes and times",
     NIS: "normalised innovation squared over its degrees of freedom; 1 for a consistent filter",
 }
+
+
+@dataclass(frozen=True)
+class FilterScores:
+    """Scores by name, one number per seed (SI, `units` by name); step_s s is the median step.
+
+    `nis` is that of all seeds with `nis_dof` degrees of freedom, None without innovations.
+    `frozen` is the step from which a linear filter's gains repeat. `shared`: all seeds were run at
+    once with one set of gains.
+    """
+
+    scores: Mapping[str, tuple[float, ...]]
+    units: Mapping[str, str]
+    nis: float | None = None
+    nis_dof: int = 0
+    step_s: float | None = None
+    setup_s: float | None = None
+    steps: int = 0
+    frozen: int | None = None
+    shared: bool = False
+
+    @property
+    def consistency(self) -> Consistency | None:
+        """NIS of all seeds together; None for a method without innovations."""
+        if self.nis is None or not self.nis_dof:
+            return None
+        return nis_consistency([self.nis], [self.nis_dof])
 
 
 def error_scores(

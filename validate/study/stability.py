@@ -1,31 +1,27 @@
-"""The stability map of a base scene: every scheme over time step, material, damping, cells, mesh.
+"""The stability map of an experiment's body: every scheme over step, material, damping, mesh.
 
 from validate.study.stability import stability
 found = stability("needle_block")
 print(found.passed, found.points)
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Literal
 
-from validate.errors import UsageError
-from validate.replay.find import find, root_of
-from validate.study.base_scenes import BaseScene, base_scene
-from validate.study.stability_cell import (
-    SchemeResult,
-    VariantResult,
-    read_variants,
-    run_variant,
-    write_variant,
-)
+from validate.replay.experiment import Experiment
+from validate.replay.find import find
+from validate.replay.ladder import StabilityBody
+from validate.replay.ladder_default import body_of
+from validate.replay.options import Report
+from validate.study.engine import CELLS, Finished, Plan, Where, finish, job_of, study_folder
+from validate.study.stability_cell import SchemeResult, Stepped, open_bench, run_cell
+from validate.study.stability_plan import StabilityCell, stability_cells
 from validate.study.stepping import STEPPINGS, Stepping
-from validate.study.variants import VariantCell, variant_cells
+from validate.study.store import Record
 
-KIND = "study-stability"
-CELLS = "cells"
+KIND = "stability"
 FEWEST = 500  # points of a map
 TOLERANCE = 0.02  # of the predicted limit
 DRIFT_TOLERANCE = 1e-6  # of the energy, over 1e5 steps in float64
@@ -33,14 +29,13 @@ RESOLVED = 6.283 / 10  # rad of the slowest mode in a step: ten steps a period
 SCHEMES: Mapping[str, Stepping] = {s.name: s for s in STEPPINGS}
 
 Regime = Literal["stable", "unresolved", "unstable", "refused"]
-Report = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
 class Point:
     """One scheme, variant and step dt s; `radius` None where nothing was run, and `why`."""
 
-    cell: VariantCell
+    cell: StabilityCell
     scheme: str
     dt: float
     regime: Regime
@@ -62,26 +57,27 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Stability:
-    """All cells with results by key; `reused` were finished before; `seconds` of this call."""
+    """All cells with their records by key."""
 
-    base: BaseScene
-    cells: tuple[VariantCell, ...]
-    results: Mapping[str, VariantResult]
+    experiment: Experiment
+    base: StabilityBody
+    cells: tuple[StabilityCell, ...]
+    done: Finished[Stepped]
     quick: bool
-    reused: int
-    seconds: float
-    workers: str
+
+    @property
+    def ran(self) -> tuple[Stepped, ...]:
+        return tuple(r.value for r in self.done.records.values() if r.value is not None)
 
     @property
     def schemes(self) -> tuple[str, ...]:
         """Those that know this body's cells."""
-        ran = (r.schemes for r in self.results.values() if r.schemes)
-        return tuple(s.scheme for s in next(ran, ()))
+        return tuple(s.scheme for s in self.ran[0].schemes) if self.ran else ()
 
     @property
     def all_points(self) -> Iterator[Point]:
         for cell in self.cells:
-            yield from points(cell, self.results[cell.key], self.schemes)
+            yield from points(cell, self.done.records[cell.key], self.schemes)
 
     @property
     def points(self) -> int:
@@ -98,67 +94,46 @@ class Stability:
 
 
 def stability(
-    name: str,
+    experiment: str | Experiment,
     *,
     quick: bool = False,
     out: Path | None = None,
-    workers: int | None = None,
-    scheduler: str = "",
+    where: Where | None = None,
     report: Report | None = None,
-) -> Stability:
+) -> Stability | None:
     """Runs what is not finished yet in `out`/<name>/study-stability/cells.
 
-    Raises `UsageError` for an unknown base scene or a scheduler that does not answer.
+    None for an experiment without density, in which nothing steps in time. Raises `UsageError` for
+    a body with too many modes, or a scheduler that does not answer.
     """
-    from validate.study.workers import Where, cores, run_each  # a second to import
-
-    start = perf_counter()
-    base = base_scene(name)
-    cells = variant_cells(base, quick)
-    folder = stability_folder(name, out) / CELLS
-    folder.mkdir(parents=True, exist_ok=True)
-    before = read_variants(folder, cells)
-    results = dict(before)
-    left = sorted((c for c in cells if c.key not in before), key=lambda c: not c.drift)
-
-    def done(cell: VariantCell, result: VariantResult) -> None:
-        results[cell.key] = result
-        if not result.failed:
-            write_variant(folder, result)
-        if report:
-            report(len(results), len(cells), "variants")
-
-    run_each(run_variant, left, Where(workers, scheduler), done)
-    named = f"Dask at {scheduler}" if scheduler else f"{workers or min(cores(), len(left))} local"
-    seconds = perf_counter() - start
-    return Stability(base, cells, results, quick, len(before), seconds, named)
+    found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
+    base = body_of(found)
+    if base is None:
+        return None
+    job = job_of(found, quick=quick)
+    cells = stability_cells(base, job, quick)
+    longest_first = tuple(sorted(cells, key=lambda c: not c.drift))
+    plan = Plan(job, longest_first, open_bench, run_cell, Stepped)
+    done = finish(plan, study_folder(found, KIND, out) / CELLS, where, report)
+    return Stability(found, base, cells, done, quick)
 
 
-def stability_folder(name: str, out: Path | None) -> Path:
-    """`out`/<name>/study-stability, by default in the reports/ of the experiment's clone."""
-    if out is None:
-        try:
-            out = root_of(find(name, Path.cwd()), Path.cwd()) / "reports"
-        except UsageError:  # a base scene needs no experiment
-            out = Path.cwd() / "reports"
-    return out / name / KIND
-
-
-def points(cell: VariantCell, result: VariantResult, schemes: tuple[str, ...]) -> Iterator[Point]:
+def points(
+    cell: StabilityCell, record: Record[Stepped], schemes: tuple[str, ...]
+) -> Iterator[Point]:
     """Every scheme and step of one variant."""
-    if result.refused or result.failed:
-        why = result.refused or result.failed
+    if record.value is None:
         for scheme in schemes:
             for dt in cell.steps:
-                yield Point(cell, scheme, dt, "refused", None, why)
+                yield Point(cell, scheme, dt, "refused", None, record.why)
         return
-    for found in result.schemes:
+    for found in record.value.schemes:
         for dt, radius in zip(cell.steps, found.radii, strict=True):
-            yield Point(cell, found.scheme, dt, *_regime(found, result, dt, radius))
+            yield Point(cell, found.scheme, dt, *_regime(found, record.value, dt, radius))
 
 
 def _regime(
-    found: SchemeResult, result: VariantResult, dt: float, radius: float
+    found: SchemeResult, result: Stepped, dt: float, radius: float
 ) -> tuple[Regime, float, str]:
     scheme = SCHEMES[found.scheme]
     if radius > 1 + scheme.rounding:
@@ -174,13 +149,12 @@ def _regime(
 
 
 def _predictions(study: Stability) -> Iterator[Prediction]:
-    ran = [r for r in study.results.values() if not r.refused and not r.failed]
     for name in study.schemes:
-        own = [s for r in ran for s in r.schemes if s.scheme == name]
+        own = [s for r in study.ran for s in r.schemes if s.scheme == name]
         yield (_limit if SCHEMES[name].limit else _no_limit)(name, own)
-    yield from _drift(study, ran)
+    yield _drift(study.ran)
     yield _refusals(study)
-    failed = [r.failed for r in study.results.values() if r.failed]
+    failed = [r.failed for r in study.done.records.values() if r.failed]
     why = failed[0] if failed else ""
     yield Prediction("variants that failed", len(failed), 0, len(study.cells), not failed, why)
     count = study.points
@@ -210,20 +184,20 @@ def _no_limit(name: str, own: list[SchemeResult]) -> Prediction:
     return Prediction(f"no_limit.{name}", worst, border, len(over), holds, "radius less 1")
 
 
-def _drift(study: Stability, ran: list[VariantResult]) -> Iterator[Prediction]:
+def _drift(ran: tuple[Stepped, ...]) -> Prediction:
     kept = [d for r in ran for d in r.drifts if SCHEMES[d.scheme].conserves]
     changes = [abs(d.double - 1) for d in kept if d.double is not None]
     worst = max(changes, default=None)
     holds = worst is not None and len(changes) == len(kept) and worst <= DRIFT_TOLERANCE
     why = "energy of schemes that conserve it, over 1e5 undamped steps in float64"
-    yield Prediction("drift", worst, DRIFT_TOLERANCE, len(changes), holds, why)
+    return Prediction("drift", worst, DRIFT_TOLERANCE, len(changes), holds, why)
 
 
 def _refusals(study: Stability) -> Prediction:
     """Exactly those that cannot be are refused, each for its own reason."""
     wrong = []
     for cell in study.cells:
-        refused = study.results[cell.key].refused
+        refused = study.done.records[cell.key].refused
         if bool(refused) != bool(cell.expected) or cell.expected not in refused:
             wrong.append(f"{cell.variant}: '{refused}'")
     count = sum(1 for c in study.cells if c.expected)

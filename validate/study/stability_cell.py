@@ -4,29 +4,28 @@ Radii, measured and predicted limits, condition numbers, locking, rounding and d
 line for which the variant is refused.
 """
 
-import json
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field, replace
-from functools import lru_cache
-from pathlib import Path
-from time import perf_counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 from scipy.linalg import eigh, eigvalsh
 
 from validate.arrays import Floats
-from validate.errors import ValidateError
+from validate.errors import ComparisonError, ValidateError
 from validate.fem.locking import locking_warning
 from validate.fem.matrices import mass_of
 from validate.fem.mixed import mixed_static
 from validate.fem.system import System, build
+from validate.replay.ladder import StabilityBody, Turned
+from validate.replay.ladder_default import body_of
+from validate.scene.scene import Scene
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
-from validate.study.base_scenes import BaseScene, Variant, base_scene
+from validate.study.engine import Job
+from validate.study.kept import Kept
 from validate.study.precision import Drift, Rounding, drift, rounding
+from validate.study.stability_plan import StabilityCell
 from validate.study.stepping import Stepping, steppings_for
-from validate.study.variants import VariantCell
 
 _REACH = 8.0  # times the predicted limit, on both sides, that the measured one is sought in
 _HALVINGS = 30  # of that interval's logarithm: 4e-9 of the limit
@@ -45,55 +44,59 @@ class SchemeResult:
 
 
 @dataclass(frozen=True)
-class VariantResult:
+class Stepped:
     """`lowest`, `highest` frequency 1/s with consistent mass; condition numbers by matrix; locking
-    factor; rounding; drift. `refused` is "" or why there is nothing; `warning` on locking or "".
+    factor (None: not for such cells); rounding; drift. `warning` on locking or "".
     """
 
-    key: str
-    refused: str = ""
-    failed: str = ""
     unknowns: int = 0
     lowest: float = 0.0
     highest: float = 0.0
     schemes: tuple[SchemeResult, ...] = ()
-    conditions: dict[str, float] = field(default_factory=dict)
+    conditions: Mapping[str, float] = field(default_factory=dict)
     locking: float | None = None
     rounding: Rounding | None = None
     drifts: tuple[Drift, ...] = ()
     warning: str = ""
-    seconds: float = 0.0
 
 
-def run_variant(cell: VariantCell) -> VariantResult:
-    """A variant that cannot be is a result with the reason."""
-    start = perf_counter()
-    base = base_scene(cell.scene)
-    try:
-        system = build(base.build(cell.variant))
-    except ValidateError as error:
-        return VariantResult(cell.key, refused=" ".join(str(error).split()))
-    try:
-        found = _result(base, cell, system)
-    except Exception as error:  # one variant must not end the study: it becomes a row
-        found = VariantResult(cell.key, failed=" ".join(f"{type(error).__name__}: {error}".split()))
-    return replace(found, seconds=perf_counter() - start)
+class StabilityBench:
+    """A body, and the locking factors of its meshes that were asked for."""
+
+    def __init__(self, body: StabilityBody) -> None:
+        self.body = body
+        self._locking: Kept[float | None] = Kept(64)
+
+    def locking(self, v: Turned) -> float | None:
+        """Compliance under the static load over that of mixed elements; E has no part in it."""
+        base = self.body.base
+        alike = replace(base, nu=max(v.nu, _LEAST_NU), mesh=v.mesh, quality=v.quality)
+        return self._locking.get(alike, lambda: _locking(self.body.pulled(alike)))
 
 
-def _result(base: BaseScene, cell: VariantCell, system: System) -> VariantResult:
-    v = cell.variant
+def open_bench(job: Job) -> StabilityBench:
+    """Raises `ComparisonError` for an experiment that has nothing to be stepped."""
+    body = body_of(job.experiment())
+    if body is None:
+        raise ComparisonError("the experiment declares no density: nothing steps in time")
+    return StabilityBench(body)
+
+
+def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
+    """Raises `SceneError` for a variant that cannot be."""
+    base, v = bench.body, cell.variant
+    system = build(base.build(v))
     modes = {mass: frequencies(system, mass) for mass in ("consistent", "lumped")}
     schemes = steppings_for(system.scene.mesh.kind)
     pulled = build(base.pulled(v))
     limit = stable_step(pulled, ExplicitLinear(1.0, "lumped", "mass"))
-    return VariantResult(
-        cell.key,
+    return Stepped(
         unknowns=len(system.free),
         lowest=float(modes["consistent"][0]),
         highest=float(modes["consistent"][-1]),
         schemes=tuple(_scheme(s, system, modes[s.mass], v, cell.steps) for s in schemes),
         conditions=_conditions(system, base.dt),
-        locking=_locking(base.name, v.nu, v.mesh, v.quality),
+        locking=bench.locking(v),
         rounding=rounding(pulled, limit),
         drifts=tuple(_drifts(base, system, schemes, modes)) if cell.drift else (),
         warning=locking_warning(system.scene) or "",
@@ -108,7 +111,7 @@ def frequencies(system: System, mass: Any) -> Floats:
 
 
 def _scheme(
-    scheme: Stepping, system: System, omegas: Floats, v: Variant, steps: tuple[float, ...]
+    scheme: Stepping, system: System, omegas: Floats, v: Turned, steps: tuple[float, ...]
 ) -> SchemeResult:
     def radius(h: float) -> float:
         return scheme.radius(h, omegas, v.mass_damping, v.stiffness_damping)
@@ -142,19 +145,19 @@ def _conditions(system: System, dt: float) -> dict[str, float]:
     return found
 
 
-@lru_cache(maxsize=64)
-def _locking(scene: str, nu: float, mesh: int, quality: float) -> float:
-    """Compliance under the static load over that of mixed elements on the mesh; E has no part."""
-    base = base_scene(scene)
-    nu = max(nu, _LEAST_NU)
-    pulled = base.pulled(replace(base.base, nu=nu, mesh=mesh, quality=quality))
+def _locking(pulled: Scene) -> float | None:
+    """None for cells that mixed elements do not know."""
+    try:
+        mixed = float(mixed_static(pulled).compliances[0])
+    except ValidateError:
+        return None
     system = build(pulled)
     f = system.loads[system.free, 0]
-    return float(f @ system.factor().solve(f)) / float(mixed_static(pulled).compliances[0])
+    return float(f @ system.factor().solve(f)) / mixed
 
 
 def _drifts(
-    base: BaseScene, system: System, schemes: tuple[Stepping, ...], modes: dict[str, Floats]
+    base: StabilityBody, system: System, schemes: tuple[Stepping, ...], modes: dict[str, Floats]
 ) -> Iterable[Drift]:
     """Schemes whose map knows its state: at half their limit, or at the paper's step."""
     for s in schemes:
@@ -164,35 +167,3 @@ def _drifts(
 
 
 # --- kept ----------------------------------------------------------------------------------------
-
-
-def write_variant(folder: Path, result: VariantResult) -> None:
-    """Writes <key>.json whole or not at all."""
-    fresh = folder / f".{result.key}.{uuid4().hex[:8]}"
-    fresh.write_text(json.dumps(asdict(result), allow_nan=False), encoding="utf-8")
-    fresh.replace(folder / f"{result.key}.json")
-
-
-def read_variants(folder: Path, cells: Iterable[VariantCell]) -> dict[str, VariantResult]:
-    """By key, those finished before; a damaged file counts as not finished."""
-    found = {}
-    for cell in cells:
-        try:
-            content = json.loads((folder / f"{cell.key}.json").read_text(encoding="utf-8"))
-            found[cell.key] = _from_json(content)
-        except (OSError, ValueError, TypeError, KeyError, AttributeError):
-            continue
-    return found
-
-
-def _from_json(content: dict[str, Any]) -> VariantResult:
-    schemes = (SchemeResult(**{**s, "radii": tuple(s["radii"])}) for s in content["schemes"])
-    kept = content["rounding"]
-    return VariantResult(
-        **{
-            **content,
-            "schemes": tuple(schemes),
-            "rounding": Rounding(**kept) if kept else None,
-            "drifts": tuple(Drift(**d) for d in content["drifts"]),
-        }
-    )

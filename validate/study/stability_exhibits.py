@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, Mark, NumberTable, Panel, RegimeMap
-from validate.study.base_scenes import PaperSetting, Variant
+from validate.replay.ladder import PaperSetting, Turned
 from validate.study.precision import DRIFT_STEPS, STEPS
 from validate.study.stability import (
     SCHEMES,
@@ -15,8 +15,8 @@ from validate.study.stability import (
     limit_error,
     points,
 )
-from validate.study.stability_cell import VariantResult
-from validate.study.variants import VariantCell, axis, drift_variant
+from validate.study.stability_cell import Stepped
+from validate.study.stability_plan import StabilityCell, axis, drift_variant
 
 REGIMES = ("stable", "unresolved", "unstable", "refused")
 _WORDS = ("stable", "stable, h too large to resolve", "unstable", "refused")
@@ -36,7 +36,7 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
     maps = tuple(m for name in _LABELS if (m := _map(study, name)) is not None)
     return (
         _claims(study),
-        _papers(study),
+        *((_papers(study),) if study.base.papers else ()),
         Exhibit("maps", "Where every scheme is stable", tuple(_map_words(study)), regimes=maps),
         _limits(study),
         _conditions(study),
@@ -45,7 +45,7 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
     )
 
 
-def variant_row(v: Variant) -> tuple[Entry, ...]:
+def variant_row(v: Turned) -> tuple[Entry, ...]:
     return (v.E, v.nu, v.rho, v.mass_damping, v.stiffness_damping, v.mesh, v.quality)
 
 
@@ -79,9 +79,9 @@ def _paper_rows(study: Stability, paper: PaperSetting) -> Iterator[tuple[Entry, 
     cell = _cell(study, paper.variant)
     if cell is None:
         return
-    result = study.results[cell.key]
-    limits = {s.scheme: s.predicted for s in result.schemes}
-    for p in _at(points(cell, result, study.schemes), paper.dt):
+    record = study.done.records[cell.key]
+    limits = {s.scheme: s.predicted for s in (record.value or Stepped()).schemes}
+    for p in _at(points(cell, record, study.schemes), paper.dt):
         limit = limits.get(p.scheme)
         times = None if limit is None else paper.dt / limit
         yield (paper.label, paper.source, _MM * p.dt, p.scheme, _WORDS[REGIMES.index(p.regime)],
@@ -112,13 +112,13 @@ def _map(study: Stability, name: str) -> RegimeMap | None:
     cells = [(v, c) for v in variants if (c := _cell(study, v)) is not None]
     if len(cells) < 2:
         return None
-    found = [list(points(c, study.results[c.key], study.schemes)) for _, c in cells]
+    found = [list(points(c, study.done.records[c.key], study.schemes)) for _, c in cells]
     panels = tuple(_panel(study, s, [c for _, c in cells], found) for s in study.schemes)
     shown = tuple(_text(name, v) for v, _ in cells)
     marks = tuple(_marks(study, name, [v for v, _ in cells]))
     return RegimeMap(
         name,
-        f"{study.base.name}: time step against {_LABELS[name].split(' / ')[0]}",
+        f"{study.experiment.name}: time step against {_LABELS[name].split(' / ')[0]}",
         "time step / s",
         _LABELS[name],
         np.array(cells[0][1].steps),
@@ -136,7 +136,7 @@ def _caption(marks: tuple[Mark, ...]) -> str:
     return f"Line: predicted limit. Marks: the papers' own settings.{more}"
 
 
-def _rows(study: Stability, name: str) -> tuple[Variant, ...]:
+def _rows(study: Stability, name: str) -> tuple[Turned, ...]:
     along = axis(study.base, name)
     if name not in _BEYOND:
         return along
@@ -145,21 +145,21 @@ def _rows(study: Stability, name: str) -> tuple[Variant, ...]:
     return (*along, beyond) if after and name != "quality" else (beyond, *along)
 
 
-def _with(v: Variant, name: str, value: float) -> Variant:
+def _with(v: Turned, name: str, value: float) -> Turned:
     return replace(v, **{name: value})  # type: ignore[arg-type]
 
 
 def _panel(
-    study: Stability, scheme: str, cells: list[VariantCell], found: list[list[Point]]
+    study: Stability, scheme: str, cells: list[StabilityCell], found: list[list[Point]]
 ) -> Panel:
     codes = [[REGIMES.index(p.regime) for p in row if p.scheme == scheme] for row in found]
-    results = (study.results[c.key] for c in cells)
+    results = (study.done.records[c.key].value or Stepped() for c in cells)
     limits = [next((s.predicted for s in r.schemes if s.scheme == scheme), None) for r in results]
     border = np.array([np.nan if x is None else x for x in limits])
     return Panel(scheme, np.array(codes), border)
 
 
-def _marks(study: Stability, name: str, rows: list[Variant]) -> Iterator[Mark]:
+def _marks(study: Stability, name: str, rows: list[Turned]) -> Iterator[Mark]:
     """Papers' settings whose value of this quantity is a row, or lies between two of E."""
     for paper in study.base.papers:
         at = _row_of(name, paper.variant, rows)
@@ -168,7 +168,7 @@ def _marks(study: Stability, name: str, rows: list[Variant]) -> Iterator[Mark]:
             yield Mark(paper.label, paper.dt, at, on_map)
 
 
-def _row_of(name: str, v: Variant, rows: list[Variant]) -> float | None:
+def _row_of(name: str, v: Turned, rows: list[Turned]) -> float | None:
     if name == "E":
         known = [(i, r.E) for i, r in enumerate(rows) if r.E > 0]
         indices, logs = [i for i, _ in known], [float(np.log(e)) for _, e in known]
@@ -178,25 +178,25 @@ def _row_of(name: str, v: Variant, rows: list[Variant]) -> float | None:
     return float(texts.index(own)) if own in texts else None
 
 
-def _alike(one: Variant, other: Variant, name: str) -> bool:
+def _alike(one: Turned, other: Turned, name: str) -> bool:
     """Equal, or but for a modulus between two rows of moduli."""
     return one == other or (name == "E" and replace(one, E=other.E) == other)
 
 
-def _text(name: str, v: Variant) -> str:
+def _text(name: str, v: Turned) -> str:
     if name == "damping":
         return f"{v.mass_damping:g}, {v.stiffness_damping:g}"
     return f"{getattr(v, name):g}"
 
 
-def _described(v: Variant) -> str:
+def _described(v: Turned) -> str:
     return (
         f"E {v.E:g} Pa, nu {v.nu:g}, rho {v.rho:g} kg/m3, alpha {v.mass_damping:g} 1/s, beta "
         f"{v.stiffness_damping:g} s, {v.mesh} cells across"
     )
 
 
-def _cell(study: Stability, v: Variant) -> VariantCell | None:
+def _cell(study: Stability, v: Turned) -> StabilityCell | None:
     return next((c for c in study.cells if c.variant == v), None)
 
 
@@ -206,7 +206,7 @@ def _cell(study: Stability, v: Variant) -> VariantCell | None:
 def _limits(study: Stability) -> Exhibit:
     rows: list[tuple[Entry, ...]] = []
     for cell in study.cells:
-        for s in study.results[cell.key].schemes:
+        for s in (study.done.records[cell.key].value or Stepped()).schemes:
             if s.predicted is not None:
                 error = limit_error(s)
                 row = (*variant_row(cell.variant), s.predicted, s.measured, error)
@@ -222,7 +222,7 @@ def _conditions(study: Stability) -> Exhibit:
     """Along every axis from the base: what a solver and a linear cell have to bear."""
     wanted = dict.fromkeys(v for name in _LABELS for v in axis(study.base, name))
     rows = [
-        (*variant_row(v), *_cost(study.results[c.key]))
+        (*variant_row(v), *_cost(study.done.records[c.key].value or Stepped()))
         for v in wanted
         if (c := _cell(study, v)) is not None
     ]
@@ -240,7 +240,7 @@ def _conditions(study: Stability) -> Exhibit:
     return Exhibit("conditions", "What the cells cost", words, tables=(table,))
 
 
-def _cost(r: VariantResult) -> tuple[Entry, ...]:
+def _cost(r: Stepped) -> tuple[Entry, ...]:
     kept = r.rounding
     single = (kept.static, kept.positions, kept.velocities) if kept else (None, None, None)
     conditions = (r.conditions.get(name) for name in ("K", "M", "J"))
@@ -250,7 +250,7 @@ def _cost(r: VariantResult) -> tuple[Entry, ...]:
 def _drifts(study: Stability) -> Exhibit:
     rows = [
         (d.scheme, _MM * d.dt, "yes" if SCHEMES[d.scheme].conserves else "no", d.double, d.single)
-        for r in study.results.values()
+        for r in study.ran
         for d in r.drifts
     ]
     head = ("scheme", "h / ms", "keeps energy", "energy left, float64 / 1",
@@ -266,9 +266,9 @@ def _drifts(study: Stability) -> Exhibit:
 
 def _refused(study: Stability) -> Exhibit:
     rows = [
-        (*variant_row(c.variant), r.refused or r.failed)
+        (*variant_row(c.variant), why)
         for c in study.cells
-        if (r := study.results[c.key]).refused or r.failed
+        if (why := study.done.records[c.key].why)
     ]
     table = NumberTable("refused", "Refused, and why", (*VARIANT, "why"), tuple(rows))
     return Exhibit("refused", "Refused", (), tables=(table,))

@@ -57,6 +57,18 @@ def grid(axes: Sequence[Axis]) -> tuple[Mapping[str, str], ...]:
     return tuple(dict(zip((a.path for a in axes), row, strict=True)) for row in rows)
 
 
+def named(values: Mapping[str, str] | Sequence[tuple[str, str]]) -> str:
+    """Settings as read: `Q=1e-09, R=1e-09`."""
+    pairs = values.items() if isinstance(values, Mapping) else values
+    return ", ".join(f"{short(k)}={v}" for k, v in pairs) or "as declared"
+
+
+def short(path: str) -> str:
+    """`Q` of `methods.kf.Q`, `twin.noise` as it is."""
+    inner = path.split(".", 2)[2] if path.startswith("methods.") else path
+    return inner.removeprefix("settings.")
+
+
 def _listed(text: str, values: str) -> tuple[str, ...]:
     found = tuple(part.strip() for part in values.split(","))
     if not all(found):

@@ -5,10 +5,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.replay.ladder import RUNGS
 from validate.study.held import DEFINITION
 from validate.study.ranking import SAME_TIME
-from validate.study.trade import ERROR, Front, Ladder, Row, Trade
-from validate.study.trade_scene import RUNGS
+from validate.study.trade import ERROR, Front, Refinement, Trade, TradeRow
 
 _MM, _US, _MB = 1e3, 1e6, 1e-6
 _NAMES = {"error": "error", "total": "error with the law's share"}
@@ -29,21 +29,20 @@ def trade_exhibits(trade: Trade) -> tuple[Exhibit, ...]:
     return (*found, *((_failures(rest),) if rest else ()))
 
 
-def case(row: Row) -> tuple[Entry, ...]:
+def case(row: TradeRow) -> tuple[Entry, ...]:
     """Which cell it is; a solver without a step of its own has none."""
-    c = row.cell
-    step = _MM * c.dt if c.solver.stepped else None
-    return (c.solver.name, c.element, c.level, step)
+    step = _MM * row.dt if row.solver.stepped else None
+    return (row.solver.name, row.element, row.level, step)
 
 
 def millimetres(value: float | None) -> float | None:
     return None if value is None else _MM * value
 
 
-def dominant(row: Row, trade: Trade) -> str:
+def dominant(row: TradeRow, trade: Trade) -> str:
     """Which share of the error is largest: mesh, solver, law, or none clearly."""
     shares = {"mesh": row.mesh_error, "solver": row.solver_error}
-    if row.cell.solver.law == "linear":
+    if row.solver.law == "linear":
         shares["law"] = trade.law_error
     known = sorted(((v, k) for k, v in shares.items() if v is not None), reverse=True)
     if len(known) < 2 or known[0][0] > _EVEN * known[1][0]:
@@ -55,15 +54,13 @@ def dominant(row: Row, trade: Trade) -> str:
 
 
 def _front_exhibit(trade: Trade) -> Exhibit:
-    scene = trade.scene
+    scene = trade.trial
     words = [
         f"Error: {ERROR}. {len(scene.points)} points, {len(scene.frames)} frames; the reference "
         f"({scene.reference[0]} mesh {scene.reference[1]}, no solver error) moves "
         f"{_MM * trade.moved:.4g} mm rms and is itself off by about {_MM * trade.floor:.2g} mm "
         "(Richardson): smaller errors count as equal.",
-        f"The declared law is linear. On a coarse pair ({trade.law_words}) large strain changes "
-        f"the answer by {_MM * trade.law_error:.3g} mm rms; the second front adds that difference "
-        "to the reference and so holds the linear and the large-strain solvers against one truth.",
+        _law_words(trade),
         _TIMES,
     ]
     words += [s for by in _NAMES for s in _dominated(trade.front(by))]
@@ -74,6 +71,16 @@ def _front_exhibit(trade: Trade) -> Exhibit:
         tables=tuple(_front_table(f, trade) for f in fronts),
         charts=tuple(_front_chart(f, trade) for f in fronts),
     )  # fmt: skip
+
+
+def _law_words(trade: Trade) -> str:
+    if trade.law_error is None:
+        return f"What large strain changes is not known: {trade.law_words}."
+    return (
+        f"Fronts of the linear law. On a coarse pair ({trade.law_words}) large strain changes the "
+        f"answer by {_MM * trade.law_error:.3g} mm rms; the second front adds that difference to "
+        "the reference and so holds the linear and the large-strain solvers against one truth."
+    )
 
 
 def _dominated(front: Front) -> Iterable[str]:
@@ -90,7 +97,7 @@ def _front_table(front: Front, trade: Trade) -> NumberTable:
     return NumberTable(f"front_{front.by}", title, head, rows)
 
 
-def _front_row(row: Row, by: str, trade: Trade) -> tuple[Entry, ...]:
+def _front_row(row: TradeRow, by: str, trade: Trade) -> tuple[Entry, ...]:
     time, error = row.time_s or 0.0, float(getattr(row, by))
     return (
         *case(row), _US * time, 1 / time, _MM * error, 100 * error / trade.moved,
@@ -102,13 +109,13 @@ def _front_chart(front: Front, trade: Trade) -> Chart:
     rows = [*front.rows, *(r for r, _ in front.beaten)]
     series = []
     for rung in RUNGS:
-        mine = [r for r in rows if r.cell.solver.rung == rung]
+        mine = [r for r in rows if r.solver.rung == rung]
         if mine:
             series.append(Series(rung, *_points(mine, front.by), "points"))
     series.append(Series("Pareto front", *_points(front.rows, front.by)))
     levels = [("reference", _MM * trade.floor)]
     if front.by == "total":
-        levels.append(("the law", _MM * trade.law_error))
+        levels += _law_level(trade)
     return Chart(
         f"front_{front.by}", f"{_NAMES[front.by].capitalize()} against time per step",
         "time of a step with its displacements / us", f"{_NAMES[front.by]} / mm", tuple(series),
@@ -118,7 +125,11 @@ def _front_chart(front: Front, trade: Trade) -> Chart:
     )  # fmt: skip
 
 
-def _points(rows: Sequence[Row], by: str) -> tuple[np.ndarray, np.ndarray]:
+def _law_level(trade: Trade) -> list[tuple[str, float]]:
+    return [] if trade.law_error is None else [("the law", _MM * trade.law_error)]
+
+
+def _points(rows: Sequence[TradeRow], by: str) -> tuple[np.ndarray, np.ndarray]:
     x = np.array([_US * (r.time_s or 0.0) for r in rows])
     return x, np.array([_MM * float(getattr(r, by)) for r in rows])
 
@@ -153,10 +164,10 @@ def _shares(trade: Trade) -> Exhibit:
                    charts=(_mesh_chart(trade),))  # fmt: skip
 
 
-def _least(rows: Iterable[Row]) -> list[Row]:
-    best: dict[tuple[str, str, int], Row] = {}
+def _least(rows: Iterable[TradeRow]) -> list[TradeRow]:
+    best: dict[tuple[str, str, int], TradeRow] = {}
     for r in rows:
-        key = (r.cell.solver.name, r.cell.element, r.cell.level)
+        key = (r.solver.name, r.element, r.level)
         if r.error is not None and (key not in best or r.error < (best[key].error or 0.0)):
             best[key] = r
     return list(best.values())
@@ -165,16 +176,16 @@ def _least(rows: Iterable[Row]) -> list[Row]:
 def _mesh_chart(trade: Trade) -> Chart:
     """Mesh error over the cells' size, one line an element."""
     series = []
-    for element, levels in trade.scene.meshes.items():
-        found = {r.cell.level: r.mesh_error for r in trade.rows
-                 if r.cell.element == element and r.mesh_error}  # fmt: skip
+    for element, levels in trade.trial.meshes.items():
+        found = {r.level: r.mesh_error for r in trade.rows
+                 if r.element == element and r.mesh_error}  # fmt: skip
         at = [level for level in levels if level in found]
         if at:
-            x = _MM * np.array([trade.scene.size(level) for level in at])
+            x = _MM * np.array([trade.trial.size(level) for level in at])
             series.append(Series(element, x, _MM * np.array([found[level] for level in at])))
     return Chart(
         "mesh_error", "What the mesh costs", "cell size / mm", "mesh's share / mm", tuple(series),
-        levels=(("reference", _MM * trade.floor), ("the law", _MM * trade.law_error)), log="xy",
+        levels=(("reference", _MM * trade.floor), *_law_level(trade)), log="xy",
     )  # fmt: skip
 
 
@@ -184,7 +195,7 @@ def _mesh_chart(trade: Trade) -> Chart:
 def _costs(trade: Trade) -> Exhibit:
     head = (*_CASE, "unknowns", "set-up / ms", "assembled", "p50 / us", "p99 / us", "max / us",
             "steps timed", "field / us", "memory / MB")  # fmt: skip
-    shortest = {(r.cell.solver.name, r.cell.element, r.cell.level): r
+    shortest = {(r.solver.name, r.element, r.level): r
                 for r in trade.rows if r.step is not None}  # fmt: skip
     shown = tuple(_cost_row(r) for r in shortest.values())
     words = (
@@ -192,14 +203,13 @@ def _costs(trade: Trade) -> Exhibit:
         "are assembled when first asked for: K stiffness, M mass, C damping, m lumped masses; a "
         "solver without inertia has made no mass, an explicit one at large strain no K.",
         f"Memory: {DEFINITION}.",
-        "The field's time is 0 where a step leaves the displacements of all nodes behind.",
     )
     note = "Of every solver, element and mesh one step; cells.csv has all."
     table = NumberTable("costs", "Set-up, time per step, memory", head, shown, note)
     return Exhibit("costs", "Set-up, steps and memory", words, tables=(table,))
 
 
-def _cost_row(r: Row) -> tuple[Entry, ...]:
+def _cost_row(r: TradeRow) -> tuple[Entry, ...]:
     assert r.step is not None
     s = r.step
     return (
@@ -215,20 +225,20 @@ def _convergence(trade: Trade) -> Exhibit:
     head = ("ladder", "sizes, finest first", "conduct", "observed order", "order used",
             "last difference / mm", "Richardson's error / mm", "index (GCI) / mm",
             "GCI of the motion / %")  # fmt: skip
-    shown = tuple(_ladder_row(x, trade.moved) for x in trade.ladders)
+    shown = tuple(_ladder_row(x, trade.moved) for x in trade.refinements)
     words = (
         "Of the finest answer of each ladder: the observed order from three answers, Richardson's "
         "estimate of its error, and the grid convergence index, 1.25 times that where the order is "
         "observed and plausible, else 3 times (Roache 1994; Celik et al. 2008). Two answers show "
-        "no order: the theoretical one is used. Ladders over steps are on one mesh.",
-        _compared(trade.ladders),
+        "no order: the theoretical one is used. Refinements over steps are on one mesh.",
+        _compared(trade.refinements),
     )
     table = NumberTable("convergence", "Discretisation error", head, shown)
     return Exhibit("convergence", "Observed order and grid convergence index", words,
                    tables=(table,))  # fmt: skip
 
 
-def _compared(ladders: Sequence[Ladder]) -> str:
+def _compared(ladders: Sequence[Refinement]) -> str:
     """The meshes' largest and the steps' largest estimate side by side."""
     meshes = [x.found.error for x in ladders if x.unit == "m"]
     steps = [x.found.error for x in ladders if x.unit == "s"]
@@ -241,7 +251,7 @@ def _compared(ladders: Sequence[Ladder]) -> str:
     )
 
 
-def _ladder_row(x: Ladder, moved: float) -> tuple[Entry, ...]:
+def _ladder_row(x: Refinement, moved: float) -> tuple[Entry, ...]:
     f, sizes = x.found, ", ".join(f"{_MM * s:.3g}" for s in x.sizes)
     return (
         x.what, f"{sizes} m{x.unit}", f.conduct, f.order, f.used, _MM * f.differences[0],
@@ -249,7 +259,7 @@ def _ladder_row(x: Ladder, moved: float) -> tuple[Entry, ...]:
     )  # fmt: skip
 
 
-def _failures(rows: Sequence[Row]) -> Exhibit:
+def _failures(rows: Sequence[TradeRow]) -> Exhibit:
     shown = tuple((*case(r), r.failed) for r in rows)
     table = NumberTable("unscored", "Cells without an error", (*_CASE, "why"), shown)
     words = (f"{len(rows)} cells were refused, ended early or were timed only; none is hidden.",)

@@ -1,21 +1,15 @@
-"""A trade or a choice as its folder: results.json, tables, figures and a page."""
+"""What a trade or a choice tells: its sentence, its part of results.json, its table of cells."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
-from validate.catalogue import experiment_files
-from validate.compare.exhibit import Exhibit
-from validate.compare.result import Result
-from validate.report.study_page import Row as TableRow
-from validate.report.study_page import StudyPage, write_study_page
+from validate.report.study_page import Row
 from validate.study.choose import Choice, error_of
 from validate.study.choose_exhibits import choose_exhibits, words
-from validate.study.trade import ERROR, Ladder, Row, Trade
+from validate.study.study_page import Told
+from validate.study.trade import ERROR, Refinement, Trade, TradeRow
 from validate.study.trade_exhibits import trade_exhibits
 
-TRADEOFF, CHOOSE = "study-tradeoff", "study-choose"
 _HEAD = (
     "solver", "rung", "law", "element", "mesh", "cell_size_m", "dt_s", "unknowns", "setup_s",
     "assembled", "step_p50_s", "step_p99_s", "step_max_s", "steps_timed", "field_s", "time_s",
@@ -24,24 +18,20 @@ _HEAD = (
 )  # fmt: skip
 
 
-def folder_of(trade: Trade, kind: str, out: Path | None) -> Path:
-    """`out`/<name>/<kind>, by default in the reports/ beside the experiments."""
-    files = experiment_files(Path.cwd())
-    reports = out or next(iter(files.values())).parents[1] / "reports"
-    return reports / trade.scene.name / kind
+def told(trade: Trade) -> Told:
+    return Told(
+        f"Trade: {trade.experiment.title}", sentence(trade), trade_exhibits(trade),
+        {"kind": "tradeoff", **trade_document(trade)}, (_HEAD, cells_table(trade)), trade.quick,
+    )  # fmt: skip
 
 
-def write_trade(trade: Trade, folder: Path) -> Path:
-    """Replaces `folder`; returns the path of report.html."""
-    told = {"kind": "tradeoff", **trade_document(trade)}
-    return _write(trade, "Trade", sentence(trade), trade_exhibits(trade), told, folder)
-
-
-def write_choice(choice: Choice, folder: Path) -> Path:
-    """Replaces `folder`; returns the path of report.html."""
-    told = {"kind": "choose", **_choice_document(choice), **trade_document(choice.trade)}
-    verdict = next(words(choice))
-    return _write(choice.trade, "Choice", verdict, choose_exhibits(choice), told, folder)
+def told_choice(choice: Choice) -> Told:
+    trade = choice.trade
+    document = {"kind": "choose", **_choice_document(choice), **trade_document(trade)}
+    return Told(
+        f"Choice: {trade.experiment.title}", next(words(choice)), choose_exhibits(choice),
+        document, (_HEAD, cells_table(trade)), trade.quick,
+    )  # fmt: skip
 
 
 def sentence(trade: Trade) -> str:
@@ -59,33 +49,18 @@ def sentence(trade: Trade) -> str:
     return f"{len(trade.rows)} cells, {scored} with an error{ends}."
 
 
-def _write(
-    trade: Trade, what: str, said: str, exhibits: tuple[Exhibit, ...], told: dict[str, Any],
-    folder: Path,
-) -> Path:  # fmt: skip
-    scene = trade.scene
-    result = Result(
-        name=scene.name, title=f"{what}: {scene.title}", source=scene.source, sentence=said,
-        parameters=(), methods=(), recordings=(), rest=(), effects=(), published=(),
-        quick=trade.quick, exhibits=exhibits,
-    )  # fmt: skip
-    created = datetime.now(UTC).isoformat(timespec="seconds")
-    page = StudyPage(result, told, (_HEAD, cells_table(trade)), ())
-    return write_study_page(page, folder, created)
-
-
-def cells_table(trade: Trade) -> tuple[TableRow, ...]:
+def cells_table(trade: Trade) -> tuple[Row, ...]:
     """Every cell, SI: rows of tables/cells.csv."""
     fronts = [{id(r) for r in trade.front(by).rows} for by in ("error", "total")]
     return tuple(_cell(r, trade, [id(r) in f for f in fronts]) for r in trade.rows)
 
 
-def _cell(r: Row, trade: Trade, fronts: Sequence[bool]) -> TableRow:
-    c, s = r.cell, r.step
+def _cell(r: TradeRow, trade: Trade, fronts: Sequence[bool]) -> Row:
+    s = r.step
     times = (s.p50, s.p99, s.max, s.n) if s else (None,) * 4
     return (
-        c.solver.name, c.solver.rung, c.solver.law, c.element, c.level, trade.scene.size(c.level),
-        c.dt if c.solver.stepped else None, r.unknowns, r.setup_s, r.assembled, *times, r.field_s,
+        r.solver.name, r.solver.rung, r.solver.law, r.element, r.level, trade.trial.size(r.level),
+        r.dt if r.solver.stepped else None, r.unknowns, r.setup_s, r.assembled, *times, r.field_s,
         r.time_s, r.memory, r.error, r.total, r.mesh_error, r.solver_error, *fronts,
         r.failed or None,
     )  # fmt: skip
@@ -96,22 +71,24 @@ def trade_document(trade: Trade) -> dict[str, Any]:
     fronts = {by: trade.front(by) for by in ("error", "total")}
     return {
         "error": ERROR,
-        "points_m": trade.scene.points.tolist(),
-        "frames_s": trade.scene.frames.tolist(),
-        "reference": {"element": trade.scene.reference[0], "mesh": trade.scene.reference[1],
+        "points_m": trade.trial.points.tolist(),
+        "frames_s": trade.trial.frames.tolist(),
+        "reference": {"element": trade.trial.reference[0], "mesh": trade.trial.reference[1],
                       "moved_rms_m": trade.moved, "own_error_m": trade.floor},
         "law_error_m": trade.law_error,
         "law_pair": trade.law_words,
         "threads": 1,
-        "seconds": trade.seconds,
+        "reused": trade.done.reused,
+        "seconds": trade.done.seconds,
+        "workers": trade.done.workers,
         "dominated": {by: list(f.dominated) for by, f in fronts.items()},
         "fronts": {by: [r.label for r in f.rows] for by, f in fronts.items()},
-        "convergence": [_ladder(x) for x in trade.ladders],
+        "convergence": [_refinement(x) for x in trade.refinements],
         "cells": [dict(zip(_HEAD, row, strict=True)) for row in cells_table(trade)],
     }  # fmt: skip
 
 
-def _ladder(x: Ladder) -> dict[str, Any]:
+def _refinement(x: Refinement) -> dict[str, Any]:
     f = x.found
     return {
         "what": x.what, "sizes": list(x.sizes), "unit": x.unit, "conduct": f.conduct,
@@ -137,11 +114,10 @@ def _choice_document(choice: Choice) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _named(row: Row | None, choice: Choice) -> dict[str, Any] | None:
+def _named(row: TradeRow | None, choice: Choice) -> dict[str, Any] | None:
     if row is None:
         return None
-    c = row.cell
     return {
-        "solver": c.solver.name, "element": c.element, "mesh": c.level, "dt_s": c.dt,
+        "solver": row.solver.name, "element": row.element, "mesh": row.level, "dt_s": row.dt,
         "error_m": error_of(row, choice.by), "time_s": row.time_s,
     }  # fmt: skip

@@ -5,16 +5,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from validate.compare.exhibit import Chart, Exhibit, Heat, Series
-from validate.study.filters import Study
-from validate.study.plan import METHODS, Cell
+from validate.study.filter_plan import METHODS, FilterCell
+from validate.study.filters import FilterStudy
 from validate.study.score import NIS
-from validate.study.sweep import Axis
-from validate.study.wording import consistency, named, short
+from validate.study.sweep import Axis, named, short
 
 _MM = 1e3
 
 
-def over_axes(study: Study) -> Iterator[Exhibit]:
+def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
     """Per method: NIS and error over its first two swept axes, or over the only one."""
     charts: list[Chart] = []
     heats: list[Heat] = []
@@ -40,17 +39,17 @@ def over_axes(study: Study) -> Iterator[Exhibit]:
         )  # fmt: skip
 
 
-def _axes_of(study: Study, method: str) -> list[Axis]:
+def _axes_of(study: FilterStudy, method: str) -> list[Axis]:
     own = f"{METHODS}{method}."
     mine = [a for a in study.plan.axes if a.path.startswith(own)]
     return mine + [a for a in study.plan.axes if not a.path.startswith(METHODS)]
 
 
-def _cells_of(study: Study, method: str) -> list[Cell]:
+def _cells_of(study: FilterStudy, method: str) -> list[FilterCell]:
     return [c for c in study.plan.cells if c.method == method]
 
 
-def _fixed(study: Study, method: str, axes: Sequence[Axis]) -> dict[str, str]:
+def _fixed(study: FilterStudy, method: str, axes: Sequence[Axis]) -> dict[str, str]:
     rows = [r for ranking in study.rankings for r in ranking.rows if r.cell.method == method]
     if not rows or not axes:
         return {}
@@ -58,17 +57,18 @@ def _fixed(study: Study, method: str, axes: Sequence[Axis]) -> dict[str, str]:
     return {a.path: best[a.path] for a in axes}
 
 
-def _value(study: Study, cell: Cell, what: str) -> float | None:
-    result = study.results.get(cell.key)
-    if result is None or result.failed:
+def _value(study: FilterStudy, cell: FilterCell, what: str) -> float | None:
+    value = study.done.records[cell.key].value
+    if value is None:
         return None
     if what == NIS:
-        seen = consistency(result)
-        return seen.mean if seen else None
-    return _MM * float(np.mean(result.scores[what]))
+        return value.consistency.mean if value.consistency else None
+    return _MM * float(np.mean(value.scores[what]))
 
 
-def _heats(study: Study, method: str, x: Axis, y: Axis, cells: Sequence[Cell]) -> Iterator[Heat]:
+def _heats(
+    study: FilterStudy, method: str, x: Axis, y: Axis, cells: Sequence[FilterCell]
+) -> Iterator[Heat]:
     for what, label, centre in ((NIS, "NIS per dof / 1", 1.0), (study.by, "error / mm", None)):
         at = {(c.values[x.path], c.values[y.path]): _value(study, c, what) for c in cells}
         values = np.array([[_nan(at.get((i, j))) for i in x.values] for j in y.values])
@@ -85,7 +85,9 @@ def _nan(value: float | None) -> float:
     return np.nan if value is None else value
 
 
-def _curves(study: Study, method: str, axis: Axis, cells: Sequence[Cell]) -> Iterator[Chart]:
+def _curves(
+    study: FilterStudy, method: str, axis: Axis, cells: Sequence[FilterCell]
+) -> Iterator[Chart]:
     """Over an axis of numbers; other values have the ranking alone."""
     numbers = axis.numbers
     if numbers is None:

@@ -4,44 +4,41 @@ from dataclasses import replace
 
 import pytest
 from study_samples import experiment_file
-from validate.replay.tracking import Tracking
 
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
+from validate.study.filter_plan import FilterPlan, plan
 from validate.study.filters import run_line
-from validate.study.plan import Plan, plan
 from validate.study.sweep import axes
 
 
 @pytest.fixture(scope="module")
-def pulled(tmp_path_factory: pytest.TempPathFactory) -> Tracking:
-    found = load_file(experiment_file(tmp_path_factory.mktemp("plan")))
-    assert isinstance(found, Tracking)
-    return found
+def pulled(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return load_file(experiment_file(tmp_path_factory.mktemp("plan")))
 
 
-def planned(pulled: Tracking, *sweeps: str, **options: object) -> Plan:
+def planned(pulled: Experiment, *sweeps: str, **options: object) -> FilterPlan:
     seeds = options.pop("seeds", 3)
     return plan(pulled, Options(**{"values": {}, **options}), axes(sweeps), seeds)  # type: ignore[arg-type]
 
 
-def test_an_axis_of_one_method_multiplies_its_cells_only(pulled: Tracking) -> None:
+def test_an_axis_of_one_method_multiplies_its_cells_only(pulled: Experiment) -> None:
     sweeps = ("methods.kf.Q=1e-12,1e-11,1e-10", "twin.noise=1e-11,1e-10")
     found = planned(pulled, *sweeps, methods=("kf", "plain"))
     assert [c.method for c in found.cells].count("kf") == 6
     assert [c.method for c in found.cells].count("plain") == 2
-    assert found.job.seeds == (5, 6, 7)
+    assert found.seeds == (5, 6, 7)
 
 
-def test_swept_methods_are_the_methods(pulled: Tracking) -> None:
+def test_swept_methods_are_the_methods(pulled: Experiment) -> None:
     assert planned(pulled, "methods.kf.Q=1e-12,1e-11").methods == ("kf",)
     assert planned(pulled, "twin.noise=1e-11,1e-10").methods == ("kf", "plain")
 
 
 def test_the_command_names_what_decides_and_what_speeds_are_compared_with(
-    pulled: Tracking,
+    pulled: Experiment,
 ) -> None:
     more = replace(pulled, methods={**pulled.methods, "other": pulled.methods["kf"]})
     values = {"methods.kf.R": "1e-10", "methods.other.R": "2e-10"}
@@ -53,7 +50,7 @@ def test_the_command_names_what_decides_and_what_speeds_are_compared_with(
     assert found == "validate run pulled --set methods.kf.R=1e-10 --methods kf,plain"
 
 
-def test_keys_know_values_seeds_methods_and_the_file(pulled: Tracking) -> None:
+def test_keys_know_values_seeds_methods_and_the_file(pulled: Experiment) -> None:
     def key(*sweeps: str, **options: object) -> str:
         return planned(pulled, *sweeps, **{"methods": ("kf",), **options}).cells[0].key
 
@@ -85,12 +82,12 @@ def test_keys_know_values_seeds_methods_and_the_file(pulled: Tracking) -> None:
     ],
 )
 def test_what_cannot_run_is_refused_at_once(
-    pulled: Tracking, sweeps: list[str], options: dict[str, object], said: str
+    pulled: Experiment, sweeps: list[str], options: dict[str, object], said: str
 ) -> None:
     with pytest.raises(UsageError, match=said):
         planned(pulled, *sweeps, **options)
 
 
 def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
-    with pytest.raises(UsageError, match="experiments over time"):
+    with pytest.raises(UsageError, match="no twin whose truth is known"):
         plan(phantom, Options({}), (), 2)

@@ -1,46 +1,35 @@
-"""What a study will run: cells, each of one method with one set of values, over common seeds."""
+"""What a filter study will run: every method with every set of values, over common seeds."""
 
-import hashlib
-import json
-import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import version
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 from validate.errors import UsageError
 from validate.parameters import describe, nearest_names, with_values
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options, configure
+from validate.study.engine import Job, job_of
+from validate.study.store import key_of
 from validate.study.sweep import Axis, grid
 
 METHODS = "methods."
-_LIBRARIES = ("numpy", "scipy", "numba", "scikit-fem")
 
 
 @dataclass(frozen=True)
-class Job:
-    """What all cells of a study share: the experiment's file, values set, quick, and the seeds."""
+class FilterCell:
+    """One method, its `settings` and the twin's `condition` as texts by path, over all `seeds`.
 
-    path: str
-    sha256: str
-    values: tuple[tuple[str, str], ...]
-    quick: bool
-    seed_path: str
-    seeds: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One method, its `settings` and the twin's `condition` as texts by path; `key` names all that
-    makes its numbers."""
+    `seed_path` is the seed's parameter; "" where there is none. `key` names all that makes its
+    numbers.
+    """
 
     method: str
     settings: tuple[tuple[str, str], ...]
     condition: tuple[tuple[str, str], ...]
-    key: str
+    seed_path: str = ""
+    seeds: tuple[int, ...] = (0,)
+    key: str = ""
+    timed: bool = False
 
     @property
     def values(self) -> dict[str, str]:
@@ -48,19 +37,20 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Plan:
+class FilterPlan:
     """The job and its cells, method by method in the order of the grid."""
 
     experiment: Experiment
     job: Job
     axes: tuple[Axis, ...]
     methods: tuple[str, ...]
-    cells: tuple[Cell, ...]
+    seeds: tuple[int, ...]
+    cells: tuple[FilterCell, ...]
 
 
 def plan(
     experiment: Experiment, options: Options, axes: Sequence[Axis], seeds: int | tuple[int, ...]
-) -> Plan:
+) -> FilterPlan:
     """Checks every path and value before anything runs.
 
     `seeds`: so many from the twin's own seed on, or these. An axis of one method multiplies that
@@ -75,71 +65,40 @@ def plan(
     methods = _methods(experiment, options.methods, axes)
     seed_path = _seed_path(parameters)
     _require(axes, parameters, experiment.methods, methods, seed_path)
-    job = Job(
-        str(experiment.path),
-        file_sha256(Path(str(experiment.path))),
-        tuple(sorted(options.values.items())),
-        options.quick,
-        seed_path,
-        _seeds(seeds, parameters, seed_path),
-    )
-    cells = tuple(c for m in methods for c in _cells(experiment, job, m, axes))
-    return Plan(experiment, job, tuple(axes), methods, cells)
+    job = job_of(experiment, options.values, options.quick)
+    own = FilterCell("", (), (), seed_path, _seeds(seeds, parameters, seed_path))
+    cells = tuple(c for m in methods for c in _cells(experiment, job, replace(own, method=m), axes))
+    return FilterPlan(experiment, job, tuple(axes), methods, own.seeds, cells)
 
 
-def set_up(experiment: Experiment, job: Job, cell: Cell, seed: int) -> tuple[Any, Any]:
+def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tuple[Any, Any]:
     """Parameters with that seed, and the method's settings, of a cell."""
     values = {**dict(job.values), **cell.values}
-    if job.seed_path:
-        values[job.seed_path] = str(seed)
+    if cell.seed_path:
+        values[cell.seed_path] = str(seed)
     parameters, methods = configure(experiment, Options(values, (cell.method,), job.quick))
     return parameters, methods[cell.method]
 
 
-def file_sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-@cache
-def code_sha256() -> str:
-    """Of this package's sources and the libraries' versions: what a stored cell rests on."""
-    found = hashlib.sha256()
-    root = Path(__file__).resolve().parents[1]
-    for path in sorted(root.rglob("*.py")):
-        found.update(path.relative_to(root).as_posix().encode())
-        found.update(path.read_bytes())
-    found.update(platform.python_version().encode())
-    found.update(" ".join(f"{name} {version(name)}" for name in _LIBRARIES).encode())
-    return found.hexdigest()
-
-
-def _cells(experiment: Experiment, job: Job, method: str, axes: Sequence[Axis]) -> list[Cell]:
-    own = f"{METHODS}{method}."
-    mine = [a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(own)]
+def _cells(
+    experiment: Experiment, job: Job, own: FilterCell, axes: Sequence[Axis]
+) -> list[FilterCell]:
+    mine = f"{METHODS}{own.method}."
     found = []
-    for row in grid(mine):
+    for row in grid([a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(mine)]):
         settings = tuple((k, v) for k, v in row.items() if k.startswith(METHODS))
         condition = tuple((k, v) for k, v in row.items() if not k.startswith(METHODS))
-        found.append(_keyed(experiment, job, method, settings, condition))
+        found.append(_keyed(experiment, job, replace(own, settings=settings, condition=condition)))
     return found
 
 
-def _keyed(
-    experiment: Experiment,
-    job: Job,
-    method: str,
-    settings: tuple[tuple[str, str], ...],
-    condition: tuple[tuple[str, str], ...],
-) -> Cell:
+def _keyed(experiment: Experiment, job: Job, bare: FilterCell) -> FilterCell:
     """The key holds every parameter and setting of the method as the cell will have it."""
-    bare = Cell(method, settings, condition, "")
     try:
-        made: Any = _described(*set_up(experiment, job, bare, job.seeds[0]))
+        made: Any = _described(*set_up(experiment, job, bare, bare.seeds[0]))
     except UsageError as error:  # a combination that settings refuse: a failed row later
         made = str(error)
-    content = [job.sha256, code_sha256(), method, made, job.quick, job.seeds, settings, condition]
-    text = json.dumps(content, default=str)
-    return Cell(method, settings, condition, hashlib.sha256(text.encode()).hexdigest()[:32])
+    return replace(bare, key=key_of(job, bare, made))
 
 
 def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:

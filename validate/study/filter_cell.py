@@ -1,4 +1,4 @@
-"""One cell on a worker: the same road as `validate run`, with recordings made in memory.
+"""A filter study's cell: the road of `validate run`, with recordings made in memory.
 
 Scenes, systems, registrations and truths are kept from cell to cell. Seeds change the noise only:
 a linear filter whose gains need no data runs them all at once, everything else one by one.
@@ -6,15 +6,13 @@ a linear filter whose gains need no data runs them all at once, everything else 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import ComparisonError, UsageError, ValidateError
+from validate.errors import ComparisonError
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.gains import schedule
@@ -26,20 +24,20 @@ from validate.parameters import describe
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
 from validate.replay.followed import Truth
 from validate.replay.method import Method
 from validate.scene.scene import Scene
 from validate.solve.march import march
 from validate.solve.types import Run, Stepper
+from validate.study.engine import Job
+from validate.study.filter_plan import FilterCell, set_up
 from validate.study.kept import Kept, fingerprint
-from validate.study.outcome import CellResult
-from validate.study.plan import Cell, Job, file_sha256, set_up
-from validate.study.score import NIS, error_scores
+from validate.study.score import NIS, FilterScores, error_scores
 from validate.study.shared import sharing
 
 _TIMED = 25  # steps that are timed where the seeds run together
 _TIMED_S = 0.01  # s after which no more of them are
+_MANY = 40  # recordings and registrations kept, of seeds mostly
 
 
 @dataclass(frozen=True)
@@ -60,11 +58,11 @@ class Bench:
         assert experiment.twin is not None
         self.twin = experiment.twin
         self._systems: Kept[System] = Kept(4)
-        self._seen: Kept[Registered] = Kept(4 * len(job.seeds))
-        self._recordings: Kept[Any] = Kept(2 * len(job.seeds))
+        self._seen: Kept[Registered] = Kept(_MANY)
+        self._recordings: Kept[Any] = Kept(_MANY)
         self._truths: Kept[Truth] = Kept(4)
 
-    def ready(self, cell: Cell, seed: int) -> Ready:
+    def ready(self, cell: FilterCell, seed: int) -> Ready:
         parameters, method = set_up(self.experiment, self.job, cell, seed)
         key = _text(parameters)
         recording = self._recordings.get(key, lambda: self.twin.record(parameters, lambda _: None))
@@ -92,35 +90,13 @@ class Bench:
         return self.twin.truth(ready.parameters, ready.seen)
 
 
-def run_cells(job: Job, cells: tuple[Cell, ...]) -> list[CellResult]:
-    """The results of some cells; raises `UsageError` when the experiment's file has changed."""
-    bench = _bench(job)
-    return [run_cell(bench, cell) for cell in cells]
+def open_bench(job: Job) -> Bench:
+    return Bench(job.experiment(), job)
 
 
-def run_cell(bench: Bench, cell: Cell) -> CellResult:
-    """A failed cell is a result with one line of reason."""
-    start = perf_counter()
-    try:
-        result = _result(bench, cell)
-    except ValidateError as error:
-        result = CellResult(cell.key, failed=" ".join(str(error).split()))
-    except Exception as error:  # one cell must not end a study of thousands: it becomes a row
-        result = CellResult(cell.key, failed=" ".join(f"{type(error).__name__}: {error}".split()))
-    return replace(result, seconds=perf_counter() - start)
-
-
-@lru_cache(maxsize=2)
-def _bench(job: Job) -> Bench:
-    path = Path(job.path)
-    experiment = load_file(path)
-    if file_sha256(path) != job.sha256:
-        raise UsageError(f"{path.name} is not the file that the study began with; start it again")
-    return Bench(experiment, job)
-
-
-def _result(bench: Bench, cell: Cell) -> CellResult:
-    first = bench.ready(cell, bench.job.seeds[0])
+def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
+    """Raises what the cell's settings, its filter or its run end with."""
+    first = bench.ready(cell, cell.seeds[0])
     start = perf_counter()
     stepper = bench.stepper(first)
     setup = perf_counter() - start
@@ -135,8 +111,8 @@ def _result(bench: Bench, cell: Cell) -> CellResult:
 
 
 def _all_seeds(
-    bench: Bench, cell: Cell, stepper: DisplacementStepper, first: Ready
-) -> CellResult | None:
+    bench: Bench, cell: FilterCell, stepper: DisplacementStepper, first: Ready
+) -> FilterScores | None:
     """None where the seeds miss different samples, damping couples the modes, or what the filter
     was given cannot be told from outside."""
     z = _measured(bench, cell, stepper, first)
@@ -150,14 +126,13 @@ def _all_seeds(
         shared, inputs, z, rows["xyz".index(bench.experiment.axis) :: scene.mesh.dimension]
     )
     if not (np.isfinite(found.values).all() and np.isfinite(found.nis).all()):
-        return CellResult(cell.key, failed="diverged: the estimate is not finite")
+        raise ComparisonError("diverged: the estimate is not finite")
     names, dof = [p.name for p in scene.probes], int(found.dof.sum())
     scores = [
         _scores(bench, first, dict(zip(names, values.T, strict=True)), float(nis.sum()), dof)
         for values, nis in zip(found.values, found.nis, strict=True)
     ]
-    return CellResult(
-        cell.key,
+    return FilterScores(
         *_columns(scores),
         nis=float(found.nis.sum()),
         nis_dof=dof * len(z),
@@ -168,7 +143,7 @@ def _all_seeds(
 
 
 def _measured(
-    bench: Bench, cell: Cell, stepper: DisplacementStepper, first: Ready
+    bench: Bench, cell: FilterCell, stepper: DisplacementStepper, first: Ready
 ) -> Floats | None:
     """Measurements z (seeds, nt, m) m by step, NaN = none, of the components the filter was given.
 
@@ -178,7 +153,7 @@ def _measured(
     own = _given(first, sensor.names)
     if own is None or not _equal(own, sensor.table):
         return None
-    others = [_given(bench.ready(cell, seed), sensor.names) for seed in bench.job.seeds[1:]]
+    others = [_given(bench.ready(cell, seed), sensor.names) for seed in cell.seeds[1:]]
     tables = [own, *(t for t in others if t is not None)]
     if any(schedule(t) != stepper.when for t in tables):
         return None
@@ -224,24 +199,22 @@ def _step_time(stepper: Stepper, inputs: Floats) -> float:
 
 
 def _one_by_one(
-    bench: Bench, cell: Cell, stepper: Stepper, first: Ready, setup: float
-) -> CellResult:
+    bench: Bench, cell: FilterCell, stepper: Stepper, first: Ready, setup: float
+) -> FilterScores:
     rows, times, nis, dof, steps = [], [], 0.0, 0, 0
-    for i, seed in enumerate(bench.job.seeds):
+    for i, seed in enumerate(cell.seeds):
         ready = first if i == 0 else bench.ready(cell, seed)
         run = _march(cell, stepper if i == 0 else bench.stepper(ready), ready)
         if not run.finished:
             end = run.outcome
-            why = f"seed {seed}: {end.state} at step {end.step}: {end.why}"
-            return CellResult(cell.key, failed=" ".join(why.split()), setup_s=setup)
+            raise ComparisonError(f"seed {seed}: {end.state} at step {end.step}: {end.why}")
         own, degrees = _nis(run)
         names = [p.name for p in ready.system.scene.probes]
         traces = {n: run.traces[f"{n}.{bench.experiment.axis}"].y for n in names}
         rows.append(_scores(bench, first, traces, own, degrees))
         nis, dof, steps = nis + own, dof + degrees, len(run.t)
         times.append(run.step_s.p50 if run.step_s else 0.0)
-    return CellResult(
-        cell.key,
+    return FilterScores(
         *_columns(rows),
         nis=nis if dof else None,
         nis_dof=dof,
@@ -251,7 +224,7 @@ def _one_by_one(
     )
 
 
-def _march(cell: Cell, stepper: Stepper, ready: Ready) -> Run:
+def _march(cell: FilterCell, stepper: Stepper, ready: Ready) -> Run:
     t, inputs = ready.seen.t, ready.seen.inputs
     return march(cell.method, stepper, t, inputs, np.array([len(t) - 1]), 0.0)
 

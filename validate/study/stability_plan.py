@@ -1,23 +1,21 @@
-"""Which variants of a base scene a stability map holds: each axis alone, and axes in pairs."""
+"""Which variants of a body a stability map holds: each axis alone, and axes in pairs."""
 
-import hashlib
-import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.study.base_scenes import BaseScene, Variant
-from validate.study.plan import code_sha256
+from validate.replay.ladder import StabilityBody, Turned
+from validate.study.engine import Job
+from validate.study.store import key_of
 
 NU = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.4999)
 E = (200.0, 600.0, 2e3, 6e3, 2e4, 6e4, 2e5, 6e5, 1e6)  # Pa
 # Mass damping 1/s and stiffness damping s, from none to beyond all that the papers print.
 DAMPING = ((0.0, 0.0), (1.0, 0.0), (100.0, 0.0), (0.0, 1e-3), (0.0, 0.01), (1.0, 0.1), (0.0, 1.0))
-QUALITY = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 DECADES = 6  # of time steps, half of them on each side of the paper's
 PER_DECADE = 4
 # What must be refused: another value of one field, and the word that the reason holds.
@@ -33,18 +31,18 @@ Pairs = tuple[Mapping[str, Any], ...]
 
 
 @dataclass(frozen=True)
-class VariantCell:
+class StabilityCell:
     """One variant with all schemes and steps (s) on it; `key` names all that makes its numbers.
 
     `drift`: 1e5 steps are taken, too. `expected` is the word of the reason it must be refused for.
     """
 
-    scene: str
-    variant: Variant
+    variant: Turned
     steps: tuple[float, ...]
-    drift: bool
-    expected: str
-    key: str
+    drift: bool = False
+    expected: str = ""
+    key: str = ""
+    timed: bool = False
 
 
 def step_grid(dt: float, quick: bool = False) -> Floats:
@@ -54,7 +52,9 @@ def step_grid(dt: float, quick: bool = False) -> Floats:
     return np.asarray(dt * 10.0**exponents)
 
 
-def variant_cells(base: BaseScene, quick: bool = False) -> tuple[VariantCell, ...]:
+def stability_cells(
+    base: StabilityBody, job: Job, quick: bool = False
+) -> tuple[StabilityCell, ...]:
     """Every variant once: the base, the papers', sweeps of one and two axes, the impossible.
 
     `quick`: axes alone, every second value.
@@ -62,40 +62,41 @@ def variant_cells(base: BaseScene, quick: bool = False) -> tuple[VariantCell, ..
     steps = tuple(step_grid(base.dt, quick).tolist())
     drifting = drift_variant(base)
     wanted = [base.base, *(p.variant for p in base.papers), drifting, *_swept(base, quick)]
-    impossible = {_changed(base.base, k, v): word for k, v, word in IMPOSSIBLE}
+    impossible = {replace(base.base, **{k: v}): word for k, v, word in IMPOSSIBLE}  # type: ignore[arg-type]
     impossible[replace(base.base, mesh=2 * base.meshes[-1])] = "unknowns"
-    found = dict.fromkeys([*wanted, *impossible])
-    return tuple(
-        _cell(base.name, v, steps, v == drifting, impossible.get(v, _of_paper(v))) for v in found
+    bare = (
+        StabilityCell(v, steps, v == drifting, impossible.get(v, _of_paper(v)))
+        for v in dict.fromkeys([*wanted, *impossible])
     )
+    return tuple(replace(c, key=key_of(job, c)) for c in bare)
 
 
-def drift_variant(base: BaseScene) -> Variant:
+def drift_variant(base: StabilityBody) -> Turned:
     """The undamped body on the coarsest mesh: what 1e5 steps are taken of."""
     return replace(base.base, mesh=base.meshes[0], mass_damping=0.0, stiffness_damping=0.0)
 
 
-def axis(base: BaseScene, name: str) -> tuple[Variant, ...]:
+def axis(base: StabilityBody, name: str) -> tuple[Turned, ...]:
     """The variants along one axis from the base: nu, E, damping, quality or mesh."""
     return tuple(replace(base.base, **changes) for changes in _axes(base)[name])
 
 
-def _of_paper(v: Variant) -> str:
+def _of_paper(v: Turned) -> str:
     """Why a printed material must be refused; "" where it need not."""
     return "Poisson" if v.nu >= 0.5 else ""
 
 
-def _axes(base: BaseScene) -> dict[str, Pairs]:
+def _axes(base: StabilityBody) -> dict[str, Pairs]:
     return {
         "nu": tuple({"nu": v} for v in NU),
         "E": tuple({"E": v} for v in E),
         "damping": tuple({"mass_damping": a, "stiffness_damping": b} for a, b in DAMPING),
-        "quality": tuple({"quality": v} for v in QUALITY),
+        "quality": tuple({"quality": v} for v in base.qualities),
         "mesh": tuple({"mesh": v} for v in base.meshes),
     }
 
 
-def _swept(base: BaseScene, quick: bool) -> Iterator[Variant]:
+def _swept(base: StabilityBody, quick: bool) -> Iterator[Turned]:
     every = 2 if quick else 1
     for changes in _axes(base).values():
         yield from (replace(base.base, **c) for c in changes[::every])
@@ -108,16 +109,3 @@ def _swept(base: BaseScene, quick: bool) -> Iterator[Variant]:
     for one, other in pairs:
         for a, b in product(axes[one], axes[other]):
             yield replace(base.base, **{**a, **b})
-
-
-def _changed(v: Variant, name: str, value: float) -> Variant:
-    changes: dict[str, Any] = {name: value}
-    return replace(v, **changes)
-
-
-def _cell(
-    scene: str, variant: Variant, steps: tuple[float, ...], drift: bool, expected: str
-) -> VariantCell:
-    content = [scene, asdict(variant), steps, drift, code_sha256()]
-    key = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:32]
-    return VariantCell(scene, variant, steps, drift, expected, key)

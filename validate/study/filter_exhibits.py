@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.study.filters import Study
-from validate.study.over_axes import over_axes
+from validate.study.filter_maps import over_axes
+from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
-from validate.study.wording import consistency, named, seeds_text
+from validate.study.sweep import named
 
 _MM = 1e3
 _SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
@@ -27,17 +27,17 @@ _PAIRS = (
 _NAMED = 3  # overlapping places that are named
 
 
-def study_exhibits(study: Study) -> tuple[Exhibit, ...]:
+def study_exhibits(study: FilterStudy) -> tuple[Exhibit, ...]:
     """In the order of a reader's questions: which, how sure, at what cost, is it honest."""
     found = [best_exhibit(study), _ranking_exhibit(study), _pareto_exhibit(study)]
     found += list(over_axes(study))
     failed = _failed_exhibit(study)
-    return (*(e for e in found if e is not None), *((failed,) if failed else ()))
+    return (*found, *((failed,) if failed else ()))
 
 
 def ranking_row(r: Ranked) -> tuple[Entry, ...]:
     """One place: what it is, its score with interval, ties, honesty and cost."""
-    seen = consistency(r.result)
+    seen = r.result.consistency
     half, apart = r.score.half, r.from_best
     return (
         r.place,
@@ -64,7 +64,7 @@ RANKING = (
 )  # fmt: skip
 
 
-def best_exhibit(study: Study) -> Exhibit:
+def best_exhibit(study: FilterStudy) -> Exhibit:
     """The winners as ready commands, with what ties with them."""
     words, rows = [], []
     for best in study.best:
@@ -83,7 +83,7 @@ def best_exhibit(study: Study) -> Exhibit:
     return Exhibit("best", "Best settings", tuple(words), tables=(table,))
 
 
-def _ranking_exhibit(study: Study) -> Exhibit:
+def _ranking_exhibit(study: FilterStudy) -> Exhibit:
     most = _SHOWN if len(study.rankings) == 1 else _SHOWN_OF_MANY
     tables = tuple(
         NumberTable(
@@ -97,8 +97,8 @@ def _ranking_exhibit(study: Study) -> Exhibit:
     return Exhibit("ranking", "Ranking", tuple(_ranking_words(study)), tables=tables)
 
 
-def _ranking_words(study: Study) -> Iterator[str]:
-    seeds = len(study.plan.job.seeds)
+def _ranking_words(study: FilterStudy) -> Iterator[str]:
+    seeds = len(study.plan.seeds)
     yield (
         f"Ranked by the mean of {study.by} over {seeds_text(seeds)} of the noise; ± is half of "
         "Student's 95 % interval of that mean, taken over the seeds."
@@ -107,6 +107,10 @@ def _ranking_words(study: Study) -> Iterator[str]:
     yield "Time is the median of one step in this study's workers, one thread each, side by side."
     if study.plan.experiment.same_model:
         yield _SAME_MODEL
+
+
+def seeds_text(count: int) -> str:
+    return "1 seed" if count == 1 else f"{count} seeds"
 
 
 def _overlapping(r: Ranked) -> str:
@@ -132,7 +136,7 @@ def _under(ranking: Ranking) -> str:
 # --- error against time --------------------------------------------------------------------------
 
 
-def _pareto_exhibit(study: Study) -> Exhibit:
+def _pareto_exhibit(study: FilterStudy) -> Exhibit:
     shown = study.rankings[:_FULL]
     charts = tuple(_pareto_chart(study, r, i) for i, r in enumerate(shown, start=1) if r.rows)
     tables = tuple(
@@ -166,7 +170,7 @@ def _dominated(ranking: Ranking) -> Iterator[str]:
         )
 
 
-def _pareto_chart(study: Study, ranking: Ranking, i: int) -> Chart:
+def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
     rows = [r for r in ranking.rows if r.result.step_s and r.score.mean > 0]
     exact = len(ranking.rows) - len(rows)
     none = f" Not drawn: {exact} without any error." if exact else ""
@@ -196,7 +200,7 @@ def _points(rows: Sequence[Ranked]) -> tuple[np.ndarray, np.ndarray]:
 # --- failures ------------------------------------------------------------------------------------
 
 
-def _failed_exhibit(study: Study) -> Exhibit | None:
+def _failed_exhibit(study: FilterStudy) -> Exhibit | None:
     rows = [
         (c.method, named(c.settings), named(c.condition), why)
         for ranking in study.rankings

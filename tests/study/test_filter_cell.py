@@ -1,47 +1,55 @@
 """One cell: sharing gains changes nothing, scores are the road's own, failures are rows."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from study_samples import experiment_file
-from validate.replay.run import compare
-from validate.replay.tracking import Tracking
 
 from validate.compare.track import rmse, track_error
+from validate.errors import UsageError
+from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
-from validate.study.cell import Bench, run_cell, run_cells
-from validate.study.outcome import CellResult, read_cells, write_cell
-from validate.study.plan import Plan, plan
+from validate.replay.road import compare
+from validate.study.engine import Plan, Where, finish
+from validate.study.filter_cell import Bench, open_bench, run_cell
+from validate.study.filter_plan import FilterPlan, plan
+from validate.study.score import FilterScores
+from validate.study.store import Record, read_records
 from validate.study.sweep import axes
 
 
 @pytest.fixture(scope="module")
-def pulled(tmp_path_factory: pytest.TempPathFactory) -> Tracking:
-    found = load_file(experiment_file(tmp_path_factory.mktemp("cell")))
-    assert isinstance(found, Tracking)
-    return found
+def pulled(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return load_file(experiment_file(tmp_path_factory.mktemp("cell")))
 
 
-def planned(pulled: Tracking, *sweeps: str, **values: str) -> Plan:
+def planned(pulled: Experiment, *sweeps: str, **values: str) -> FilterPlan:
     texts = {k.replace("__", "."): v for k, v in values.items()}
     return plan(pulled, Options(texts, ("kf",)), axes(sweeps), 3)
 
 
-def first(pulled: Tracking, *sweeps: str, **values: str) -> CellResult:
+def first(pulled: Experiment, *sweeps: str, **values: str) -> FilterScores:
     made = planned(pulled, *sweeps, **values)
     return run_cell(Bench(pulled, made.job), made.cells[0])
 
 
+def record(made: FilterPlan, folder: Path) -> Record[FilterScores]:
+    """That of the first cell, by the engine."""
+    work = Plan(made.job, made.cells[:1], open_bench, run_cell, FilterScores)
+    return finish(work, folder, Where(workers=0)).records[made.cells[0].key]
+
+
 def test_shared_gains_give_the_scores_of_single_runs(
-    pulled: Tracking, monkeypatch: pytest.MonkeyPatch
+    pulled: Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     together = first(pulled)
     assert together.shared
     dense = first(pulled, methods__kf__gains="every_step")
     assert dense.shared
-    monkeypatch.setattr("validate.study.cell.sharing", lambda stepper: None)
+    monkeypatch.setattr("validate.study.filter_cell.sharing", lambda stepper: None)
     alone = first(pulled)
     assert not alone.shared
     assert alone.scores.keys() == together.scores.keys()
@@ -52,7 +60,7 @@ def test_shared_gains_give_the_scores_of_single_runs(
     assert len(set(together.scores["top.rmse"])) == 3  # every seed has its own noise
 
 
-def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Tracking) -> None:
+def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Experiment) -> None:
     scores = {s.name: s.value for s in compare(pulled, Options({}, ("kf",))).methods[0].scores}
     found = first(pulled).scores
     for name in ("top.rmse", "side.rmse", "nis.per_dof"):
@@ -72,37 +80,35 @@ def test_the_pooled_error_is_that_of_all_probes() -> None:
     assert found["a.rmse"] == rmse(one)
 
 
-def test_seeds_that_miss_different_samples_run_one_by_one(pulled: Tracking) -> None:
+def test_seeds_that_miss_different_samples_run_one_by_one(pulled: Experiment) -> None:
     found = first(pulled, twin__missing="0.3")
     assert not found.shared
-    assert not found.failed
     assert found.nis_dof < 3 * 3 * 40
 
 
-def test_a_failure_is_a_row_with_one_line(pulled: Tracking) -> None:
-    refused = first(pulled, "methods.kf.Q=-1,1e-11")
-    assert "variance Q = -1 m2" in refused.failed
-    crashed = first(pulled, methods__kf__trap="raise")
+def test_a_failure_is_a_record_with_one_line(pulled: Experiment, tmp_path: Path) -> None:
+    refused = record(planned(pulled, "methods.kf.Q=-1,1e-11"), tmp_path)
+    assert "variance Q = -1 m2" in refused.refused
+    crashed = record(planned(pulled, methods__kf__trap="raise"), tmp_path)
     assert crashed.failed == "ZeroDivisionError: a trap"
-    assert crashed.scores == {}
+    assert crashed.value is None
 
 
-def test_a_changed_file_stops_the_study(pulled: Tracking) -> None:
-    from dataclasses import replace
-
-    from validate.errors import UsageError
-
+def test_a_changed_file_stops_the_study(pulled: Experiment, tmp_path: Path) -> None:
     made = planned(pulled)
     with pytest.raises(UsageError, match="not the file that the study began with"):
-        run_cells(replace(made.job, sha256="0"), made.cells)
+        record(replace(made, job=replace(made.job, sha256="0")), tmp_path)
 
 
 def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
-    pulled: Tracking, tmp_path: Path
+    pulled: Experiment, tmp_path: Path
 ) -> None:
-    cell, result = planned(pulled).cells[0], first(pulled)
-    write_cell(tmp_path, cell, result)
-    assert read_cells(tmp_path, [cell]) == {cell.key: result}
-    file = tmp_path / f"{cell.key}.json"
+    made = planned(pulled)
+    found = record(made, tmp_path)
+    assert found.value is not None
+    assert found.value.scores == first(pulled).scores
+    key = made.cells[0].key
+    assert read_records(tmp_path, [key], FilterScores) == {key: found}
+    file = tmp_path / f"{key}.json"
     file.write_text(file.read_text("utf-8")[:-20], encoding="utf-8")
-    assert read_cells(tmp_path, [cell]) == {}
+    assert read_records(tmp_path, [key], FilterScores) == {}

@@ -1,0 +1,222 @@
+"""Selections, deviations and what of a recording is compared, on three samples by hand."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats, Ints
+from validate.errors import ComparisonError, RegistrationError
+from validate.fem.locate import nearest_node_rows
+from validate.register.markers import MarkerObservation, Together
+from validate.register.observation import EVERYTHING, Selection, frame_at, nearest_samples
+from validate.register.registered import Registered
+from validate.register.signals import (
+    SignalObservation,
+    holds_at,
+    instant,
+    require_rising,
+    windows_of,
+)
+from validate.scene.box import box
+from validate.solve.types import Trace
+
+T = np.array([0.0, 1.0, 2.0])
+RUN_T = np.array([0.0, 0.5, 1.0, 1.5, 2.0])
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A run of five half seconds, with fields at the first, third and last."""
+
+    traces: dict[str, Trace]
+    method: str = "run"
+    t: Floats = field(default_factory=lambda: RUN_T)
+    at: Ints = field(default_factory=lambda: np.array([0, 2, 4]))
+    u: Floats = field(default_factory=lambda: np.zeros((3, 8, 3)))
+
+
+def signal(role: str = "validates", **changes: object) -> SignalObservation:
+    y = np.array([[0.0], [2.0], [4.0]])
+    plain = SignalObservation("cell", "validates", T, y, "N", 0.1, "force", "stage.force")
+    return replace(plain, role=role, **changes)
+
+
+def ramp(y: tuple[float, ...]) -> Simulated:
+    return Simulated({"stage.force": Trace(np.array(y), "N")})
+
+
+HALVES = ramp((0.0, 1.0, 3.0, 4.0, 5.0))  # N at the run's steps
+
+
+# --- selections -----------------------------------------------------------------------------------
+
+
+def test_a_hold_is_one_sample_a_window_many_and_all_is_every_one() -> None:
+    hold = Selection("2N", np.array([1.0]))
+    window = Selection("late", np.array([1.0, 2.0]))
+    assert [s.samples(T, RUN_T, "cell").tolist() for s in (hold, window, EVERYTHING)] == [
+        [1], [1, 2], [0, 1, 2],
+    ]  # fmt: skip
+    assert hold.steps(RUN_T).tolist() == [2]
+    assert instant(hold) == 1.0
+
+
+def test_all_is_no_sample_before_the_first_or_after_the_last_step() -> None:
+    assert EVERYTHING.samples(T, np.array([0.5, 1.0]), "cell").tolist() == [1]
+    assert EVERYTHING.samples(T, np.array([1.0 + 1e-12, 2.0]), "cell").tolist() == [1, 2]
+
+
+def test_a_trace_is_read_at_the_nearest_step_of_a_hold_and_between_steps_of_all() -> None:
+    y = HALVES.traces["stage.force"].y
+    between = np.array([0.25, 1.25])
+    assert EVERYTHING.read(RUN_T, y, between).tolist() == [0.5, 3.5]
+    assert Selection("h", np.array([1.2])).read(RUN_T, y, between).tolist() == [3.0]
+
+
+def test_the_nearest_sample_is_the_earlier_of_two_and_within_a_second() -> None:
+    assert nearest_samples(T, np.array([0.5, 0.51, 2.9]), "cell").tolist() == [0, 1, 2]
+    assert nearest_samples(np.array([1.0]), np.array([0.5]), "cell").tolist() == [0]
+    with pytest.raises(ComparisonError, match=r"cell has no sample within 1 s of t = 3\.500 s"):
+        nearest_samples(T, np.array([0.0, 3.5]), "cell")
+
+
+def test_every_instant_of_all_is_a_kept_frame_and_one_that_is_not_kept_is_refused() -> None:
+    assert EVERYTHING.instants(HALVES).t == pytest.approx([0.0, 1.0, 2.0])
+    hold = Selection("h", np.array([1.0]))
+    assert hold.instants(HALVES) is hold
+    assert frame_at(HALVES, EVERYTHING.instants(HALVES)).shape == (3, 8, 3)
+    with pytest.raises(ComparisonError, match=r"run: 3 output frames, none at '1\.5s'"):
+        frame_at(HALVES, Selection("1.5s", np.array([1.5])))
+
+
+# --- deviations -----------------------------------------------------------------------------------
+
+
+def test_a_signals_deviation_is_the_trace_less_what_was_measured() -> None:
+    """Measured 0, 2, 4 N; the run has 0, 3, 5 N there."""
+    (every,) = signal().deviations(HALVES, EVERYTHING)
+    assert every.values.tolist() == [[0.0], [1.0], [1.0]]
+    assert (every.quantity, every.unit, every.sd, every.systematic) == ("force", "N", 0.1, 0.0)
+    assert (every.simulated, every.measured) == (None, None)
+    assert every.definition == "force, simulated less measured at every sample"
+    (one,) = signal().deviations(HALVES, Selection("2N", np.array([1.0]), "one sample"))
+    assert (one.values.tolist(), one.simulated, one.measured) == ([[1.0]], 3.0, 2.0)
+    assert one.definition == "force, one sample"
+    (late,) = signal().deviations(HALVES, Selection("late", np.array([1.0, 2.0])))
+    assert late.values.tolist() == [[1.0], [1.0]]
+
+
+def test_a_signal_without_a_trace_says_what_was_not_answered() -> None:
+    other = signal(trace="nowhere")
+    assert other.deviations(HALVES, EVERYTHING) == ()
+    assert other.unanswered(HALVES) == ("cell",)
+    assert signal().unanswered(HALVES) == ()
+    assert signal().units == {"force": "N"}
+    assert signal().rows() is None
+
+
+MESH = box((1.0, 1.0, 1.0), (1, 1, 1))
+TOP = np.array([[0.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
+
+
+def markers(*groups: Together) -> MarkerObservation:
+    """Two corners that were seen to rise by 1, 2 mm a second; the second is lost at the end."""
+    x = TOP + np.multiply.outer(T, 1e-3 * np.array([[0, 0, 1], [0, 0, 2]]))
+    x[2, 1] = np.nan
+    none: object = None
+    return MarkerObservation(
+        "seen", "validates", T, ("a", "b"), x, TOP, nearest_node_rows(MESH, TOP), 1e-4,
+        np.array([3e-4, 4e-4]), none, groups,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def still(*probes: str) -> Simulated:
+    """A run in which nothing moves, with these probes."""
+    zero = Trace(np.zeros(5), "m")
+    return Simulated({f"{p}.{c}": zero for p in probes for c in "xyz"})
+
+
+def test_each_marker_is_a_quantity_where_a_probe_has_its_name() -> None:
+    (a,) = markers().deviations(still("a"), EVERYTHING)
+    assert (a.quantity, a.unit, a.sd, a.systematic) == ("a", "m", 1e-4, 3e-4)
+    assert a.values == pytest.approx(-1e-3 * np.array([[0, 0, 0], [0, 0, 1], [0, 0, 2]]))
+    _, b = markers().deviations(still("a", "b"), EVERYTHING)
+    assert b.values == pytest.approx(-1e-3 * np.array([[0, 0, 0], [0, 0, 2]]))  # lost at the end
+    assert markers().deviations(still("b"), Selection("end", np.array([2.0]))) == ()
+    assert markers().unanswered(still("a")) == ("b",)
+    assert markers().units == {"a": "m", "b": "m"}
+
+
+def test_markers_together_are_read_from_the_field_along_their_axes() -> None:
+    up, across = Together("up", (2,), "along z"), Together("across", (0, 1), "along x and y")
+    seen = markers(up, across)
+    one, two = seen.deviations(still(), Selection("1s", np.array([1.0])))
+    assert (one.quantity, two.quantity) == ("up", "across")
+    assert one.values == pytest.approx(np.array([[-1e-3], [-2e-3]]))
+    assert two.values == pytest.approx(np.zeros((2, 2)), abs=1e-15)
+    assert one.systematic == pytest.approx(np.sqrt((9 + 16) / 2 / 3) * 1e-4)
+    end, _ = seen.deviations(still(), Selection("end", np.array([2.0])))
+    assert end.values == pytest.approx(np.array([[-2e-3]]))
+    every, _ = seen.deviations(still(), EVERYTHING)
+    assert len(every.values) == 2 + 2 + 1
+    assert seen.unanswered(still()) == ()
+    assert set(seen.units) == {"up", "across"}
+
+
+# --- a recording ----------------------------------------------------------------------------------
+
+
+def stage(**changes: object) -> SignalObservation:
+    y = np.array([[0.0], [1e-3], [2e-3]])
+    return replace(SignalObservation("stage", "drives", T, y, "m", 0.0), **changes)
+
+
+def test_inputs_are_the_driving_signals_side_by_side_in_order() -> None:
+    load = SignalObservation("pull", "drives", T, np.array([[5.0], [6.0], [7.0]]), "N", 0.0)
+    cell = signal()
+    seen = Registered((stage(), cell, load))
+    assert seen.inputs.tolist() == [[0.0, 5.0], [1e-3, 6.0], [2e-3, 7.0]]
+    assert [d.name for d in seen.drives] == ["stage", "pull"]
+    assert [id(o) for o in seen.compared] == [id(cell)]
+    assert [id(o) for o in seen.of(SignalObservation)] == [id(cell)]  # none that drives
+    assert seen.of(MarkerObservation) == ()
+    assert seen.stage(1.4) == 1e-3
+
+
+def test_driving_signals_on_different_times_are_refused() -> None:
+    late = stage(name="pull", unit="N", t=T + 0.01)
+    with pytest.raises(ComparisonError, match="2 driving signals on different times; resample"):
+        Registered((stage(), late))
+    with pytest.raises(ComparisonError, match="2 driving signals on different times"):
+        Registered((stage(), stage(t=T[:2], y=np.zeros((2, 1)))))
+    with pytest.raises(ComparisonError, match="no observation drives the simulation"):
+        Registered((signal(),))
+
+
+def test_frames_are_rest_and_holds_or_else_evenly_many() -> None:
+    holds = tuple(Selection(str(t), np.array([t])) for t in (2.0, 1.0))
+    rest = Selection("0", np.array([0.0]))
+    assert Registered((stage(),), holds, rest).frames(3, 200).tolist() == [0, 1, 2]
+    assert Registered((stage(),), holds[:1], rest).frames(3, 2).tolist() == [0, 2]
+    assert Registered((stage(),)).frames(3, 200).tolist() == [0, 1, 2]
+    assert Registered((stage(),)).frames(1000, 5).tolist() == [0, 250, 500, 749, 999]
+    window = (Selection("w", T),)
+    assert Registered((stage(),), window).frames(3, 2).tolist() == [0, 2]
+
+
+def test_holds_are_where_the_drive_stood_and_windows_where_it_was() -> None:
+    rest, hold = holds_at(stage(), T, (2e-3,), 1e-4)
+    assert (rest.label, instant(rest), hold.label, instant(hold)) == ("0mm", 0.0, "2mm", 2.0)
+    with pytest.raises(ComparisonError, match=r"no measurement at 1\.5 mm: 0 matched samples"):
+        holds_at(stage(), T, (1.5e-3,), 1e-4)
+    (window,) = windows_of(stage(), {"late": (0.5e-3, 2e-3)})
+    assert window.t == pytest.approx([1.0, 2.0])
+    with pytest.raises(ComparisonError, match=r"window beyond: 0 samples between 3 and 4 mm"):
+        windows_of(stage(), {"beyond": (3e-3, 4e-3)})
+
+
+def test_a_force_that_falls_as_the_drive_closes_has_the_wrong_sign() -> None:
+    require_rising(stage(), signal())
+    with pytest.raises(RegistrationError, match="'force' falls by 4 N as 'stage' closes by 2 mm"):
+        require_rising(stage(), signal(y=-signal().y))

@@ -1,0 +1,90 @@
+"""`--set methods.NAME.FIELD=VALUE` reaches every method's own settings in every experiment."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from validate.errors import UsageError
+from validate.parameters import Parameter, describe
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.options import Options, configure
+
+FILES = sorted((Path(__file__).resolve().parents[2] / "experiments").glob("*.py"))
+PARTS = ("settings", "scene")
+
+
+@pytest.fixture(scope="module", params=FILES, ids=lambda file: file.stem)
+def experiment(request: pytest.FixtureRequest) -> Experiment:
+    return load_file(request.param)
+
+
+def other(parameter: Parameter) -> str | None:
+    """Another value that its field takes, as text; None for texts and lists, which name things."""
+    if "|" in parameter.type and "float" not in parameter.type and "int" not in parameter.type:
+        choices = [c for c in parameter.type.split("|") if c != str(parameter.default)]
+        return choices[0] if choices else None
+    if "float" in parameter.type:
+        return repr(0.9 * parameter.default) if parameter.default else "0.5"
+    if parameter.type == "int":
+        return str(parameter.default + 1)
+    return None
+
+
+def changes(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:
+    """Method, its part, path within it and a new text: one number or choice of every part."""
+    for name, method in experiment.methods.items():
+        for part in PARTS:
+            value = getattr(method, part)
+            fields = describe(value) if value is not None else ()
+            usable = [(p.path, other(p)) for p in fields if "tuple" not in p.type]
+            numbers = [(path, text) for path, text in usable if text is not None]
+            for path, text in numbers[:1]:
+                yield name, part, path, text
+
+
+def found(experiment: Experiment, values: dict[str, str]) -> dict[str, Any]:
+    return configure(experiment, Options(values))[1]
+
+
+def value_at(method: Any, part: str, path: str) -> Any:
+    value = getattr(method, part)
+    for name in path.split("."):
+        value = getattr(value, name)
+    return value
+
+
+def test_there_are_nine() -> None:
+    assert len(FILES) == 9
+
+
+def test_a_field_is_set_by_its_short_path_and_by_the_whole_one(experiment: Experiment) -> None:
+    tried = list(changes(experiment))
+    assert tried
+    for name, part, path, text in tried:
+        whole = found(experiment, {f"methods.{name}.{part}.{path}": text})
+        short = found(experiment, {f"methods.{name}.{path}": text})
+        assert short == whole
+        assert str(value_at(short[name], part, path)) == text
+        assert value_at(short[name], part, path) != value_at(experiment.methods[name], part, path)
+        others = {n: m for n, m in short.items() if n != name}
+        assert others == {n: m for n, m in experiment.methods.items() if n != name}
+
+
+def test_every_listed_path_can_be_set_to_what_it_is(experiment: Experiment) -> None:
+    """What `validate list NAME` shows is what `--set` takes, and its own value changes nothing."""
+    listed = describe(experiment.methods, "methods.")
+    assert len(listed) > 4 * len(experiment.methods)
+    for p in listed:
+        if p.default is None or (isinstance(p.default, list | str) and not p.default):
+            continue
+        text = ",".join(map(str, p.default)) if isinstance(p.default, list) else str(p.default)
+        assert found(experiment, {p.path: text}) == dict(experiment.methods), p.path
+
+
+def test_an_unknown_field_names_the_nearest(experiment: Experiment) -> None:
+    name, _, path, _ = next(changes(experiment))
+    with pytest.raises(UsageError, match=rf"unknown parameter '{name}\.{path}x'; nearest: "):
+        found(experiment, {f"methods.{name}.{path}x": "1"})

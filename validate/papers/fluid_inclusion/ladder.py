@@ -1,0 +1,92 @@
+"""The ladder of paper 000's phantom: meshes near its 1328 nodes, loads to 9 mm."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.papers.fluid_inclusion.phantom import PhantomModel, build
+from validate.recording.types import Recording
+from validate.replay.ladder import Ladder, Trial, marker_noise
+from validate.replay.ladder_solvers import ORDERS, still, still_best, still_pair
+from validate.scene.mesh import Mesh
+from validate.scene.scene import LawName, Scene
+
+GRIDS = {7: (7, 8, 11), 9: (9, 10, 15), 11: (11, 13, 19)}  # nodes along x, y, z by level
+_DEEPEST = 0.009  # m, the last load of the experiment
+_TABLE = 0.0015  # m between the loads that large strain is solved at
+_ELEMENTS: Mapping[str, dict[str, Any]] = {
+    "P1": {"order": 1}, "MD": {"order": 1, "dilatation": "nodal_mean"}, "P2": {"order": 2},
+}  # fmt: skip
+
+
+def phantom_trial(
+    build: Callable[[Recording, Any, Any], Scene], method: Any, recording: Recording, p: Any,
+    quick: bool,
+) -> Trial:  # fmt: skip
+    """By the experiment's `build`; `method` has its `order`, `dilatation` and `law` changed."""
+
+    def scene(element: str, level: int, law: LawName) -> Scene:
+        x, y, z = GRIDS[level]
+        mesh = replace(p.mesh, nodes_x=x, nodes_y=y, nodes_z=z)
+        changed = replace(method, law=law, **_ELEMENTS[element])
+        return build(recording, replace(p, mesh=mesh), changed)
+
+    rise = _DEEPEST / _fastest(recording)
+    fine = (7, 9) if quick else (7, 9, 11)
+    return Trial(
+        build=scene,
+        size=lambda level: _cell_size(p, level),
+        meshes={"P1": fine, "MD": fine, "P2": (7,) if quick else (7, 9)},
+        orders=ORDERS,
+        steps=(rise / 6, rise / 240),
+        inputs=lambda t: _DEEPEST / rise * t[:, None],
+        frames=rise * np.array([1 / 3, 2 / 3, 1.0]),
+        points=_points(scene("P1", 7, "linear").mesh),
+        reference=("P2", 9 if quick else 11),
+        best=still_best(cavities=True),
+        solvers=still(True, rise / 6, _TABLE, medium=9, coarse=7),
+        pair=still_pair("P2", 7, rise / 6, cavities=True),
+        dynamic=False,
+        rise_s=rise,
+        noise=marker_noise(recording),
+        notes=(
+            "Steps are static: a step is a load increment, and no density is declared, so nothing "
+            "with inertia runs here.",
+        ),
+    )
+
+
+def _cell_size(p: Any, level: int) -> float:
+    x, y, z = GRIDS[level]
+    volume = p.block.x * p.block.y * p.block.z
+    return float((volume / ((x - 1) * (y - 1) * (z - 1))) ** (1 / 3))
+
+
+def _points(mesh: Mesh) -> Floats:
+    """A ring in the solid a little outside the cavity, and a grid on the top face."""
+    wall = mesh.nodes[mesh.facet_nodes("cavity")]
+    centre = (wall.max(axis=0) + wall.min(axis=0)) / 2
+    radius = 1.1 * float(np.ptp(wall[:, 0])) / 2
+    angle = 2 * np.pi * np.arange(16) / 16
+    ring = np.stack([np.cos(angle), np.zeros(16), np.sin(angle)], axis=1)
+    top = mesh.nodes.max(axis=0)
+    shares = [(a, b) for a in (0.15, 0.4, 0.6, 0.85) for b in (0.15, 0.4, 0.6, 0.85)]
+    face = np.array([(a * top[0], top[1], b * top[2]) for a, b in shares])
+    return np.vstack([centre + radius * ring, face])
+
+
+def _fastest(recording: Recording) -> float:
+    """Speed m/s of the stage over its quickest second."""
+    stage = recording.signal("stage", "m")
+    y = np.interp(np.arange(stage.t[0], stage.t[-1], 1.0), stage.t, stage.y[:, 0])
+    return float(np.abs(np.diff(y)).max())
+
+
+def _trial(recording: Recording, parameters: Any, quick: bool) -> Trial:
+    return phantom_trial(build, PhantomModel(), recording, parameters, quick)
+
+
+LADDER = Ladder(_trial)

@@ -1,0 +1,128 @@
+"""The solvers of a ladder: every scheme that knows a scene's kind, each by its rung."""
+
+from collections.abc import Callable
+from typing import Any
+
+from validate.replay.ladder import LawPair, Solver
+from validate.scene.scene import LawName
+from validate.solve.central import CentralDifference
+from validate.solve.explicit_linear import ExplicitLinear
+from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.implicit import NewtonDynamics
+from validate.solve.modal import Modal
+from validate.solve.newmark import Newmark
+from validate.solve.newton import StaticNewton
+from validate.solve.quasi_static import QuasiStatic
+from validate.solve.tabulated import Tabulated
+from validate.solve.types import Scheme
+
+# Of displacements in smooth fields.
+ORDERS = {"H8": 2.0, "Q4": 2.0, "P1": 2.0, "MD": 2.0, "P2": 3.0}
+_MODES = 60  # of the reference, beside the statics of the rest
+_PARTS = 16  # explicit steps at large strain within one of the ladder's
+
+# --- with inertia ---------------------------------------------------------------------------------
+
+
+def exact_in_time(dt: float) -> Scheme:
+    """Without error for loads that stand still within a step."""
+    return Modal(dt, modes=_MODES, propagate="constant")
+
+
+def exact_in_ramps(dt: float) -> Scheme:
+    """Without error for loads that change linearly within a step."""
+    return Modal(dt, modes=_MODES, propagate="linear")
+
+
+def swinging(
+    steps: tuple[float, ...], small: int, medium: int, law: LawName = "neo_hooke"
+) -> tuple[Solver, ...]:
+    """Every scheme of linear dynamics, and both of large strain on tetrahedra.
+
+    Baselines that solve anew at every step run on meshes up to `small`, dense ones up to `medium`.
+    """
+    large: dict[str, Any] = {"law": law}
+    return (
+        Solver("quasi-static", "static superposition", lambda dt: QuasiStatic(), stepped=False),
+        Solver("10 modes", "modal", _modal(10), stepped=False),
+        Solver("40 modes", "modal", _modal(40), stepped=False),
+        Solver("implicit, prefactored", "prefactored", implicit()),
+        Solver("backward Euler, prefactored", "prefactored", implicit(rule="backward_euler"),
+               order=1.0),
+        Solver("generalised alpha, prefactored", "prefactored",
+               implicit(rule="generalised_alpha", a0="zero")),
+        Solver("implicit, dense inverse", "prefactored", implicit(solver="dense_inverse"),
+               finest=medium),
+        Solver("implicit, lumped mass", "prefactored", implicit(mass="lumped")),
+        Solver("implicit, conjugate gradients", "prefactored", implicit(solver="cg")),
+        Solver("implicit, Gauss-Seidel", "prefactored", implicit(solver="gauss_seidel")),
+        Solver("implicit, sparse LU every step", "prefactored", implicit(solver="sparse_lu"),
+               finest=small),
+        Solver("implicit, Gaussian elimination every step", "prefactored",
+               implicit(solver="gaussian_elimination"), finest=small),
+        Solver("explicit, consistent mass", "explicit",
+               lambda dt: ExplicitLinear(dt, mass="consistent", damping_terms="full")),
+        Solver("explicit, lumped, C = alpha M", "explicit", ExplicitLinear),
+        Solver("large strain, explicit", "large strain",
+               lambda dt: CentralDifference(dt, _PARTS, "lagged"), elements=("P1",), **large),
+        Solver("large strain, implicit", "large strain", _newton_dynamics,
+               elements=("P1", "P2"), finest=medium, shortest=steps[0], **large),
+    )  # fmt: skip
+
+
+def swinging_pair(element: str, level: int, dt: float, law: LawName = "neo_hooke") -> LawPair:
+    """Average acceleration of the linear law and at large strain."""
+    return LawPair(element, level, dt, implicit(), _newton_dynamics, law)
+
+
+def implicit(**settings: Any) -> Callable[[float], Scheme]:
+    return lambda dt: Newmark(dt, **settings)
+
+
+def _modal(count: int) -> Callable[[float], Scheme]:
+    return lambda dt: Modal(dt, modes=count, propagate="constant")
+
+
+def _newton_dynamics(dt: float) -> Scheme:
+    return NewtonDynamics(dt, mass="consistent")
+
+
+# --- without --------------------------------------------------------------------------------------
+
+
+def still_best(cavities: bool) -> Callable[[float], Scheme]:
+    """The linear solver without error: superposition, with the root of the fluid's pressure."""
+    return lambda dt: ExactPressure() if cavities else QuasiStatic()
+
+
+def still(
+    cavities: bool, increment: float, table: float, medium: int, coarse: int,
+    law: LawName = "neo_hooke",
+) -> tuple[Solver, ...]:  # fmt: skip
+    """Statics: superposition, the fluid's pressure, and large strain, in increments or a `table`.
+
+    The table runs on meshes up to `medium`; Newton at every step on `coarse` ones, in the largest
+    `increment` s only.
+    """
+    fluid: tuple[Solver, ...] = (
+        Solver("superposition, cavity empty", "static superposition", lambda dt: NoFluid(),
+               stepped=False, lacks="the fluid and its pressure"),
+        Solver("condensed, exact pressure", "condensed", lambda dt: ExactPressure(), stepped=False),
+        Solver("condensed, paper's loop at 1 %", "condensed", lambda dt: PressureLoop(),
+               stepped=False),
+    )  # fmt: skip
+    dry = Solver("superposition", "static superposition", lambda dt: QuasiStatic(), stepped=False)
+    return (
+        *(fluid if cavities else (dry,)),
+        Solver("large strain, table", "large strain", lambda dt: Tabulated(StaticNewton(), table),
+               stepped=False, law=law, finest=medium),
+        Solver("large strain, Newton every step", "large strain", lambda dt: StaticNewton(),
+               law=law, finest=coarse, shortest=increment),
+    )  # fmt: skip
+
+
+def still_pair(
+    element: str, level: int, dt: float, cavities: bool, law: LawName = "neo_hooke"
+) -> LawPair:
+    """Linear statics and Newton's at large strain."""
+    return LawPair(element, level, dt, still_best(cavities), lambda dt: StaticNewton(), law)

@@ -1,0 +1,67 @@
+"""The same body on another mesh: uniformly refined, or of straight linear cells only."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from validate.arrays import Ints
+from validate.scene.mesh import Kind, Mesh, quadratic
+from validate.scene.scene import Scene
+
+# The cells of a quadratic simplex, by the local numbers of its nodes (mesh.EDGES): corners first,
+# then what is left in the middle.
+_PARTS = {
+    2: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    3: (
+        (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3),
+        (4, 8, 6, 7), (4, 5, 6, 8), (6, 8, 9, 7), (6, 5, 9, 8),
+    ),
+}  # fmt: skip
+_HALVES = ((0, 2), (2, 1))  # of a quadratic edge
+
+
+def linear(mesh: Mesh) -> Mesh:
+    """The mesh of its vertices alone; linear ones as they are."""
+    if mesh.order == 1:
+        return mesh
+    d = mesh.dimension
+    kind: Kind = "tri3" if d == 2 else "tet4"
+    count = int(mesh.corners.max()) + 1
+    facets = {name: f[:, :d] for name, f in mesh.facets.items()}
+    return Mesh(mesh.nodes[:count], mesh.corners, kind, facets)
+
+
+def refined(scene: Scene) -> Scene:
+    """Every simplex cut into 2^d at the middles of its edges; facet sets and regions follow.
+
+    Cells of linear elements. Raises `SceneError` for bricks.
+    """
+    fine = quadratic(linear(scene.mesh))
+    d = fine.dimension
+    kind: Kind = "tri3" if d == 2 else "tet4"
+    parts = _HALVES if d == 2 else _PARTS[2]
+    facets = {name: _cut(f, parts) for name, f in fine.facets.items()}
+    mesh = Mesh(fine.nodes, _cut(fine.cells, _PARTS[d]), kind, facets)
+    each = np.arange(2**d)
+    regions = tuple(
+        replace(r, cells=(2**d * r.cells[:, None] + each).ravel()) for r in scene.regions
+    )
+    return replace(scene, mesh=mesh, regions=regions)
+
+
+def _cut(cells: Ints, parts: Sequence[tuple[int, ...]]) -> Ints:
+    """All `parts` of the first cell, then those of the second, ..."""
+    return np.stack([cells[:, list(part)] for part in parts], axis=1).reshape(-1, len(parts[0]))
+
+
+def of_element(scene: Scene, element: str) -> Scene:
+    """The scene in elements "P1", "MD" (P1, nodal mean dilatation), "P2", "H8" or "Q4"."""
+    mesh = linear(scene.mesh)
+    if element in ("H8", "Q4"):
+        return scene
+    return replace(
+        scene,
+        mesh=quadratic(mesh) if element == "P2" else mesh,
+        dilatation="nodal_mean" if element == "MD" else "pointwise",
+    )

@@ -1,0 +1,40 @@
+"""A testing machine on a material point: stress against stretch, the whole record at once."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.stretch_response import response
+from validate.scene.material_point import MaterialPoint
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.types import Outcome, Run, Trace
+
+_UNITS = {"nominal_stress": "Pa", "free_stretch": "1", "volume_ratio": "1"}
+
+
+@dataclass(frozen=True)
+class StretchTest:
+    """Settings: there are none. A point has no nodes, so a run has traces alone."""
+
+    handles: ClassVar[Handles] = Handles(
+        LARGE, inertia=False, cavities=False, loads=False, contact=(), mesh=False
+    )
+
+    def solve(self, scene: MaterialPoint, t: Floats, inputs: Floats) -> Run:
+        """Under stretches (nt, 1); refused, with the reason, where one of them has no stress.
+
+        Raises `SceneError` for a scene that is no material point, and the linear law.
+        """
+        require_handled(scene, self)
+        stretch = inputs[:, 0]
+        try:
+            found, outcome = response(scene, stretch), Outcome("finished", len(t))
+        except SceneError as none:
+            t, stretch, outcome = t[:0], stretch[:0], Outcome("refused", 0, str(none))
+            found = dict.fromkeys(_UNITS, stretch)
+        traces = {name: Trace(y, _UNITS[name]) for name, y in found.items()}
+        traces[scene.inputs[0]] = Trace(stretch, "1")
+        return Run("", t, np.arange(len(t)), np.zeros((len(t), 0, 3)), traces, outcome, 0.0, None)

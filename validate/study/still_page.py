@@ -1,0 +1,92 @@
+"""What a static experiment's stability map tells: its loop's gain, or that nothing is stepped."""
+
+from dataclasses import asdict
+
+import numpy as np
+
+from validate.compare.exhibit import Exhibit, Mark, NumberTable, Panel, RegimeMap
+from validate.replay.experiment import Experiment
+from validate.study.gain import TOLERANCE, GainMap
+from validate.study.study_page import CellsTable, Told
+
+_REGIMES = ("settles", "never settles")
+_NOTHING = (
+    "{name} declares no density and no fluid: no scheme of it marches in time, and none of its "
+    "statics is a loop; there is no stability to be mapped."
+)
+
+
+def told_nothing(experiment: Experiment, quick: bool) -> Told:
+    """A page that says so."""
+    said = _NOTHING.format(name=experiment.name)
+    words = Exhibit("stability", "Nothing steps in time", (said,))
+    document = {"kind": "stability", "points": 0}
+    return Told(f"Stability map: {experiment.title}", said, (words,), document, ((), ()), quick)
+
+
+def told_gain(found: GainMap, quick: bool) -> Told:
+    band = ("good", "Predictions hold") if found.passed else ("bad", "Predictions fail")
+    return Told(
+        f"Stability map: {found.experiment.title}", sentence(found), (_exhibit(found),),
+        {
+            "kind": "stability",
+            "passed": found.passed,
+            "points": sum(len(v.gains) for _, v in found.limits),
+            "gains": [{"load": c.load, **asdict(v)} for c, v in found.limits],
+            "refused": [r.why for r in found.done.records.values() if r.why],
+        },
+        _cells(found), quick, passed=found.passed, band=band,
+    )  # fmt: skip
+
+
+def sentence(found: GainMap) -> str:
+    """Where the loop's gain has its limit, and whether that was predicted, in one sentence."""
+    errors = [abs(v.error) for _, v in found.limits if v.error is not None]
+    limits = [v.measured for _, v in found.limits if v.measured is not None]
+    if not limits:
+        return "Nothing steps in time; no limit of the pressure loop's gain was found."
+    tuned = found.limits[0][1].tuned
+    return (
+        "Nothing steps in time; the loop that keeps the fluid's volume settles up to gains of "
+        f"{min(limits):.4g} to {max(limits):.4g} Pa (tuned: {tuned:.4g} Pa), at most "
+        f"{100 * max(errors):.2g} % from the predicted ones, {100 * TOLERANCE:g} % allowed."
+    )
+
+
+def _exhibit(found: GainMap) -> Exhibit:
+    head = ("share of the largest load / 1", "predicted limit / Pa", "measured limit / Pa",
+            "apart / 1", "tuned gain / Pa", "updates at the nearest gain")  # fmt: skip
+    rows = []
+    for cell, v in found.limits:
+        nearest = int(np.argmin(np.abs(np.log(np.array(v.gains) / v.tuned))))
+        rows.append((cell.load, v.predicted, v.measured, v.error, v.tuned, v.updates[nearest]))
+    table = NumberTable("gains", "Limits of the gain under load", head, tuple(rows))
+    words = (
+        "Paper 000's loop P <- P + Kp (1 - V/V0) settles where |1 - Kp dV/dP / V0| < 1. Predicted "
+        "from the compliance of the cavity at the pressure that keeps its volume; measured by "
+        "running the loop from rest and halving the interval.",
+    )
+    maps = (_map(found),) if found.limits else ()
+    return Exhibit("gain", "The gain of the pressure loop", words, (table,), regimes=maps)
+
+
+def _map(found: GainMap) -> RegimeMap:
+    first = found.limits[0][1]
+    codes = [[int(n < 0) for n in v.updates] for _, v in found.limits]
+    border = np.array([v.predicted for _, v in found.limits])
+    panel = Panel("pressure loop", np.array(codes), border)
+    return RegimeMap(
+        "gain", f"{found.experiment.name}: gain against load", "gain / Pa",
+        "share of the largest load", np.array(first.gains),
+        tuple(f"{c.load:g}" for c, _ in found.limits), _REGIMES, (panel,),
+        (Mark("tuned", first.tuned, 0.0),), "Line: predicted limit. Mark: the tuned gain.",
+    )  # fmt: skip
+
+
+def _cells(found: GainMap) -> CellsTable:
+    rows = tuple(
+        (c.load, gain, None if n < 0 else n)
+        for c, v in found.limits
+        for gain, n in zip(v.gains, v.updates, strict=True)
+    )
+    return ("load_1", "gain_Pa", "updates"), rows
