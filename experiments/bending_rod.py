@@ -24,14 +24,14 @@ from validate.papers.accuracy.ladders import ROD_LADDER
 from validate.papers.accuracy.needle import STEP
 from validate.papers.accuracy.rod import MP3, SIZE, bending_rod, gravity_inputs
 from validate.papers.accuracy.rod_exhibits import tell
-from validate.replay.cards import Clock, changed, shipped
+from validate.replay.cards import TimeSteps, changed, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "bending_rod.mcap"
-PARAMETERS = SolverTest(card(MP3), Cells(3), Clock(STEP, 300), RefinedTwin(), str(RECORDING))
+PARAMETERS = SolverTest(card(MP3), Cells(3), TimeSteps(STEP, 300), RefinedTwin(), str(RECORDING))
 
 
 def scene(material: Material, body: Cells) -> Scene:

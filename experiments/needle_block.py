@@ -24,14 +24,14 @@ from validate.papers.accuracy.figures import NEEDLE_FIGURES
 from validate.papers.accuracy.ladders import NEEDLE_LADDER
 from validate.papers.accuracy.needle import MP1, MP2, STEP, needle_block, needle_depth
 from validate.papers.accuracy.needle_exhibits import tell
-from validate.replay.cards import Clock, changed, shipped
+from validate.replay.cards import TimeSteps, changed, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
 from validate.scene.scene import Material, Scene
 from validate.solve.modal import Modal
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "needle_block.mcap"
-PARAMETERS = SolverTest(card(MP1), Cells(20), Clock(STEP, 300), RefinedTwin(), str(RECORDING))
+PARAMETERS = SolverTest(card(MP1), Cells(20), TimeSteps(STEP, 300), RefinedTwin(), str(RECORDING))
 
 
 def scene(material: Material, body: Cells) -> Scene:

@@ -14,11 +14,12 @@ import pytest
 
 from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
+from validate.papers.ekf_nfem import cone_exhibits
 from validate.papers.ekf_nfem.cone_twin import record_cone
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
-from validate.replay import compare, load, paper_003_cone
+from validate.replay import compare, load
 from validate.replay.experiment import Experiment
 
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
@@ -44,8 +45,8 @@ def coarse(cone: Experiment) -> Iterator[Experiment]:
 
     assert cone.twin is not None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_003_cone, "locking_table", dear)
-        patch.setattr(paper_003_cone, "readings_table", dear)
+        patch.setattr(cone_exhibits, "locking_table", dear)
+        patch.setattr(cone_exhibits, "readings_table", dear)
         yield replace(
             cone,
             load=made,

@@ -14,7 +14,8 @@ import pytest
 from validate.compare.result import MethodResult, Result
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.papers.ekf_nfem.cube_exhibits import published_cube, readings_table
+from validate.papers.ekf_nfem.figures import CUBE_FIGURES
+from validate.papers.ekf_nfem.tables import readings_table
 from validate.replay import compare, load
 from validate.replay.experiment import Experiment
 from validate.scene.scene import Scene
@@ -118,7 +119,7 @@ def test_the_printed_gain_leaves_the_noise_where_it_is(printed: Result) -> None:
 
 def test_table_1_stands_beside_ours_and_is_not_called_reproduced(printed: Result) -> None:
     values = {m.name: scores(printed, m.name) for m in printed.methods}
-    figures = [f for f in published_cube(values) if f.source == "Table 1"]
+    figures = [f.beside(values) for f in CUBE_FIGURES if f.source == "Table 1"]
     assert len(figures) == 6
     assert {f.verdict for f in figures} == {"not reproducible as printed"}
     assert all(f.ours is not None and f.theirs is not None for f in figures)

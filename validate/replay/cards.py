@@ -31,7 +31,7 @@ class DampedTissue:
 
 
 @dataclass(frozen=True)
-class Clock:
+class TimeSteps:
     dt: float = quantity(1e-3, "s", "time step")
     steps: int = quantity(1000, "1", "steps")
 

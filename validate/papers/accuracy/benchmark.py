@@ -15,7 +15,7 @@ from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
-from validate.replay.cards import Clock, DampedTissue
+from validate.replay.cards import DampedTissue, TimeSteps
 from validate.replay.experiment import Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
@@ -60,7 +60,7 @@ class SolverTest:
 
     material: DampedTissue
     body: Cells
-    clock: Clock
+    clock: TimeSteps
     twin: RefinedTwin
     recording: str = quantity("", "1", "the recording")
 

@@ -12,7 +12,7 @@ from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
-from validate.replay.cards import Clock, TrackedTwin
+from validate.replay.cards import TimeSteps, TrackedTwin
 from validate.replay.experiment import Progress
 from validate.replay.followed import Truth, truth_of
 from validate.scene.box import box
@@ -77,7 +77,7 @@ class PushedCube:
     material: LargeStrain = LargeStrain()
     mesh: CubeMesh = CubeMesh()
     loading: Ramp = Ramp()
-    clock: Clock = Clock(2e-4, 750)
+    clock: TimeSteps = TimeSteps(2e-4, 750)
     twin: TrackedTwin = TrackedTwin(seed=2020)
     recording: str = quantity("", "1", "the recording")
 

@@ -15,7 +15,7 @@ from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
-from validate.replay.cards import Clock, DampedTissue, TrackedTwin
+from validate.replay.cards import DampedTissue, TimeSteps, TrackedTwin
 from validate.replay.experiment import Progress
 from validate.replay.followed import Truth, truth_of
 from validate.scene.box import box, centroids
@@ -75,7 +75,7 @@ class PulledBlock:
     material: DampedTissue = DampedTissue(rho=1068.0, stiffness_damping=0.1)
     body: BlockCells = BlockCells()
     loading: Traction = Traction()
-    clock: Clock = Clock(0.002, 500)
+    clock: TimeSteps = TimeSteps(0.002, 500)
     twin: LayeredTwin = LayeredTwin()
     recording: str = quantity("", "1", "the recording")
 

@@ -12,8 +12,8 @@ from validate.fem.hyperelastic import Body
 from validate.fem.system import build, responses
 from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.papers.ekf_nfem.cone_twin import (
+    ConeTwin,
     LoadTable,
-    TwinSettings,
     cone_scene,
     crosshead,
     load_table,
@@ -29,15 +29,15 @@ from validate.scene.mesh_file import read_mesh
 from validate.solve.newton import StaticNewton
 
 MESH = read_mesh(Path(__file__).resolve().parents[2] / "experiments" / "meshes" / "cone.npz")
-COARSE = TwinSettings(radial=2, axial=4, loads=4)
+COARSE = ConeTwin(radial=2, axial=4, loads=4)
 QUIET = replace(COARSE, sd_force=0.0, sd_stage=0.0, sd_marker=0.0, missing=0.0)
 
 
-def made(settings: TwinSettings) -> Recording:
+def made(settings: ConeTwin) -> Recording:
     return record_cone(settings, lambda _: None)
 
 
-def table(settings: TwinSettings) -> LoadTable:
+def table(settings: ConeTwin) -> LoadTable:
     places = np.array(list(marker_places(settings).values()))
     return load_table(cone_scene(settings), places, settings.force, settings.loads)
 
@@ -212,7 +212,7 @@ def test_the_papers_load_is_within_the_noise(project_root: Path) -> None:
 @pytest.mark.timeout(900)
 def test_the_shipped_recording_is_made_again(project_root: Path) -> None:
     read = read_recording(project_root / "recordings" / "ekf_cone.mcap")
-    again = made(TwinSettings())
+    again = made(ConeTwin())
     for topic in ("stage", "load_cell"):
         assert again.signals[topic].y == pytest.approx(read.signals[topic].y, abs=1e-9)
     there, here = read.markers["markers"].x, again.markers["markers"].x
