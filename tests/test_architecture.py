@@ -11,10 +11,7 @@ from phantoms import COARSE_GRID, phantom_mesh
 # Grows while one file is read and never leaves its reader.
 ACCUMULATORS = {"streams.py:Collected"}
 # Names that still stand for two things; none may come to them.
-TWICE = {
-    "Bench", "Block", "Body", "Cell", "Clock", "Followed", "Interval", "Row", "Solver", "Table",
-    "TwinSettings", "Variant", "_Drawn", "_Walk",
-}  # fmt: skip
+TWICE = {"Block", "Clock"}
 
 
 def modules(root: Path) -> list[Path]:
