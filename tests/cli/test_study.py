@@ -79,7 +79,7 @@ def test_the_best_line_decides_and_names_what_decides(
 def test_a_finished_study_is_not_run_again(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validate.study.workers._client", None)  # no cluster is started
+    monkeypatch.setattr("validate.study.cluster._client", None)  # no cluster is started
     file = str(made / "experiments" / "pulled.py")
     assert run(["study", "filters", file, *SWEEPS, "--seeds", "3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["study"]
@@ -89,7 +89,7 @@ def test_a_finished_study_is_not_run_again(
 def test_bad_input_is_one_line(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validate.study.workers.CONNECT_S", 0.5)
+    monkeypatch.setattr("validate.study.cluster.CONNECT_S", 0.5)
     file = str(made / "experiments" / "pulled.py")
     for arguments, said in (
         (["--sweep", "methods.kf.QQ=1,2"], "nearest: kf.Q"),

@@ -6,14 +6,14 @@ from dataclasses import replace
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.replay.ladder import Solver
+from validate.replay.ladder import Rival
 from validate.solve.newmark import Newmark
 from validate.solve.types import StepTimes
 from validate.study.choose import Wanted, meeting, misses, nearest, wanted
 from validate.study.trade import TradeRow
 
 WANTED = Wanted(0.5e-3, 1000.0)
-ANY = Solver("any", "prefactored", Newmark)
+ANY = Rival("any", "prefactored", Newmark)
 
 
 def row(name: str, error: float | None, time: float, dt: float = 0.01) -> TradeRow:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.study.interval import Interval, interval, paired
+from validate.study.interval import SeedInterval, interval, paired
 
 
 def test_the_95_percent_interval_of_five_numbers() -> None:
@@ -13,7 +13,7 @@ def test_the_95_percent_interval_of_five_numbers() -> None:
 
 
 def test_one_number_has_no_interval() -> None:
-    assert interval([2.0]) == Interval(2.0, None, 1)
+    assert interval([2.0]) == SeedInterval(2.0, None, 1)
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:

@@ -13,7 +13,7 @@ from validate.errors import SceneError
 from validate.fem.factor import factorise
 from validate.fem.system import build
 from validate.replay.experiment import Experiment
-from validate.replay.ladder import LawPair, Solver, Trial
+from validate.replay.ladder import LawPair, Rival, Trial
 from validate.scene.box import box
 from validate.scene.mesh import quadratic
 from validate.scene.scene import LawName, Load, Material, Scene, Support
@@ -33,8 +33,8 @@ from validate.study.trade_exhibits import trade_exhibits
 from validate.study.trade_page import trade_document
 
 STEPS = (0.02, 0.01, 0.005)
-STATIC = Solver("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
-AVERAGE = Solver("average", "prefactored", Newmark)
+STATIC = Rival("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
+AVERAGE = Rival("average", "prefactored", Newmark)
 
 
 def block(element: str, level: int, law: LawName) -> Scene:
@@ -57,10 +57,10 @@ def small(job: Job | None = None) -> Trial:
         lambda dt: Modal(dt, propagate="constant"),
         (
             STATIC,
-            Solver("all modes", "modal", lambda dt: Modal(dt, propagate="constant"), stepped=False),
+            Rival("all modes", "modal", lambda dt: Modal(dt, propagate="constant"), stepped=False),
             AVERAGE,
-            Solver("explicit", "explicit", lambda dt: ExplicitLinear(dt, damping_terms="full")),
-            Solver("large", "large strain",
+            Rival("explicit", "explicit", lambda dt: ExplicitLinear(dt, damping_terms="full")),
+            Rival("large", "large strain",
                    lambda dt: NewtonDynamics(dt, mass="consistent"), law="neo_hooke",
                    elements=("P1",), finest=1, shortest=STEPS[0]),
         ),
@@ -183,7 +183,7 @@ def test_bad_input_exits_with_2_and_one_line(capsys: pytest.CaptureFixture[str])
     assert "bending_rod" in lines[1]
 
 
-def timed(name: str, error: float, time: float, solver: Solver = AVERAGE) -> TradeRow:
+def timed(name: str, error: float, time: float, solver: Rival = AVERAGE) -> TradeRow:
     step = StepTimes(time, time, time, 9)
     solver = replace(solver, name=name)
     return TradeRow(solver, "P1", 1, 0.01, step=step, error=error, total=error)

@@ -134,9 +134,9 @@ def _studied(command: Any) -> Any:
 
 def _common(options: dict[str, Any]) -> Any:
     """Takes the options of every study out of a command's."""
-    from validate.cli.studying import Common
+    from validate.cli.studying import StudyOptions
 
-    return Common(**{k: options.pop(k) for k in Common.__dataclass_fields__})
+    return StudyOptions(**{k: options.pop(k) for k in StudyOptions.__dataclass_fields__})
 
 
 @study.command("filters")

@@ -22,7 +22,7 @@ from validate.study.filters import FilterStudy, study
 from validate.study.gain import GainMap, gain_map
 from validate.study.ranking import Ranking
 from validate.study.stability import Stability, stability
-from validate.study.study_page import Told, write_study
+from validate.study.study_page import Findings, write_study
 from validate.study.sweep import named
 from validate.study.trade import Trade, again, trade
 
@@ -34,7 +34,7 @@ _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interv
 
 
 @dataclass(frozen=True)
-class Common:
+class StudyOptions:
     """What every study is told: where its folder lies, where its cells run, how it prints."""
 
     out: Path | None
@@ -50,7 +50,7 @@ class Common:
 
 def filters(
     name: str,
-    common: Common,
+    common: StudyOptions,
     *,
     sweeps: tuple[str, ...],
     seeds: str,
@@ -74,7 +74,7 @@ def filters(
     return _OK
 
 
-def stability_map(name: str, common: Common) -> int:
+def stability_map(name: str, common: StudyOptions) -> int:
     """Maps where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
     experiment = find(name, Path.cwd())
     with _running(experiment, "stability", "stability", common) as report:
@@ -93,7 +93,7 @@ def stability_map(name: str, common: Common) -> int:
     return _OK if found.passed else _FAILED
 
 
-def _still(experiment: Experiment, still: GainMap | None, common: Common) -> int:
+def _still(experiment: Experiment, still: GainMap | None, common: StudyOptions) -> int:
     """A static experiment: the gain of its loop, or that nothing is stepped."""
     told = (
         still_page.told_nothing(experiment, common.quick)
@@ -106,7 +106,7 @@ def _still(experiment: Experiment, still: GainMap | None, common: Common) -> int
     return _FAILED if told.passed is False else _OK
 
 
-def tradeoff(name: str, common: Common) -> int:
+def tradeoff(name: str, common: StudyOptions) -> int:
     """Measures error against time; 0."""
     found = _measured(name, common)
     page = _written(found.experiment, trade_page.told(found), "tradeoff", common)
@@ -116,7 +116,7 @@ def tradeoff(name: str, common: Common) -> int:
     return _OK
 
 
-def choosing(name: str, common: Common, *, error: str, rate: str, declared_law: bool) -> int:
+def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared_law: bool) -> int:
     """Runs the pilots, climbs the ladder; 0 when a method meets both, else 1."""
     want = wanted(error, rate)
     found = _measured(name, common)
@@ -142,7 +142,7 @@ def seeds_of(text: str) -> int | tuple[int, ...]:
 # --- what all do ----------------------------------------------------------------------------------
 
 
-def _measured(name: str, common: Common) -> Trade:
+def _measured(name: str, common: StudyOptions) -> Trade:
     experiment = find(name, Path.cwd())
     with _running(experiment, "tradeoff", "pilot runs", common) as report:
         return trade(
@@ -151,7 +151,9 @@ def _measured(name: str, common: Common) -> Trade:
 
 
 @contextmanager
-def _running(experiment: Experiment, kind: str, title: str, common: Common) -> Iterator[Report]:
+def _running(
+    experiment: Experiment, kind: str, title: str, common: StudyOptions
+) -> Iterator[Report]:
     """A progress bar; an interruption says what is kept."""
     try:
         with progress(f"{experiment.name}: {title}") as report:
@@ -164,7 +166,7 @@ def _running(experiment: Experiment, kind: str, title: str, common: Common) -> I
         raise
 
 
-def _written(experiment: Experiment, told: Told, kind: str, common: Common) -> Path:
+def _written(experiment: Experiment, told: Findings, kind: str, common: StudyOptions) -> Path:
     """The page's path; prints results.json where that is asked for."""
     page = write_study(experiment, told, study_folder(experiment, kind, common.out))
     if common.as_json:

@@ -32,7 +32,7 @@ RUNGS: tuple[Rung, ...] = (
 
 
 @dataclass(frozen=True)
-class Solver:
+class Rival:
     """A scheme on the ladder: `make(dt)` s. `stepped`: whether its answer depends on dt.
 
     It runs on `elements` (none: all) at meshes up to `finest` (0: all) and down to `shortest`
@@ -98,7 +98,7 @@ class Trial:
     points: Floats
     reference: tuple[str, int]
     best: Callable[[float], Scheme]
-    solvers: tuple[Solver, ...]
+    solvers: tuple[Rival, ...]
     pair: LawPair | None
     dynamic: bool
     rise_s: float
@@ -123,7 +123,7 @@ class Trial:
         inputs = self.inputs(self.times(self.steps[-1]))
         return np.asarray(inputs[int(np.argmax(np.abs(inputs).sum(axis=1)))])
 
-    def solver(self, name: str) -> Solver:
+    def solver(self, name: str) -> Rival:
         return next(s for s in self.solvers if s.name == name)
 
 

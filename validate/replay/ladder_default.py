@@ -18,7 +18,7 @@ from validate.replay.ladder import (
     LARGEST,
     QUALITY,
     LawPair,
-    Solver,
+    Rival,
     StabilityBody,
     Trial,
     marker_noise,
@@ -171,7 +171,7 @@ def _steps_and_frames(loading: _Loading, quick: bool) -> tuple[tuple[float, ...]
 
 def _solvers(
     own: OwnBody, meshes: Mapping[str, tuple[int, ...]], steps: tuple[float, ...], loading: _Loading
-) -> tuple[tuple[Solver, ...], LawPair]:
+) -> tuple[tuple[Rival, ...], LawPair]:
     """All that handle the scene, and what its law costs on the coarsest mesh."""
     levels = next(iter(meshes.values()))
     element, coarse, medium = list(meshes)[-1], levels[0], levels[len(levels) // 2]
@@ -187,7 +187,7 @@ def _solvers(
     return tuple(s for s in every if _handles(s, steps[0], own.scene)), pair
 
 
-def _handles(solver: Solver, dt: float, scene: Scene) -> bool:
+def _handles(solver: Rival, dt: float, scene: Scene) -> bool:
     return solver.make(dt).handles.covers(with_law(scene, solver.law))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from validate.replay.ladder import LawPair, Solver
+from validate.replay.ladder import LawPair, Rival
 from validate.scene.scene import LawName
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
@@ -36,36 +36,36 @@ def exact_in_ramps(dt: float) -> Scheme:
 
 def swinging(
     steps: tuple[float, ...], small: int, medium: int, law: LawName = "neo_hooke"
-) -> tuple[Solver, ...]:
+) -> tuple[Rival, ...]:
     """Every scheme of linear dynamics, and both of large strain on tetrahedra.
 
     Baselines that solve anew at every step run on meshes up to `small`, dense ones up to `medium`.
     """
     large: dict[str, Any] = {"law": law}
     return (
-        Solver("quasi-static", "static superposition", lambda dt: QuasiStatic(), stepped=False),
-        Solver("10 modes", "modal", _modal(10), stepped=False),
-        Solver("40 modes", "modal", _modal(40), stepped=False),
-        Solver("implicit, prefactored", "prefactored", implicit()),
-        Solver("backward Euler, prefactored", "prefactored", implicit(rule="backward_euler"),
+        Rival("quasi-static", "static superposition", lambda dt: QuasiStatic(), stepped=False),
+        Rival("10 modes", "modal", _modal(10), stepped=False),
+        Rival("40 modes", "modal", _modal(40), stepped=False),
+        Rival("implicit, prefactored", "prefactored", implicit()),
+        Rival("backward Euler, prefactored", "prefactored", implicit(rule="backward_euler"),
                order=1.0),
-        Solver("generalised alpha, prefactored", "prefactored",
+        Rival("generalised alpha, prefactored", "prefactored",
                implicit(rule="generalised_alpha", a0="zero")),
-        Solver("implicit, dense inverse", "prefactored", implicit(solver="dense_inverse"),
+        Rival("implicit, dense inverse", "prefactored", implicit(solver="dense_inverse"),
                finest=medium),
-        Solver("implicit, lumped mass", "prefactored", implicit(mass="lumped")),
-        Solver("implicit, conjugate gradients", "prefactored", implicit(solver="cg")),
-        Solver("implicit, Gauss-Seidel", "prefactored", implicit(solver="gauss_seidel")),
-        Solver("implicit, sparse LU every step", "prefactored", implicit(solver="sparse_lu"),
+        Rival("implicit, lumped mass", "prefactored", implicit(mass="lumped")),
+        Rival("implicit, conjugate gradients", "prefactored", implicit(solver="cg")),
+        Rival("implicit, Gauss-Seidel", "prefactored", implicit(solver="gauss_seidel")),
+        Rival("implicit, sparse LU every step", "prefactored", implicit(solver="sparse_lu"),
                finest=small),
-        Solver("implicit, Gaussian elimination every step", "prefactored",
+        Rival("implicit, Gaussian elimination every step", "prefactored",
                implicit(solver="gaussian_elimination"), finest=small),
-        Solver("explicit, consistent mass", "explicit",
+        Rival("explicit, consistent mass", "explicit",
                lambda dt: ExplicitLinear(dt, mass="consistent", damping_terms="full")),
-        Solver("explicit, lumped, C = alpha M", "explicit", ExplicitLinear),
-        Solver("large strain, explicit", "large strain",
+        Rival("explicit, lumped, C = alpha M", "explicit", ExplicitLinear),
+        Rival("large strain, explicit", "large strain",
                lambda dt: CentralDifference(dt, _PARTS, "lagged"), elements=("P1",), **large),
-        Solver("large strain, implicit", "large strain", _newton_dynamics,
+        Rival("large strain, implicit", "large strain", _newton_dynamics,
                elements=("P1", "P2"), finest=medium, shortest=steps[0], **large),
     )  # fmt: skip
 
@@ -98,25 +98,25 @@ def still_best(cavities: bool) -> Callable[[float], Scheme]:
 def still(
     cavities: bool, increment: float, table: float, medium: int, coarse: int,
     law: LawName = "neo_hooke",
-) -> tuple[Solver, ...]:  # fmt: skip
+) -> tuple[Rival, ...]:  # fmt: skip
     """Statics: superposition, the fluid's pressure, and large strain, in increments or a `table`.
 
     The table runs on meshes up to `medium`; Newton at every step on `coarse` ones, in the largest
     `increment` s only.
     """
-    fluid: tuple[Solver, ...] = (
-        Solver("superposition, cavity empty", "static superposition", lambda dt: NoFluid(),
+    fluid: tuple[Rival, ...] = (
+        Rival("superposition, cavity empty", "static superposition", lambda dt: NoFluid(),
                stepped=False, lacks="the fluid and its pressure"),
-        Solver("condensed, exact pressure", "condensed", lambda dt: ExactPressure(), stepped=False),
-        Solver("condensed, paper's loop at 1 %", "condensed", lambda dt: PressureLoop(),
+        Rival("condensed, exact pressure", "condensed", lambda dt: ExactPressure(), stepped=False),
+        Rival("condensed, paper's loop at 1 %", "condensed", lambda dt: PressureLoop(),
                stepped=False),
     )  # fmt: skip
-    dry = Solver("superposition", "static superposition", lambda dt: QuasiStatic(), stepped=False)
+    dry = Rival("superposition", "static superposition", lambda dt: QuasiStatic(), stepped=False)
     return (
         *(fluid if cavities else (dry,)),
-        Solver("large strain, table", "large strain", lambda dt: Tabulated(StaticNewton(), table),
+        Rival("large strain, table", "large strain", lambda dt: Tabulated(StaticNewton(), table),
                stepped=False, law=law, finest=medium),
-        Solver("large strain, Newton every step", "large strain", lambda dt: StaticNewton(),
+        Rival("large strain, Newton every step", "large strain", lambda dt: StaticNewton(),
                law=law, finest=coarse, shortest=increment),
     )  # fmt: skip
 

@@ -11,15 +11,15 @@ from validate.study.filters import FilterStudy
 from validate.study.interval import interval
 from validate.study.score import FilterScores
 from validate.study.store import Record
-from validate.study.study_page import CellsTable, Told
+from validate.study.study_page import CellsTable, Findings
 
 
-def told(study: FilterStudy) -> Told:
+def told(study: FilterStudy) -> Findings:
     """The study with the parameters and methods that it began with."""
     experiment, job = study.plan.experiment, study.plan.job
     options = Options(dict(job.values), study.plan.methods, job.quick)
     parameters, methods = configure(experiment, options)
-    return Told(
+    return Findings(
         f"Filter study: {experiment.title}", sentence(study), study_exhibits(study),
         document(study), cells_table(study), job.quick,
         describe(parameters) + describe(methods, "methods."), seed=study.plan.seeds[0],

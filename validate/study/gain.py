@@ -137,8 +137,7 @@ def _predicted(columns: Responses, drives: Floats) -> float:
     if state.failure:
         raise ComparisonError(f"no pressure keeps the volume: {state.failure[1]}")
     k = columns.drives
-    traces = stepper.traces([state])
-    pressures = [traces[f"{c.name}.pressure"].y[0] for c in columns.scene.cavities]
+    pressures = [state.numbers[f"{c.name}.pressure"] for c in columns.scene.cavities]
     z = np.concatenate([[1.0], drives, pressures])
     slopes = 3 * (columns.volumes @ z @ z)
     compliance = slopes[:, k + 1 :] / columns.rest_volumes[:, None]

@@ -10,7 +10,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Interval:
+class SeedInterval:
     """A mean of `count` independent numbers; `half` is half the 95 % interval, None for one."""
 
     mean: float
@@ -25,20 +25,20 @@ class Interval:
     def high(self) -> float:
         return self.mean + (self.half or 0.0)
 
-    def overlaps(self, other: "Interval") -> bool:
+    def overlaps(self, other: "SeedInterval") -> bool:
         return self.low <= other.high and other.low <= self.high
 
 
-def interval(values: Sequence[float]) -> Interval:
+def interval(values: Sequence[float]) -> SeedInterval:
     """Of the mean of independent, equally distributed values (n,), n >= 1."""
     n = len(values)
     mean = float(np.mean(values))
     if n < 2:
-        return Interval(mean, None, n)
+        return SeedInterval(mean, None, n)
     spread = float(np.std(values, ddof=1)) / np.sqrt(n)
-    return Interval(mean, float(student.ppf((1 + LEVEL) / 2, n - 1) * spread), n)
+    return SeedInterval(mean, float(student.ppf((1 + LEVEL) / 2, n - 1) * spread), n)
 
 
-def paired(one: Sequence[float], other: Sequence[float]) -> Interval:
+def paired(one: Sequence[float], other: Sequence[float]) -> SeedInterval:
     """Of one less other over common seeds (n,): what both share of the noise cancels."""
     return interval(np.subtract(one, other).tolist())

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from validate.study.filter_plan import FilterCell
-from validate.study.interval import Interval, interval, paired
+from validate.study.interval import SeedInterval, interval, paired
 from validate.study.score import FilterScores
 from validate.study.store import Record
 
@@ -27,9 +27,9 @@ class Ranked:
     place: int
     cell: FilterCell
     result: FilterScores
-    score: Interval
+    score: SeedInterval
     overlaps: tuple[int, ...]
-    from_best: Interval
+    from_best: SeedInterval
     tied: bool
     dominated_by: int | None
     scores: tuple[float, ...]
@@ -85,12 +85,12 @@ def _ranking(
     return Ranking(condition, tuple(rows), failed)
 
 
-def _overlaps(i: int, scores: Sequence[Interval]) -> tuple[int, ...]:
+def _overlaps(i: int, scores: Sequence[SeedInterval]) -> tuple[int, ...]:
     mine = scores[i]
     return tuple(j + 1 for j, s in enumerate(scores) if j != i and mine.overlaps(s))
 
 
-def tied(mine: Sequence[float], best: Sequence[float]) -> tuple[Interval, bool]:
+def tied(mine: Sequence[float], best: Sequence[float]) -> tuple[SeedInterval, bool]:
     """`mine` less `best` over common seeds, and whether that interval holds zero (or there is none:
     one seed tells nothing)."""
     apart = paired(mine, best)

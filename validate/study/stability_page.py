@@ -9,12 +9,12 @@ from validate.study.stability_cell import Stepped
 from validate.study.stability_exhibits import stability_exhibits, variant_row
 from validate.study.stability_plan import StabilityCell
 from validate.study.store import Record
-from validate.study.study_page import CellsTable, Told
+from validate.study.study_page import CellsTable, Findings
 
 
-def told(study: Stability) -> Told:
+def told(study: Stability) -> Findings:
     band = ("good", "Predictions hold") if study.passed else ("bad", "Predictions fail")
-    return Told(
+    return Findings(
         f"Stability map: {study.base.words}", sentence(study), stability_exhibits(study),
         document(study), points_table(study), study.quick, passed=study.passed, band=band,
     )  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 from validate.compare.exhibit import Exhibit, Mark, NumberTable, Panel, RegimeMap
 from validate.replay.experiment import Experiment
 from validate.study.gain import TOLERANCE, GainMap
-from validate.study.study_page import CellsTable, Told
+from validate.study.study_page import CellsTable, Findings
 
 _REGIMES = ("settles", "never settles")
 _NOTHING = (
@@ -16,17 +16,17 @@ _NOTHING = (
 )
 
 
-def told_nothing(experiment: Experiment, quick: bool) -> Told:
+def told_nothing(experiment: Experiment, quick: bool) -> Findings:
     """A page that says so."""
     said = _NOTHING.format(name=experiment.name)
     words = Exhibit("stability", "Nothing steps in time", (said,))
     document = {"kind": "stability", "points": 0}
-    return Told(f"Stability map: {experiment.title}", said, (words,), document, ((), ()), quick)
+    return Findings(f"Stability map: {experiment.title}", said, (words,), document, ((), ()), quick)
 
 
-def told_gain(found: GainMap, quick: bool) -> Told:
+def told_gain(found: GainMap, quick: bool) -> Findings:
     band = ("good", "Predictions hold") if found.passed else ("bad", "Predictions fail")
-    return Told(
+    return Findings(
         f"Stability map: {found.experiment.title}", sentence(found), (_exhibit(found),),
         {
             "kind": "stability",

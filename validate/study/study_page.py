@@ -16,7 +16,7 @@ CellsTable = tuple[tuple[str, ...], tuple[Row, ...]]
 
 
 @dataclass(frozen=True)
-class Told:
+class Findings:
     """What a study tells: `title`, one `sentence`, exhibits, its part of results.json (SI, nothing
     that is not finite), head and rows of tables/cells.csv.
 
@@ -36,7 +36,7 @@ class Told:
     seed: int | None = None
 
 
-def write_study(experiment: Experiment, told: Told, folder: Path) -> Path:
+def write_study(experiment: Experiment, told: Findings, folder: Path) -> Path:
     """Replaces all of `folder` but its cells; returns the path of report.html."""
     twin = told.seed is not None
     result = Result(

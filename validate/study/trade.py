@@ -12,7 +12,7 @@ from validate.arrays import Floats, rms
 from validate.errors import ComparisonError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
-from validate.replay.ladder import Solver, Trial
+from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_default import trial_of
 from validate.replay.options import Report
 from validate.solve.types import StepTimes
@@ -58,7 +58,7 @@ class TradeRow:
     `setup_s` is that of the solver's first dt on this mesh; see `Stride` for the other costs.
     """
 
-    solver: Solver
+    solver: Rival
     element: str
     level: int
     dt: float
@@ -95,7 +95,7 @@ class Refinement:
 
 
 @dataclass(frozen=True)
-class Front:
+class ParetoFront:
     """Cells that nothing beats by `by`, fastest first; the beaten ones' beaters; methods off it."""
 
     by: str
@@ -148,12 +148,12 @@ class Trade:
         """Rms length m of what large strain changes."""
         return None if self.gap is None else rms(self.gap)
 
-    def front(self, by: str = "error") -> Front:
+    def front(self, by: str = "error") -> ParetoFront:
         """The Pareto front of `by` ("error" or "total") against time per step."""
         return front(self.rows, by, self.floor)
 
 
-def front(rows: tuple[TradeRow, ...], by: str, floor: float = 0.0) -> Front:
+def front(rows: tuple[TradeRow, ...], by: str, floor: float = 0.0) -> ParetoFront:
     """See `Trade.front`; rows without this error or a time are left out, errors below `floor` m
     count as equal."""
     good = [r for r in rows if getattr(r, by) is not None and r.time_s is not None]
@@ -164,7 +164,7 @@ def front(rows: tuple[TradeRow, ...], by: str, floor: float = 0.0) -> Front:
     by_whom = [dominator(i, errors, times) for i in range(len(good))]
     free = [r for r, j in zip(good, by_whom, strict=True) if j is None]
     beaten = tuple((r, good[j]) for r, j in zip(good, by_whom, strict=True) if j is not None)
-    return Front(by, tuple(sorted(free, key=lambda r: r.time_s or 0.0)), beaten)
+    return ParetoFront(by, tuple(sorted(free, key=lambda r: r.time_s or 0.0)), beaten)
 
 
 # --- which cells ----------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError, ValidateError
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import System, build
-from validate.replay.ladder import Solver, Trial
+from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_default import trial_of
 from validate.scene.scene import LawName
 from validate.solve.march import march
@@ -126,7 +126,7 @@ def _read(trial: Trial, system: System, run: Run) -> Floats:
 # --- a solver, measured ---------------------------------------------------------------------------
 
 
-def _measured(trial: Trial, cell: TradeCell, solver: Solver) -> Measured:
+def _measured(trial: Trial, cell: TradeCell, solver: Rival) -> Measured:
     """On one system, so that later steps find its matrices assembled."""
     start = perf_counter()
     try:

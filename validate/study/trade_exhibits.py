@@ -8,7 +8,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.replay.ladder import RUNGS
 from validate.study.held import DEFINITION
 from validate.study.ranking import SAME_TIME
-from validate.study.trade import ERROR, Front, Refinement, Trade, TradeRow
+from validate.study.trade import ERROR, ParetoFront, Refinement, Trade, TradeRow
 
 _MM, _US, _MB = 1e3, 1e6, 1e-6
 _NAMES = {"error": "error", "total": "error with the law's share"}
@@ -83,13 +83,13 @@ def _law_words(trade: Trade) -> str:
     )
 
 
-def _dominated(front: Front) -> Iterable[str]:
+def _dominated(front: ParetoFront) -> Iterable[str]:
     if front.dominated:
         named = "; ".join(front.dominated)
         yield f"Dominated by {_NAMES[front.by]}, on every mesh and step tried: {named}."
 
 
-def _front_table(front: Front, trade: Trade) -> NumberTable:
+def _front_table(front: ParetoFront, trade: Trade) -> NumberTable:
     head = (*_CASE, "time / us", "rate / Hz", f"{_NAMES[front.by]} / mm", "of the motion / %",
             "mesh's share / mm", "solver's share / mm", "dominates")  # fmt: skip
     rows = tuple(_front_row(r, front.by, trade) for r in front.rows)
@@ -105,7 +105,7 @@ def _front_row(row: TradeRow, by: str, trade: Trade) -> tuple[Entry, ...]:
     )  # fmt: skip
 
 
-def _front_chart(front: Front, trade: Trade) -> Chart:
+def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
     rows = [*front.rows, *(r for r, _ in front.beaten)]
     series = []
     for rung in RUNGS:

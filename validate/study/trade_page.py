@@ -6,7 +6,7 @@ from typing import Any
 from validate.report.study_page import Row
 from validate.study.choose import Choice, error_of
 from validate.study.choose_exhibits import choose_exhibits, words
-from validate.study.study_page import Told
+from validate.study.study_page import Findings
 from validate.study.trade import ERROR, Refinement, Trade, TradeRow
 from validate.study.trade_exhibits import trade_exhibits
 
@@ -18,17 +18,17 @@ _HEAD = (
 )  # fmt: skip
 
 
-def told(trade: Trade) -> Told:
-    return Told(
+def told(trade: Trade) -> Findings:
+    return Findings(
         f"Trade: {trade.experiment.title}", sentence(trade), trade_exhibits(trade),
         {"kind": "tradeoff", **trade_document(trade)}, (_HEAD, cells_table(trade)), trade.quick,
     )  # fmt: skip
 
 
-def told_choice(choice: Choice) -> Told:
+def told_choice(choice: Choice) -> Findings:
     trade = choice.trade
     document = {"kind": "choose", **_choice_document(choice), **trade_document(trade)}
-    return Told(
+    return Findings(
         f"Choice: {trade.experiment.title}", next(words(choice)), choose_exhibits(choice),
         document, (_HEAD, cells_table(trade)), trade.quick,
     )  # fmt: skip
