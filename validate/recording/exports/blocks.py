@@ -34,7 +34,7 @@ _NUMBERED = re.compile(r"[^0-9]{2,24}?[\s:#№._-]*(?P<label>[A-Za-z]{0,2}[0-9][
 
 
 @dataclass(frozen=True)
-class Block:
+class TextBlock:
     """Lines of one table: the file's and its own header, names, units, rows of any length."""
 
     shared: list[Line]
@@ -69,7 +69,7 @@ def parse_tables(
     return [_table(b, raw, text, split.separator, sign) for b in blocks]
 
 
-def _table(block: Block, raw: Sequence[str], text: Text, separator: str, decimal: str) -> Table:
+def _table(block: TextBlock, raw: Sequence[str], text: Text, separator: str, decimal: str) -> Table:
     table = Table(
         header={**header_of(block.shared, raw), **header_of(block.header, raw)},
         columns=columns_of(block.names[1], block.units, block.rows),
@@ -89,7 +89,7 @@ def _table(block: Block, raw: Sequence[str], text: Text, separator: str, decimal
     return table
 
 
-def _even(block: Block) -> Block:
+def _even(block: TextBlock) -> TextBlock:
     """The block with rows of equal length; text lines below its table go to its header."""
     found = fitted(block.names, block.rows)
     return replace(
@@ -103,7 +103,7 @@ def _even(block: Block) -> Block:
 # --- where tables begin and end ------------------------------------------------------------------
 
 
-def _blocks(lines: Sequence[Line], run: int) -> list[Block]:
+def _blocks(lines: Sequence[Line], run: int) -> list[TextBlock]:
     tops = _tops(lines)
     if not tops or tops[0] > run:
         raise RecordingError(
@@ -113,7 +113,7 @@ def _blocks(lines: Sequence[Line], run: int) -> list[Block]:
     sizes = [_size(lines, tops, k) for k in range(len(tops))]
     least = min(MIN_ROWS, max(sizes))
     shared: list[Line] = []
-    blocks: list[Block] = []
+    blocks: list[TextBlock] = []
     above: list[Line] = list(lines[: tops[0]])
     small: list[str] = []
     for k, top in enumerate(tops):
@@ -125,7 +125,7 @@ def _blocks(lines: Sequence[Line], run: int) -> list[Block]:
             small.append(f"{len(rows)} rows below line {names[0]} ('{names[1][0]}', ...)")
             above += lines[top : tops[k + 1] if not last else len(lines)]
             continue
-        found = _stacked(Block([], above, names, units, rows, ""))
+        found = _stacked(TextBlock([], above, names, units, rows, ""))
         if blocks:
             found = [replace(b, shared=shared) for b in found]
         else:
@@ -177,7 +177,7 @@ def _parted(zone: list[Line]) -> tuple[list[Line], list[Line]]:
 
 
 def _refuse_pretender(
-    names: Line, units: list[str], rows: Sequence[Line], blocks: Sequence[Block]
+    names: Line, units: list[str], rows: Sequence[Line], blocks: Sequence[TextBlock]
 ) -> None:
     """Words amid samples, with a few more samples below, are no table of their own."""
     width = max(len(cells) for _, cells in rows)
@@ -193,7 +193,7 @@ def _shared(header: list[Line]) -> list[Line]:
     return header[: marks[0]] if marks else header
 
 
-def _stacked(block: Block) -> list[Block]:
+def _stacked(block: TextBlock) -> list[TextBlock]:
     """The block in parts where lines such as `Specimen 2` stand amid its rows."""
     label = next(filter(None, (specimen_label(c) for _, c in reversed(block.header))), "")
     parts: list[tuple[str, list[Line]]] = [(label, [])]
