@@ -16,6 +16,8 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import compare
 from validate.replay.find import load_file
+from validate.scene.box import box
+from validate.scene.mesh_file import write_mesh
 
 ROWS = np.arange(200)
 DIAMETER, HEIGHT, E = 0.03, 0.02, 20e3
@@ -143,3 +145,17 @@ def test_the_phantoms_experiment_agrees_as_written(tmp_path: Path, project_root:
     code, output = in_folder(tmp_path, "run", "mine")
     assert code == 0, output
     assert "9 of 9 checks agree" in output
+
+
+def test_a_mesh_file_is_a_body_too(tmp_path: Path) -> None:
+    """A block of the cylinder's area between slipping plates: the same force, by statics."""
+    side = float(np.sqrt(np.pi) * DIAMETER / 2)
+    block = box((side, side, HEIGHT), (2, 2, 2))
+    named = {"lower_plate": block.facets["z0"], "upper_plate": block.facets["z1"]}
+    write_mesh(replace(block, facets=named), tmp_path / "body.npz")
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
+    mine = load_file(tmp_path / "experiments" / "my_gel.py")
+    result = compare(mine, {"specimen.mesh": str(tmp_path / "body.npz")})
+    assert [c.verdict for c in result.checks] == ["agrees", "agrees"]
+    assert result.methods[0].scene.copies == 1

@@ -23,9 +23,10 @@ from validate.replay.cards import beside, changed, one
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.cylinder import quarter_cylinder
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
+from validate.scene.refine import of_element, refined
 from validate.scene.scene import Drive, LawName, Material, Pin, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
@@ -57,6 +58,7 @@ class CylinderGrid:
     radial: int = quantity(4, "1", "elements from axis to rim")
     axial: int = quantity(4, "1", "elements along the axis")
     finer: int = quantity(6, "1", "both, on the second mesh, for u_num")
+    halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
 
 
 @dataclass(frozen=True)
@@ -116,8 +118,8 @@ def compression(
         name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
         sets=_sets, identify=_identify, frames=2,
         uncertainty=Uncertainty(
-            finer=changed("mesh", radial=_finer, axial=_finer),
-            refinement=lambda p: float((p.mesh.finer / p.mesh.radial) ** 2 - 1),
+            finer=changed("mesh", radial=_finer, axial=_finer, halvings=_halved),
+            refinement=_refinement,
             inputs=(
                 Input("modulus", changed("material", E=_stiffer), one,
                       "E within its declared uncertainty"),
@@ -145,18 +147,18 @@ def _identify(recordings: Sequence[Recording], p: Compression) -> Identified:
 
 
 def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
-    linear = _body(p)
-    material = Material(p.material.E or 1.0, p.material.nu, model.law)
-    whole = p.specimen.mesh is not None
-    return Scene(
-        quadratic(linear) if model.order == 2 else linear,
-        material,
+    mesh, whole = _body(p), p.specimen.mesh is not None
+    scene = Scene(
+        mesh,
+        Material(p.material.E or 1.0, p.material.nu, model.law),
         (*between(model.plates), *(() if whole else SYMMETRY)),
-        pins=_pins(linear) if whole and model.plates == "slip" else (),
+        pins=_pins(mesh) if whole and model.plates == "slip" else (),
         drives=(STAGE,),
-        dilatation="nodal_mean" if model.order == 1 else "pointwise",
         copies=1 if whole else 4,
     )
+    for _ in range(p.mesh.halvings if whole else 0):
+        scene = refined(scene)
+    return of_element(scene, "P2" if model.order == 2 else "MD")
 
 
 def _body(p: Compression) -> Mesh:
@@ -226,6 +228,16 @@ def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
 
 def _finer(p: Compression) -> int:
     return p.mesh.finer
+
+
+def _halved(p: Compression) -> int:
+    return p.mesh.halvings + 1
+
+
+def _refinement(p: Compression) -> float:
+    """r^2 - 1: corners of bonded plates limit the order to 2."""
+    ratio = 2.0 if p.specimen.mesh is not None else p.mesh.finer / p.mesh.radial
+    return ratio**2 - 1
 
 
 def _stiffer(p: Compression) -> float:
