@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from study_samples import experiment_file
 
-from validate.errors import UsageError
+from validate.errors import SceneError, UsageError
 from validate.fem.system import Responses
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.ladder_default import body_of, trial_of
 from validate.replay.own_body import OwnBody, own_body
 from validate.scene.box import box
+from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import boundary_facets, cell_volumes
 from validate.scene.refine import linear, of_element, refined
 from validate.scene.scene import Material, Region, Scene, Support
@@ -144,3 +145,10 @@ def test_a_gains_limit_is_two_over_the_compliance(own_phantom: OwnBody) -> None:
     assert found.holds
     settled = [g for g, n in zip(found.gains, found.updates, strict=True) if n >= 0]
     assert max(settled) < 2 / c
+
+
+def test_a_material_point_enters_no_study(pulled: Experiment) -> None:
+    point = MaterialPoint(Material(1e4, 0.3, "neo_hooke"), "uniaxial")
+    lone = replace(pulled, build=lambda recording, parameters, options: point)
+    with pytest.raises(SceneError, match="no mesh and no steps"):
+        trial_of(lone, quick=True)

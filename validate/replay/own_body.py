@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from validate.errors import ValidateError
+from validate.errors import SceneError, ValidateError
 from validate.parameters import Parameter, describe, with_values
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.options import folder_of
+from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.refine import refined
 from validate.scene.scene import LawName, Scene
@@ -88,7 +89,7 @@ class OwnBody:
 
     def _built(self, parameters: Any) -> Scene:
         method = self.experiment.methods[self.experiment.accepted[0]]
-        return self.experiment.build(self.recording, parameters, method.scene)
+        return meshed(self.experiment.build(self.recording, parameters, method.scene))
 
     def _refines(self, p: Parameter) -> bool:
         changed = with_values(self.parameters, {p.path: _scaled(p, 2.0)})
@@ -105,6 +106,13 @@ def own_body(experiment: Experiment) -> OwnBody:
     if experiment.identify is not None:
         parameters = experiment.identify(recordings, parameters).parameters
     return OwnBody(experiment, parameters, recordings[0])
+
+
+def meshed(scene: AnyScene) -> Scene:
+    """The scene; raises `SceneError` for a material point, in which nothing can be refined."""
+    if isinstance(scene, MaterialPoint):
+        raise SceneError("a material point has no mesh and no steps: it enters no study")
+    return scene
 
 
 def with_law(scene: Scene, law: LawName) -> Scene:

@@ -26,7 +26,7 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.followed import Truth
 from validate.replay.method import Method
-from validate.scene.scene import Scene
+from validate.replay.own_body import meshed
 from validate.solve.march import march
 from validate.solve.types import Run, Stepper
 from validate.study.engine import Job
@@ -66,7 +66,7 @@ class Bench:
         parameters, method = set_up(self.experiment, self.job, cell, seed)
         key = _text(parameters)
         recording = self._recordings.get(key, lambda: self.twin.record(parameters, lambda _: None))
-        scene: Scene = self.experiment.build(recording, parameters, method.scene)
+        scene = meshed(self.experiment.build(recording, parameters, method.scene))
         mark = fingerprint(scene)
         system = self._systems.get(mark, lambda: build_system(scene))
         seen = self._seen.get(

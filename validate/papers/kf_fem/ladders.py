@@ -43,7 +43,8 @@ PRINTED_LADDER = Ladder(
 
 def _swing(recording: Recording, p: PulledBlock, quick: bool) -> Trial:
     base = build(recording, p, None)
-    force = p.loading.traction * float(np.prod(base.mesh.nodes.max(axis=0)[:2]))
+    width, depth, _ = base.mesh.nodes.max(axis=0).tolist()
+    force = p.loading.traction * width * depth
 
     def inputs(t: Floats) -> Floats:
         return np.asarray(force * (t < p.loading.off + 1e-9)[:, None])
