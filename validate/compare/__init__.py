@@ -1,1 +1,18 @@
 """Comparison: residuals of a run against a recording, scores with units, verdicts with counts."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "residual": ("Residual", "residuals"),
+    "score": ("Score", "scores_of"),
+    "verdict": ("Accept", "Check", "Sensitivity", "judge"),
+    "published": ("Figure", "Published"),
+    "effects": ("Effect", "Sensor"),
+    "metric": ("Metric",),
+    "two_fields": ("compare_fields",),
+    "result": ("MethodResult", "Result"),
+    "exhibit": ("Animation", "Chart", "Exhibit", "NodeMap", "NumberTable", "Picture", "Series"),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

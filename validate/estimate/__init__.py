@@ -1,1 +1,14 @@
 """Filters: a system and its measurements give an estimate with its uncertainty, never the truth."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "filters": ("FILTERS", "Filter"),
+    "measurements": ("Measurements", "measurements"),
+    "consistency": ("Consistency", "nees_consistency", "nis_consistency"),
+    "kf_fem": ("KfFem",),
+    "filterpy_guest": ("Guest",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

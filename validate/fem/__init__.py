@@ -1,1 +1,15 @@
 """Scene -> matrices. scikit-fem assembles; unknowns are node-major (x0 y0 z0 x1 ...)."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "system": ("Responses", "System", "build", "responses"),
+    "assemble": ("mass", "stiffness"),
+    "laws": ("Law", "law_of"),
+    "critical": ("CriticalStep", "critical_step"),
+    "modes": ("Modes", "modes_of"),
+    "locate": ("Rows",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

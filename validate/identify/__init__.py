@@ -1,1 +1,12 @@
 """Parameters from recordings, each with its uncertainty and the samples it came from."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "interval": ("Interval", "profile_interval"),
+    "law": ("LawFit", "fit_scale"),
+    "modulus": ("ModulusFit", "gent_correction", "identify_modulus"),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

@@ -2,3 +2,19 @@
 
 The only floor that knows file formats. `types` holds what every reader returns.
 """
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "types": ("Clock", "Contours", "Frames", "Markers", "Recording", "Signal", "Source"),
+    "reader": ("Reader",),
+    "readers": ("READERS",),
+    "mcap.read": ("read_recording",),
+    "mcap.write": ("write_recording",),
+    "preflight": ("Inspection", "inspect_recording"),
+    "alignment": ("Offset", "offset_by_correlation", "shift"),
+    "events": ("offset_by_event",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

@@ -4,16 +4,18 @@ Transforms are named T_target_from_source; residuals are mapped source minus tar
 millimetres in messages. Fit on the rest state once, then freeze.
 """
 
-from validate.register.quality import Method, Registration, register_points
-from validate.register.transform import Similarity, fit_rigid, fit_similarity
-from validate.register.two_step import fit_two_step
+from validate.exports import lazily, names
 
-__all__ = [
-    "Method",
-    "Registration",
-    "Similarity",
-    "fit_rigid",
-    "fit_similarity",
-    "fit_two_step",
-    "register_points",
-]
+_HOMES = {
+    "quality": ("Registration", "register_points"),
+    "transform": ("Similarity", "fit_rigid", "fit_similarity"),
+    "two_step": ("fit_two_step",),
+    "registered": ("Registered",),
+    "observation": ("Deviation", "Observation", "Selection"),
+    "markers": ("MarkerObservation", "observe_markers"),
+    "outlines": ("OutlineObservation", "observe_outlines"),
+    "signals": ("SignalObservation",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

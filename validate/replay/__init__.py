@@ -11,11 +11,37 @@ from pathlib import Path
 
 from validate.compare.result import Result
 from validate.replay import road
-from validate.replay.experiment import Experiment
+from validate.replay.experiment import (
+    Case,
+    EffectSpec,
+    Experiment,
+    Identified,
+    Input,
+    Told,
+    Twin,
+    Uncertainty,
+    Variant,
+)
 from validate.replay.find import find
+from validate.replay.ladder import Ladder
+from validate.replay.method import Method
 from validate.replay.options import Options
 
-__all__ = ["Experiment", "compare", "load"]
+__all__ = [
+    "Case",
+    "EffectSpec",
+    "Experiment",
+    "Identified",
+    "Input",
+    "Ladder",
+    "Method",
+    "Told",
+    "Twin",
+    "Uncertainty",
+    "Variant",
+    "compare",
+    "load",
+]
 
 
 def load(name: str) -> Experiment:

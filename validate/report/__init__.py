@@ -5,3 +5,13 @@ page is a function of the result that returns None where it does not apply. matp
 files named after what they show, pyvista in `renders` and `render_maps` only, jinja2 fills the page
 in `html` only.
 """
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "write": ("write_report",),
+    "store": ("document", "schema"),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

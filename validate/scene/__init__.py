@@ -1,1 +1,31 @@
 """What is simulated, declared: mesh, materials, supports, drives, cavities. No matrices."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "mesh": ("Mesh", "quadratic"),
+    "mesh_file": ("read_mesh", "write_mesh"),
+    "scene": (
+        "Cavity",
+        "Drive",
+        "Foundation",
+        "Load",
+        "Material",
+        "Membrane",
+        "Pin",
+        "Probe",
+        "Region",
+        "Scene",
+        "Support",
+        "Weight",
+    ),
+    "material_point": ("MaterialPoint",),
+    "box": ("grid",),
+    "cylinder": ("quarter_cylinder",),
+    "inclusion": ("Block", "Capsule", "block_with_inclusion"),
+    "plates": ("Plates", "between_plates"),
+    "refine": ("refined",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

@@ -1,1 +1,14 @@
 """Schemes: settings, preparation and step apart; `march` walks the steps."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "types": ("Outcome", "Run", "SceneSolver", "Scheme", "State", "StepTimes", "Stepper", "Trace"),
+    "handles": ("Handles", "require_handled"),
+    "schemes": ("SCHEMES", "SOLVERS", "schemes_that"),
+    "march": ("run_scheme",),
+    "amplification": ("Amplification",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

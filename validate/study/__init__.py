@@ -1,1 +1,14 @@
 """Studies: many runs of an experiment on a grid, on Dask."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "engine": ("Finished", "Job", "Plan", "Where", "finish"),
+    "store": ("Record",),
+    "filters": ("FilterStudy",),
+    "trade": ("Front", "Trade", "TradeRow"),
+    "choose": ("Choice", "Wanted", "wanted"),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

@@ -1,1 +1,13 @@
 """Twins: simulated experiments recorded as if measured; scene + scheme + sensors + seed."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "sensors": ("OutlineSensor", "Pen", "StageProfile"),
+    "stepped": ("SteppedTwin",),
+    "tracked": ("Camera", "Origin", "Reading"),
+    "ultrasound": ("Scanner",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)
