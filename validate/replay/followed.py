@@ -8,8 +8,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.residual import Residual, reached_end
+from validate.errors import SceneError
 from validate.register.registered import Registered
-from validate.scene.material_point import AnyScene
+from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.types import Run
@@ -60,6 +61,13 @@ class Followed:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "residuals", MappingProxyType(dict(self.residuals)))
+
+    @property
+    def body(self) -> Scene:
+        """The scene of a run on a mesh; raises `SceneError` for a material point."""
+        if isinstance(self.scene, MaterialPoint):
+            raise SceneError(f"'{self.label}' was run at a material point: it has no mesh")
+        return self.scene
 
     @property
     def seen(self) -> Registered:

@@ -67,7 +67,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     progress("materials")
     prostate, ends = _materials(p, cases)
     progress("static solution")
-    system = build_system(main["implicit"].scene)
+    system = build_system(main["implicit"].body)
     t: Floats = p.clock.dt * np.arange(1, _LONG + 1, dtype=np.float64)
     still, end = static_exhibit(system, _SETTLING, p.clock.dt, _LONG, needle_depth(t))
     progress("critical steps")
@@ -154,7 +154,7 @@ def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     """MP1's answers and MP2's own quasi-statics against the implicit run with MP2."""
     case = cases["prostate"]
     errors = errors_on(case, ("E_n", "E_s", "E_i"), ("implicit", *RIVALS))
-    scene = replace(case["implicit"].scene, material=MP2)
+    scene = replace(case["implicit"].body, material=MP2)
     run = _run(scene, FIVE["quasi_static"].settings, p)
     truth = case["implicit"].truth.u
     assert truth is not None

@@ -54,7 +54,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     switches, ratio = switches_exhibit(main, 3)
     progress("static solution")
     t: Floats = p.clock.dt * np.arange(1, _LONG + 1, dtype=np.float64)
-    system = build_system(main["implicit"].scene)
+    system = build_system(main["implicit"].body)
     still, end = static_exhibit(system, FIVE, p.clock.dt, _LONG, gravity_inputs(t))
     progress("first crossing by mesh")
     dip, crossings = _dips()

@@ -27,14 +27,14 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
     main = cases[""]
     explicit = main["nfem"]
     progress("readings of the force")
-    readings = readings_table(explicit.scene, _PRINTED_FORCE, "z")
+    readings = readings_table(explicit.body, _PRINTED_FORCE, "z")
     progress("locking")
-    locked = locking_table(explicit.scene, _NU)
-    limits = steps_table(explicit.scene, _PRINTED_STEP)
+    locked = locking_table(explicit.body, _NU)
+    limits = steps_table(explicit.body, _PRINTED_STEP)
     share = kinetic_share(explicit)
     numbers = {
-        "nodes": float(len(explicit.scene.mesh.nodes)),
-        "cells": float(len(explicit.scene.mesh.cells)),
+        "nodes": float(len(explicit.body.mesh.nodes)),
+        "cells": float(len(explicit.body.mesh.cells)),
         "locking": float(plain(locked.rows[-1][1]) or 0.0),
     }
     if share is not None:

@@ -33,7 +33,7 @@ INTEGRATORS = (
 
 def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """Rates over the size of the mesh, both readings of the force, critical steps, locking."""
-    scene = cases[""]["nfem"].scene
+    scene = cases[""]["nfem"].body
     progress("rates of 6 to 105 456 tetrahedra")
     side = float(np.ptp(scene.mesh.nodes[:, 0]))
     rates = measured_rates(scene.material, side, EDGES, INTEGRATORS)

@@ -47,7 +47,7 @@ def _nrmse(
 ) -> Floats:
     """NRMSE (seeds,) at the measured node, along z, of the filter as printed."""
     progress(f"{SEEDS} seeds, Q = {Q:g} mm2, {recursion}")
-    system = build_system(followed.scene)
+    system = build_system(followed.body)
     settings = ModalKf(
         parameters.clock.dt, Q * _MM2, PRINTED * _MM2, PRINTED * _MM2,
         recursion=recursion, gains="shared", a0=parameters.loading.a0,  # type: ignore[arg-type]
