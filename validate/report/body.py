@@ -8,8 +8,9 @@ from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.report.numbers import significant, spaced, with_unit
 from validate.report.observed import Held, holds, outline, shown_method
+from validate.scene.material_point import AnyScene
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Scene, Weight
+from validate.scene.scene import Weight
 
 _MM = 1e3
 
@@ -99,7 +100,7 @@ def _load(hold: Held) -> str:
     return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.drive, hold.unit)
 
 
-def _toward(scene: Scene) -> Floats:
+def _toward(scene: AnyScene) -> Floats:
     """Where the body is driven to, else where its weight pulls; without either the last axis is
     drawn upward."""
     weights = [load.direction for load in scene.loads if isinstance(load, Weight)]

@@ -15,7 +15,7 @@ from validate.register.markers import MarkerObservation
 from validate.register.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.scene.scene import Scene
+from validate.scene.material_point import AnyScene
 from validate.solve.types import Run, StepTimes
 
 _APART = 0.08  # share of the largest difference below which two methods draw one line
@@ -71,7 +71,7 @@ def markers(registered: Registered) -> MarkerObservation | None:
     return next(iter(registered.of(MarkerObservation)), None)
 
 
-def axis_label(scene: Scene, axis: int) -> str:
+def axis_label(scene: AnyScene, axis: int) -> str:
     """An axis of the scene's frame with its unit, and which drive moves along it."""
     along = [d.name for d in scene.drives if abs(d.direction[axis]) > _ALONG]
     return f"{'xyz'[axis]}{f' (along {along[0]})' if along else ''} / mm"

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats, Ints
+from validate.scene.material_point import AnyScene
 from validate.scene.mesh import Mesh, boundary_facets
-from validate.scene.scene import Scene
 
 OUTSIDE = "outside"
 _FEWEST = 8  # triangles that a thinned part keeps, to remain a body
@@ -30,7 +30,7 @@ class SurfacePart:
     whole: int
 
 
-def skins(scene: Scene, most: int) -> tuple[SurfacePart, ...]:
+def skins(scene: AnyScene, most: int) -> tuple[SurfacePart, ...]:
     """The outside and every cavity wall, about `most` triangles in all; none of a 2-D mesh."""
     mesh = scene.mesh
     if mesh.dimension != 3:

@@ -6,7 +6,17 @@ from typing import Literal
 import numpy as np
 
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Cavity, Drive, Load, Material, Probe, Region, Scene, Weight
+from validate.scene.scene import (
+    Cavity,
+    Drive,
+    Load,
+    Material,
+    Probe,
+    Region,
+    Scene,
+    Support,
+    Weight,
+)
 
 StretchMode = Literal["uniaxial", "equibiaxial", "pure_shear"]
 
@@ -53,6 +63,14 @@ class MaterialPoint:
     @property
     def regions(self) -> tuple[Region, ...]:
         return ()
+
+    @property
+    def supports(self) -> tuple[Support, ...]:
+        return ()
+
+    @property
+    def copies(self) -> int:
+        return 1
 
 
 AnyScene = Scene | MaterialPoint
