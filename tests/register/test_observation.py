@@ -195,14 +195,16 @@ def test_driving_signals_on_different_times_are_refused() -> None:
 
 
 def test_frames_are_rest_and_holds_or_else_evenly_many() -> None:
-    holds = tuple(Selection(str(t), np.array([t])) for t in (2.0, 1.0))
+    t = np.arange(11.0)
+    drive = stage(t=t, y=1e-3 * t[:, None])
+    holds = tuple(Selection(str(at), np.array([at])) for at in (7.0, 2.9))
     rest = Selection("0", np.array([0.0]))
-    assert Registered((stage(),), holds, rest).frames(3, 200).tolist() == [0, 1, 2]
-    assert Registered((stage(),), holds[:1], rest).frames(3, 2).tolist() == [0, 2]
-    assert Registered((stage(),)).frames(3, 200).tolist() == [0, 1, 2]
-    assert Registered((stage(),)).frames(1000, 5).tolist() == [0, 250, 500, 749, 999]
-    window = (Selection("w", T),)
-    assert Registered((stage(),), window).frames(3, 2).tolist() == [0, 2]
+    assert Registered((drive,), holds, rest).frames(11, 200).tolist() == [0, 3, 7]
+    assert Registered((drive,), holds[:1]).frames(11, 2).tolist() == [7]
+    assert Registered((drive,)).frames(11, 200).tolist() == list(range(11))
+    assert Registered((drive,)).frames(1000, 5).tolist() == [0, 250, 500, 749, 999]
+    window = (Selection("w", t[3:6]),)
+    assert Registered((drive,), window).frames(11, 2).tolist() == [0, 10]
 
 
 def test_holds_are_where_the_drive_stood_and_windows_where_it_was() -> None:
