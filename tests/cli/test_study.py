@@ -64,6 +64,7 @@ def test_the_best_line_is_the_best_cell(made: Path) -> None:
     assert abs(rmse - found["mean"]) < 3 * found["half_95"]  # one seed of three
 
 
+@pytest.mark.slow
 def test_the_best_line_decides_and_names_what_decides(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,6 +36,7 @@ def apart(one: Sequence[Floats], other: Sequence[Floats]) -> float:
     return max(float(np.nanmax(np.abs(a - b))) for a, b in pairs)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, twin: Recording) -> None:
     write_recording(twin, tmp_path / "a.mcap")
     write_recording(made(), tmp_path / "b.mcap")

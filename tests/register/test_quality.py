@@ -398,6 +398,7 @@ def test_several_outliers_do_not_hide_each_other():
     assert [o.name for o in register(x, y).outliers] == ["m02", "m05"]
 
 
+@pytest.mark.slow
 def test_clean_markers_raise_no_alarm():
     """Each bound is set to one false alarm in a thousand sets."""
     alarms = 0

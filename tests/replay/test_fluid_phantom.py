@@ -310,6 +310,7 @@ def test_lost_markers_are_left_out_and_counted(phantom: Experiment, good: Record
     assert markers.registration.missing == ("m08",)
 
 
+@pytest.mark.slow
 def test_a_run_that_does_not_converge_is_a_result(phantom: Experiment) -> None:
     result = compare(phantom, Options({"methods.p1_loop.gain": "0"}, ("p1_loop",)))
     assert result.methods[0].run.outcome.state == "not_converged"

@@ -27,6 +27,7 @@ def animation(result: Result) -> Animation:
     return made
 
 
+@pytest.mark.slow
 def test_between_loads_linear_in_the_stage(result: Result) -> None:
     run, seen = result.methods[0].run, result.methods[0].registered[0]
     found = in_steps(seen, run, 8)
@@ -118,6 +119,7 @@ def test_gif(animation: Animation) -> None:
         assert (np.abs(shown - drawn.astype(int)).max(axis=2) < 40).mean() > 0.995
 
 
+@pytest.mark.slow
 def test_in_the_report(result: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
     page = write_report(result, tmp_path / "phantom", created="2026-11-21T04:00:00Z")

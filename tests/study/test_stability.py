@@ -284,6 +284,7 @@ def leaves(content: Any) -> Iterator[Any]:
         yield content
 
 
+@pytest.mark.slow
 def test_the_folder_has_no_number_that_is_not_finite(
     few: tuple[StabilityCell, ...], tmp_path: Path
 ) -> None:

@@ -144,6 +144,7 @@ def commanded(measured: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studying, "trade", lambda experiment, **rest: measured)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("commanded")
 def test_choose_writes_its_folder_and_exits_by_its_verdict(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

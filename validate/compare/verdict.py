@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2
 
 from validate.arrays import rms
 from validate.compare.residual import Residual
 from validate.errors import ComparisonError
+from validate.estimate.consistency import chi_square_quantile
 
 Verdict = Literal["agrees", "differs", "cannot decide"]
 
@@ -106,7 +106,7 @@ def error_and_noise(residual: Residual) -> tuple[float, float]:
         return float(residual.values[0, 0]), float(np.hypot(residual.sd, residual.systematic))
     noise = c * residual.sd**2
     E = np.sqrt(max(rms(residual.values) ** 2 - noise, 0.0))
-    reach = np.sqrt(max(noise * (float(chi2.ppf(0.95, k * c)) / (k * c) - 1), 0.0))
+    reach = np.sqrt(max(noise * (float(chi_square_quantile(0.95, k * c)) / (k * c) - 1), 0.0))
     return float(E), float(np.hypot(reach / 2, np.sqrt(c) * residual.systematic))
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.stats import chi2
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
@@ -11,6 +10,7 @@ from validate.compare.score import Score
 from validate.estimate.consistency import (
     Consistency,
     Whiteness,
+    chi_square_quantile,
     nees_consistency,
     nis_consistency,
     whiteness,
@@ -161,4 +161,4 @@ def _chart(followed: Followed) -> Chart:
 
 
 def _band(dof: Floats, probability: float) -> Floats:
-    return np.asarray(chi2.ppf(probability, dof) / dof)
+    return np.asarray(chi_square_quantile(probability, dof) / dof)

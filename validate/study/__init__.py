@@ -6,7 +6,7 @@ _HOMES = {
     "engine": ("Finished", "Job", "Plan", "Where", "finish"),
     "store": ("Record",),
     "filters": ("FilterStudy",),
-    "trade": ("Front", "Trade", "TradeRow"),
+    "trade": ("ParetoFront", "Trade", "TradeRow"),
     "choose": ("Choice", "Wanted", "wanted"),
 }
 
