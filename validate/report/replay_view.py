@@ -64,8 +64,9 @@ class View:
 
     @property
     def drive_frame(self) -> str:
-        """The frame of the first signal that drives."""
-        return self.recording.signals[drive(self.registered).name].frame
+        """The frame of the first signal that drives; a drive that was derived has the machine's."""
+        recorded = self.recording.signals.get(drive(self.registered).name)
+        return recorded.frame if recorded else "machine"
 
     def local(self, name: str) -> str:
         """The name of a frame of this recording only, never the scene's."""
