@@ -199,12 +199,14 @@ def test_frames_are_rest_and_holds_or_else_evenly_many() -> None:
     drive = stage(t=t, y=1e-3 * t[:, None])
     holds = tuple(Selection(str(at), np.array([at])) for at in (7.0, 2.9))
     rest = Selection("0", np.array([0.0]))
-    assert Registered((drive,), holds, rest).frames(11, 200).tolist() == [0, 3, 7]
-    assert Registered((drive,), holds[:1]).frames(11, 2).tolist() == [7]
-    assert Registered((drive,)).frames(11, 200).tolist() == list(range(11))
-    assert Registered((drive,)).frames(1000, 5).tolist() == [0, 250, 500, 749, 999]
+    assert Registered((drive,), holds, rest).frames(np.arange(11.0), 200).tolist() == [0, 3, 7]
+    every_third = np.arange(2.0, 11.0, 3.0)  # long steps keep the frames of their own steps
+    assert Registered((drive,), holds[:1]).frames(every_third, 2).tolist() == [2]
+    assert Registered((drive,), holds[:1]).frames(np.arange(11.0), 2).tolist() == [7]
+    assert Registered((drive,)).frames(np.arange(11.0), 200).tolist() == list(range(11))
+    assert Registered((drive,)).frames(np.arange(1000.0), 5).tolist() == [0, 250, 500, 749, 999]
     window = (Selection("w", t[3:6]),)
-    assert Registered((drive,), window).frames(11, 2).tolist() == [0, 10]
+    assert Registered((drive,), window).frames(np.arange(11.0), 2).tolist() == [0, 10]
 
 
 def test_holds_are_where_the_drive_stood_and_windows_where_it_was() -> None:

@@ -64,13 +64,14 @@ class Registered:
         """The observations of one kind that do not drive."""
         return tuple(o for o in self.compared if isinstance(o, kind))
 
-    def frames(self, steps: int, most: int) -> Ints:
-        """Which of a run's `steps` keep their fields: rest and single instants, else `most`
-        evenly."""
+    def frames(self, t: Floats, most: int) -> Ints:
+        """Which of a run's steps at t (nt,) s keep their fields: rest and single instants, else
+        `most` evenly."""
         compared = [s for s in (self.rest, *self.selections) if s is not None]
         single = [s for s in compared if s.t is not None and len(s.t) == 1]
         if single:
-            return np.unique(np.concatenate([s.steps(self.t) for s in single]))
+            return np.unique(np.concatenate([s.steps(t) for s in single]))
+        steps = len(t)
         return np.unique(np.linspace(0, steps - 1, min(most, steps)).round().astype(np.int64))
 
     def stage(self, t: float) -> float:

@@ -63,7 +63,7 @@ class _Runs:
         every = slice(method.stride - 1, None, method.stride)
         t, inputs = seen.t[every], seen.inputs[every]
         steps = method.steps or len(t)
-        at = seen.frames(len(t), self._experiment.frames)
+        at = seen.frames(t, self._experiment.frames)
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
         if isinstance(method.settings, SceneSolver) or isinstance(self._scene, MaterialPoint):
