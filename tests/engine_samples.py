@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from validate.errors import SceneError
-from validate.study.engine import Job, Plan
+from validate.study.job import Job, Plan
 
 
 @dataclass(frozen=True)

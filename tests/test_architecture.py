@@ -1,7 +1,8 @@
 """Habits that hold in every module: frozen types, schemes that are all in their tuple."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -98,3 +99,26 @@ def test_the_recording_floor_knows_no_phantom(project_root: Path) -> None:
     for path in (project_root / "validate" / "recording").rglob("*.py"):
         text = path.read_text(encoding="utf-8").lower()
         assert not [word for word in words if word in text], path.name
+
+
+def test_no_module_imports_itself_by_a_detour(project_root: Path) -> None:
+    """Imports inside functions count: what waits for its call is an arrow all the same."""
+    files = {
+        ".".join(path.relative_to(project_root).with_suffix("").parts): path
+        for path in (project_root / "validate").rglob("*.py")
+    }
+    modules = {name.removesuffix(".__init__"): path for name, path in files.items()}
+    TopologicalSorter({name: _imports(path, modules) for name, path in modules.items()}).prepare()
+
+
+def _imports(path: Path, modules: Mapping[str, Path]) -> set[str]:
+    """The project's modules that a file names in its imports."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            for name in node.names:
+                whole = f"{node.module}.{name.name}"
+                found.add(whole if whole in modules else node.module)
+        elif isinstance(node, ast.Import):
+            found |= {name.name for name in node.names}
+    return found & modules.keys()

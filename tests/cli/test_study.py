@@ -9,7 +9,8 @@ import jsonschema
 import pytest
 from study_samples import experiment_file
 
-from validate.cli.main import BAD_INPUT, run
+from validate.cli.arguments import BAD_INPUT
+from validate.cli.main import run
 from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.replay.road import compare

@@ -15,7 +15,8 @@ from engine_samples import Waited, Waiting, logged, waiting
 
 from validate.errors import UsageError
 from validate.study import engine
-from validate.study.engine import Where, finish
+from validate.study.engine import finish
+from validate.study.job import Where
 from validate.study.store import Record, key_of, read_records, write_record
 
 HERE = Where(workers=0)

@@ -13,9 +13,10 @@ from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.replay.road import compare
-from validate.study.engine import Plan, Where, finish
+from validate.study.engine import finish
 from validate.study.filter_cell import Bench, open_bench, run_cell
 from validate.study.filter_plan import FilterPlan, plan
+from validate.study.job import Plan, Where
 from validate.study.score import FilterScores
 from validate.study.store import Record, read_records
 from validate.study.sweep import axes

@@ -28,7 +28,8 @@ from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.newmark import Newmark
 from validate.study import precision, stability_page
 from validate.study import stability as stability_module
-from validate.study.engine import Finished, Job, Plan, Where, finish
+from validate.study.engine import Finished, finish
+from validate.study.job import Job, Plan, Where
 from validate.study.precision import drift
 from validate.study.stability import SCHEMES, Stability, points, stability
 from validate.study.stability_cell import (

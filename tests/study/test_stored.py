@@ -9,7 +9,8 @@ import pytest
 from rich.console import Console
 
 from validate.cli import comparing
-from validate.cli.main import BAD_INPUT, run
+from validate.cli.arguments import BAD_INPUT
+from validate.cli.main import run
 from validate.errors import ComparisonError, UsageError
 from validate.study.stored import read_run, side_by_side
 from validate.study.stored_pairs import pairs

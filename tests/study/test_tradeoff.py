@@ -25,8 +25,9 @@ from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
 from validate.study.choose import choose, principal_strains, wanted
 from validate.study.choose_exhibits import choose_exhibits
-from validate.study.engine import Job, Plan, Where, finish
+from validate.study.engine import finish
 from validate.study.held import held_bytes
+from validate.study.job import Job, Plan, Where
 from validate.study.trade import Trade, TradeRow, front, trade_cells, traded
 from validate.study.trade_cell import Measured, run_cell
 from validate.study.trade_exhibits import trade_exhibits

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from validate.catalogue import experiment_files
+from validate.cli.arguments import FAILED
 from validate.cli.display import console, progress, shown, table
-from validate.cli.main import FAILED
 from validate.compare.published import Published
 from validate.compare.result import Result
 from validate.replay.find import find

@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 from validate import __version__
+from validate.cli.arguments import BAD_INPUT, BUG, INTERRUPTED
 from validate.errors import UsageError, ValidateError
 
-FAILED, BAD_INPUT, BUG, INTERRUPTED = 1, 2, 70, 130
 _OUT = click.Path(file_okay=False, path_type=Path)
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -259,14 +259,3 @@ def record(name: str, out: Path, values: tuple[str, ...]) -> None:
     from validate.cli import making
 
     making.record(name, out, values)
-
-
-def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:
-    """`a=b` texts as a mapping; raises `UsageError` for a text without '='."""
-    found = {}
-    for text in texts:
-        key, sign, value = text.partition("=")
-        if not (sign and key.strip()):
-            raise UsageError(f"{option} {text}: expected PATH=VALUE")
-        found[key.strip()] = value.strip()
-    return found

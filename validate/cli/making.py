@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from validate.cli.arguments import pairs
 from validate.cli.display import progress
-from validate.cli.main import pairs
 from validate.cli.recordings import written as say
 from validate.errors import UsageError
 from validate.parameters import with_values

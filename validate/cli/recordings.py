@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from validate.cli.arguments import pairs
 from validate.cli.display import console
-from validate.cli.main import pairs
 from validate.errors import UsageError
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.mcap.read import read_recording

@@ -5,8 +5,8 @@ from pathlib import Path
 from time import perf_counter
 
 from validate.catalogue import experiment_files
+from validate.cli.arguments import FAILED, pairs
 from validate.cli.display import console, progress, relative, shown, table
-from validate.cli.main import FAILED, pairs
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, root_of

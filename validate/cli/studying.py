@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.display import console, progress, relative, table
-from validate.cli.main import pairs
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
@@ -16,17 +16,17 @@ from validate.report.numbers import MISSING, significant
 from validate.study import filter_page, stability_page, still_page, trade_page
 from validate.study.choose import Choice, choose, error_of, wanted
 from validate.study.choose_exhibits import words
-from validate.study.engine import CELLS, Finished, Where, study_folder
+from validate.study.engine import CELLS, Finished, study_folder
 from validate.study.filter_exhibits import RANKING, ranking_row
 from validate.study.filters import FilterStudy, study
 from validate.study.gain import GainMap, gain_map
+from validate.study.job import Where
 from validate.study.ranking import Ranking
 from validate.study.stability import Stability, stability
 from validate.study.study_page import Findings, write_study
 from validate.study.sweep import named
 from validate.study.trade import Trade, again, trade
 
-_OK, _FAILED = 0, 1
 _PLACES = 10  # of every ranking on the terminal
 _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
             "against #1", "NIS per dof / 1", "filter is", "step / ms",
@@ -71,7 +71,7 @@ def filters(
     if not common.as_json:
         _show_filters(found)
         _end(found.done, page)
-    return _OK
+    return OK
 
 
 def stability_map(name: str, common: StudyOptions) -> int:
@@ -90,7 +90,7 @@ def stability_map(name: str, common: StudyOptions) -> int:
     if not common.as_json:
         _show_stability(found)
         _end(found.done, page)
-    return _OK if found.passed else _FAILED
+    return OK if found.passed else FAILED
 
 
 def _still(experiment: Experiment, still: GainMap | None, common: StudyOptions) -> int:
@@ -103,7 +103,7 @@ def _still(experiment: Experiment, still: GainMap | None, common: StudyOptions) 
     page = _written(experiment, told, "stability", common)
     if not common.as_json:
         console().print(f"{told.sentence}\nreport: {relative(page)}", soft_wrap=True)
-    return _FAILED if told.passed is False else _OK
+    return FAILED if told.passed is False else OK
 
 
 def tradeoff(name: str, common: StudyOptions) -> int:
@@ -113,7 +113,7 @@ def tradeoff(name: str, common: StudyOptions) -> int:
     if not common.as_json:
         _show_trade(found)
         _end(found.done, page)
-    return _OK
+    return OK
 
 
 def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared_law: bool) -> int:
@@ -127,7 +127,7 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
     if not common.as_json:
         _show_choice(choice)
         _end(found.done, page)
-    return _OK if choice.pick is not None else _FAILED
+    return OK if choice.pick is not None else FAILED
 
 
 def seeds_of(text: str) -> int | tuple[int, ...]:

@@ -13,7 +13,7 @@ import distributed
 from distributed.scheduler import KilledWorker
 
 from validate.errors import UsageError
-from validate.study.engine import C, Done, Plan, R, Where, run_batch
+from validate.study.job import C, Done, Plan, R, Where, run_batch
 from validate.study.store import Record
 
 TASK_S = 0.5  # s of work in one task: a kill loses so much, and Dask's 2 ms a task vanish in it

@@ -29,8 +29,8 @@ from validate.replay.method import Method
 from validate.replay.own_body import meshed
 from validate.solve.march import march
 from validate.solve.types import Run, Stepper
-from validate.study.engine import Job
 from validate.study.filter_plan import FilterCell, set_up
+from validate.study.job import Job
 from validate.study.kept import Kept, fingerprint
 from validate.study.score import NIS, FilterScores, error_scores
 from validate.study.shared import sharing

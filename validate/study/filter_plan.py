@@ -8,7 +8,7 @@ from validate.errors import UsageError
 from validate.parameters import describe, nearest_names, with_values
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options, configure
-from validate.study.engine import Job, job_of
+from validate.study.job import Job, job_of
 from validate.study.store import key_of
 from validate.study.sweep import Axis, grid
 

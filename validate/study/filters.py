@@ -15,9 +15,10 @@ from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.options import Options, Report
-from validate.study.engine import CELLS, Finished, Plan, Where, finish, study_folder
+from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.filter_cell import open_bench, run_cell
 from validate.study.filter_plan import METHODS, FilterCell, FilterPlan, plan
+from validate.study.job import Plan, Where
 from validate.study.ranking import Ranked, Ranking, rankings, tied
 from validate.study.score import POOLED, FilterScores
 from validate.study.sweep import axes

@@ -18,7 +18,8 @@ from validate.replay.experiment import Experiment
 from validate.replay.options import Report
 from validate.replay.own_body import own_body, with_law
 from validate.solve.fluid import ExactPressure, PressureLoop, tuned_gain
-from validate.study.engine import CELLS, Finished, Job, Plan, Where, finish, job_of, study_folder
+from validate.study.engine import CELLS, Finished, finish, study_folder
+from validate.study.job import Job, Plan, Where, job_of
 from validate.study.stability_cell import measured_limit
 from validate.study.store import key_of
 

@@ -15,7 +15,8 @@ from validate.replay.find import find
 from validate.replay.ladder import StabilityBody
 from validate.replay.ladder_default import body_of
 from validate.replay.options import Report
-from validate.study.engine import CELLS, Finished, Plan, Where, finish, job_of, study_folder
+from validate.study.engine import CELLS, Finished, finish, study_folder
+from validate.study.job import Plan, Where, job_of
 from validate.study.stability_cell import SchemeResult, Stepped, open_bench, run_cell
 from validate.study.stability_plan import StabilityCell, stability_cells
 from validate.study.stepping import STEPPINGS, Stepping

@@ -21,7 +21,7 @@ from validate.replay.ladder import StabilityBody, Turned
 from validate.replay.ladder_default import body_of
 from validate.scene.scene import Scene
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
-from validate.study.engine import Job
+from validate.study.job import Job
 from validate.study.kept import Kept
 from validate.study.precision import Drift, Rounding, drift, rounding
 from validate.study.stability_plan import StabilityCell

@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.replay.ladder import StabilityBody, Turned
-from validate.study.engine import Job
+from validate.study.job import Job
 from validate.study.store import key_of
 
 NU = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.4999)

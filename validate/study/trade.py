@@ -17,16 +17,8 @@ from validate.replay.ladder_default import trial_of
 from validate.replay.options import Report
 from validate.solve.types import StepTimes
 from validate.study.convergence import Convergence, convergence
-from validate.study.engine import (
-    CELLS,
-    Finished,
-    Job,
-    Plan,
-    Where,
-    finish,
-    job_of,
-    study_folder,
-)
+from validate.study.engine import CELLS, Finished, finish, study_folder
+from validate.study.job import Job, Plan, Where, job_of
 from validate.study.ranking import dominator
 from validate.study.store import Record
 from validate.study.trade_cell import (

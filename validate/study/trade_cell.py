@@ -21,8 +21,8 @@ from validate.replay.ladder_default import trial_of
 from validate.scene.scene import LawName
 from validate.solve.march import march
 from validate.solve.types import Run, Scheme, Stepper, StepTimes
-from validate.study.engine import Job
 from validate.study.held import held_bytes
+from validate.study.job import Job
 from validate.study.store import key_of
 
 _FIRST, _PROBED = 4, 60  # steps that tell how long all would take, the second where it is short

@@ -1,0 +1,16 @@
+"""What the commands share: exit codes, and texts of the form PATH=VALUE."""
+
+from validate.errors import UsageError
+
+OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
+
+
+def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:
+    """`a=b` texts as a mapping; raises `UsageError` for a text without '='."""
+    found = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        if not (sign and key.strip()):
+            raise UsageError(f"{option} {text}: expected PATH=VALUE")
+        found[key.strip()] = value.strip()
+    return found

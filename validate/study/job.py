@@ -1,0 +1,117 @@
+"""What all cells of a study share, and what a worker does with some of them."""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Generic, Protocol, TypeVar
+
+from validate.errors import UsageError, ValidateError
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.options import folder_of
+from validate.study.store import Record
+
+
+class Keyed(Protocol):
+    """A cell, small enough to be sent; `timed`: its times are what it is run for."""
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def timed(self) -> bool: ...
+
+
+C = TypeVar("C", bound=Keyed)
+R = TypeVar("R")
+Done = Callable[[Any, Record[Any]], None]
+
+
+@dataclass(frozen=True)
+class Where:
+    """`workers` local processes (None: one a core, at most the cells; 0: in this process), or the
+    address of a Dask scheduler that runs."""
+
+    workers: int | None = None
+    scheduler: str = ""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all cells of a study share: the experiment's file, its hash and those of its recordings,
+    values set, quick."""
+
+    path: str
+    sha256: str
+    recordings: tuple[str, ...] = ()
+    values: tuple[tuple[str, str], ...] = ()
+    quick: bool = False
+
+    def experiment(self) -> Experiment:
+        """Raises `UsageError` when the file is not the one that the study began with."""
+        path = Path(self.path)
+        if file_sha256(path) != self.sha256:
+            raise UsageError(
+                f"{path.name} is not the file that the study began with; start it again"
+            )
+        return load_file(path)
+
+
+def job_of(
+    experiment: Experiment, values: Mapping[str, str] | None = None, quick: bool = False
+) -> Job:
+    """Raises what loading the experiment's recordings does."""
+    folder, path = folder_of(experiment), Path(str(experiment.path))
+    loaded = experiment.load(experiment.parameters, folder)
+    hashes = tuple(r.source.sha256 for r in loaded)
+    return Job(str(path), file_sha256(path), hashes, tuple(sorted((values or {}).items())), quick)
+
+
+def file_sha256(path: Path) -> str:
+    """Of an experiment's file and of those beside it that it names."""
+    text = path.read_text(encoding="utf-8")
+    beside = [f for f in sorted(path.parent.glob("*.py")) if f != path and f.stem in text]
+    return hashlib.sha256(b"".join(f.read_bytes() for f in (path, *beside))).hexdigest()
+
+
+@dataclass(frozen=True)
+class Plan(Generic[C, R]):
+    """`open(job)` makes what a worker keeps between cells, `run(bench, cell)` a value of `kind`.
+
+    Both are functions of a module, so that they can be sent.
+    """
+
+    job: Job
+    cells: tuple[C, ...]
+    open: Callable[[Job], Any]
+    run: Callable[[Any, C], R]
+    kind: type[R]
+
+
+def run_batch(
+    open_: Callable[[Job], Any], run: Callable[[Any, C], R], job: Job, cells: Sequence[C]
+) -> list[Record[R]]:
+    """On a worker: the records of some cells. Raises what opening the experiment raises."""
+    bench = _opened(open_, job)
+    return [_guarded(run, bench, cell) for cell in cells]
+
+
+@lru_cache(maxsize=2)
+def _opened(open_: Callable[[Job], Any], job: Job) -> Any:
+    return open_(job)
+
+
+def _guarded(run: Callable[[Any, C], R], bench: Any, cell: C) -> Record[R]:
+    """One cell must not end a study of thousands: an error becomes a record with its line."""
+    start = perf_counter()
+    record: Record[R]
+    try:
+        record = Record(cell.key, run(bench, cell))
+    except ValidateError as error:
+        record = Record(cell.key, refused=" ".join(str(error).split()))
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}"
+        record = Record(cell.key, failed=" ".join(text.split()))
+    return replace(record, seconds=perf_counter() - start)
