@@ -3,7 +3,8 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "engine": ("Finished", "Job", "Plan", "Where", "finish"),
+    "engine": ("Finished", "finish"),
+    "job": ("Job", "Plan", "Where"),
     "store": ("Record",),
     "filters": ("FilterStudy",),
     "trade": ("ParetoFront", "Trade", "TradeRow"),
