@@ -1,9 +1,9 @@
 """The covariance of a diagonal transition over one step, in one pass over its lower triangle."""
 
 import numpy as np
-from numba import njit
 
 from validate.arrays import Floats
+from validate.fem.compiled import compiled
 
 
 def advance_reference(
@@ -17,7 +17,7 @@ def advance_reference(
     return prior, prior @ H.T
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def advance(
     P: Floats, G: Floats, B: Floats, f: Floats, Q: Floats, H: Floats
 ) -> tuple[Floats, Floats]:

@@ -5,15 +5,15 @@ Paper 003, eqs 35-39. P is changed in place and packed by row, one column a comp
 "node" 6 rows (xx, yy, zz, xy, xz, yz) of 3 x 3 ones.
 """
 
-import numba
 import numpy as np
 
 from validate.arrays import Floats, Ints
+from validate.fem.compiled import compiled
 
 HUGE = 1e300  # m^2: beyond it the next products would leave the number range
 
 _ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
-_compiled = numba.njit(cache=True, error_model="numpy")
+_compiled = compiled(error_model="numpy")
 
 
 @_compiled

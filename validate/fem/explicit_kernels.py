@@ -28,6 +28,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
+from validate.fem.compiled import compiled
 
 Cells = NDArray[np.int32]
 Springs = tuple[Cells, Cells, Floats]
@@ -46,14 +47,8 @@ _FAST = {"contract", "reassoc", "nsz", "arcp"}
 _CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 3 % off
 
 
-def _compiled(function: _Function) -> _Function:
-    made = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")(function)
-    return cast(_Function, made)
-
-
-def _threaded(function: _Function) -> _Function:
-    made = njit(cache=True, nogil=True, parallel=True, error_model="numpy")(function)
-    return cast(_Function, made)
+_compiled = compiled(nogil=True, fastmath=_FAST, error_model="numpy")
+_threaded = compiled(nogil=True, parallel=True, error_model="numpy")
 
 
 def _inlined(function: _Function) -> _Function:

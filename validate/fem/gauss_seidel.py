@@ -1,8 +1,7 @@
 """Gauss-Seidel sweeps over a sparse matrix: the compiled kernel, and plain loops to check it by."""
 
-from numba import njit
-
 from validate.arrays import Floats, Ints
+from validate.fem.compiled import compiled
 
 
 def sweeps_loops(
@@ -21,4 +20,4 @@ def sweeps_loops(
             x[i] = rest / pivot
 
 
-sweeps = njit(cache=True, nogil=True, error_model="numpy")(sweeps_loops)
+sweeps = compiled(nogil=True, error_model="numpy")(sweeps_loops)
