@@ -15,7 +15,6 @@ from validate.recording.images.outline import Outline, extract_outline, outlines
 from validate.recording.images.shapes import circle_points, ellipse_points
 from validate.recording.types import Frames
 from validate.register.outline_geometry import normal_distances
-from validate.twin.cysts import cyst_frame, cyst_outline
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
 PX = (1e-4, 1e-4)
@@ -65,7 +64,7 @@ def test_shapes_through_exact_points() -> None:
 def test_eighteen_frames_meet_their_bounds(bench: ModuleType, level: float) -> None:
     """Nine frames each of low and high contrast with shadows of 0, 6 and 12 dB, no hint given."""
     shadows = [0.0, 6.0, 12.0]
-    results = [bench.judged(cyst_frame(i, level, shadows[i % 3])) for i in range(9)]
+    results = [bench.judged(bench.cyst_frame(i, level, shadows[i % 3])) for i in range(9)]
     assert all(r is not None for r in results)
     low = level < -15
     assert np.median([r.rms for r in results]) < (0.13e-3 if low else 0.26e-3)
@@ -155,8 +154,8 @@ def test_shapes_and_what_does_not_fit_them() -> None:
     assert (free.shape, oval.shape, ring.shape) == ("free", "ellipse", "circle")
 
 
-def test_extraction_turns_with_the_image() -> None:
-    truth = cyst_outline(np.array([9e-3, 11e-3]), 4e-3, np.random.default_rng(8))
+def test_extraction_turns_with_the_image(bench: ModuleType) -> None:
+    truth = bench.cyst_outline(np.array([9e-3, 11e-3]), 4e-3, np.random.default_rng(8))
     frame = image(truth, level=-20.0)
     found = extract_outline(frame, PX)
     mirrored = extract_outline(np.ascontiguousarray(frame[:, ::-1]), PX)

@@ -82,9 +82,6 @@ def test_numbers_by_hand():
     np.testing.assert_allclose(found.residuals, x - y, atol=1e-15)
     assert found.fre == pytest.approx(0.1)
     assert found.fle == pytest.approx(0.1 / np.sqrt(1 - 2 / 4))
-    across, along = found.residual_parts([0, 0, 2])
-    np.testing.assert_allclose(across, 0, atol=1e-15)
-    np.testing.assert_allclose(along, [0.1, 0.1, -0.1, -0.1])
     assert found.k_effective == 4
 
 
@@ -146,15 +143,15 @@ def test_tre_at_the_inclusion_of_paper_000():
     assert np.sqrt(np.trace(covariance)) == pytest.approx(0.218e-3, abs=0.0005e-3)
 
 
-def test_one_registration_predicts_its_tre_in_both_parts():
+def test_one_registration_predicts_its_tre() -> None:
+    """Far above the inclusion: more than where no lever acts, fle / sqrt(k)."""
     y = grid(0.002)
     found = register(measured(y, 12)[0], y)
-    inclusion = [y.mean(axis=0) + [0, 0, -0.0225]]
-    total, (plane, vertical) = found.tre_at(inclusion), found.tre_parts_at(inclusion, UP)
-    np.testing.assert_allclose(plane**2 + vertical**2, total**2)
-    assert vertical[0] == pytest.approx(found.fle / np.sqrt(3 * 42), rel=1e-3)  # no lever there
-    assert plane[0] > 2 * vertical[0]
     assert found.fle == pytest.approx(SD * np.sqrt(3), rel=0.15)
+    assert found.tre_at([y.mean(axis=0)]) == pytest.approx(found.fle / np.sqrt(42), rel=1e-3)
+    below = y.mean(axis=0)[None] - 0.0225 * UP
+    covariance = target_covariance(below, y, found.fle)[0]
+    assert found.tre_at(below) == pytest.approx(np.sqrt(np.trace(covariance)))
 
 
 @pytest.mark.parametrize(
@@ -220,8 +217,6 @@ def test_wrong_inputs_are_refused():
     assert "not finite" in message(np.where(y == y[0, 0], np.inf, y), y)
     with pytest.raises(RegistrationError, match="4 names, 3 different"):
         register_points(["a", "b", "c", "a"], y[:4], y[:4], expected_sd=SD)
-    with pytest.raises(RegistrationError, match="has no length"):
-        register(y, y).residual_parts([0, 0, 0])
 
 
 # --- degenerate sets ---

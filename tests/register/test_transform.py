@@ -38,13 +38,10 @@ def test_apply_is_scale_rotation_shift_by_hand():
 
 @settings(max_examples=50, deadline=None)
 @given(seed=SEEDS, d=DIMENSIONS, s=st.floats(0.1, 10))
-def test_inverse_and_composition(seed, d, s):
+def test_the_inverse_leads_back(seed, d, s):
     a = Similarity(rotation(seed, d), points(seed, 1, d)[0], s)
-    b = Similarity(rotation(seed + 1, d), points(seed + 1, 1, d)[0], 1.5)
     x = points(seed + 2, 5, d)
     np.testing.assert_allclose(a.inverse().apply(a.apply(x)), x, atol=1e-12)
-    np.testing.assert_allclose(a.compose(b).apply(x), a.apply(b.apply(x)), atol=1e-12 * s)
-    np.testing.assert_allclose(a.compose(b).matrix, a.matrix @ b.matrix, atol=1e-12 * s)
 
 
 @settings(max_examples=100, deadline=None)

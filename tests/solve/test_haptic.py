@@ -12,15 +12,9 @@ def test_a_rate_means_something_beside_its_step() -> None:
     printed = RealTime(75.0, 1e-3, 0.24e-3)
     assert printed.factor == pytest.approx(0.075)
     assert printed.ratio == pytest.approx(4.17, abs=0.01)
-    assert not printed.haptic
     ours = RealTime(16.2e3, 0.24e-3, 0.26e-3)
     assert ours.factor == pytest.approx(3.888)
     assert ours.force_hz == pytest.approx(1 / 0.24e-3)
-    assert ours.haptic
-
-
-def test_fast_steps_too_short_for_real_time_are_not_haptic() -> None:
-    assert not RealTime(20e3, 2e-5, 3e-5).haptic
 
 
 @pytest.mark.parametrize("numbers", [(0.0, 1e-3, 1e-3), (1e3, -1e-3, 1e-3), (1e3, 1e-3, np.nan)])

@@ -10,6 +10,9 @@ _HOMES = {
     "effects": ("Effect", "Sensor"),
     "metric": ("Metric",),
     "two_fields": ("compare_fields",),
+    "force_error": ("force_pair", "force_scores"),
+    "boundary": ("outline_boundary",),
+    "shape_error": ("Boundaries", "boundary_scores"),
     "result": ("MethodResult", "Result"),
     "exhibit": ("Animation", "Chart", "Exhibit", "NodeMap", "NumberTable", "Picture", "Series"),
 }

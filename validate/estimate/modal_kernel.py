@@ -6,22 +6,15 @@ from validate.arrays import Floats
 from validate.fem.compiled import compiled
 
 
-def advance_reference(
-    P: Floats, G: Floats, B: Floats, f: Floats, Q: Floats, H: Floats
-) -> tuple[Floats, Floats]:
-    """P- (n, n) = (P + G B^T + B G^T) * f f^T + Q and P- H^T (n, m).
-
-    G, B (n, r) are the last update (see `covariance`), r = 0 for none.
-    """
-    prior = (P + G @ B.T + B @ G.T) * np.outer(f, f) + Q
-    return prior, prior @ H.T
-
-
 @compiled(fastmath={"contract", "reassoc"})
 def advance(
     P: Floats, G: Floats, B: Floats, f: Floats, Q: Floats, H: Floats
 ) -> tuple[Floats, Floats]:
-    """As `advance_reference`, compiled: only lower triangles of P, Q and P- are read and filled."""
+    """P- (n, n) = (P + G B^T + B G^T) * f f^T + Q and P- H^T (n, m).
+
+    G, B (n, r) are the last update (see `covariance`), r = 0 for none. Only lower triangles of P, Q
+    and P- are read and filled.
+    """
     n, r, m = P.shape[0], G.shape[1], H.shape[0]
     prior, W = np.empty((n, n)), np.zeros((m, n))
     Gt, Bt, row = G.T.copy(), B.T.copy(), np.empty(n)

@@ -72,12 +72,6 @@ class Registration:
         k, d = self.residuals.shape
         return measures.localisation_error(self.fre, k, d, _scaled(self.method))
 
-    def residual_parts(self, normal: ArrayLike) -> tuple[Floats, Floats]:
-        """Residuals across (lengths) and along (signed) a target-frame normal (d,): (k,) m each."""
-        n = _unit(normal, len(self.transform.t))
-        along = self.residuals @ n
-        return np.linalg.norm(self.residuals - np.outer(along, n), axis=1), along
-
     def tre_at(self, points: ArrayLike) -> Floats:
         """Predicted target registration error, rms (m,) m, at points (m, d) m of the target frame.
 
@@ -85,13 +79,6 @@ class Registration:
         """
         error: Floats = np.sqrt(np.trace(self._covariance(points), axis1=1, axis2=2))
         return error
-
-    def tre_parts_at(self, points: ArrayLike, normal: ArrayLike) -> tuple[Floats, Floats]:
-        """`tre_at` across and along `normal` (d,), (m,) m each; the squares add up to its own."""
-        n = _unit(normal, len(self.transform.t))
-        covariance = self._covariance(points)
-        along: Floats = n @ covariance @ n
-        return np.sqrt(np.trace(covariance, axis1=1, axis2=2) - along), np.sqrt(along)
 
     def _covariance(self, points: ArrayLike) -> Floats:
         d = len(self.transform.t)
@@ -271,12 +258,3 @@ def _excess(
         f"residual{without} {1e3 * per_axis:.3g} mm per axis is {per_axis / noise:.3g} times the "
         f"noise of {1e3 * noise:.3g} mm (declared; for exact data, rounding), unexplained"
     ]
-
-
-def _unit(normal: ArrayLike, d: int) -> Floats:
-    n = checked(normal, "normal", (d,), error=RegistrationError)
-    length = float(np.linalg.norm(n))
-    if length == 0:
-        raise RegistrationError(f"normal {n.tolist()} has no length: give a direction")
-    unit: Floats = n / length
-    return unit

@@ -72,10 +72,6 @@ class Similarity:
         """T_source_from_target."""
         return Similarity(self.R.T, -(self.t @ self.R) / self.s, 1.0 / self.s)
 
-    def compose(self, inner: "Similarity") -> "Similarity":
-        """`inner` first, then this: T_c_from_b.compose(T_b_from_a) is T_c_from_a."""
-        return Similarity(self.R @ inner.R, self.apply(inner.t), self.s * inner.s)
-
 
 def fit_rigid(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Similarity:
     """T_target_from_source with s = 1 that minimises sum_i w_i |R x_i + t - y_i|^2.

@@ -1,12 +1,11 @@
 """How errors grow per step: the spectral radius of a linear scheme's map of (u, v, a) at rest.
 
 With C = alpha M + beta K the modes of K and M decouple and the map is 3 x 3 for each of them: exact
-and cheap. `step_matrix` drives a stepper itself, column by column, for whatever couples the modes.
-Radius 1 is the border: an undamped mode of average acceleration lies on it; above it, however
-little, a run grows without end (heavily damped explicit ones by as little as 1.0002 a step).
+and cheap. Radius 1 is the border: an undamped mode of average acceleration lies on it; above it,
+however little, a run grows without end (heavily damped explicit ones by 1.0002 a step).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
@@ -15,15 +14,12 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.matrices import damping_of, mass_of
 from validate.fem.system import System
-from validate.solve.dynamic import Moving
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.explicit_linear import UpdateName as ExplicitUpdate
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import Rule, per_mode, rule_of
-from validate.solve.types import Stepper
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
-STEPPED_LIMIT = 400  # free unknowns of a stepper's own map: a dense matrix of 1200
 _COUPLED = 1e-8  # of the damping, as in `fem.modes`
 
 
@@ -69,7 +65,7 @@ def modes_with(system: System, scheme: Newmark | ExplicitLinear) -> tuple[Floats
     modal = shapes.T @ C @ shapes
     c = np.diag(modal).copy()
     if np.abs(modal - np.diag(c)).max() > _COUPLED * max(float(np.abs(c).max()), 1e-300):
-        raise SceneError("the damping couples the modes; use step_matrix of the stepper")
+        raise SceneError("the damping couples the modes; use Rayleigh damping of one material")
     return np.sqrt(np.maximum(squares, 0.0)), c
 
 
@@ -99,25 +95,3 @@ def explicit_maps(h: float, c: Floats, k: Floats, update: ExplicitUpdate) -> Flo
 def spectral_radii(maps: Floats) -> Floats:
     """Largest magnitude of the eigenvalues of every map (r, m, m)."""
     return np.asarray(np.abs(np.linalg.eigvals(maps)).max(axis=-1))
-
-
-def step_matrix(stepper: Stepper, system: System) -> Floats:
-    """The map (3 m, 3 m) of (u, v, a) of the free unknowns, by steps from unit states at inputs 0.
-
-    Raises `SceneError` above 400 free unknowns.
-    """
-    m = len(system.free)
-    if m > STEPPED_LIMIT:
-        raise SceneError(f"{m} unknowns: a step's dense map has at most {STEPPED_LIMIT}")
-    rest = stepper.rest()
-    assert isinstance(rest.inner, Moving)
-    still = np.zeros(len(system.scene.inputs))
-    columns = np.empty((3 * m, 3 * m))
-    for j in range(3 * m):
-        x = np.zeros((3, m))
-        x[j // m, j % m] = 1.0
-        # A state that has been under way: the first step treats loads in its own way.
-        one = replace(rest, k=1, inner=replace(rest.inner, u=x[0], v=x[1], a=x[2]))
-        after: Moving = stepper.step(one, still).inner
-        columns[:, j] = np.concatenate([after.u, after.v, after.a])
-    return columns

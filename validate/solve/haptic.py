@@ -41,8 +41,3 @@ class RealTime:
     def force_hz(self) -> float:
         """New forces a second when the model runs in step with the clock, at most 1/dt."""
         return min(self.rate_hz, 1 / self.dt)
-
-    @property
-    def haptic(self) -> bool:
-        """Whether every haptic tick gets a force of its own."""
-        return self.factor >= 1 and self.force_hz >= HAPTIC_HZ

@@ -106,26 +106,13 @@ class Propagation:
     @cached_property
     def A(self) -> sparse.csr_array:
         """Paper 001, eq 12."""
-        return self._mixed(0, _weights(self.rule)[2])
-
-    @cached_property
-    def L(self) -> sparse.csr_array:
-        """Paper 001, eq 14."""
-        return self._mixed(1, 0.0)
-
-    @cached_property
-    def M_a(self) -> sparse.csr_array:
-        """The matrix of a: M itself for average acceleration."""
-        return self._mixed(2, 0.0)
+        (mu, _, _), (cu, _, _), ku = _weights(self.rule)
+        return sparse.csr_array(mu * self.M + cu * self.C + ku * self.K)
 
     @cached_property
     def J(self) -> sparse.csr_array:
         """Paper 001, eq 13."""
         return _system_matrix(self.rule, self.M, self.C, self.K)
-
-    def _mixed(self, column: int, k: float) -> sparse.csr_array:
-        m, c, _ = _weights(self.rule)
-        return sparse.csr_array(m[column] * self.M + c[column] * self.C + k * self.K)
 
 
 def propagation(

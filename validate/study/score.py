@@ -11,10 +11,6 @@ from validate.estimate.consistency import Consistency, nis_consistency
 
 POOLED = "all.rmse"
 NIS = "nis.per_dof"
-WORDS = {
-    POOLED: "root mean square error over all probes and times",
-    NIS: "normalised innovation squared over its degrees of freedom; 1 for a consistent filter",
-}
 
 
 @dataclass(frozen=True)

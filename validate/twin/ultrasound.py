@@ -20,8 +20,6 @@ from validate.errors import SceneError
 from validate.parameters import quantity
 from validate.recording.images.raster import coverage
 
-SPECKLE_RATIO = float(np.sqrt(np.pi / (4 - np.pi)))  # mean / sd of a Rayleigh envelope
-
 
 @dataclass(frozen=True)
 class Scanner:
