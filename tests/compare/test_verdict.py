@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.verdict import Check, Sensitivity, error_and_noise, judge
-from validate.errors import ComparisonError
 
 
 def scalar(value: float, sd: float = 1.0, systematic: float = 0.0) -> Residual:
@@ -21,12 +21,12 @@ def points(values: np.ndarray, sd: float = 1.0, systematic: float = 0.0) -> Resi
 
 
 def judged(residual: Residual, limit: float = 1e9, **inputs: float) -> Check:
-    """Judged on a second mesh that changes nothing; inputs of one unit each."""
+    """Judged without a discretisation; inputs of one unit each."""
     parts = [
         Sensitivity(name, replace(residual, values=np.full(residual.values.shape, size)), 1.0)
         for name, size in inputs.items()
     ]
-    return judge(residual, limit, residual, 1.0, parts)
+    return judge(residual, limit, Numerical(), parts)
 
 
 # The three verdicts
@@ -54,12 +54,13 @@ def test_branches(value: float, limit: float, verdict: str) -> None:
     assert check.name == "pressure@9mm"
 
 
-def test_uncertainties_add_in_squares_and_the_mesh_has_its_safety() -> None:
-    """u_D 3 and 4, u_num 1.5 x 16 / 2, inputs 2 x 6 and 5: 13 from (5, 12)."""
+def test_uncertainties_add_in_squares() -> None:
+    """u_D 3 and 4, u_num 12 of mesh and step, inputs 2 x 6 and 5: 13 from (5, 12)."""
     one = scalar(1.0, 3.0, 4.0)
-    finer = scalar(17.0, 3.0, 4.0)
+    numerical = Numerical({"mesh": 12.0 * 0.6, "time step": 12.0 * 0.8}, "three meshes")
     inputs = [Sensitivity("friction", scalar(6.0), -2.0), Sensitivity("pose", scalar(5.0), 1.0)]
-    check = judge(one, 1e3, finer, 2.0, inputs)
+    check = judge(one, 1e3, numerical, inputs)
+    assert check.numerical == "three meshes"
     assert check.u_D == pytest.approx(5.0)
     assert check.u_num == pytest.approx(12.0)
     assert check.u_input == pytest.approx(13.0)
@@ -75,13 +76,17 @@ def test_undecided_names_what_would_decide() -> None:
         why = judged(scalar(0.1), 0.5, **parts).why
         assert f"better measurement of '{name}' would decide" in why
         assert "exceeds the limit 0.5" in why
-    finer = scalar(10.0)
-    assert "'mesh' would decide" in judge(scalar(0.0), 0.5, finer, 1.0, []).why
+    for name, better in (("mesh", "a finer mesh"), ("time step", "a shorter time step")):
+        check = judge(scalar(0.0), 0.5, Numerical({name: 10.0}), [])
+        assert f"{better} would decide" in check.why
 
 
-def test_no_second_mesh_is_refused() -> None:
-    with pytest.raises(ComparisonError, match="pressure@9mm: no second mesh, so no u_num"):
-        judge(scalar(0.0), 1.0, None, 1.0, [])
+@pytest.mark.parametrize("error", [0.0, 1e6])
+def test_nothing_is_decided_where_nothing_bounds_the_discretisation(error: float) -> None:
+    unbounded = Numerical({"mesh": np.inf, "time step": 0.1}, "diverging: cells of 1 mm decide")
+    check = judge(scalar(error), 1e9, unbounded, [])
+    assert (check.verdict, check.why) == ("cannot decide", "diverging: cells of 1 mm decide")
+    assert (check.u_num, check.u_val) == (np.inf, np.inf)
 
 
 def test_exact_agreement_without_any_uncertainty() -> None:

@@ -1,5 +1,6 @@
 """Tables and progress bars on the terminal; plain lines when it is not one."""
 
+import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -53,6 +54,8 @@ def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 def shown(value: float, unit: str) -> str:
     """A value as people read it: m as mm, Pa as kPa above 1000, s as us."""
+    if math.isinf(value):
+        return "unknown"
     if unit == "m":
         return f"{1e3 * value:.3f} mm"
     if unit == "Pa":

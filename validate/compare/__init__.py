@@ -4,6 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "residual": ("Residual", "residuals"),
+    "numerical": ("Numerical",),
     "score": ("Score", "scores_of"),
     "verdict": ("Accept", "Check", "Sensitivity", "judge"),
     "published": ("Figure", "Published"),

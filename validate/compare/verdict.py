@@ -8,6 +8,7 @@ not explain, sqrt(rms^2 - noise^2), and u_D half of the smallest such part that 
 in 5 % of repetitions (chi-square with one degree of freedom per number compared).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -15,16 +16,19 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import rms
+from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
-from validate.errors import ComparisonError
 from validate.estimate.consistency import chi_square_quantile
 
 Verdict = Literal["agrees", "differs", "cannot decide"]
 
-# Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
-SAFETY = 3.0 / 2
 # The name of the part of u_val that a filter itself claims.
 OWN_COVARIANCE = "the filter's own covariance"
+_OTHERWISE = {
+    OWN_COVARIANCE: "a filter that is surer of its estimate",
+    "mesh": "a finer mesh",
+    "time step": "a shorter time step",
+}
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,10 @@ class Accept:
 
 @dataclass(frozen=True)
 class Check:
-    """A verdict: error `value`, `limit`, `u_val` and its parts, in `unit`; points compared."""
+    """A verdict: error `value`, `limit`, `u_val` and its parts, in `unit`; points compared.
+
+    u_num and u_val are infinite where nothing bounds them; `numerical` says how u_num was found.
+    """
 
     name: str
     value: float
@@ -52,6 +59,7 @@ class Check:
     count: int
     verdict: Verdict
     why: str
+    numerical: str = ""
 
     @property
     def holds(self) -> bool:
@@ -70,33 +78,22 @@ class Sensitivity:
 def judge(
     residual: Residual,
     limit: float,
-    finer: Residual | None,
-    refinement: float,
+    numerical: Numerical,
     inputs: Sequence[Sensitivity],
 ) -> Check:
-    """The verdict on one residual.
-
-    `finer` is the same residual on a finer mesh, `refinement` = r^p - 1 with the ratio r of the
-    cell sizes and the formal order p. Raises `ComparisonError` when there is no second mesh.
-    """
-    if finer is None:
-        raise ComparisonError(f"{residual.name}: no second mesh, so no u_num; set a finer mesh")
-    if refinement <= 0:
-        raise ComparisonError(
-            f"{residual.name}: the second mesh is not finer than the first (r^p - 1 = "
-            f"{refinement:.3g}); set a finer one"
-        )
+    """The verdict on one residual; where nothing bounds u_num it cannot be decided."""
     E, u_D = error_and_noise(residual)
-    u_num = SAFETY * rms(finer.values - residual.values) / refinement
+    u_num = numerical.u
     parts = {s.name: abs(s.scale) * rms(s.change.values) for s in inputs}
     u_input = float(np.sqrt(sum(p**2 for p in parts.values())))
     u_val = float(np.sqrt(u_D**2 + u_num**2 + u_input**2))
-    named = {"measurement": u_D, "mesh": u_num} | parts
-    verdict, why = _verdict(E, u_val, limit, named)
+    named = {"measurement": u_D} | dict(numerical.parts) | parts
+    verdict, why = _verdict(E, u_val, limit, named, numerical.words)
     name = residual.name if _scalar(residual) else f"{residual.quantity}.rms@{residual.load}"
     return Check(
-        name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why
-    )
+        name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why,
+        numerical.words,
+    )  # fmt: skip
 
 
 def error_and_noise(residual: Residual) -> tuple[float, float]:
@@ -110,7 +107,11 @@ def error_and_noise(residual: Residual) -> tuple[float, float]:
     return float(E), float(np.hypot(reach / 2, np.sqrt(c) * residual.systematic))
 
 
-def _verdict(E: float, u_val: float, limit: float, parts: dict[str, float]) -> tuple[Verdict, str]:
+def _verdict(
+    E: float, u_val: float, limit: float, parts: dict[str, float], numerical: str
+) -> tuple[Verdict, str]:
+    if math.isinf(u_val):
+        return "cannot decide", numerical
     largest = max(parts, key=lambda name: parts[name])
     if abs(E) > 2 * u_val:
         return "differs", f"|E| is {abs(E) / u_val:.1f} u_val" if u_val else "u_val is zero"
@@ -128,9 +129,7 @@ def _verdict(E: float, u_val: float, limit: float, parts: dict[str, float]) -> t
 
 def _better(part: str) -> str:
     """What would make a part of u_val smaller."""
-    if part == OWN_COVARIANCE:
-        return "a filter that is surer of its estimate"
-    return f"a better measurement of '{part}'"
+    return _OTHERWISE.get(part, f"a better measurement of '{part}'")
 
 
 def _scalar(residual: Residual) -> bool:

@@ -7,15 +7,18 @@ import numpy as np
 
 from validate.arrays import rms
 from validate.compare.effects import Effect, effect
+from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
-from validate.compare.verdict import OWN_COVARIANCE, SAFETY, Accept, Check, Sensitivity, judge
+from validate.compare.verdict import OWN_COVARIANCE, Accept, Check, Sensitivity, judge
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows
 from validate.replay.experiment import EffectSpec, Uncertainty, Variant, unchanged
 from validate.replay.followed import Followed
 from validate.replay.runs import Road
 
+# Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
+_SAFETY = 3.0 / 2
 _NO_UNIT = "-"  # of a quantity that no observation has
 
 
@@ -37,7 +40,7 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
-    refined, ratio = _refined(road, mine.method, mine.residuals)
+    errors = _mesh_errors(road, mine.method, mine.residuals)
     inputs, own = _sensitivities(road), _own_doubt(mine)
     found: list[Check] = []
     for accept in road.experiment.accept:
@@ -46,8 +49,7 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
             judge(
                 mine.residuals[key],
                 accept.limit,
-                refined.get(key),
-                ratio,
+                Numerical({"mesh": errors[key]}),
                 inputs.get(key, []) + own.get(key, []),
             )
             for key in keys
@@ -61,26 +63,28 @@ def _accepts(accept: Accept, residual: Residual) -> bool:
     )
 
 
-def _refined(
-    road: Road, name: str, residuals: Mapping[str, Residual]
-) -> tuple[Mapping[str, Residual], float]:
-    """A method's residuals as they would be on the finer mesh, by itself or its stand-in, and
-    r^p - 1 of the two meshes.
+def _mesh_errors(road: Road, name: str, residuals: Mapping[str, Residual]) -> dict[str, float]:
+    """u_num of every residual of a method, SI: by itself or its stand-in on the finer mesh.
 
     A twin of the same model on the same mesh has no discretisation error: u_num is zero there.
     """
     uncertainty = _declared(road)
     if uncertainty is None:
-        return residuals, 1.0
+        return dict.fromkeys(residuals, 0.0)
     own = uncertainty.stand_in.get(name, name)
     coarse = road.main(Variant(own)).residuals
     finer = road.main(Variant(own, uncertainty.finer)).residuals
-    shifted = {
-        key: replace(r, values=r.values + finer[key].values - coarse[key].values)
-        for key, r in residuals.items()
-        if key in finer and key in coarse
-    }
-    return shifted, uncertainty.refinement(road.parameters)
+    scale = _SAFETY / _refinement(uncertainty, road)
+    return {key: scale * rms(finer[key].values - coarse[key].values) for key in residuals}
+
+
+def _refinement(uncertainty: Uncertainty, road: Road) -> float:
+    found = uncertainty.refinement(road.parameters)
+    if found <= 0:
+        raise ComparisonError(
+            f"the second mesh is not finer than the first (r^p - 1 = {found:.3g}); set a finer one"
+        )
+    return found
 
 
 def _declared(road: Road) -> Uncertainty | None:
@@ -154,7 +158,7 @@ def effects_of(road: Road, results: tuple[MethodResult, ...]) -> tuple[Effect, .
     if not shown:
         return ()
     inputs = _sensitivities(road)
-    meshes = [_mesh_errors(road, m) for m in results if m.accepted]
+    meshes = [_mesh_errors(road, m.name, m.residuals) for m in results if m.accepted]
     return tuple(
         effect(
             e.name,
@@ -166,13 +170,6 @@ def effects_of(road: Road, results: tuple[MethodResult, ...]) -> tuple[Effect, .
         )
         for e in shown
     )
-
-
-def _mesh_errors(road: Road, method: MethodResult) -> dict[str, float]:
-    """u_num of every residual of an accepted method, SI."""
-    refined, ratio = _refined(road, method.name, method.residuals)
-    scale = SAFETY / ratio
-    return {key: scale * rms(r.values - method.residuals[key].values) for key, r in refined.items()}
 
 
 def _shared(
