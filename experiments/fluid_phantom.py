@@ -34,8 +34,10 @@ METHODS: Mapping[str, Method] = {
 }
 
 
-def identify(recordings: Sequence[Recording], parameters: Phantom) -> Identified:
-    return friction_from_rise(EXPERIMENT, "md_fluid", recordings, parameters)
+def identify(
+    recordings: Sequence[Recording], parameters: Phantom, methods: Mapping[str, Method]
+) -> Identified:
+    return friction_from_rise(EXPERIMENT, methods["md_fluid"], recordings, parameters)
 
 
 ADDED_SENSORS = (

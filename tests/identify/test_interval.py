@@ -5,7 +5,7 @@ import pytest
 
 from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.identify.interval import profile_interval
+from validate.identify.interval import mesh_share, profile_interval
 
 
 def test_a_parabola_gives_its_minimum_and_two_standard_deviations() -> None:
@@ -23,6 +23,24 @@ def test_a_side_that_the_data_do_not_bound_ends_with_the_grid() -> None:
     assert found.high == pytest.approx(0.2, abs=0.02)
 
 
+def test_the_meshs_share_widens_both_sides_within_the_grid() -> None:
+    grid = np.linspace(0, 1, 21)
+    chi_square = 30 + ((grid - 0.4) / 0.05) ** 2
+    found = profile_interval(grid, chi_square, 30, mesh=0.12)
+    assert (found.low, found.high) == pytest.approx((0.4 - 0.26, 0.4 + 0.26), abs=2e-3)
+    wide = profile_interval(grid, chi_square, 30, mesh=2.0)
+    assert (wide.low, wide.high) == (0.0, 1.0)
+
+
+def test_the_meshs_share_is_richardsons_with_a_factor() -> None:
+    """u(h) = 10 + 3 h^2 at h = 0.1 is off by 0.03, from either side; 1.5 of it is u."""
+    own, finer, coarser = (10 + 3 * h**2 for h in (0.1, 0.05, 0.15))
+    assert mesh_share(own, finer, 0.5, 2.0) == pytest.approx(1.5 * 0.03)
+    assert mesh_share(own, coarser, 1.5, 2.0) == pytest.approx(1.5 * 0.03)
+    with pytest.raises(ComparisonError, match="two sizes are needed"):
+        mesh_share(own, finer, 1.0, 2.0)
+
+
 def test_nothing_to_profile_is_an_error() -> None:
     with pytest.raises(ComparisonError, match="3 points over 9"):
         profile_interval(np.arange(3.0), np.zeros(3), 9)
@@ -34,4 +52,5 @@ def test_the_phantoms_slipping_plates_are_identified(phantom_result: Result) -> 
     found = {s.name: s for s in phantom_result.identified}
     assert found["friction.share.low"].value == 0.0
     assert found["friction.share.high"].value < 0.1
+    assert 0 < found["friction.share.mesh"].value < 0.05
     assert found["friction.share"].count == 126

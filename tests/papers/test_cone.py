@@ -52,7 +52,7 @@ def test_sets_lie_on_their_surfaces_and_cover_the_boundary() -> None:
 def test_equal_diameters_are_the_cylinder() -> None:
     cone, cylinder = (
         quarter_cone(0.05, 0.05, 0.03, 3, 4, 2.0),
-        quarter_cylinder(0.05, 0.03, 3, 4, 2.0),
+        quarter_cylinder(0.05, 0.03, 3, 4, 2.0, inscribed=True),
     )
     assert np.array_equal(cone.nodes, cylinder.nodes)
     assert np.array_equal(cone.facets["side"], cylinder.facets["rim"])

@@ -49,7 +49,7 @@ def test_the_checks_hold_and_count_every_sample(result: Result) -> None:
     assert len(result.recordings) == 5
     assert [(p.verdict, p.fault) for p in result.published] == [("reproduced", "")]
     assert any("Whether the plates slipped" in note for note in result.notes)
-    assert "kPa (bonded plates) and 107.7 kPa (slipping)" in result.sentence
+    assert "kPa (bonded plates) and 107.7 ± 0.9 kPa (slipping)" in result.sentence
 
 
 def test_every_law_is_compared_within_its_validity_and_no_further(result: Result) -> None:
@@ -77,9 +77,16 @@ def test_bonded_svk_ends_where_a_corner_leaves_its_law(result: Result) -> None:
 
 
 def test_large_strain_moduli_have_confidence_and_a_bracket(result: Result) -> None:
-    """Neo-Hooke to 50 %: mu = E/3, 31 kPa slipping; data/README has 36.7 kPa to 66 %."""
+    """Neo-Hooke to 50 %: mu = E/3, 30.4 kPa slipping; data/README has 36.7 kPa to 66 %.
+
+    It was 31.2 kPa on a mesh with 97.45 % of the cylinder's area.
+    """
     found = {s.name: s.value for s in result.identified}
-    assert found["modulus.neo_slip"] / 3 == pytest.approx(31.2e3, rel=0.02)
+    assert found["modulus.neo_slip"] / 3 == pytest.approx(30.39e3, rel=1e-3)
     assert 0.55 < found["modulus.neo_bonded"] / found["modulus.neo_slip"] < 0.65
     assert 0 < found["modulus.neo_slip.confidence"] < 0.02 * found["modulus.neo_slip"]
+    # Five by six elements do not resolve the corners of held plates: meshes of 6 x 8 and 8 x 10
+    # give 59.9 and 63.5 kPa, and the logs' scatter alone would print 0.5.
+    assert found["modulus.neo_bonded"] == pytest.approx(55.3e3, rel=5e-3)
+    assert found["modulus.neo_bonded.confidence"] > 8e3
     assert all(m.band == pytest.approx(0.043) for m in result.methods)

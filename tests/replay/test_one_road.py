@@ -1,6 +1,6 @@
 """What one road has the other has too: the same tiny block over time and at holds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -31,6 +31,7 @@ from validate.replay.experiment import (
     Variant,
 )
 from validate.replay.followed import Cases
+from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.scene.scene import Scene
@@ -152,7 +153,9 @@ def test_identification(road: Experiment) -> None:
     """What was identified from the recordings is what the models run with."""
     given: list[int] = []
 
-    def identify(recordings: tuple[Recording, ...], card: Card) -> Identified:
+    def identify(
+        recordings: Sequence[Recording], card: Card, methods: Mapping[str, Method]
+    ) -> Identified:
         given.append(len(recordings))
         score = Score("modulus.E", 12e3, "Pa", 1, "measured recording", "told")
         return Identified(replace(card, E=12e3), (score,), ("It was told.",), "E = 12 kPa")

@@ -159,7 +159,7 @@ def test_arrays_of_a_wrong_shape_or_content_are_refused(
 
 
 def test_facet_nodes_and_nearest_node() -> None:
-    mesh = quarter_cylinder(0.05, 0.03, 2, 3)
+    mesh = quarter_cylinder(0.05, 0.03, 2, 3, inscribed=True)
     top = mesh.facet_nodes("upper_plate")
     assert np.array_equal(top, np.flatnonzero(mesh.nodes[:, 2] > 0.03 - 1e-9))
     for corner in product((0.0, 0.025), (0.0,), (0.0, 0.03)):

@@ -3,7 +3,7 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "interval": ("Interval", "profile_interval"),
+    "interval": ("Interval", "mesh_share", "profile_interval"),
     "law": ("LawFit", "fit_scale"),
     "modulus": ("ModulusFit", "gent_correction", "identify_modulus"),
 }

@@ -22,9 +22,11 @@ class LawFit:
     count: int
     residual_rms: float
 
-    def confidence(self, logs: int) -> float | None:
-        """Two standard deviations of the mean over `logs` repeats."""
-        return None if self.sd_repeats is None else 2 * self.sd_repeats / float(np.sqrt(logs))
+    def confidence(self, logs: int, mesh: float = 0.0) -> float | None:
+        """Two standard deviations: of the mean over `logs` repeats, and `mesh` of the mesh."""
+        if self.sd_repeats is None:
+            return None
+        return 2 * float(np.hypot(self.sd_repeats / np.sqrt(logs), mesh))
 
 
 def fit_scale(curves: Sequence[Floats], forces: Sequence[Floats]) -> LawFit:

@@ -135,7 +135,9 @@ def _size(p: Compression) -> Cylinder:
     return Cylinder(p.specimen.diameter, p.specimen.height)
 
 
-def _identify(recordings: Sequence[Recording], p: Compression) -> Identified:
+def _identify(
+    recordings: Sequence[Recording], p: Compression, methods: Mapping[str, Method]
+) -> Identified:
     if p.material.E is not None:
         return Identified(p, (), ())
     E = identify_modulus(recordings, _size(p), (p.fit_from, p.fit_to)).mean

@@ -30,10 +30,15 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
             raise UsageError(f"unknown method '{name}'; {nearest_names(name, known)}")
     parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
     mine = {k: v for k, v in options.values.items() if not k.startswith("methods.")}
-    theirs = {k[8:]: v for k, v in options.values.items() if k.startswith("methods.")}
-    methods = dict(with_values(experiment.methods, theirs))
+    methods = all_methods(experiment, options)
     chosen = options.methods or tuple(methods)
     return with_values(parameters, mine), {name: methods[name] for name in chosen}
+
+
+def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
+    """Every method with the user's values, whether it is run or not: what identifies follows."""
+    theirs = {k[8:]: v for k, v in options.values.items() if k.startswith("methods.")}
+    return dict(with_values(experiment.methods, theirs))
 
 
 def folder_of(experiment: Experiment) -> Path:

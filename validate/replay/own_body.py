@@ -22,7 +22,7 @@ from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.refine import refined
 from validate.scene.scene import LawName, Scene
 
-_SAME_VOLUME = 0.02  # of a body with curved faces on two meshes
+_SAME = 0.02  # relative: extents and volume of a body with curved faces on two meshes
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def own_body(experiment: Experiment) -> OwnBody:
     parameters = experiment.parameters
     recordings = experiment.load(parameters, folder_of(experiment))
     if experiment.identify is not None:
-        parameters = experiment.identify(recordings, parameters).parameters
+        parameters = experiment.identify(recordings, parameters, experiment.methods).parameters
     return OwnBody(experiment, parameters, recordings[0])
 
 
@@ -136,8 +136,8 @@ def _scaled(p: Parameter, factor: float) -> str:
 
 def _same_body(one: Mesh, other: Mesh) -> bool:
     """Whether the nodes are other ones and the body is the same."""
-    extents = np.allclose(np.ptp(one.nodes, axis=0), np.ptp(other.nodes, axis=0), rtol=1e-6)
-    volume = np.isclose(_volume(one), _volume(other), rtol=_SAME_VOLUME)
+    extents = np.allclose(np.ptp(one.nodes, axis=0), np.ptp(other.nodes, axis=0), rtol=_SAME)
+    volume = np.isclose(_volume(one), _volume(other), rtol=_SAME)
     return bool(extents and volume) and len(one.nodes) != len(other.nodes)
 
 

@@ -18,7 +18,7 @@ from validate.replay.checks import checks_of, effects_of, variants_of
 from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
-from validate.replay.options import Options, Report, configure, folder_of
+from validate.replay.options import Options, Report, all_methods, configure, folder_of
 from validate.replay.runs import Road
 from validate.replay.sentence import verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
@@ -28,7 +28,9 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
     shipped = experiment.load(parameters, folder_of(experiment))
-    identified = experiment.identify(shipped, parameters) if experiment.identify else None
+    identified = None
+    if experiment.identify:
+        identified = experiment.identify(shipped, parameters, all_methods(experiment, options))
     used = identified.parameters if identified else parameters
     road = Road(experiment, methods, used, report, quick=options.quick)
     road.expect(variants_of(road))

@@ -8,9 +8,19 @@ from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_posit
 
 
 def quarter_cylinder(
-    diameter: float, height: float, radial: int, axial: int, grading: float = 1.0
+    diameter: float,
+    height: float,
+    radial: int,
+    axial: int,
+    grading: float = 1.0,
+    *,
+    inscribed: bool = False,
 ) -> Mesh:
     """Linear tetrahedra of x, y >= 0, axis z; `radial`, `axial` count elements.
+
+    The rim is a polygon of 8 `radial` sides with the circle's area, so that the mesh carries the
+    force of the round body: its corners lie a little outside the circle, on it if `inscribed`, with
+    an area that is then too small (2.6 % for two elements).
 
     A square grid is mapped onto the quarter disc ring by ring (the concentric map); Kuhn's diagonal
     runs from the axis to the rim, so no cell is flat. `grading` above 1 shrinks the cells towards
@@ -28,7 +38,8 @@ def quarter_cylinder(
     ring = np.maximum(i, j)
     angle = np.pi / 4 * _ratio(np.where(i >= j, j, i), ring)
     angle = np.where(i >= j, angle, np.pi / 2 - angle)
-    r = diameter / 2 * (1 - (1 - ring / radial) ** grading)
+    corner = diameter / 2 * (1.0 if inscribed else _outside(radial))
+    r = corner * (1 - (1 - ring / radial) ** grading)
     s = 2 * k / axial - 1
     z = height / 2 * (1 + np.sign(s) * (1 - (1 - np.abs(s)) ** grading))
     nodes = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=-1)
@@ -46,6 +57,15 @@ def quarter_cylinder(
     mesh = Mesh(nodes.reshape(-1, 3), cells, "tet4", facets)
     require_positive_cells(mesh)
     return mesh
+
+
+def _outside(radial: int) -> float:
+    """Corner radius over circle radius where polygon and circle have one area.
+
+    A polygon of n corners on a circle has n sin(2 pi / n) / (2 pi) of its area.
+    """
+    share = 4 * radial / np.pi * np.sin(np.pi / (4 * radial))
+    return float(1 / np.sqrt(share))
 
 
 def _ratio(part: Floats, whole: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """The cylinders of Dawood et al. (2026): parameters, logs, scene and registration."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -18,8 +18,8 @@ from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.compression import STAGE, SYMMETRY, between, pressed_log
 from validate.scene.cylinder import quarter_cylinder
-from validate.scene.mesh import quadratic
 from validate.scene.plates import Contact
+from validate.scene.refine import of_element
 from validate.scene.scene import LawName, Material, Scene
 
 DATA_SET = "abubakardawood/tissue-phantom-material-database (CC BY 4.0)"
@@ -128,22 +128,17 @@ def build(recording: Recording, parameters: LoggedCylinder, model: CylinderModel
 def model_scene(
     size: tuple[float, float], p: LoggedCylinder, model: CylinderModel, E: float
 ) -> Scene:
-    grid = replace(p.mesh, radial=model.radial or p.mesh.radial, axial=model.axial or p.mesh.axial)
+    """A quarter of the cylinder with its planes of symmetry, the upper plate driven down."""
+    mesh = quarter_cylinder(*size, *grid_of(p, model), p.mesh.grading)
+    supports = (*between(model.plates), *SYMMETRY)
     material = Material(E, p.material.nu, model.law)
-    scene = cylinder_scene(*size, grid, material, model.plates)
-    if model.order == 2:
-        return scene
-    linear = quarter_cylinder(*size, grid.radial, grid.axial, grid.grading)
-    return replace(scene, mesh=linear, dilatation="nodal_mean")
+    scene = Scene(mesh, material, supports, drives=(STAGE,), copies=4)
+    return of_element(scene, "P2" if model.order == 2 else "MD")
 
 
-def cylinder_scene(
-    diameter: float, height: float, grid: QuarterGrid, material: Material, contact: Contact
-) -> Scene:
-    """A quarter of the cylinder with its two planes of symmetry, the upper plate driven down."""
-    mesh = quadratic(quarter_cylinder(diameter, height, grid.radial, grid.axial, grid.grading))
-    supports = (*between(contact), *SYMMETRY)
-    return Scene(mesh, material, supports, drives=(STAGE,), copies=4)
+def grid_of(p: LoggedCylinder, model: CylinderModel) -> tuple[int, int]:
+    """Elements from axis to rim and along the axis: the method's own, else the mesh's."""
+    return model.radial or p.mesh.radial, model.axial or p.mesh.axial
 
 
 def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Registered:
@@ -166,10 +161,9 @@ def specimen_size(recording: Recording, p: LoggedCylinder) -> tuple[float, float
     )
 
 
-def stiffening(
-    diameter: float, height: float, grid: QuarterGrid, nu: float, contact: Contact
-) -> float:
-    """Apparent over true modulus of the meshed cylinder: E_app = F h / (A d) at E = 1 Pa."""
-    scene = cylinder_scene(diameter, height, grid, Material(1.0, nu), contact)
+def stiffening(size: tuple[float, float], p: LoggedCylinder, model: CylinderModel) -> float:
+    """Apparent over true modulus of a method's meshed cylinder: E_app = F h / (A d) at E = 1 Pa."""
+    diameter, height = size
+    scene = model_scene(size, p, model, 1.0)
     force = responses(build_system(scene)).reactions[0, 0]
     return float(force * height / (np.pi * diameter**2 / 4))

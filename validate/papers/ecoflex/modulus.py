@@ -4,24 +4,28 @@ Whether the plates slipped was not recorded, so linear FEM brackets it: slipping
 apparent modulus as the material's, bonded ones divide it by the stiffening that the mesh shows.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import ceil, hypot, sqrt
+from typing import TypeVar
 
 import numpy as np
 
 from validate.arrays import rms
 from validate.compare.score import Score
 from validate.fem.system import build as build_system
+from validate.identify.interval import mesh_share
 from validate.identify.law import LawFit, fit_scale
 from validate.identify.modulus import (
     Cylinder,
     ModulusSummary,
-    apparent_to_material,
     gent_correction,
     identify_modulus,
 )
 from validate.papers.ecoflex.cylinder import (
+    CylinderModel,
     LoggedCylinder,
+    grid_of,
     model_scene,
     place,
     specimen_size,
@@ -32,45 +36,75 @@ from validate.register.signals import SignalObservation
 from validate.replay.experiment import Identified
 from validate.replay.method import Method
 
+T = TypeVar("T")
+
+LAWS = ("svk_slip", "neo_slip", "neo_bonded")
+# Where a held plate meets the free side the displacement grows as r^0.595: the least root of
+# sin^2(pi l / 2) = 1 - l^2 (Williams, J. Appl. Mech. 19 (1952) 526, clamped and free sides at 90
+# degrees, incompressible), and the force converges at twice that.
+CORNER_ORDER = 1.19
+
 
 def identified(
-    methods: Mapping[str, Method], recordings: Sequence[Recording], parameters: LoggedCylinder
+    recordings: Sequence[Recording], parameters: LoggedCylinder, methods: Mapping[str, Method]
 ) -> Identified:
-    """The modulus for which this mesh has the measured slope, slipping and bonded."""
+    """The modulus for which each method, on its own mesh, has the measured slope or force."""
     p = parameters
-    window = (p.fit_from, p.fit_to)
-    diameter, height = specimen_size(recordings[0], p)
-    found = identify_modulus(recordings, Cylinder(diameter, height), window)
-    slip, bonded = (
-        stiffening(diameter, height, p.mesh, p.material.nu, c) for c in ("slip", "bonded")
-    )
-    half = stiffening(diameter, height / 2, p.mesh, p.material.nu, "bonded")
-    laws = {
-        name: _law_fit(recordings, p, methods[name])
-        for name in ("svk_slip", "neo_slip", "neo_bonded")
-    }
-    material = replace(
-        p.material,
-        E_slip=p.material.E_slip or found.mean / slip,
-        E_bonded=p.material.E_bonded or found.mean / bonded,
-        **{f"E_{k}": getattr(p.material, f"E_{k}") or fit.scale for k, fit in laws.items()},
-    )
-    scores = _scores(found, bonded, gent_correction(diameter, height))
-    scores += tuple(
-        s
-        for name, fit in laws.items()
-        for s in _law_scores(name, methods[name].label, fit, len(recordings))
-    )
+    size = specimen_size(recordings[0], p)
+    found = identify_modulus(recordings, Cylinder(*size), (p.fit_from, p.fit_to))
+    factors = {name: _stiffening(size, p, methods[name].scene) for name in ("slip", "bonded")}
+    laws = {name: _law_fit(recordings, p, methods[name]) for name in LAWS}
+    moduli = {name: found.mean / factor for name, (factor, _) in factors.items()}
+    moduli |= {name: fit.scale for name, (fit, _) in laws.items()}
+    chosen = {f"E_{k}": getattr(p.material, f"E_{k}") or v for k, v in moduli.items()}
+    bonded, _ = factors["bonded"]
+    scores = _scores(found, factors, gent_correction(*size))
+    for name, (fit, mesh) in laws.items():
+        scores += _law_scores(name, methods[name].label, fit, mesh, len(recordings))
     headline = (
-        f"The modulus lies between {found.mean / bonded / 1e3:.1f} kPa (bonded plates) and "
-        f"{found.mean / 1e3:.1f} kPa (slipping): force alone cannot say which"
+        f"The modulus lies between {_span(moduli['bonded'], found, factors['bonded'])} (bonded "
+        f"plates) and {_span(moduli['slip'], found, factors['slip'])} (slipping): force alone "
+        "cannot say which"
     )
-    notes = _notes(found, bonded, half, height)
-    return Identified(replace(p, material=material), scores, notes, headline)
+    squat = stiffening((size[0], size[1] / 2), p, methods["bonded"].scene)
+    notes = _notes(found, moduli, squat / bonded, size[1])
+    return Identified(replace(p, material=replace(p.material, **chosen)), scores, notes, headline)
 
 
-def _law_fit(recordings: Sequence[Recording], p: LoggedCylinder, method: Method) -> LawFit:
-    """The law's modulus over its whole range, by the method's own mesh."""
+Factor = tuple[float, float]  # apparent over true modulus, and its uncertainty from the mesh
+
+
+def _stiffening(size: tuple[float, float], p: LoggedCylinder, model: CylinderModel) -> Factor:
+    return _meshed(p, model, lambda m: stiffening(size, p, m), float)
+
+
+def _law_fit(
+    recordings: Sequence[Recording], p: LoggedCylinder, method: Method
+) -> tuple[LawFit, float]:
+    """The law's modulus over its whole range, by the method's own mesh, and the mesh's share Pa."""
+    model: CylinderModel = method.scene
+    return _meshed(
+        p, model, lambda m: _fitted(recordings, p, replace(method, scene=m)), lambda f: f.scale
+    )
+
+
+def _meshed(
+    p: LoggedCylinder,
+    model: CylinderModel,
+    solve: Callable[[CylinderModel], T],
+    value: Callable[[T], float],
+) -> tuple[T, float]:
+    """What `solve` finds on the model's mesh, and the mesh's share from one of 2/3 the elements,
+    of 3/2 where two of them are the least."""
+    own = grid_of(p, model)
+    by = 2 / 3 if min(own) > 2 else 3 / 2
+    radial, axial = (ceil(by * n) for n in own)
+    found, again = solve(model), solve(replace(model, radial=radial, axial=axial))
+    ratio = sqrt(own[0] * own[1] / (radial * axial))
+    return found, mesh_share(value(found), value(again), ratio, CORNER_ORDER)
+
+
+def _fitted(recordings: Sequence[Recording], p: LoggedCylinder, method: Method) -> LawFit:
     scene = model_scene(specimen_size(recordings[0], p), p, method.scene, 1.0)
     stepper = method.settings.prepare(build_system(scene))
     curves, forces = [], []
@@ -84,44 +118,65 @@ def _law_fit(recordings: Sequence[Recording], p: LoggedCylinder, method: Method)
     return fit_scale(curves, forces)
 
 
-def _law_scores(name: str, label: str, fit: LawFit, logs: int) -> tuple[Score, ...]:
+def _law_scores(name: str, label: str, fit: LawFit, mesh: float, logs: int) -> tuple[Score, ...]:
     words = f"modulus over the law's whole range, {label}; shear modulus is a third"
     rows = [(f"modulus.{name}", fit.scale, "Pa", words)]
+    rows.append((f"modulus.{name}.mesh", mesh, "Pa", _MESH))
     if fit.sd_repeats is not None:
         rows.append((f"modulus.{name}.sd_repeats", fit.sd_repeats, "Pa", "sd of one log's modulus"))
-        band = fit.confidence(logs) or 0.0
-        rows.append((f"modulus.{name}.confidence", band, "Pa", "two sd of the mean over the logs"))
+        band = fit.confidence(logs, mesh) or 0.0
+        rows.append((f"modulus.{name}.confidence", band, "Pa", _BAND))
     rows.append((f"force.fit_rms.{name}", fit.residual_rms, "N", "rms residual of the fitted law"))
     return tuple(Score(n, v, unit, fit.count, "measured logs", w) for n, v, unit, w in rows)
 
 
-def _scores(found: ModulusSummary, bonded: float, gent: float) -> tuple[Score, ...]:
+_MESH = "standard uncertainty from the mesh, of two meshes"
+_BAND = "two sd: of the mean over the logs and of the mesh"
+
+
+def _scores(found: ModulusSummary, factors: Mapping[str, Factor], gent: float) -> tuple[Score, ...]:
     logs, samples = len(found.fits), sum(f.count for f in found.fits)
-    bracket = apparent_to_material(found, bonded)
     noise = rms([f.noise for f in found.fits])
+    words = {"slip": "material's, if the plates slip", "bonded": "material's, if the plates hold"}
     rows = [
         ("modulus.E", found.mean, "Pa", samples, "apparent modulus, mean over the logs"),
         ("modulus.E.sd_repeats", found.sd_repeats or 0.0, "Pa", logs, "sd of one log's modulus"),
         ("modulus.E.sd_mean", found.sd_mean, "Pa", logs, "sd of the mean over the logs"),
-        ("modulus.E_slip", bracket.slip, "Pa", samples, "material's, if the plates slip"),
-        ("modulus.E_bonded", bracket.bonded, "Pa", samples, "material's, if the plates hold"),
-        ("modulus.bonded_factor", bonded, "1", 1, "apparent over true modulus, bonded, this mesh"),
+        ("modulus.bonded_factor", factors["bonded"][0], "1", 1,
+         "apparent over true modulus, bonded, this mesh"),
         ("modulus.gent_factor", gent, "1", 1, "the same by Gent's formula"),
         ("load_cell.noise", noise, "N", samples, "sd of the load cell's noise, from the logs"),
-    ]
-    return tuple(
-        Score(name, v, unit, n, "measured logs", words) for name, v, unit, n, words in rows
-    )
+    ]  # fmt: skip
+    for name, (factor, mesh) in factors.items():
+        E = found.mean / factor
+        rows += [
+            (f"modulus.E_{name}", E, "Pa", samples, words[name]),
+            (f"modulus.E_{name}.mesh", E * mesh / factor, "Pa", samples, _MESH),
+            (f"modulus.E_{name}.confidence", _band(found, (factor, mesh)), "Pa", samples, _BAND),
+        ]
+    return tuple(Score(name, v, unit, n, "measured logs", w) for name, v, unit, n, w in rows)
 
 
-def _notes(found: ModulusSummary, bonded: float, half: float, height: float) -> tuple[str, ...]:
+def _band(found: ModulusSummary, factor: Factor) -> float:
+    value, mesh = factor
+    return 2 * found.mean / value * hypot(found.sd_mean / found.mean, mesh / value)
+
+
+def _span(E: float, found: ModulusSummary, factor: Factor) -> str:
+    """A modulus with two standard deviations of the logs' mean and of the mesh."""
+    return f"{E / 1e3:.1f} ± {_band(found, factor) / 1e3:.1f} kPa"
+
+
+def _notes(
+    found: ModulusSummary, moduli: Mapping[str, float], half: float, height: float
+) -> tuple[str, ...]:
     offsets = [f.offset for f in found.fits]
     toes = [1e3 * height * f.toe for f in found.fits]
     return (
         f"Whether the plates slipped was not recorded. The material's modulus lies between "
-        f"{found.mean / bonded / 1e3:.1f} kPa (bonded) and {found.mean / 1e3:.1f} kPa (slipping).",
+        f"{moduli['bonded'] / 1e3:.1f} kPa (bonded) and {moduli['slip'] / 1e3:.1f} kPa (slipping).",
         f"Force alone cannot tell the two apart. A cylinder of {500 * height:.0f} mm height would: "
-        f"its apparent modulus would be {half / bonded:.2f} times this one's with bonded plates "
+        f"its apparent modulus would be {half:.2f} times this one's with bonded plates "
         "and the same with slipping ones.",
         f"Load cell offsets of {min(offsets):.3f}..{max(offsets):.3f} N and toes of "
         f"{min(toes):.3f}..{max(toes):.3f} mm (seating of the plate: where the fitted line reaches "

@@ -21,7 +21,7 @@ def quarter_cone(
         raise SceneError(
             f"cone of diameters {1e3 * bottom:g} and {1e3 * top:g} mm: both must be positive"
         )
-    upright = quarter_cylinder(bottom, height, radial, axial, grading)
+    upright = quarter_cylinder(bottom, height, radial, axial, grading, inscribed=True)
     nodes = upright.nodes.copy()
     nodes[:, :2] *= (1 + (top / bottom - 1) * nodes[:, 2] / height)[:, None]
     facets = {_NAMES.get(name, name): f for name, f in upright.facets.items()}

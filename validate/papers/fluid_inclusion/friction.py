@@ -5,12 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.score import Score
-from validate.identify.interval import Interval, profile_interval
+from validate.identify.interval import SAFETY, Interval, profile_interval
+from validate.papers.fluid_inclusion.effects import UNCERTAINTY
 from validate.papers.fluid_inclusion.phantom import Phantom
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified
+from validate.replay.method import Method
 from validate.replay.solved import solve
 
 SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
@@ -26,24 +29,44 @@ def _rubbing(p: Phantom, share: float) -> Phantom:
 
 
 def friction_from_rise(
-    experiment: Experiment, method: str, recordings: Sequence[Recording], parameters: Phantom
+    experiment: Experiment, method: Method, recordings: Sequence[Recording], parameters: Phantom
 ) -> Identified:
     """Plate friction from the vertical rise of the markers, by one method of the experiment."""
 
-    def rise(share: float) -> list[Residual]:
-        rubbing, settings = _rubbing(parameters, share), experiment.methods[method]
-        found = solve(experiment, tuple(recordings), method, settings, rubbing).residuals
-        return [r for r in found.values() if r.quantity == "marker.vertical"]
+    def rise(share: float, p: Phantom) -> list[Residual]:
+        found = solve(experiment, tuple(recordings), "friction", method, _rubbing(p, share))
+        return [r for r in found.residuals.values() if r.quantity == "marker.vertical"]
 
-    risen = [rise(float(share)) for share in SHARES]
-    chi_square = [sum(float((r.values**2).sum()) / r.sd**2 for r in found) for found in risen]
-    fit = profile_interval(SHARES, np.array(chi_square), sum(r.count for r in risen[-1]))
+    risen = [rise(float(share), parameters) for share in SHARES]
+    weighed = np.array([_weighed(found) for found in risen])
+    chi_square = (weighed**2).sum(axis=1)
+    best = int(np.argmin(chi_square))
+    finer = _weighed(rise(float(SHARES[best]), UNCERTAINTY.finer(parameters)))
+    mesh = _mesh_share(weighed, best, finer, UNCERTAINTY.refinement(parameters))
+    fit = profile_interval(SHARES, chi_square, sum(r.count for r in risen[-1]), mesh)
     return Identified(parameters, _scores(fit), (_said(fit),))
+
+
+def _weighed(found: Sequence[Residual]) -> Floats:
+    """All residuals (n,) over their standard deviations."""
+    return np.concatenate([r.values.ravel() / r.sd for r in found])
+
+
+def _mesh_share(weighed: Floats, best: int, finer: Floats, refinement: float) -> float:
+    """How far the share moves, by least squares, when the mesh's error is taken off the rise.
+
+    `weighed` (g, n) at every share, `finer` (n,) at the best one on the finer mesh; `refinement` is
+    r^p - 1 of the two meshes.
+    """
+    slope = np.gradient(weighed, SHARES, axis=0)[best]
+    moved = float(slope @ (finer - weighed[best])) / float(slope @ slope)
+    return SAFETY * abs(moved) / refinement
 
 
 def _scores(fit: Interval) -> tuple[Score, ...]:
     words = "tangential plate stiffness k as k/(k + 1e6 N/m3): 0 slips, 1 bonds; from the rise"
     rows = {"share": fit.best, "share.low": fit.low, "share.high": fit.high}
+    rows["share.mesh"] = fit.mesh
     rows["chi_square"] = fit.chi_square
     return tuple(
         Score(f"friction.{name}", value, "1", fit.count, "measured markers", words)
@@ -54,6 +77,7 @@ def _scores(fit: Interval) -> tuple[Score, ...]:
 def _said(fit: Interval) -> str:
     return (
         f"Plate friction from the markers' vertical rise ({fit.count} values): share "
-        f"{fit.best:.2f}, between {fit.low:.2f} and {fit.high:.2f} (two standard deviations), "
-        "where 0 is slipping, 1 bonded and 0.5 a tangential stiffness of 1e6 N/m3."
+        f"{fit.best:.2f}, between {fit.low:.2f} and {fit.high:.2f} (two standard deviations, "
+        f"one of {fit.mesh:.1g} from the mesh among them), where 0 is slipping, 1 bonded and 0.5 a "
+        "tangential stiffness of 1e6 N/m3."
     )
