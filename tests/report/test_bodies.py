@@ -58,6 +58,19 @@ def test_a_probe_that_dies_means_no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
     gl._working_window.cache_clear()
 
 
+def test_gl_is_probed_once_by_who_asks_early_and_who_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    probes: list[int] = []
+    alive = subprocess.CompletedProcess([], 0)
+    monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    monkeypatch.setattr(subprocess, "run", lambda *_a, **_k: probes.append(1) or alive)
+    gl._working_window.cache_clear()
+    gl.ask()
+    assert gl.available()
+    gl._working_window.cache_clear()
+    assert len(probes) == 1
+
+
 def test_a_probe_that_hangs_means_no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
     def hangs(*_a: object, **_k: object) -> None:
         raise subprocess.TimeoutExpired("probe", 60)

@@ -12,6 +12,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.find import find, root_of
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.report import gl
 from validate.report.write import write_report
 
 
@@ -26,6 +27,7 @@ def run(
     as_json: bool,
 ) -> int:
     """Runs experiments and writes their reports; 0 when all checks of all hold."""
+    gl.ask()
     start = Path.cwd()
     chosen = [find(n, start) for n in (experiment_files(start) if everything else names)]
     wanted = tuple(m.strip() for m in methods.split(",") if m.strip())

@@ -91,12 +91,14 @@ def _eliminated(
     borders = np.concatenate([columns.row, *(p.border for p in parts)], dtype=np.int64)
     rows = np.union1d(np.arange(start, stop), borders)
     F = np.zeros((len(rows), len(rows)))
-    F[np.searchsorted(rows, columns.row), columns.col] = columns.data
-    for part in parts:
+    for i, part in enumerate(parts):
         at = np.searchsorted(rows, part.border)
-        F[np.ix_(at, at)] += part.matrix
+        within = np.ix_(at, at)
+        F[within] = part.matrix if i == 0 else F[within] + part.matrix  # the first meets zeros
+    F[np.searchsorted(rows, columns.row), columns.col] += columns.data
     k = stop - start
     L = cholesky(F[:k, :k], lower=True, check_finite=False)
     below = solve_triangular(L, F[k:, :k].T, lower=True, check_finite=False).T
-    left = F[k:, k:] - below @ below.T
+    left = below @ below.T
+    np.subtract(F[k:, k:], left, out=left)
     return Front(start, stop, rows[k:], L, below), _Update(rows[k:], left)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -82,7 +83,9 @@ def image_axes(ax: Axes, outlines: Iterable[Floats]) -> None:
     ax.set(xlabel="image x / mm", ylabel="image y / mm")
 
 
-def _paint(figure: Figure, shots: list[_Shot], label: str, driven: str) -> Callable[[int], None]:
+def _paint(
+    figure: Figure, shots: list[_Shot], label: str, driven: str
+) -> Callable[[int], tuple[Artist, ...]]:
     ax = figure.subplots()
     rest = np.vstack([shots[1].measured, shots[1].measured[:1]])
     ax.plot(*rest.T, color="#9A9A9A", lw=0.8, label="measured at rest")
@@ -91,11 +94,11 @@ def _paint(figure: Figure, shots: list[_Shot], label: str, driven: str) -> Calla
     image_axes(ax, (o for s in shots for o in (s.simulated, s.measured)))
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
-    def turn(i: int) -> None:
+    def turn(i: int) -> tuple[Artist, ...]:
         shot = shots[i]
         line.set_data(*shot.simulated.T)
         points.set_data(*shot.measured.T)
         points.set_color(MEASURED if shot.held else _BEFORE)
-        ax.set_title(f"{driven} at {shot.title}")
+        return points, line, ax.set_title(f"{driven} at {shot.title}")
 
     return turn

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from functools import cache
+from threading import Lock, Thread
 
 HOW_TO_GET = (
     "Three-dimensional renders are missing: this machine has no OpenGL library. On Debian or "
@@ -23,6 +24,12 @@ pixels = plotter.screenshot(return_img=True)
 raise SystemExit(0 if pixels.min() < pixels.max() else 1)
 """
 _TIMEOUT = 60.0  # s: a cold start of VTK on a slow disk
+_ONE_PROBE = Lock()
+
+
+def ask() -> None:
+    """Begins to find out beside what comes next, for `available` to answer at once later."""
+    Thread(target=available, daemon=True).start()
 
 
 def available() -> bool:
@@ -32,7 +39,8 @@ def available() -> bool:
     """
     if os.environ.get("VALIDATE_NO_GL") == "1":
         return False
-    window = _working_window(os.environ.get(_VARIABLE, ""))
+    with _ONE_PROBE:
+        window = _working_window(os.environ.get(_VARIABLE, ""))
     if window is None:
         return False
     os.environ[_VARIABLE] = window

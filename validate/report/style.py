@@ -1,11 +1,12 @@
 """How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -71,21 +72,32 @@ def free_look(i: int, colour: str) -> Style:
 
 
 def film(
-    paint: Callable[[Figure], Callable[[int], None]], count: int, width: float, height: float
+    paint: Callable[[Figure], Callable[[int], Sequence[Artist]]],
+    count: int,
+    width: float,
+    height: float,
 ) -> tuple[Pixels, ...]:
     """`count` pictures of one figure: `paint` fills it and returns what turns it to number i.
 
-    The layout is that of number 0 throughout.
+    That names the artists that it changes, which alone are drawn anew, over all others. The layout
+    is that of number 0 throughout.
     """
     settings: Any = dict(_SETTINGS)
     with mpl.rc_context(settings):
         figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)
         turn, taken = paint(figure), list[Pixels]()
+        moving = turn(0)
+        canvas.draw()
+        figure.set_layout_engine("none")
+        for artist in moving:
+            artist.set_animated(True)
+        canvas.draw()
+        still = canvas.copy_from_bbox(figure.bbox)
         for i in range(count):
-            turn(i)
-            canvas.draw()
-            figure.set_layout_engine("none")
+            canvas.restore_region(still)
+            for artist in turn(i):
+                figure.draw_artist(artist)
             taken.append(_pixels(canvas))
     return tuple(taken)
 
