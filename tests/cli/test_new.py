@@ -59,7 +59,7 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     assert (paths["specimen.diameter"], paths["specimen.height"]) == (DIAMETER, HEIGHT)
     result = compare(load_file(tmp_path / "experiments" / "my_gel.py"))
     assert [(c.name, c.verdict) for c in result.checks] == [
-        ("force.rms@fit", "agrees"), ("force.rms@beyond", "agrees"),
+        ("force.rms@fit", "fitted"), ("force.rms@beyond", "agrees"),
     ]  # fmt: skip
     values = {p.path: p.default for p in result.parameters}
     assert values["material.E"] == pytest.approx(E, rel=0.02)
@@ -157,5 +157,5 @@ def test_a_mesh_file_is_a_body_too(tmp_path: Path) -> None:
     assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
     mine = load_file(tmp_path / "experiments" / "my_gel.py")
     result = compare(mine, {"specimen.mesh": str(tmp_path / "body.npz")})
-    assert [c.verdict for c in result.checks] == ["agrees", "agrees"]
+    assert [c.verdict for c in result.checks] == ["fitted", "agrees"]
     assert result.methods[0].scene.copies == 1

@@ -57,7 +57,7 @@ def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root
         outputs[arguments[0]] = out
     assert "clock_offset/images" in outputs["inspect"]
     assert "seconds 0.25, sd 0.01" in outputs["inspect"]
-    assert "2 of 2 checks agree" in outputs["run"]
+    assert "my_gel: agrees; evidence: 1 of 2 checks; measured" in outputs["run"]
     assert (own_files / "reports" / "my_gel" / "report.html").stat().st_size > 10_000
     recording = read_recording(own_files / "test.mcap")
     assert set(recording.signals) == {"displacement", "force"}

@@ -9,7 +9,16 @@ from scipy.stats import chi2
 from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import Result
-from validate.compare.verdict import Check, Sensitivity, error_and_noise, judge
+from validate.compare.verdict import (
+    Accept,
+    Check,
+    Sensitivity,
+    as_fitted,
+    as_repeated,
+    error_of,
+    judge,
+)
+from validate.errors import ComparisonError
 
 
 def scalar(value: float, sd: float = 1.0, systematic: float = 0.0) -> Residual:
@@ -49,7 +58,7 @@ def judged(residual: Residual, limit: float = 1e9, **inputs: float) -> Check:
 def test_branches(value: float, limit: float, verdict: str) -> None:
     check = judged(scalar(value), limit)
     assert check.verdict == verdict
-    assert check.holds == (verdict == "agrees")
+    assert check.evidence == (verdict != "cannot decide")
     assert (check.value, check.u_val, check.count, check.unit) == (value, 1.0, 1, "Pa")
     assert check.name == "pressure@9mm"
 
@@ -101,16 +110,18 @@ def test_exact_agreement_without_any_uncertainty() -> None:
 
 def test_error_of_many_points_is_what_noise_does_not_explain() -> None:
     """12 points with (3, 4): rms 5; noise 1 per component explains sqrt(2) of it."""
-    E, u_D = error_and_noise(points(np.tile([3.0, 4.0], (12, 1)), 1.0, 0.5))
+    seen = error_of(points(np.tile([3.0, 4.0], (12, 1)), 1.0, 0.5))
     reach = np.sqrt(2.0 * (chi2.ppf(0.95, 24) / 24 - 1))
-    assert pytest.approx(np.sqrt(23.0)) == E
-    assert u_D == pytest.approx(np.hypot(reach / 2, np.sqrt(2) * 0.5))
+    assert (seen.raw, seen.noise) == pytest.approx((5.0, np.sqrt(2.0)))
+    assert pytest.approx(np.sqrt(23.0)) == seen.E
+    assert seen.u_D == pytest.approx(np.hypot(reach / 2, np.sqrt(2) * 0.5))
     assert judged(points(np.tile([3.0, 4.0], (12, 1)))).name == "contour.rms@9mm"
 
 
 def test_residual_smaller_than_its_noise_is_no_error() -> None:
-    E, _ = error_and_noise(points(np.full((10, 1), 0.5)))
-    assert E == 0.0
+    seen = error_of(points(np.full((10, 1), -0.5)))
+    assert (seen.E, seen.raw, seen.noise) == (0.0, 0.5, 1.0)
+    assert str(seen.E) == "0.0"
     assert judged(points(np.full((10, 1), 0.5))).verdict == "agrees"
 
 
@@ -128,7 +139,7 @@ def test_perfect_model_agrees_in_95_of_100_repetitions(k: int, c: int) -> None:
 @pytest.mark.parametrize(("k", "c"), [(1, 1), (40, 1), (42, 2)])
 def test_bias_of_three_u_is_found(k: int, c: int) -> None:
     values = np.zeros((k, c))
-    u = error_and_noise(points(values + 1e6))[1]
+    u = error_of(points(values + 1e6)).u_D
     noise = 0.0 if k * c == 1 else float(c)
     values[:, 0] = np.sqrt((3 * u) ** 2 + noise)
     check = judged(points(values))
@@ -143,6 +154,54 @@ def test_noisy_bias_is_found_as_often_as_the_normal_law_says() -> None:
     for bias, share in ((3.0, 0.8413), (1.5, 0.3087)):
         found = np.mean([judged(scalar(bias + zi)).verdict == "differs" for zi in z])
         assert found == pytest.approx(share, abs=0.02)
+
+
+def test_error_of_one_component_keeps_its_sign() -> None:
+    """A force too low at every sample is a negative error; distances in a plane have no sign."""
+    assert pytest.approx(-np.sqrt(24.0)) == error_of(points(np.full((12, 1), -5.0))).E
+    assert pytest.approx(np.sqrt(24.0)) == error_of(points(np.full((12, 1), 5.0))).E
+    assert error_of(points(np.full((12, 2), -5.0))).E > 0
+
+
+# What is not a number
+
+
+@pytest.mark.parametrize("hole", [np.nan, np.inf])
+def test_what_is_not_a_number_never_agrees(hole: float) -> None:
+    """A NaN compares false with everything, so every branch would let it through to `agrees`."""
+    still = scalar(1.0)
+    checks = [
+        judged(scalar(1.0, sd=hole)),
+        judged(scalar(1.0, systematic=hole)),
+        judge(still, 9.0, Numerical(), [Sensitivity("pose", scalar(1.0), hole)]),
+        judged(still, limit=hole),
+    ]
+    assert [c.verdict for c in checks] == 4 * ["cannot decide"]
+    assert all("not a finite number: " in c.why for c in checks)
+
+
+@pytest.mark.parametrize("limit", [np.nan, np.inf, 0.0, -1.0])
+def test_accepted_limit_is_a_positive_number(limit: float) -> None:
+    with pytest.raises(ComparisonError, match="is not a positive number"):
+        Accept("force", limit, "ours")
+
+
+# What is no evidence
+
+
+def test_fitted_is_no_evidence_whatever_the_error() -> None:
+    for value in (0.1, 9.0):
+        check = as_fitted(judged(scalar(value)), "served to identify")
+        assert (check.verdict, check.evidence) == ("fitted", False)
+        assert check.why.startswith("served to identify: no evidence; |E| is")
+    nothing = replace(judged(scalar(0.1)), count=0, verdict="cannot decide")
+    assert as_fitted(nothing, "served") == nothing
+
+
+def test_a_model_that_repeats_itself_cannot_agree_but_may_differ() -> None:
+    assert as_repeated(judged(scalar(0.1)), "same").verdict == "repeats itself"
+    assert as_repeated(judged(scalar(9.0)), "same").verdict == "differs"
+    assert as_repeated(judged(scalar(0.1), 0.5), "same").verdict == "cannot decide"
 
 
 # The whole

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,10 +76,17 @@ def untold() -> Result:
     """Nobody knows the truth, and another recording lies beside."""
     case = Case("other", "another recording", shifted, shipped=True)
     fem_and_filter = {name: TINY.methods[name] for name in ("fem", "kf")}
-    return compare(
-        replace(TINY, methods=fem_and_filter, twin=None, uncertainty=FINER, cases=(case,)),
-        Options({}),
+    own = replace(
+        TINY, methods=fem_and_filter, twin=None, uncertainty=FINER, cases=(case,), load=as_measured
     )
+    return compare(own, Options({}))
+
+
+def as_measured(card: Card, folder: Path) -> tuple[Recording, ...]:
+    """The recording as an instrument writes it: it does not say that a model made it."""
+    (made,) = TINY.load(card, folder)
+    told = {k: v for k, v in made.metadata.items() if k not in ("provenance", "made_with")}
+    return (replace(made, metadata=told),)
 
 
 def test_a_recording_without_a_twin_is_judged_by_its_residuals(untold: Result) -> None:
@@ -89,7 +97,7 @@ def test_a_recording_without_a_twin_is_judged_by_its_residuals(untold: Result) -
     assert check.value**2 == pytest.approx(
         max(rms(residual.values) ** 2 - 3 * residual.sd**2, 0.0), abs=1e-15
     )
-    assert (untold.same_model, untold.seed, untold.twin_notice) == (False, None, "")
+    assert (untold.kind, untold.seed, untold.twin_notice) == ("measured", None, "")
 
 
 def test_without_a_twin_nothing_is_scored_or_drawn_against_a_truth(untold: Result) -> None:
@@ -284,5 +292,5 @@ def test_a_signal_whose_trace_no_method_has_is_a_note_and_a_failed_check() -> No
     result = compare(declared(AT_HOLDS, place=place, uncertainty=FINER), Options({}))
     assert any(note.startswith("cell: cell compared with nothing") for note in result.notes)
     (check,) = (c for c in result.checks if c.name == "force")
-    assert (check.unit, check.count, check.holds) == ("N", 0, False)
+    assert (check.unit, check.count, check.verdict) == ("N", 0, "cannot decide")
     assert not result.passed

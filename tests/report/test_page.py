@@ -10,6 +10,7 @@ from report_samples import BLIND, CHECK, bare_result, small_result
 
 from validate.compare.effects import Change
 from validate.compare.result import Result
+from validate.compare.verdict import Verdict
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.html import page
 from validate.report.sections import exhibits
@@ -91,13 +92,16 @@ def test_all_recordings_are_drawn() -> None:
 
 
 @pytest.mark.parametrize(
-    ("verdict", "word", "colour"),
-    [("agrees", "Agrees", "good"), ("differs", "Differs", "bad"),
-     ("cannot decide", "Undecided", "open")],
+    ("verdict", "size", "word", "colour"),
+    [("agrees", 0.01, "Agrees", "good"), ("differs", 0.1, "Differs", "bad"),
+     ("cannot decide", 0.01, "Undecided", "open"), ("fitted", 0.1, "No evidence", "open"),
+     ("repeats itself", 0.01, "No evidence", "open")],
 )  # fmt: skip
-def test_band_says_the_verdict_in_words_and_colour(verdict: str, word: str, colour: str) -> None:
+def test_band_says_the_verdict_in_words_and_colour(
+    verdict: Verdict, size: float, word: str, colour: str
+) -> None:
     result = small_result()
-    method = replace(result.methods[0], checks=(replace(CHECK, verdict=verdict),))
+    method = replace(result.methods[0], checks=(replace(CHECK, value=size, verdict=verdict),))
     text = empty(replace(result, methods=(method,)))
     assert f'class="band {colour}" id="verdict"><b>{word}:' in text
     assert unescape(text).count(result.sentence) == 1
@@ -110,7 +114,7 @@ def test_nothing_checked_is_undecided() -> None:
 @pytest.mark.parametrize("anchor", ["quick", "twin", "same-model"])
 def test_notices_only_where_they_apply(anchor: str) -> None:
     plain = small_result()
-    told = replace(plain, quick=True, twin_notice="It is a twin.", same_model=True)
+    told = replace(plain, quick=True, twin_notice="It is a twin.", kind="same model")
     assert f'id="{anchor}"' not in empty(plain)
     assert f'id="{anchor}"' in empty(told)
 
@@ -134,7 +138,7 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
     (table,) = found["checks"].exhibit.tables
     assert [shown(c) for c in table.rows[0]] == [
         "soft", "force.plate@2mm", "N",
-        "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
+        "0.0120", "0.00800", "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
         "✓ agrees", "|E| is 0.5 u_val",
     ]  # fmt: skip
 

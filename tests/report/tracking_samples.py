@@ -175,7 +175,7 @@ def tracking_result() -> Result:
         name="box_push", title="A box pushed to and fro", source="A made-up source",
         sentence="Kalman filter predicts what was held out: 1 of 1 checks agree.",
         parameters=(), methods=methods, recordings=(recording,), rest=(), effects=(), published=(),
-        notes=("nothing odd",), same_model=True, exhibits=shown(),
+        notes=("nothing odd",), kind="same model", exhibits=shown(),
     )  # fmt: skip
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from validate.catalogue import experiment_files
 from validate.cli.arguments import FAILED
-from validate.cli.display import console, progress, shown, table
+from validate.cli.display import console, error_shown, progress, shown, table
 from validate.compare.published import Published
-from validate.compare.result import Result
+from validate.compare.result import KINDS, Result
 from validate.replay.find import find
 from validate.replay.options import Options
 from validate.replay.road import compare
@@ -56,22 +56,23 @@ def _document(result: Result, holds: bool) -> dict[str, Any]:
 
 def _print(result: Result) -> None:
     screen = console()
-    screen.print(f"{result.name}: {result.source}\n", soft_wrap=True)
+    screen.print(f"{result.name}: {KINDS[result.kind]}", soft_wrap=True)
+    screen.print(f"{result.source}\n", soft_wrap=True)
     rows = [
         [p.name, _value(p.ours, p), _value(p.theirs, p), p.fault or p.verdict, p.reason]
         for p in result.published
     ]
     screen.print(table("Published figures", ["figure", "ours", "theirs", "verdict", "why"], rows))
     checks = [
-        [c.name, shown(c.value, c.unit), shown(c.limit, c.unit), str(c.count), c.verdict]
+        [c.name, error_shown(c), shown(c.limit, c.unit), str(c.count), c.verdict]
         for c in result.checks
     ]
     screen.print(table("\nAccepted limits", ["check", "error", "limit", "n", "verdict"], checks))
     faults = sum(bool(p.fault) for p in result.published)
-    held = sum(c.holds for c in result.checks)
+    overall = result.overall
     screen.print(
         f"\n{len(result.published)} published figures, {faults} no longer stand; "
-        f"{held} of {len(result.checks)} checks agree\n"
+        f"checks: {overall.word}, {overall.counted}\n"
     )
 
 

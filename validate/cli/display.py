@@ -5,10 +5,14 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+if TYPE_CHECKING:  # what only names a type costs `validate list` nothing
+    from validate.compare.verdict import Check
 
 
 def console(*, error: bool = False) -> Console:
@@ -63,6 +67,11 @@ def shown(value: float, unit: str) -> str:
     if unit == "s":
         return f"{1e6 * value:.1f} us" if value < 1e-2 else f"{value:.2f} s"
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def error_shown(check: "Check") -> str:
+    """The error of a check; that noise explains all of it is no zero."""
+    return "within noise" if check.value == 0 < check.raw else shown(check.value, check.unit)
 
 
 def relative(path: Path) -> str:

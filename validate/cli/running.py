@@ -6,8 +6,8 @@ from time import perf_counter
 
 from validate.catalogue import experiment_files
 from validate.cli.arguments import FAILED, pairs
-from validate.cli.display import console, progress, relative, shown, table
-from validate.compare.result import Result
+from validate.cli.display import console, error_shown, progress, relative, shown, table
+from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, root_of
 from validate.replay.options import Options
@@ -53,12 +53,16 @@ def _one(experiment: Experiment, options: Options, out: Path, as_json: bool) -> 
 def _summary(result: Result, page: Path, seconds: float) -> None:
     screen = console()
     rows = [
-        [m.name, c.name, shown(c.value, c.unit), shown(2 * c.u_val, c.unit),
+        [m.name, c.name, error_shown(c), shown(2 * c.u_val, c.unit),
          shown(c.limit, c.unit), str(c.count), c.verdict, c.why]
         for m in result.methods for c in m.checks
     ]  # fmt: skip
     head = ["method", "check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
-    screen.print(f"{result.name}: {result.title}\n", soft_wrap=True)
+    found = result.overall
+    screen.print(
+        f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", soft_wrap=True
+    )
+    screen.print(f"{result.title}\n", soft_wrap=True)
     if rows:
         screen.print(table("Checks", head, rows))
     screen.print(f"\n{result.sentence}", soft_wrap=True)

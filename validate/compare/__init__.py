@@ -14,6 +14,7 @@ _HOMES = {
     "force_error": ("force_pair", "force_scores"),
     "boundary": ("outline_boundary",),
     "shape_error": ("Boundaries", "boundary_scores"),
+    "overall": ("Overall", "judge_all"),
     "result": ("MethodResult", "Result"),
     "exhibit": ("Animation", "Chart", "Exhibit", "NodeMap", "NumberTable", "Picture", "Series"),
 }

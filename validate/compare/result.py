@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Literal
 
 from validate.compare.effects import Effect
 from validate.compare.exhibit import Exhibit
+from validate.compare.overall import Overall, judge_all
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.score import Score
@@ -15,6 +17,15 @@ from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.scene.material_point import AnyScene
 from validate.solve.types import Run
+
+Kind = Literal["measured", "twin", "same model"]
+KINDS: Mapping[Kind, str] = MappingProxyType(
+    {
+        "measured": "measured",
+        "twin": "twin, made by another model than the one judged",
+        "same model": "same model, the recording and the judged model are one",
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +57,10 @@ class MethodResult:
 
 @dataclass(frozen=True)
 class Result:
-    """An experiment compared: all that a report needs."""
+    """An experiment compared: all that a report needs.
+
+    `kind` is what the recording is: measured, a twin, or the judged model's own.
+    """
 
     name: str
     title: str
@@ -61,7 +75,7 @@ class Result:
     identified: tuple[Score, ...] = ()
     notes: tuple[str, ...] = ()
     quick: bool = False
-    same_model: bool = False
+    kind: Kind = "measured"
     seed: int | None = None
     twin_notice: str = ""
     inputs: tuple[str, ...] = field(default=())
@@ -77,6 +91,11 @@ class Result:
         return tuple(c for m in self.methods for c in m.checks)
 
     @property
+    def overall(self) -> Overall:
+        """The experiment's verdict, corrected for the number of its checks."""
+        return judge_all(self.checks)
+
+    @property
     def passed(self) -> bool:
-        """All checks hold, and there is at least one: a run that compares nothing has failed."""
-        return bool(self.checks) and all(c.holds for c in self.checks)
+        """What the exit code follows: a run that compares nothing has failed."""
+        return self.overall.passed

@@ -10,7 +10,15 @@ from validate.compare.effects import Effect, effect
 from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
-from validate.compare.verdict import OWN_COVARIANCE, Accept, Check, Sensitivity, judge
+from validate.compare.verdict import (
+    OWN_COVARIANCE,
+    Accept,
+    Check,
+    Sensitivity,
+    as_fitted,
+    as_repeated,
+    judge,
+)
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows
 from validate.replay.experiment import EffectSpec, Uncertainty, Variant, unchanged
@@ -46,15 +54,33 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
     for accept in road.experiment.accept:
         keys = [k for k, r in mine.residuals.items() if _accepts(accept, r)]
         found += [
-            judge(
+            _classed(
+                road,
+                mine,
                 mine.residuals[key],
-                accept.limit,
-                Numerical({"mesh": errors[key]}),
-                inputs.get(key, []) + own.get(key, []),
+                judge(
+                    mine.residuals[key],
+                    accept.limit,
+                    Numerical({"mesh": errors[key]}),
+                    inputs.get(key, []) + own.get(key, []),
+                ),
             )
             for key in keys
         ] or [_nothing(accept, mine)]
     return tuple(found)
+
+
+def _classed(road: Road, mine: Followed, residual: Residual, check: Check) -> Check:
+    """The check as what it is: fitted, a model that repeats itself, or evidence."""
+    if residual.role == "calibrates" or {residual.name, residual.quantity} & set(road.calibrated):
+        return as_fitted(check, "these data served to identify")
+    if residual.quantity in road.settings[mine.method].markers:
+        return as_fitted(check, "this marker was given to the filter")
+    if road.remade:
+        return as_repeated(check, "the recording was made again from this run's own parameters")
+    if road.kind == "same model":
+        return as_repeated(check, "recording and judged model are the same model")
+    return check
 
 
 def _accepts(accept: Accept, residual: Residual) -> bool:
@@ -89,7 +115,7 @@ def _refinement(uncertainty: Uncertainty, road: Road) -> float:
 
 def _declared(road: Road) -> Uncertainty | None:
     experiment = road.experiment
-    if experiment.uncertainty is None and not experiment.same_model:
+    if experiment.uncertainty is None and road.kind != "same model":
         raise ComparisonError(f"{experiment.name}: no uncertainty is declared; u_val unknown")
     return experiment.uncertainty
 

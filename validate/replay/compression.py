@@ -142,7 +142,8 @@ def _identify(
         return Identified(p, (), ())
     E = identify_modulus(recordings, _size(p), (p.fit_from, p.fit_to)).mean
     note = f"E = {E:.0f} Pa was identified from the recording in the window 'fit', slipping plates."
-    return Identified(replace(p, material=replace(p.material, E=E)), (), (note,))
+    used = replace(p, material=replace(p.material, E=E))
+    return Identified(used, (), (note,), calibrated=("force@fit",))
 
 
 # --- the scene ------------------------------------------------------------------------------------

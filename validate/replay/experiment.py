@@ -82,13 +82,15 @@ class Uncertainty:
 class Identified:
     """What was identified from the recordings: parameters to use, scores, and sentences to show.
 
-    `headline` opens the verdict.
+    `headline` opens the verdict. `calibrated` names the residuals (a quantity, or quantity@load)
+    whose data served: checks on them are fitted, and no evidence.
     """
 
     parameters: Any
     scores: tuple[Score, ...]
     notes: tuple[str, ...]
     headline: str = ""
+    calibrated: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

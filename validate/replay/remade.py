@@ -21,6 +21,12 @@ def stamped(recording: Recording, parameters: Any) -> Recording:
     return replace(recording, metadata=kept)
 
 
+def synthetic(recording: Recording) -> bool:
+    """Whether a recording says of itself that a model made it."""
+    told = recording.metadata
+    return _RECORD in told or dict(told.get("provenance", {})).get("kind") == "twin"
+
+
 def made_by(
     recording: Recording,
     parameters: Any,

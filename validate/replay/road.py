@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from validate.compare.exhibit import captioned
 from validate.compare.published import Published
 from validate.compare.residual import rest_residuals, unanswered
-from validate.compare.result import MethodResult, Result
+from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.fem.locking import locking_warning
@@ -23,6 +23,12 @@ from validate.replay.runs import Road
 from validate.replay.sentence import verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
 
+_AGAINST: Mapping[Kind, str] = {
+    "measured": "measured recording",
+    "twin": "recording of a twin",
+    "same model": "recording of the same model",
+}
+
 
 def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
@@ -32,7 +38,8 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     if experiment.identify:
         identified = experiment.identify(shipped, parameters, all_methods(experiment, options))
     used = identified.parameters if identified else parameters
-    road = Road(experiment, methods, used, report, quick=options.quick)
+    calibrated = identified.calibrated if identified else ()
+    road = Road(experiment, methods, used, report, quick=options.quick, calibrated=calibrated)
     road.expect(variants_of(road))
     remade = road.start(shipped)
     main = {name: road.main(Variant(name)) for name in methods}
@@ -45,7 +52,7 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         name=experiment.name,
         title=experiment.title,
         source=experiment.source,
-        sentence=_opening(identified) + verdict_sentence(results, quick=options.quick),
+        sentence=_opening(identified) + verdict_sentence(results, road.kind, quick=options.quick),
         parameters=describe(used) + describe(methods, "methods."),
         methods=results,
         recordings=road.recordings,
@@ -55,9 +62,9 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         identified=identified.scores if identified else (),
         notes=_notes(remade, identified, main),
         quick=options.quick,
-        same_model=experiment.same_model,
+        kind=road.kind,
         seed=experiment.seed,
-        twin_notice=experiment.twin_notice,
+        twin_notice="" if road.kind == "measured" else experiment.twin_notice,
         inputs=_inputs(experiment),
         exhibits=tuple(
             captioned(exhibit, experiment.captions)
@@ -88,7 +95,7 @@ def _method(road: Road, mine: Followed, others: Cases) -> MethodResult:
         residuals=mine.residuals,
         scores=(
             *(s for f in followed for s in truth_scores(f, experiment.axis)),
-            *(s for r in mine.residuals.values() for s in scores_of(r, "measured recording")),
+            *(s for r in mine.residuals.values() for s in scores_of(r, _AGAINST[road.kind])),
             *run_scores(mine.run),
             *_outside(mine),
             *(s for f in followed for s in consistency_scores(f)),

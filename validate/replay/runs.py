@@ -4,20 +4,22 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from validate.compare.result import Kind
 from validate.errors import ComparisonError
 from validate.recording.types import Recording
 from validate.replay.experiment import Case, Experiment, Variant
 from validate.replay.followed import MAIN, Followed, Truth
 from validate.replay.method import Method
 from validate.replay.options import Report, folder_of
-from validate.replay.remade import made_by
+from validate.replay.remade import made_by, synthetic
 from validate.replay.solved import solve
 
 
 class Road:
     """Solves each variant once on each case and counts them for the progress bar.
 
-    `truths` are kept by case: the twin is repeated once.
+    `truths` are kept by case: the twin is repeated once. `calibrated` names residuals whose data
+    served to identify; `remade` says that the user's own parameters made the recording.
     """
 
     def __init__(
@@ -28,12 +30,15 @@ class Road:
         report: Report | None,
         *,
         quick: bool,
+        calibrated: tuple[str, ...] = (),
     ) -> None:
         self.experiment, self.methods, self.parameters = experiment, methods, parameters
+        self.calibrated = calibrated
         self.settings: Mapping[str, Method] = {**experiment.methods, **methods}
         self.quick = quick
         self.cases = () if quick else _cases(experiment, methods)
         self.recordings: tuple[Recording, ...] = ()
+        self.remade = False
         self._true: Any = parameters
         self._report = report
         self._done: dict[tuple[Any, ...], Followed] = {}
@@ -48,7 +53,15 @@ class Road:
     def start(self, shipped: tuple[Recording, ...]) -> tuple[str, ...]:
         """Takes the recordings, made anew where the user changed their twin; what to say of it."""
         self.recordings, self._true, said = self._made(shipped, self.parameters)
+        self.remade = bool(said)
         return said
+
+    @property
+    def kind(self) -> Kind:
+        """What the recordings are: measured, a twin's, or the judged model's own."""
+        if not self.remade and not any(synthetic(r) for r in self.recordings):
+            return "measured"
+        return "same model" if self.experiment.same_model else "twin"
 
     def tell(self, what: str) -> None:
         if self._report:

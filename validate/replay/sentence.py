@@ -1,37 +1,75 @@
-"""The one sentence that opens a report."""
+"""The words that open a report and a terminal: what was judged by what, and what came of it."""
 
-from validate.compare.result import MethodResult
+from collections.abc import Iterable
+
+from validate.compare.overall import Overall, judge_all
+from validate.compare.result import Kind, MethodResult
+from validate.compare.verdict import Check, Verdict
+
+_ALL_AGREE: dict[Kind, str] = {
+    "measured": "predicts what was measured within the error of the comparison",
+    "twin": "follows the twin, a recording of another model, within the error of the comparison",
+    "same model": "agrees with a recording of its own model",
+}
+_COUNTED: tuple[tuple[Verdict, str], ...] = (
+    ("agrees", "agree"),
+    ("differs", "differ"),
+    ("cannot decide", "cannot be decided"),
+    ("fitted", "fitted, no evidence"),
+    ("repeats itself", "only repeat the model itself, no evidence"),
+)
+_NAMED = ("differs", "cannot decide")
 
 
-def verdict_sentence(results: tuple[MethodResult, ...], *, quick: bool) -> str:
+def verdict_sentence(results: tuple[MethodResult, ...], kind: Kind, *, quick: bool) -> str:
     """What was decided, for how many comparisons, and what was not."""
     checked = [m for m in results if m.checks]
     if not checked:
         return "Nothing was decided: none of the accepted methods was run."
-    parts = [_of(m) for m in checked]
+    parts = [_of(m, kind) for m in checked]
     ending = " (quick run: fewer comparisons, no published verdicts)" if quick else ""
-    return "; ".join(parts) + ending + "."
+    return (
+        "; ".join(parts)
+        + ending
+        + "."
+        + _corrected(judge_all([c for m in checked for c in m.checks]))
+    )
 
 
-def _of(method: MethodResult) -> str:
-    count = len(method.checks)
-    held = [c for c in method.checks if c.holds]
-    points = sum(c.count for c in method.checks)
-    if len(held) == count:
+def _of(method: MethodResult, kind: Kind) -> str:
+    """One method: how many checks have which verdict."""
+    checks = method.checks
+    if all(c.verdict == "agrees" for c in checks):
+        points = sum(c.count for c in checks)
         return (
-            f"{method.label} predicts what was measured within the error of the comparison: "
-            f"{count} of {count} checks agree over {points} compared values"
+            f"{method.label} {_ALL_AGREE[kind]}: {len(checks)} of {len(checks)} checks agree over "
+            f"{points} compared values"
         )
-    differs = [c.name for c in method.checks if c.verdict == "differs"]
-    open_ = [c.name for c in method.checks if c.verdict == "cannot decide"]
-    told = [f"{len(held)} of {count} checks agree"]
-    if differs:
-        told.append(f"{len(differs)} differ ({_named(differs)})")
-    if open_:
-        told.append(f"{len(open_)} cannot be decided ({_named(open_)})")
+    told = []
+    for verdict, words in _COUNTED:
+        found = [c for c in checks if c.verdict == verdict]
+        if found:
+            which = f" ({_named(found)})" if verdict in _NAMED else ""
+            told.append(f"{len(found)} of {len(checks)} checks {words}{which}")
     return f"{method.label}: " + ", ".join(told)
 
 
-def _named(names: list[str]) -> str:
+def _corrected(found: Overall) -> str:
+    """What the correction for many checks changes; nothing where none differs."""
+    if found.differs:
+        return (
+            f" Corrected for {found.total} checks (Holm), {len(found.differs)} still differ: "
+            f"{_named(found.differs)}."
+        )
+    if found.alone:
+        return (
+            f" Corrected for {found.total} checks (Holm) none differs: by chance alone a perfect "
+            "model shows as much."
+        )
+    return ""
+
+
+def _named(checks: Iterable[Check]) -> str:
+    names = [c.name for c in checks]
     shown = ", ".join(names[:4])
     return shown if len(names) <= 4 else f"{shown} and {len(names) - 4} others"

@@ -117,7 +117,7 @@ def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, st
         "method": method.name if method else "",
         "method_label": method.label if method else "",
         "quick": "yes" if result.quick else "no",
-        "same_model": "yes" if result.same_model else "no",
+        "kind": result.kind,
         "interpolated": _interpolated(result),
         "thinned": "; ".join(thinned) or "nothing",
         "left_out": "; ".join(_left_out(result, method, found)) or "nothing",

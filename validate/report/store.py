@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, rms
+from validate.compare.overall import Overall
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
@@ -61,7 +62,8 @@ def document(result: Result, created: str) -> Json:
         "sentence": result.sentence,
         "passed": result.passed,
         "quick": result.quick,
-        "same_model": result.same_model,
+        "kind": result.kind,
+        "overall": _overall(result.overall),
         "twin_notice": result.twin_notice,
         "seed": result.seed,
         "notes": list(result.notes),
@@ -163,9 +165,21 @@ def _score(score: Score) -> Json:
     return members(score) | why
 
 
+def _overall(found: Overall) -> Json:
+    return {
+        "verdict": found.word,
+        "evidence": found.evidence,
+        "checks": found.total,
+        "correction": "Holm",
+        "differs": [c.name for c in found.differs],
+        "differs_alone": [c.name for c in found.alone],
+        "undecided": [c.name for c in found.undecided],
+    }
+
+
 def _check(check: Check) -> Json:
     """A check that compared nothing has no error and no uncertainty."""
-    parts = ("value", "u_val", "u_D", "u_num", "u_input")
+    parts = ("value", "raw", "noise", "u_val", "u_D", "u_num", "u_input")
     return members(check) | ({} if check.count else dict.fromkeys(parts))
 
 

@@ -51,7 +51,7 @@ def write_study(experiment: Experiment, told: Findings, folder: Path) -> Path:
         effects=(),
         published=(),
         quick=told.quick,
-        same_model=twin and experiment.same_model,
+        kind="measured" if not twin else "same model" if experiment.same_model else "twin",
         seed=told.seed,
         twin_notice=experiment.twin_notice if twin else "",
         exhibits=told.exhibits,

@@ -68,7 +68,10 @@ def identified(
     )
     squat = stiffening((size[0], size[1] / 2), p, methods["bonded"].scene)
     notes = _notes(found, moduli, squat / bonded, size[1])
-    return Identified(replace(p, material=replace(p.material, **chosen)), scores, notes, headline)
+    fitted = p.material.E_slip is None or p.material.E_bonded is None
+    calibrated = ("force@5pct",) if fitted else ()
+    used = replace(p, material=replace(p.material, **chosen))
+    return Identified(used, scores, notes, headline, calibrated)
 
 
 Factor = tuple[float, float]  # apparent over true modulus, and its uncertainty from the mesh

@@ -1,0 +1,114 @@
+"""What is no evidence: same models, twins made again from one's own parameters, fitted data."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tiny import TINY, Card, record
+
+from validate.cli.running import run as run_command
+from validate.compare.result import Result
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError
+from validate.recording.types import Recording
+from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty
+from validate.replay.options import Options
+from validate.replay.remade import stamped
+from validate.replay.road import compare
+
+FEM = {"fem": TINY.methods["fem"]}
+
+
+def other_model(**more: Any) -> Experiment:
+    """The block and its twin, declared as made by another model; the twin is a file."""
+    twin = replace(TINY.twin or Twin(record), same_model=False, remake=("twin.", "sd"))
+    uncertainty = Uncertainty(lambda card: replace(card, cells=4), lambda card: 1.0, (), "fem")
+    own = replace(TINY, twin=twin, uncertainty=uncertainty, methods=FEM, cases=(), load=shipped)
+    return replace(own, **more)
+
+
+def shipped(card: Card, folder: Path) -> tuple[Recording, ...]:
+    return (stamped(record(Card(), print), Card()),)
+
+
+def judged(experiment: Experiment, **values: str) -> Result:
+    return compare(experiment, Options(values, methods=("fem",)))
+
+
+def test_the_same_model_repeats_itself_and_predicts_nothing() -> None:
+    result = judged(replace(TINY, cases=()))
+    assert [c.verdict for c in result.checks] == ["repeats itself"]
+    assert (result.kind, result.overall.word, result.passed) == ("same model", "no evidence", True)
+    assert result.overall.counted == "evidence: 0 of 1 checks"
+    assert "predicts" not in result.sentence
+    assert "repeat the model itself, no evidence" in result.sentence
+
+
+def test_a_same_model_that_differs_has_failed() -> None:
+    result = judged(replace(TINY, cases=(), load=shipped), E="9e4")
+    assert [c.verdict for c in result.checks] == ["differs"]
+    assert not result.passed
+
+
+def test_another_models_twin_is_evidence_but_no_measurement() -> None:
+    result = judged(other_model())
+    assert [c.verdict for c in result.checks] == ["agrees"]
+    assert result.kind == "twin"
+    assert "predicts what was measured" not in result.sentence
+    assert {s.against for s in result.methods[0].scores} >= {"recording of a twin"}
+
+
+def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
+    result = judged(other_model(), sd="1e-4")
+    assert result.notes[0].startswith("The twin was recorded anew")
+    assert [c.verdict for c in result.checks] == ["repeats itself"]
+    assert "made again from this run's own parameters" in result.checks[0].why
+
+
+def test_an_undeclared_uncertainty_is_no_excuse_for_a_measurement() -> None:
+    """A measured recording put into a same-model experiment is not judged as its own model."""
+
+    def measured(card: Card, folder: Path) -> tuple[Recording, ...]:
+        made = record(card, print)
+        told = {k: v for k, v in made.metadata.items() if k != "provenance"}
+        return (replace(made, metadata=told),)
+
+    with pytest.raises(ComparisonError, match="no uncertainty is declared"):
+        judged(replace(TINY, cases=(), load=measured))
+
+
+@pytest.mark.parametrize("name", ["node_B", "node_B@all"])
+def test_data_that_served_to_identify_are_fitted(name: str) -> None:
+    def identify(recordings: Any, card: Card) -> Identified:
+        return Identified(card, (), (), calibrated=(name,))
+
+    result = judged(other_model(identify=identify))
+    assert [c.verdict for c in result.checks] == ["fitted"]
+    assert (result.overall.word, result.passed) == ("no evidence", True)
+
+
+def test_a_marker_given_to_a_filter_is_fitted() -> None:
+    methods = {"kf": TINY.methods["kf"]}
+    accept = tuple(Accept(m, 1.0, "ours") for m in ("node_A", "node_B"))
+    experiment = replace(TINY, methods=methods, accepted=("kf",), accept=accept, cases=())
+    found = {c.name: c.verdict for c in compare(experiment, Options({})).checks}
+    assert methods["kf"].markers == ("node_A",)
+    assert found == {"node_A.rms@all": "fitted", "node_B.rms@all": "repeats itself"}
+
+
+def test_the_terminals_first_line_says_what_was_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    monkeypatch.setattr("validate.cli.running.find", lambda name, start: replace(TINY, cases=()))
+    code = run_command(
+        ("tiny",), everything=False, quick=True, out=tmp_path, values=(), methods="fem",
+        as_json=False,
+    )  # fmt: skip
+    first = capsys.readouterr().out.splitlines()[0]
+    assert code == 0
+    assert first == (
+        "tiny: no evidence; evidence: 0 of 1 checks; same model, the recording and the judged "
+        "model are one"
+    )
