@@ -80,7 +80,7 @@ def test_an_undeclared_uncertainty_is_no_excuse_for_a_measurement() -> None:
 
 @pytest.mark.parametrize("name", ["node_B", "node_B@all"])
 def test_data_that_served_to_identify_are_fitted(name: str) -> None:
-    def identify(recordings: Any, card: Card) -> Identified:
+    def identify(recordings: Any, card: Card, methods: Any) -> Identified:
         return Identified(card, (), (), calibrated=(name,))
 
     result = judged(other_model(identify=identify))
