@@ -6,28 +6,31 @@ Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from validate.compare.verdict import Accept
 from validate.parameters import quantity, require_ranges
-from validate.recording.types import Recording
+from validate.recording.types import Contours, Recording
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Together, placed_markers
-from validate.register.outlines import observe_outlines
-from validate.register.plane import cavity_sampler
+from validate.register.observation import nearest_sample
+from validate.register.outlines import Corner, observe_outlines
+from validate.register.plane import SurfaceSampler, cavity_sampler
 from validate.register.registered import Registered
-from validate.register.signals import driving, holds_at, instant, validating
+from validate.register.signals import driving, holds_at, instant, require_rising, validating
 from validate.replay.cards import beside, changed, one
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
-from validate.scene.mesh import quadratic
+from validate.scene.mesh import Mesh, quadratic
 from validate.scene.plates import Contact, Plates, between_plates
-from validate.scene.scene import Cavity, Drive, Material, Scene, Support
+from validate.scene.scene import Cavity, Dilatation, Drive, Material, Scene, Support
 from validate.solve.fluid import ExactPressure, NoFluid
 
+# The stage presses towards the fixed plate; the block stands on a table.
+PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
+CAVITIES = (Cavity("inclusion", "cavity"),)
 _WITHIN = 0.1e-3  # m: the stage stood at a load
-_PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
 _TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
 _PLANE = (
     Together("marker.inplane", (0, 2), "position along the stage and sideways"),
@@ -41,6 +44,10 @@ class BlockCard:
     y: float = quantity(0.0, "m", "height")
     z: float = quantity(0.0, "m", "lateral size")
 
+    @property
+    def size(self) -> Block:
+        return Block(self.x, self.y, self.z)
+
 
 @dataclass(frozen=True)
 class GelCard:
@@ -49,10 +56,18 @@ class GelCard:
 
 
 @dataclass(frozen=True)
-class BlockGrid:
-    nodes_x: int = quantity(9, "1", "nodes along x")
+class BlockNodes:
+    nodes_x: int = quantity(9, "1", "nodes along x (9 x 10 x 15 gives the 1328 of paper 000)")
     nodes_y: int = quantity(10, "1", "nodes along y")
     nodes_z: int = quantity(15, "1", "nodes along z")
+
+    @property
+    def nodes(self) -> tuple[int, int, int]:
+        return (self.nodes_x, self.nodes_y, self.nodes_z)
+
+
+@dataclass(frozen=True)
+class BlockGrid(BlockNodes):
     finer: float = quantity(1.27, "1", "how many times finer the second mesh is, for u_num")
 
 
@@ -105,6 +120,17 @@ def filled(label: str, *, order: Literal[1, 2] = 2, fluid: bool = True) -> Metho
     return Method(label, ExactPressure() if fluid else NoFluid(), Filled(order))
 
 
+#: The inputs that every such experiment has, with the fields of `InclusionRanges`.
+INPUTS = (
+    Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)), one,
+          "E within its declared relative uncertainty"),
+    Input("Poisson ratio", changed("material", nu=lambda p: p.material.nu - p.ranges.nu), one,
+          "nu within its declared uncertainty"),
+    Input("plate friction", changed(plates="bonded"), lambda p: p.ranges.friction,
+          "a share of the way from slipping to bonded plates"),
+)  # fmt: skip
+
+
 def inclusion_test(
     name: str,
     title: str,
@@ -120,62 +146,80 @@ def inclusion_test(
         uncertainty=Uncertainty(
             finer=_finer,
             refinement=lambda p: float(p.mesh.finer**2 - 1),
-            inputs=(
-                Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)),
-                      one, "E within its declared uncertainty"),
-                Input("Poisson ratio",
-                      changed("material", nu=lambda p: p.material.nu - p.ranges.nu), one,
-                      "nu within its declared uncertainty"),
-                Input("plate friction", changed(plates="bonded"),
-                      lambda p: p.ranges.friction, "between slipping and bonded plates"),
-            ),
+            inputs=INPUTS,
             surrogate=next(n for n, m in methods.items() if m.scene == Filled(1)),
         ),
     )  # fmt: skip
 
 
-def _inclusion(recording: Recording, p: InclusionTest) -> Capsule:
-    """Centre x, z and radius of the rest outline; height and length from record 'inclusion'."""
-    contours = recording.contour(p.streams.outline)
-    stage = driving(recording, p.streams.stage, "m")
-    rest = holds_at(stage, contours.t, (), within=_WITHIN)[0]
-    index = int(abs(contours.t - instant(rest)).argmin())
-    return outlined_capsule(contours, index, recording.record("inclusion"))
-
-
 def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
-    nodes = (p.mesh.nodes_x, p.mesh.nodes_y, p.mesh.nodes_z)
-    block = Block(p.block.x, p.block.y, p.block.z)
-    mesh = block_with_inclusion(block, nodes, _inclusion(recording, p))
-    return between_plates(
-        mesh if model.order == 1 else quadratic(mesh),
-        Material(p.material.E, p.material.nu),
-        p.plates,
-        _PLATES,
-        "pointwise" if model.order == 2 else "nodal_mean",
-        cavities=(Cavity("inclusion", "cavity"),),
-    )
+    capsule = measured_capsule(recording, recording.contour(p.streams.outline), p.streams)
+    mesh = block_with_inclusion(p.block.size, p.mesh.nodes, capsule)
+    return pressed_block(mesh, Material(p.material.E, p.material.nu), p.plates, model.order)
 
 
 def _place(recording: Recording, p: InclusionTest, scene: Scene) -> Registered:
-    names = p.streams
-    stage, contours = driving(recording, names.stage, "m"), recording.contour(names.outline)
-    rest, *holds = holds_at(stage, contours.t, p.loads, within=_WITHIN)
-    wall = cavity_sampler(scene.mesh, "cavity", _inclusion(recording, p))
-    markers = placed_markers(
-        recording, scene.mesh, topic=names.markers, together=_PLANE, tracker=names.tracker,
-        up=(0.0, 1.0, 0.0),
+    contours = recording.contour(p.streams.outline)
+    wall = cavity_sampler(scene.mesh, "cavity", measured_capsule(recording, contours, p.streams))
+    return placed(recording, contours, scene, wall, p.streams, p.loads, _PLANE)
+
+
+# --- what a paper's own block of this kind uses too -----------------------------------------------
+
+
+def measured_capsule(
+    recording: Recording, contours: Contours, streams: Streams, allowance: float = 0.0
+) -> Capsule:
+    """Centre x, z and radius of the rest outline; height and length from record 'inclusion'.
+
+    `allowance` m and what is raised: `outlined_capsule`.
+    """
+    rest = holds_at(driving(recording, streams.stage, "m"), contours.t, (), within=_WITHIN)[0]
+    index = nearest_sample(contours.t, instant(rest), "outlines")
+    return outlined_capsule(contours, index, recording.record("inclusion"), allowance)
+
+
+def pressed_block(
+    mesh: Mesh, material: Material, contact: Contact, order: Literal[1, 2],
+    dilatation: Dilatation = "nodal_mean", **more: Any,
+) -> Scene:  # fmt: skip
+    """The block of linear cells, made of `order`, between its plates; `dilatation` is of order 1,
+    `more` goes to `between_plates`."""
+    return between_plates(
+        mesh if order == 1 else quadratic(mesh), material, contact, PLATES,
+        "pointwise" if order == 2 else dilatation, cavities=CAVITIES, **more,
     )  # fmt: skip
-    outline = observe_outlines(contours, wall, rest=instant(rest), name=names.outline)
+
+
+def placed(
+    recording: Recording, contours: Contours, scene: Scene, wall: SurfaceSampler, streams: Streams,
+    loads: tuple[float, ...], together: tuple[Together, ...], *,
+    corners: tuple[Corner, ...] = (), **registration: Any,
+) -> Registered:  # fmt: skip
+    """Stage, outlines, markers and signals at rest and at `loads` m.
+
+    `registration` goes to `placed_markers`. Raises `RegistrationError` for a signal that falls as
+    the plates close, and what the parts raise.
+    """
+    stage = driving(recording, streams.stage, "m")
     signals = []
-    for topic in names.signals:
+    for topic in streams.signals:
         unit = recording.signals[topic].unit
-        quantity_name, trace = _TRACES[unit]
-        signals.append(validating(recording, topic, unit, quantity=quantity_name, trace=trace))
+        measured, trace = _TRACES[unit]
+        signals.append(validating(recording, topic, unit, quantity=measured, trace=trace))
+        require_rising(stage, signals[-1])
+    rest, *holds = holds_at(stage, contours.t, loads, within=_WITHIN)
+    outline = observe_outlines(
+        contours, wall, rest=instant(rest), corners=corners, name=streams.outline
+    )
+    markers = placed_markers(
+        recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
+        up=(0.0, 1.0, 0.0), **registration,
+    )  # fmt: skip
     return Registered((stage, outline, markers, *signals), tuple(holds), rest)
 
 
 def _finer(p: InclusionTest) -> InclusionTest:
     g = p.mesh
-    nodes = [round((n - 1) * g.finer) + 1 for n in (g.nodes_x, g.nodes_y, g.nodes_z)]
+    nodes = [round((n - 1) * g.finer) + 1 for n in g.nodes]
     return replace(p, mesh=replace(g, nodes_x=nodes[0], nodes_y=nodes[1], nodes_z=nodes[2]))

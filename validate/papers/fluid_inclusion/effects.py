@@ -2,6 +2,7 @@
 
 from validate.replay.cards import changed, one
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
+from validate.replay.inclusion import INPUTS
 
 finer = changed(
     "mesh",
@@ -9,13 +10,8 @@ finer = changed(
     nodes_y=lambda p: p.mesh.finer_y,
     nodes_z=lambda p: p.mesh.finer_z,
 )
-INPUTS = (
-    Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)), one,
-          "E within its declared relative uncertainty"),
-    Input("Poisson ratio", changed("material", nu=lambda p: p.material.nu - p.ranges.nu), one,
-          "nu within its declared uncertainty"),
-    Input("plate friction", changed(plates="bonded"), lambda p: p.ranges.friction,
-          "a share of the way from slipping to bonded plates"),
+ALL = (
+    *INPUTS,
     Input("image pose x", changed("registration", image_shift_x=lambda p: p.ranges.pose), one,
           "image plane along the stage; the meshed inclusion follows"),
     Input("image pose z", changed("registration", image_shift_z=lambda p: p.ranges.pose), one,
@@ -27,7 +23,7 @@ INPUTS = (
           changed("inclusion", longer=lambda p: p.inclusion.longer + p.ranges.length), one,
           "length of the meshed inclusion"),
 )  # fmt: skip
-UNCERTAINTY = Uncertainty(finer, lambda p: float(p.mesh.ratio**2 - 1), INPUTS, surrogate="md_fluid")
+UNCERTAINTY = Uncertainty(finer, lambda p: float(p.mesh.ratio**2 - 1), ALL, surrogate="md_fluid")
 
 BASE = Variant("md_fluid")
 

@@ -13,7 +13,7 @@ from validate.arrays import Floats
 from validate.compare.published import Figure, Values
 from validate.fem.system import Responses, build, responses
 from validate.papers.fluid_inclusion.square import square_with_hole
-from validate.papers.fluid_inclusion.twin import CAVITIES, PLATES
+from validate.replay.inclusion import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.plates import between_plates
 from validate.scene.scene import Cavity, Material, Scene, Support

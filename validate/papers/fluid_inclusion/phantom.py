@@ -9,23 +9,28 @@ from typing import Literal
 
 import numpy as np
 
-from validate.papers.fluid_inclusion.twin import CAVITIES, PLATES, PhantomTwin, record_phantom
-from validate.parameters import quantity, require_ranges
+from validate.papers.fluid_inclusion.twin import PhantomTwin, record_phantom
+from validate.parameters import quantity
 from validate.recording.images.outline import outlines_of
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
-from validate.register.inclusion import outlined_capsule
-from validate.register.markers import Sampling, Together, placed_markers
-from validate.register.observation import nearest_sample
-from validate.register.outlines import Corner, observe_outlines
+from validate.register.markers import Sampling, Together
+from validate.register.outlines import Corner
 from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
-from validate.register.signals import driving, holds_at, instant, require_rising, validating
 from validate.replay.experiment import Progress
-from validate.replay.inclusion import BlockCard, GelCard
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
-from validate.scene.mesh import quadratic
-from validate.scene.plates import Contact, between_plates
+from validate.replay.inclusion import (
+    BlockCard,
+    BlockNodes,
+    GelCard,
+    InclusionRanges,
+    Streams,
+    measured_capsule,
+    placed,
+    pressed_block,
+)
+from validate.scene.inclusion import Capsule, block_with_inclusion
+from validate.scene.plates import Contact
 from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
 
 
@@ -50,20 +55,13 @@ class WallCard:
 
 
 @dataclass(frozen=True)
-class PhantomGrid:
-    nodes_x: int = quantity(9, "1", "nodes along x (9 x 10 x 15 gives the 1328-node mesh)")
-    nodes_y: int = quantity(10, "1", "nodes along y")
-    nodes_z: int = quantity(15, "1", "nodes along z")
+class PhantomGrid(BlockNodes):
     finer_x: int = quantity(11, "1", "nodes along x of the second mesh, for u_num")
     finer_y: int = quantity(13, "1", "nodes along y of the second mesh")
     finer_z: int = quantity(19, "1", "nodes along z of the second mesh")
     order: Literal[1, 2] | None = quantity(
         None, "1", "1 or 2 for every method; none: each method's own"
     )
-
-    @property
-    def nodes(self) -> tuple[int, int, int]:
-        return (self.nodes_x, self.nodes_y, self.nodes_z)
 
     @property
     def ratio(self) -> float:
@@ -87,18 +85,10 @@ class Placing:
 
 
 @dataclass(frozen=True)
-class PhantomRanges:
-    """Standard uncertainties of the inputs, declared before the comparison."""
-
-    E: float = quantity(0.05, "1", "relative, of the modulus")
-    nu: float = quantity(0.005, "1", "of the Poisson ratio")
-    friction: float = quantity(0.03, "1", "share of the way from slipping to bonded plates")
+class PhantomRanges(InclusionRanges):
     pose: float = quantity(0.1e-3, "m", "of the image pose, per axis")
     radius: float = quantity(0.05e-3, "m", "of the inclusion's radius")
     length: float = quantity(0.5e-3, "m", "of the inclusion's length")
-
-    def __post_init__(self) -> None:
-        require_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -123,10 +113,6 @@ class Phantom:
     )
     recording: str | None = quantity(None, "1", "MCAP file; none: the shipped one")
 
-    @property
-    def size(self) -> Block:
-        return Block(self.block.x, self.block.y, self.block.z)
-
 
 @dataclass(frozen=True)
 class PhantomModel:
@@ -141,7 +127,7 @@ class PhantomModel:
 def record(parameters: Phantom, progress: Progress) -> Recording:
     p = parameters
     material = Material(p.material.E, p.material.nu, p.twin.law)
-    return record_phantom(p.twin, p.size, material, progress)
+    return record_phantom(p.twin, p.block.size, material, progress)
 
 
 def load(parameters: Phantom, folder: Path) -> tuple[Recording, ...]:
@@ -156,19 +142,13 @@ def load(parameters: Phantom, folder: Path) -> tuple[Recording, ...]:
 
 def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Scene:
     p = parameters
-    mesh = block_with_inclusion(p.size, p.mesh.nodes, inclusion(recording, p))
-    order = p.mesh.order or model.order
+    mesh = block_with_inclusion(p.block.size, p.mesh.nodes, inclusion(recording, p))
+    material = Material(p.material.E, p.material.nu, model.law)
     contact = model.plates if p.plates == "as_method" else p.plates
-    return between_plates(
-        mesh if order == 1 else quadratic(mesh),
-        Material(p.material.E, p.material.nu, model.law),
-        contact,
-        PLATES,
-        "pointwise" if order == 2 else model.dilatation,
-        cavities=CAVITIES,
-        friction=p.friction,
-        membrane=_membrane(p.membrane),
-    )
+    return pressed_block(
+        mesh, material, contact, p.mesh.order or model.order, model.dilatation,
+        friction=p.friction, membrane=_membrane(p.membrane),
+    )  # fmt: skip
 
 
 def _membrane(wall: WallCard) -> tuple[Membrane, ...]:
@@ -179,38 +159,18 @@ def _membrane(wall: WallCard) -> tuple[Membrane, ...]:
 
 def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered:
     p = parameters
-    stage = driving(recording, "stage", "m")
     contours = _shifted(recording.contour("outline"), p)
-    capsule = measured_inclusion(recording, p)
-    shape = None if p.registration.wall == "facets" else capsule
-    nearest = p.registration.wall == "nearest_node"
-    wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=nearest)
-    signals = tuple(validating(recording, *names, quantity=q, trace=t) for names, q, t in SIGNALS)
-    for signal in signals:
-        require_rising(stage, signal)
-    rest, *holds = holds_at(stage, contours.t, p.loads, within=0.1e-3)
-    outline = observe_outlines(contours, wall, rest=instant(rest), corners=(TOP_LEFT,))
-    markers = placed_markers(
-        recording,
-        scene.mesh,
-        method=p.registration.method,
-        sampling=p.registration.sampling,
-        together=TOP_FACE,
-        tracker="pen",
-        up=(0.0, 1.0, 0.0),
-    )
-    return Registered(
-        (stage, outline, markers, *signals),
-        tuple(holds),
-        rest,
-        findings=_misplaced(capsule, inclusion(recording, p)),
-    )
+    capsule, how = measured_inclusion(recording, p), p.registration
+    shape = None if how.wall == "facets" else capsule
+    wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
+    seen = placed(
+        recording, contours, scene, wall, STREAMS, p.loads, TOP_FACE,
+        corners=(TOP_LEFT,), method=how.method, sampling=how.sampling,
+    )  # fmt: skip
+    return replace(seen, findings=_misplaced(capsule, inclusion(recording, p)))
 
 
-SIGNALS = (
-    (("load_cell", "N"), "force.plate", "stage.force"),
-    (("pressure", "Pa"), "pressure", "inclusion.pressure"),
-)
+STREAMS = Streams(signals=("load_cell", "pressure"))
 TOP_LEFT = Corner(
     "contour.top_left",
     np.deg2rad(225.0),
@@ -257,10 +217,8 @@ def inclusion(recording: Recording, parameters: Phantom) -> Capsule:
 def measured_inclusion(recording: Recording, parameters: Phantom) -> Capsule:
     """Centre x, z and radius of the rest outline; height and length from the declared sweep."""
     contours = _shifted(recording.contour("outline"), parameters)
-    rest = holds_at(driving(recording, "stage", "m"), contours.t, (), within=0.1e-3)[0]
-    moved = abs(parameters.registration.image_shift_x), abs(parameters.registration.image_shift_z)
-    index = nearest_sample(contours.t, instant(rest), "outlines")
-    return outlined_capsule(contours, index, recording.record("inclusion"), sum(moved))
+    moved = abs(parameters.registration.image_shift_x) + abs(parameters.registration.image_shift_z)
+    return measured_capsule(recording, contours, STREAMS, moved)
 
 
 def _shifted(contours: Contours, parameters: Phantom) -> Contours:

@@ -15,10 +15,11 @@ from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Frames, Recording, Source
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
+from validate.replay.inclusion import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import quadratic
-from validate.scene.plates import Plates, between_plates
-from validate.scene.scene import Cavity, Drive, LawName, Material, Support
+from validate.scene.plates import between_plates
+from validate.scene.scene import LawName, Material
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton
@@ -36,9 +37,6 @@ _LAWS = {
 IMAGE_POSE = np.array(
     [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0225], [1.0, 0.0, 0.0, 0.015], [0.0, 0.0, 0.0, 1.0]]
 )
-# The stage presses towards the probe; the block stands on a table.
-PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
-CAVITIES = (Cavity("inclusion", "cavity"),)
 PROFILE = StageProfile((0.0, 0.003, 0.006, 0.009), speed=1e-3, hold=7.0, rate=10.0)
 PEN_TURN, PEN_SHIFT = (62.0, -17.0, 128.0), (0.412, -0.236, -1.137)
 SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers", "b_mode")
