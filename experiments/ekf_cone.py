@@ -13,7 +13,6 @@ from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.papers.ekf_nfem.cone import (
     UNCERTAINTY,
-    ConeMesh,
     PressedCone,
     build,
     place,
@@ -34,7 +33,8 @@ from validate.solve.tabulated import Tabulated
 HERE = Path(__file__).parent
 RECORDINGS = HERE.parent / "recordings"
 PARAMETERS = PressedCone(
-    mesh=ConeMesh(str(HERE / "meshes" / "cone.npz")), recording=str(RECORDINGS / "ekf_cone.mcap")
+    mesh=replace(PressedCone().mesh, file=str(HERE / "meshes" / "cone.npz")),
+    recording=str(RECORDINGS / "ekf_cone.mcap"),
 )
 QUASI_STATIC = Tabulated(StaticNewton("none"), 0.4e-3)
 A = ("node_A",)

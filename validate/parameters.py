@@ -85,15 +85,21 @@ def _resolved(settings: Any, names: list[str]) -> list[str] | None:
     return None
 
 
-def require_ranges(ranges: Any) -> None:
-    """Every field is a standard uncertainty: raises `UsageError` unless it is 0 or above.
+@dataclass(frozen=True)
+class Ranges:
+    """Standard uncertainties of the inputs, declared before the comparison.
 
-    Those without unit are relative or shares, and at most 1.
+    Those without unit are relative or shares. Raises `UsageError` for one below 0, or a share
+    above 1.
     """
-    for f in fields(ranges):
-        value = getattr(ranges, f.name)
-        if not value >= 0 or (f.metadata.get("unit") == "1" and value > 1):
-            raise UsageError(f"ranges.{f.name} = {value:g}: a standard uncertainty is 0 or above")
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if not value >= 0 or (f.metadata.get("unit") == "1" and value > 1):
+                raise UsageError(
+                    f"ranges.{f.name} = {value:g}: a standard uncertainty is 0 or above"
+                )
 
 
 def nearest_names(name: str, known: set[str]) -> str:

@@ -87,7 +87,18 @@ def one(parameters: Any) -> float:
     return 1.0
 
 
-#: The second mesh of a quarter of a round body, for u_num.
+@dataclass(frozen=True)
+class QuarterGrid:
+    """A quarter of a round body."""
+
+    radial: int = quantity(6, "1", "cells from axis to rim")
+    axial: int = quantity(8, "1", "cells along the axis")
+    grading: float = quantity(2.0, "1", "above 1: smaller cells towards rim and plates")
+    finer_radial: int = quantity(8, "1", "the second mesh, for u_num")
+    finer_axial: int = quantity(10, "1", "the second mesh, for u_num")
+
+
+#: The second mesh of a `QuarterGrid`.
 finer_quarter = changed(
     "mesh", radial=lambda p: p.mesh.finer_radial, axial=lambda p: p.mesh.finer_axial
 )

@@ -15,7 +15,7 @@ import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.identify.modulus import Cylinder, ModulusFit, fit_modulus, identify_modulus
-from validate.parameters import quantity, require_ranges
+from validate.parameters import Ranges, quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
@@ -62,14 +62,9 @@ class CylinderGrid:
 
 
 @dataclass(frozen=True)
-class CompressionRanges:
-    """Standard uncertainties of the inputs, declared before the comparison."""
-
+class CompressionRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of the modulus")
     diameter: float = quantity(0.005, "1", "relative, of the diameter")
-
-    def __post_init__(self) -> None:
-        require_ranges(self)
 
 
 @dataclass(frozen=True)

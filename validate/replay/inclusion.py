@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from validate.compare.verdict import Accept
-from validate.parameters import quantity, require_ranges
+from validate.parameters import Ranges, quantity
 from validate.recording.types import Contours, Recording
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Together, placed_markers
@@ -72,15 +72,10 @@ class BlockGrid(BlockNodes):
 
 
 @dataclass(frozen=True)
-class InclusionRanges:
-    """Standard uncertainties of the inputs, declared before the comparison."""
-
+class InclusionRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of the modulus")
     nu: float = quantity(0.005, "1", "of the Poisson ratio")
     friction: float = quantity(0.03, "1", "share of the way from slipping to bonded plates")
-
-    def __post_init__(self) -> None:
-        require_ranges(self)
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from validate.errors import RecordingError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
 from validate.identify.modulus import cylinder_of, fit_modulus
-from validate.parameters import quantity, require_ranges
+from validate.parameters import Ranges, quantity
 from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
 from validate.register.registered import Registered
+from validate.replay.cards import QuarterGrid
 from validate.replay.compression import STAGE, SYMMETRY, between, pressed_log
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.plates import Contact
@@ -43,23 +44,9 @@ class LoggedSpecimen:
 
 
 @dataclass(frozen=True)
-class QuarterGrid:
-    radial: int = quantity(6, "1", "quadratic elements from axis to rim")
-    axial: int = quantity(8, "1", "quadratic elements along the axis")
-    grading: float = quantity(2.0, "1", "above 1: smaller cells towards rim and plates")
-    finer_radial: int = quantity(8, "1", "the second mesh, for u_num")
-    finer_axial: int = quantity(10, "1", "the second mesh, for u_num")
-
-
-@dataclass(frozen=True)
-class SiliconeRanges:
-    """Standard uncertainties of the inputs, declared before the comparison."""
-
+class SiliconeRanges(Ranges):
     specimen: float = quantity(0.043, "1", "relative scatter of E between specimens (4.5 of 104)")
     nu: float = quantity(0.0004, "1", "of the Poisson ratio")
-
-    def __post_init__(self) -> None:
-        require_ranges(self)
 
 
 @dataclass(frozen=True)

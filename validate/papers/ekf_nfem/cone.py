@@ -17,12 +17,12 @@ from validate.papers.ekf_nfem.cone_twin import (
     marker_places,
     record_cone,
 )
-from validate.parameters import quantity, require_ranges
+from validate.parameters import Ranges, quantity
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation, placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
-from validate.replay.cards import changed, finer_quarter
+from validate.replay.cards import QuarterGrid, changed, finer_quarter
 from validate.replay.experiment import Input, Progress, Uncertainty
 from validate.replay.followed import Truth
 from validate.scene.mesh import quadratic
@@ -46,13 +46,8 @@ class ShearCard:
 
 
 @dataclass(frozen=True)
-class ConeMesh:
+class ConeMesh(QuarterGrid):
     file: str = quantity("", "1", "mesh of the explicit runs")
-    radial: int = quantity(4, "1", "cells from axis to side of the quarter")
-    axial: int = quantity(5, "1", "cells along its axis")
-    finer_radial: int = quantity(6, "1", "the second mesh, for u_num")
-    finer_axial: int = quantity(7, "1", "the second mesh, for u_num")
-    grading: float = quantity(2.0, "1", "above 1: smaller cells towards side and plates")
     load_step: float = quantity(0.4e-3, "m", "grid of loads that the quarter is solved at")
 
 
@@ -63,14 +58,9 @@ class ScaledTime:
 
 
 @dataclass(frozen=True)
-class ConeRanges:
-    """Standard uncertainties of the inputs, declared before the comparison."""
-
+class ConeRanges(Ranges):
     modulus: float = quantity(0.02, "1", "relative, of the shear modulus")
     nu: float = quantity(0.0002, "1", "of the Poisson ratio")
-
-    def __post_init__(self) -> None:
-        require_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -78,7 +68,7 @@ class PressedCone:
     """Parameters; `recording` is a path."""
 
     material: ShearCard = ShearCard()
-    mesh: ConeMesh = ConeMesh()
+    mesh: ConeMesh = ConeMesh(4, 5, finer_radial=6, finer_axial=7)
     clock: ScaledTime = ScaledTime()
     ranges: ConeRanges = ConeRanges()
     twin: ConeTwin = ConeTwin()
