@@ -133,7 +133,7 @@ def test_an_unwritable_place(tmp_path: Path) -> None:
 def test_what_draws_is_imported_when_something_is_drawn() -> None:
     heavy = ("matplotlib", "jinja2", "vtk", "pyvista", "PIL")
     code = (
-        "import sys; import validate.report.write, validate.report.study_page; "
+        "import sys; import validate.report.write, validate.study.study_page; "
         f"print([name for name in {heavy} if name in sys.modules])"
     )
     done = subprocess.run(

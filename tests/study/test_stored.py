@@ -12,8 +12,7 @@ from validate.cli import comparing
 from validate.cli.arguments import BAD_INPUT
 from validate.cli.main import run
 from validate.errors import ComparisonError, UsageError
-from validate.study.stored import read_run, side_by_side
-from validate.study.stored_pairs import pairs
+from validate.study.stored import pairs, read_run, side_by_side
 
 
 def stored(folder: Path, **changes: Any) -> Path:

@@ -8,8 +8,7 @@ from rich.table import Table
 
 from validate.cli.display import console, table
 from validate.report.numbers import shown_unit, significant, text
-from validate.study.stored import Row, SideBySide, read_run, side_by_side
-from validate.study.stored_pairs import Pair, pairs
+from validate.study.stored import Pair, Row, SideBySide, pairs, read_run, side_by_side
 
 
 def compare(paths: tuple[Path, ...], as_json: bool) -> None:

@@ -4,14 +4,13 @@ from typing import Any
 
 from validate.parameters import describe
 from validate.replay.options import Options, configure
-from validate.report.study_page import Row
 from validate.study.filter_exhibits import seeds_text, study_exhibits
 from validate.study.filter_plan import FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.interval import interval
 from validate.study.score import FilterScores
 from validate.study.store import Record
-from validate.study.study_page import CellsTable, Findings
+from validate.study.study_page import CellsTable, Findings, Row
 
 
 def told(study: FilterStudy) -> Findings:

@@ -9,9 +9,12 @@ from validate.compare.exhibit import Exhibit
 from validate.compare.result import Result
 from validate.parameters import Parameter
 from validate.replay.experiment import Experiment
-from validate.report.study_page import Row, StudyPage, write_study_page
+from validate.report.folder import MARK, replace_folder
+from validate.report.store import document, write_json
+from validate.report.tables import write_csv
 from validate.study.engine import CELLS
 
+Row = tuple[Any, ...]
 CellsTable = tuple[tuple[str, ...], tuple[Row, ...]]
 
 
@@ -37,7 +40,10 @@ class Findings:
 
 
 def write_study(experiment: Experiment, told: Findings, folder: Path) -> Path:
-    """Replaces all of `folder` but its cells; returns the path of report.html."""
+    """Replaces all of `folder` but its cells; returns the path of report.html.
+
+    Raises what `replace_folder` and `draw_all` do.
+    """
     twin = told.seed is not None
     result = Result(
         name=experiment.name,
@@ -56,6 +62,25 @@ def write_study(experiment: Experiment, told: Findings, folder: Path) -> Path:
         twin_notice=experiment.twin_notice if twin else "",
         exhibits=told.exhibits,
     )
+    return replace_folder(folder, lambda f: _fill(told, result, f), (CELLS,)) / "report.html"
+
+
+def _fill(told: Findings, result: Result, folder: Path) -> None:
+    # What draws is imported when something is drawn: matplotlib takes half a second.
+    from validate.report.exhibits import draw_all, write_files
+    from validate.report.html import page
+    from validate.report.provenance import parameters
+
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    page = StudyPage(result, told.document, told.cells, (CELLS,), told.passed, told.band)
-    return write_study_page(page, folder, created)
+    for name in ("tables", "figures"):
+        (folder / name).mkdir()
+    content = {**document(result, created), "study": told.document}
+    if told.passed is not None:
+        content["passed"] = told.passed
+    write_json(content, folder / MARK)
+    write_csv(folder / "tables" / "cells.csv", *told.cells)
+    drawn = draw_all(result, (*result.exhibits, parameters(result)))
+    for exhibit in drawn:
+        write_files(exhibit, folder)
+    text = page(result, drawn, created, told.band)
+    (folder / "report.html").write_text(text, encoding="utf-8")

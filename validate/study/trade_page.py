@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from validate.report.study_page import Row
 from validate.study.choose import Choice, error_of
 from validate.study.choose_exhibits import choose_exhibits, words
-from validate.study.study_page import Findings
+from validate.study.study_page import Findings, Row
 from validate.study.trade import ERROR, Refinement, Trade, TradeRow
 from validate.study.trade_exhibits import trade_exhibits
 
