@@ -156,7 +156,14 @@ def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
 def _place(recording: Recording, p: InclusionTest, scene: Scene) -> Registered:
     contours = recording.contour(p.streams.outline)
     wall = cavity_sampler(scene.mesh, "cavity", measured_capsule(recording, contours, p.streams))
-    return placed(recording, contours, scene, wall, p.streams, p.loads, _PLANE)
+    units = {topic: _unit(recording, topic) for topic in p.streams.signals}
+    return placed(recording, contours, scene, wall, p.streams, units, p.loads, _PLANE)
+
+
+def _unit(recording: Recording, topic: str) -> str:
+    """The unit of a signal; where it is absent or of another kind, the one to be asked for."""
+    found = recording.signals.get(topic)
+    return found.unit if found is not None and found.unit in _TRACES else "N"
 
 
 # --- what a paper's own block of this kind uses too -----------------------------------------------
@@ -188,18 +195,17 @@ def pressed_block(
 
 def placed(
     recording: Recording, contours: Contours, scene: Scene, wall: SurfaceSampler, streams: Streams,
-    loads: tuple[float, ...], together: tuple[Together, ...], *,
+    units: Mapping[str, str], loads: tuple[float, ...], together: tuple[Together, ...], *,
     corners: tuple[Corner, ...] = (), **registration: Any,
 ) -> Registered:  # fmt: skip
-    """Stage, outlines, markers and signals at rest and at `loads` m.
+    """Stage, outlines, markers and signals (`units` by topic, N or Pa) at rest and at `loads` m.
 
     `registration` goes to `placed_markers`. Raises `RegistrationError` for a signal that falls as
     the plates close, and what the parts raise.
     """
     stage = driving(recording, streams.stage, "m")
     signals = []
-    for topic in streams.signals:
-        unit = recording.signals[topic].unit
+    for topic, unit in units.items():
         measured, trace = _TRACES[unit]
         signals.append(validating(recording, topic, unit, quantity=measured, trace=trace))
         require_rising(stage, signals[-1])

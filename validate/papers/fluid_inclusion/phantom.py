@@ -164,13 +164,14 @@ def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered
     shape = None if how.wall == "facets" else capsule
     wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
     seen = placed(
-        recording, contours, scene, wall, STREAMS, p.loads, TOP_FACE,
+        recording, contours, scene, wall, STREAMS, SIGNALS, p.loads, TOP_FACE,
         corners=(TOP_LEFT,), method=how.method, sampling=how.sampling,
     )  # fmt: skip
     return replace(seen, findings=_misplaced(capsule, inclusion(recording, p)))
 
 
-STREAMS = Streams(signals=("load_cell", "pressure"))
+STREAMS = Streams()
+SIGNALS = {"load_cell": "N", "pressure": "Pa"}
 TOP_LEFT = Corner(
     "contour.top_left",
     np.deg2rad(225.0),

@@ -1,0 +1,68 @@
+"""Signals of an experiment with an inclusion: known by unit, refused by name, with their sign."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from validate.errors import RecordingError, RegistrationError, ValidateError
+from validate.recording.mcap.read import read_recording
+from validate.recording.types import Recording, Signal
+from validate.replay.experiment import Experiment
+from validate.replay.inclusion import (
+    BlockCard,
+    BlockGrid,
+    InclusionTest,
+    Streams,
+    filled,
+    inclusion_test,
+)
+
+
+def declared(*signals: str) -> Experiment:
+    parameters = InclusionTest(
+        block=BlockCard(0.060, 0.045, 0.070), mesh=BlockGrid(7, 8, 11),
+        streams=Streams(signals=signals), loads=(0.003,),
+    )  # fmt: skip
+    models = {"p1": filled("P1", order=1)}
+    return inclusion_test("mine", "A block", "this test", parameters, models, ("p1",), ())
+
+
+def placed(recording: Recording, *signals: str) -> tuple[str, ...]:
+    """Names of what is observed."""
+    mine = declared(*signals)
+    scene = mine.build(recording, mine.parameters, mine.methods["p1"].scene)
+    return tuple(o.name for o in mine.place(recording, mine.parameters, scene).observations)
+
+
+@pytest.fixture(scope="module")
+def recorded(project_root: Path) -> Recording:
+    return read_recording(project_root / "recordings" / "fluid_phantom.mcap")
+
+
+def test_forces_and_pressures_are_observed_beside_outlines_and_markers(recorded: Recording) -> None:
+    everything = ("stage", "outline", "markers", "pressure", "load_cell")
+    assert placed(recorded, "pressure", "load_cell") == everything
+
+
+def turned(s: Signal) -> Signal:
+    return replace(s, y=-s.y)
+
+
+@pytest.mark.parametrize(
+    ("topic", "change", "error", "says"),
+    [
+        ("load_cell", lambda s: replace(s, unit="mm"), RecordingError, "'load_cell' is in mm"),
+        ("scale", None, RecordingError, "no signal 'scale'"),
+        ("load_cell", turned, RegistrationError, "'force.plate' falls by .* N as 'stage' closes"),
+    ],
+    ids=["unit", "absent", "sign"],
+)
+def test_a_signal_that_cannot_be_used_is_refused(
+    recorded: Recording, topic: str, change: object, error: type[ValidateError], says: str
+) -> None:
+    signals = dict(recorded.signals)
+    if callable(change):
+        signals[topic] = change(signals[topic])
+    with pytest.raises(error, match=says):
+        placed(replace(recorded, signals=signals), topic)
