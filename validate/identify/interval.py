@@ -51,7 +51,7 @@ def mesh_share(own: float, other: float, ratio: float, order: float) -> float:
     """Standard uncertainty of a value on its `own` mesh, in the value's unit.
 
     Richardson's estimate from an `other` mesh with cells `ratio` times as large, at an `order` of
-    convergence, with the factor for two meshes (Roache 1998). Raises `ComparisonError` where the
+    convergence, with the factor for two meshes (Roache 1994). Raises `ComparisonError` where the
     meshes are alike.
     """
     if ratio <= 0 or ratio == 1 or order <= 0:
