@@ -14,7 +14,6 @@ def test_a_rate_means_something_beside_its_step() -> None:
     assert printed.ratio == pytest.approx(4.17, abs=0.01)
     ours = RealTime(16.2e3, 0.24e-3, 0.26e-3)
     assert ours.factor == pytest.approx(3.888)
-    assert ours.force_hz == pytest.approx(1 / 0.24e-3)
 
 
 @pytest.mark.parametrize("numbers", [(0.0, 1e-3, 1e-3), (1e3, -1e-3, 1e-3), (1e3, 1e-3, np.nan)])

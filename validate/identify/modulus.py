@@ -9,8 +9,7 @@ through the origin would not. Curvature inside the window stays: for a material 
 E_apparent is a mean tangent and grows with the window.
 
 Compression of a cylinder between plates it cannot slip on is stiffer than its material:
-E_apparent = E * correction. Whether plates slip is seldom recorded, so `apparent_to_material`
-gives both ends.
+E_apparent = E * correction. Whether plates slip is seldom recorded.
 """
 
 import math
@@ -81,16 +80,6 @@ class ModulusSummary:
     sd_repeats: float | None
     sd_mean: float
     fits: tuple[ModulusFit, ...]
-
-
-@dataclass(frozen=True)
-class MaterialBracket:
-    """Young's modulus (Pa) and its sd (Pa) at the two ends: plates that slip, plates that bond."""
-
-    slip: float
-    slip_sd: float
-    bonded: float
-    bonded_sd: float
 
 
 def cylinder_of(recording: Recording) -> Cylinder:
@@ -167,17 +156,6 @@ def gent_correction(diameter: float, height: float) -> float:
     """
     cylinder = Cylinder(diameter, height)
     return 1 + 2 * (cylinder.diameter / (4 * cylinder.height)) ** 2
-
-
-def apparent_to_material(summary: ModulusSummary, correction: float) -> MaterialBracket:
-    """Young's modulus between slipping plates (E_apparent) and bonded (E_apparent / correction).
-
-    `correction` >= 1 comes from `gent_correction` or a finite-element run. Raises `UsageError`.
-    """
-    if not (math.isfinite(correction) and correction >= 1):
-        raise UsageError(f"correction {correction}: bonded plates stiffen, expected >= 1")
-    E, sd = summary.mean, summary.sd_mean
-    return MaterialBracket(E, sd, E / correction, sd / correction)
 
 
 def load_noise(force: Floats) -> float:

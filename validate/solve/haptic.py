@@ -36,8 +36,3 @@ class RealTime:
     def ratio(self) -> float:
         """dt over the critical step; a sound explicit run needs less than 1."""
         return self.dt / self.critical_dt
-
-    @property
-    def force_hz(self) -> float:
-        """New forces a second when the model runs in step with the clock, at most 1/dt."""
-        return min(self.rate_hz, 1 / self.dt)
