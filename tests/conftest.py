@@ -29,7 +29,8 @@ LONG_RUNS = ("phantom_result", "whole")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         shared = next((name for name in LONG_RUNS if name in item.fixturenames), "")
-        item.add_marker(pytest.mark.xdist_group(shared or item.path.name))
+        if item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(shared or item.path.name))
     items.sort(key=lambda item: not set(LONG_RUNS) & set(item.fixturenames))
 
 

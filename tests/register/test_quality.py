@@ -29,6 +29,11 @@ NAMES = tuple(f"m{i:02d}" for i in range(42))
 METHODS = ("rigid", "similarity", "two_step", "two_step_scaled")
 
 
+def seeds(every, quick=4):
+    """Seeds of which the first few are drawn by default, all of them with the long tests."""
+    return [*range(quick), *(pytest.param(s, marks=pytest.mark.slow) for s in range(quick, every))]
+
+
 def grid(jitter, seed=0):
     """42 markers (42, 3) m on the plane z = 0, 7 x 6 at 10 mm."""
     u, v = np.meshgrid(0.01 * np.arange(7), 0.01 * np.arange(6), indexing="ij")
@@ -120,7 +125,7 @@ def test_fre_and_tre_match_their_prediction_over_many_draws(d, scaled):
     target = y.mean(axis=0) + ([0, 0, -0.0225] if d == 3 else [0.03, 0.02])
     fit = fit_similarity if scaled else fit_rigid
     fre2, tre2 = [], []
-    for _ in range(3000):
+    for _ in range(1500):
         x = y + rng.normal(0, SD, y.shape)
         T = fit(x, y)
         fre2.append(rms(T.apply(x) - y) ** 2)
@@ -321,7 +326,7 @@ def test_three_permuted_markers_are_named():
     assert "markers m01, m04 and m09 look permuted" in message(x, y)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(8))
 def test_any_permutation_of_a_jittered_grid_is_found(seed):
     y = grid(0.003, seed)
     x, _ = measured(y, seed)
@@ -428,7 +433,7 @@ def test_unrelated_points_are_an_excess_not_a_permutation():
         assert "times the noise of 0.577 mm" in said
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(20))
 def test_few_unrelated_points_are_no_permutation(seed):
     """Relabelling brings them 3 times closer now and then, but not within their spacing."""
     flat = np.array([1, 1, 0])
@@ -436,7 +441,7 @@ def test_few_unrelated_points_are_no_permutation(seed):
     assert "times the noise of 0.577 mm" in found.findings[-1]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(20))
 def test_noise_of_the_size_of_the_spacing_is_no_permutation(seed):
     y = cloud(seed, 42) * [1, 1, 0]
     x = y + np.random.default_rng(seed).normal(0, 2 * SD, y.shape)

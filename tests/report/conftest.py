@@ -1,4 +1,4 @@
-"""The fluid phantom by its two cheapest methods, compared once for the tests of the report."""
+"""The fluid phantom by its two cheapest methods, compared once: its tests are one group."""
 
 import pytest
 

@@ -1,9 +1,6 @@
 """The fluid phantom through the whole road on its cheapest methods: outlines and markers drawn."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import jsonschema
 import pytest
@@ -11,26 +8,13 @@ from report_samples import CHECK
 
 from validate.compare.result import Result
 from validate.register.outline_geometry import normal_distances
-from validate.replay.options import Options
-from validate.replay.road import compare
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.observed import outline_seen
 from validate.report.sections import SECTIONS, exhibits
 from validate.report.store import document, schema
 from validate.report.tables import shown as read
 
-
-@pytest.fixture(scope="module")
-def result(project_root: Path) -> Result:
-    path = project_root / "experiments" / "fluid_phantom.py"
-    spec = importlib.util.spec_from_file_location("fluid_phantom", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["fluid_phantom"] = module
-    spec.loader.exec_module(module)
-    experiment = replace(module.EXPERIMENT, path=path)
-    return compare(experiment, Options({}, methods=("p1_fluid", "p1_dry")))
+pytestmark = pytest.mark.xdist_group("two methods of the phantom")
 
 
 @pytest.fixture(scope="module")

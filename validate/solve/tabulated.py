@@ -7,6 +7,7 @@ of fourth order between. Its step time is that of the interpolation, not of a so
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import prod
 from typing import ClassVar
 
 import numpy as np
@@ -96,8 +97,8 @@ class TabulatedStepper:
         return State(k, self.inner.field(solved), None, solved.updates, solved.numbers)
 
     def _between(self, k: int, place: float, first: int, end: int) -> State:
-        states, nodes = self.table.states[first:end], np.arange(first, end, dtype=float)
-        weights = [float(np.prod([(place - o) / (n - o) for o in nodes if o != n])) for n in nodes]
+        states, nodes = self.table.states[first:end], range(first, end)
+        weights = [prod((place - o) / (n - o) for o in nodes if o != n) for n in nodes]
         pairs = list(zip(weights, states, strict=True))
         u = sum(w * self.inner.field(s) for w, s in pairs)
         numbers = {name: float(sum(w * s.numbers[name] for w, s in pairs)) for name in self.units}

@@ -99,12 +99,11 @@ def is_unit_row(cells: Sequence[str]) -> bool:
 
 def is_names(cells: Sequence[str]) -> bool:
     """Whether the cells may name columns: two words or more, no numbers before the first gap."""
-    if is_unit_row(cells):
-        return False
-    return any(
+    words = any(
         len(named) >= 2 and not any(looks_numeric(c) or c.lower() in NOTHING for c in named)
         for named in ([c for c in cells if c], [c for c in cells[: _gap(cells)] if c])
     )
+    return words and not is_unit_row(cells)
 
 
 def _gap(cells: Sequence[str]) -> int:
