@@ -60,7 +60,7 @@ POINT = Experiment(
     uncertainty=Uncertainty(
         finer=lambda card: card,
         refinement=lambda card: 1.0,
-        inputs=(Input("mu", lambda c: replace(c, mu=1.01 * c.mu), lambda c: 1.0, "modulus"),),
+        inputs=(Input("mu", lambda c, z: replace(c, mu=c.mu * (1 + z / 100)), "", "assumed"),),
         surrogate="neo",
     ),
     path=Path(__file__),

@@ -12,6 +12,7 @@ from tiny import AT_HOLDS, LOADS, STEPS, TINY, Breaks, Card, stiffer
 from validate.arrays import rms
 from validate.compare.effects import Sensor
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
+from validate.compare.inputs import Declared
 from validate.compare.published import Figure
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
@@ -248,12 +249,23 @@ def test_a_stand_in_takes_a_slow_methods_place_on_the_finer_mesh(road: Experimen
 @ROADS
 def test_inputs(road: Experiment) -> None:
     """One standard uncertainty of an input, by the surrogate, is part of u_val."""
-    source = Input("modulus", harder, lambda card: 0.1, "E")
+    source = Input("modulus", lambda c, z: replace(c, E=(1 + 0.03 * z) * c.E), "E", "assumed")
     result = compare(declared(road, uncertainty=replace(FINER, inputs=(source,))), Options({}))
     check = result.checks[-1]
     assert check.u_input > 0
     assert check.u_val == pytest.approx(np.sqrt(check.u_D**2 + check.u_num**2 + check.u_input**2))
-    assert result.inputs == ("modulus: E",)
+    first = {j.name: j for j in result.joint}
+    assert first[check.name.replace(".rms", "")].first_order == pytest.approx(check.u_input)
+    assert all(j.draws == 12 for j in result.joint)
+    assert all(abs(j.percent or 0.0) < 5 for j in result.joint)
+    assert result.inputs == (Declared("modulus", "E", "assumed"),)
+
+
+@ROADS
+def test_a_quick_run_draws_nothing(road: Experiment) -> None:
+    source = Input("modulus", lambda c, z: replace(c, E=(1 + 0.03 * z) * c.E), "E", "assumed")
+    quick = Options({}, quick=True)
+    assert compare(declared(road, uncertainty=replace(FINER, inputs=(source,))), quick).joint == ()
 
 
 # --- what is compared with nothing ----------------------------------------------------------------

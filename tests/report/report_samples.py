@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.compare.effects import Change, Effect
+from validate.compare.inputs import Declared, Joint
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
@@ -137,7 +138,8 @@ def small_result() -> Result:
         identified=(Score("modulus.E", 1e4, "Pa", 42, "stress and strain", "slope"),),
         notes=("cube_a: nothing odd",),
         seed=7,
-        inputs=("modulus: within 5 %",),
+        inputs=(Declared("modulus", "within 5 %", "assumed"),),
+        joint=(Joint("force@3mm", "N", 0.02, 0.03, 12),),
     )
 
 

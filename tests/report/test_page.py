@@ -135,7 +135,11 @@ def test_every_picture_has_words_and_units() -> None:
 
 def test_check_row_shows_two_u_val_and_its_parts() -> None:
     found, _ = made(small_result())
-    (table,) = found["checks"].exhibit.tables
+    table, declared, sampled = found["checks"].exhibit.tables
+    assert declared.rows == (("modulus", "within 5 %", "assumed"),)
+    assert [shown(entry) for entry in sampled.rows[0]] == [
+        "force@3mm", "N", "0.0200", "0.0300", "? 50.0", "12",
+    ]  # fmt: skip
     assert [shown(c) for c in table.rows[0]] == [
         "soft", "force.plate@2mm", "N",
         "0.0120", "0.00800", "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",

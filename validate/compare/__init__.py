@@ -6,6 +6,7 @@ _HOMES = {
     "residual": ("Residual", "residuals"),
     "numerical": ("Numerical",),
     "score": ("Score", "scores_of"),
+    "inputs": ("Declared", "Joint"),
     "verdict": ("Accept", "Check", "Sensitivity", "judge"),
     "published": ("Figure", "Published"),
     "effects": ("Effect", "Sensor"),

@@ -1,12 +1,13 @@
 """The whole comparison of an experiment: what the report shows and the exit code rests on."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
 from validate.compare.effects import Effect
 from validate.compare.exhibit import Exhibit
+from validate.compare.inputs import Declared, Joint
 from validate.compare.overall import Overall, judge_all
 from validate.compare.published import Published
 from validate.compare.residual import Residual
@@ -78,7 +79,8 @@ class Result:
     kind: Kind = "measured"
     seed: int | None = None
     twin_notice: str = ""
-    inputs: tuple[str, ...] = field(default=())
+    inputs: tuple[Declared, ...] = ()
+    joint: tuple[Joint, ...] = ()
     exhibits: tuple[Exhibit, ...] = ()
 
     @property

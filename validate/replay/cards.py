@@ -1,5 +1,6 @@
 """What the parameters of several experiments have in common: cards, and changes of them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 from pathlib import Path
@@ -9,6 +10,7 @@ from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.replay.experiment import Change
+from validate.scene.plates import plates_of_share, rubbing_share
 from validate.scene.scene import Material
 from validate.twin.tracked import Camera, require_noise
 
@@ -82,9 +84,22 @@ def changed(part: str = "", **values: Any) -> Change:
     return change
 
 
-def one(parameters: Any) -> float:
-    """The scale of an input whose change is one standard uncertainty."""
-    return 1.0
+def moved(part: str = "", **values: Callable[[Any, float], Any]) -> Callable[[Any, float], Any]:
+    """As `changed`, of an uncertain input: every value is a function of all parameters and z."""
+
+    def move(p: Any, z: float) -> Any:
+        return changed(part, **{k: v(p, z) for k, v in values.items()})(p)
+
+    return move
+
+
+def rubbed(p: Any, z: float) -> Any:
+    """A block whose plates rub by z `ranges.friction` more; what lies beyond slipping or bonded is
+    mirrored back."""
+    E, apart = p.material.E, p.block.x
+    share = abs(rubbing_share(p.plates, p.friction, E, apart) + z * p.ranges.friction)
+    plates, friction = plates_of_share(min(share, 2 - share), E, apart)
+    return replace(p, plates=plates, friction=friction)
 
 
 @dataclass(frozen=True)

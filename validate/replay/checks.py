@@ -1,12 +1,14 @@
 """Verdicts of the accepted methods: u_num from a finer mesh, u_input from declared inputs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from validate.arrays import rms
+from validate.arrays import Floats, rms
 from validate.compare.effects import Effect, effect
+from validate.compare.inputs import Joint, joint, joint_draws
 from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
@@ -21,12 +23,13 @@ from validate.compare.verdict import (
 )
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows
-from validate.replay.experiment import EffectSpec, Uncertainty, Variant, unchanged
+from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant, unchanged
 from validate.replay.followed import Followed
 from validate.replay.runs import Road
 
 # Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
 _SAFETY = 3.0 / 2
+_DRAWS = 12  # of all inputs at once
 _NO_UNIT = "-"  # of a quantity that no observation has
 
 
@@ -39,7 +42,8 @@ def variants_of(road: Road) -> list[Variant]:
         own = [uncertainty.stand_in.get(name, name) for name in accepted]
         wanted += [Variant(o, change) for o in own for change in (unchanged, uncertainty.finer)]
         wanted += [Variant(uncertainty.surrogate)]
-        wanted += [Variant(uncertainty.surrogate, i.change) for i in uncertainty.inputs]
+        wanted += [Variant(uncertainty.surrogate, i.by(1.0)) for i in uncertainty.inputs]
+        wanted += _joint_variants(road)
     return wanted + [v for e in shown_effects(road) for v in (e.one, e.other)]
 
 
@@ -128,13 +132,44 @@ def _sensitivities(road: Road) -> dict[str, list[Sensitivity]]:
         return found
     base = road.main(Variant(uncertainty.surrogate)).residuals
     for source in uncertainty.inputs:
-        moved = road.main(Variant(uncertainty.surrogate, source.change)).residuals
+        moved = road.main(Variant(uncertainty.surrogate, source.by(1.0))).residuals
         for key in base.keys() & moved.keys():
             step = replace(base[key], values=moved[key].values - base[key].values, sd=0.0)
-            found.setdefault(key, []).append(
-                Sensitivity(source.name, step, source.scale(road.parameters))
-            )
+            found.setdefault(key, []).append(Sensitivity(source.name, step, 1.0))
     return found
+
+
+def joint_inputs(road: Road) -> tuple[Joint, ...]:
+    """First-order u_input of all that is accepted beside draws of all inputs at once."""
+    parts, variants = _sensitivities(road), _joint_variants(road)
+    if not parts or not variants:
+        return ()
+    base = road.main(Variant(variants[0].method)).residuals
+    drawn = [road.main(variant).residuals for variant in variants]
+    accepted = (k for k, r in base.items() if any(_accepts(a, r) for a in road.experiment.accept))
+    return tuple(
+        joint(base[key], parts[key], seen)
+        for key in accepted
+        if key in parts and (seen := [one[key] for one in drawn if key in one])
+    )
+
+
+def _joint_variants(road: Road) -> list[Variant]:
+    """The surrogate with all inputs drawn at once; none in a quick run."""
+    uncertainty = road.experiment.uncertainty
+    if road.quick or uncertainty is None or not uncertainty.inputs:
+        return []
+    table = joint_draws(_DRAWS, len(uncertainty.inputs))
+    return [Variant(uncertainty.surrogate, _together(uncertainty.inputs, row)) for row in table]
+
+
+def _together(inputs: Sequence[Input], draw: Floats) -> Change:
+    def change(parameters: Any) -> Any:
+        for source, z in zip(inputs, draw.tolist(), strict=True):
+            parameters = source.move(parameters, z)
+        return parameters
+
+    return change
 
 
 def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:

@@ -19,7 +19,7 @@ from validate.parameters import Ranges, quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
-from validate.replay.cards import beside, changed, one
+from validate.replay.cards import beside, changed, moved
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.cylinder import quarter_cylinder
@@ -116,10 +116,10 @@ def compression(
             finer=changed("mesh", radial=_finer, axial=_finer, halvings=_halved),
             refinement=_refinement,
             inputs=(
-                Input("modulus", changed("material", E=_stiffer), one,
-                      "E within its declared uncertainty"),
-                Input("diameter", changed("material", E=_wider), one,
-                      "diameter within its declared range"),
+                Input("modulus", moved("material", E=_stiffer),
+                      "E within its declared uncertainty", "assumed"),
+                Input("diameter", moved("material", E=_wider),
+                      "diameter within its declared range", "assumed"),
             ),
             surrogate=accepted[0],
         ),
@@ -238,10 +238,10 @@ def _refinement(p: Compression) -> float:
     return ratio**2 - 1
 
 
-def _stiffer(p: Compression) -> float:
-    return (p.material.E or 0.0) * (1 + p.ranges.E)
+def _stiffer(p: Compression, z: float) -> float:
+    return (p.material.E or 0.0) * (1 + z * p.ranges.E)
 
 
-def _wider(p: Compression) -> float:
+def _wider(p: Compression, z: float) -> float:
     """A wider specimen is as much stiffer as its area is larger."""
-    return (p.material.E or 0.0) * (1 + p.ranges.diameter) ** 2
+    return (p.material.E or 0.0) * (1 + z * p.ranges.diameter) ** 2

@@ -14,6 +14,7 @@ from validate.compare.exhibit import Exhibit
 from validate.compare.published import Figure
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
+from validate.errors import ComparisonError
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.followed import Cases, Truth
@@ -39,12 +40,25 @@ class Variant:
 
 @dataclass(frozen=True)
 class Input:
-    """An uncertain input: `change` moves it, times `scale` that is one standard uncertainty."""
+    """An uncertain input: `move` takes parameters to where it is off by z standard uncertainties.
+
+    z lies within +-sqrt(3), the half-width of a uniform range. `source` says where the range comes
+    from, or "assumed".
+    """
 
     name: str
-    change: Change
-    scale: Callable[[Any], float]
+    move: Callable[[Any, float], Any]
     doc: str
+    source: str
+
+    def __post_init__(self) -> None:
+        if not self.source.strip():
+            raise ComparisonError(
+                f"input '{self.name}' has no source; cite what its range comes from, or 'assumed'"
+            )
+
+    def by(self, z: float) -> Change:
+        return lambda parameters: self.move(parameters, z)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from validate.register.outlines import Corner, observe_outlines
 from validate.register.plane import SurfaceSampler, cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
-from validate.replay.cards import beside, changed, one
+from validate.replay.cards import beside, moved, rubbed
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
@@ -75,7 +75,7 @@ class BlockGrid(BlockNodes):
 class InclusionRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of the modulus")
     nu: float = quantity(0.005, "1", "of the Poisson ratio")
-    friction: float = quantity(0.03, "1", "share of the way from slipping to bonded plates")
+    friction: float = quantity(0.03, "1", "of the share k/(k + 4 E/x) that the plates rub")
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,7 @@ class InclusionTest:
     ranges: InclusionRanges = InclusionRanges()
     streams: Streams = Streams()
     plates: Contact = quantity("slip", "1", "contact of both plates")
+    friction: float = quantity(0.0, "N/m3", "tangential stiffness of the plates, if partial")
     loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
 
 
@@ -117,12 +118,11 @@ def filled(label: str, *, order: Literal[1, 2] = 2, fluid: bool = True) -> Metho
 
 #: The inputs that every such experiment has, with the fields of `InclusionRanges`.
 INPUTS = (
-    Input("modulus", changed("material", E=lambda p: p.material.E * (1 + p.ranges.E)), one,
-          "E within its declared relative uncertainty"),
-    Input("Poisson ratio", changed("material", nu=lambda p: p.material.nu - p.ranges.nu), one,
-          "nu within its declared uncertainty"),
-    Input("plate friction", changed(plates="bonded"), lambda p: p.ranges.friction,
-          "a share of the way from slipping to bonded plates"),
+    Input("modulus", moved("material", E=lambda p, z: p.material.E * (1 + z * p.ranges.E)),
+          "E within its declared relative uncertainty", "assumed"),
+    Input("Poisson ratio", moved("material", nu=lambda p, z: p.material.nu - z * p.ranges.nu),
+          "nu within its declared uncertainty", "assumed"),
+    Input("plate friction", rubbed, "share of the way from slipping to bonded plates", "assumed"),
 )  # fmt: skip
 
 
@@ -150,7 +150,9 @@ def inclusion_test(
 def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
     capsule = measured_capsule(recording, recording.contour(p.streams.outline), p.streams)
     mesh = block_with_inclusion(p.block.size, p.mesh.nodes, capsule)
-    return pressed_block(mesh, Material(p.material.E, p.material.nu), p.plates, model.order)
+    return pressed_block(
+        mesh, Material(p.material.E, p.material.nu), p.plates, model.order, friction=p.friction
+    )
 
 
 def _place(recording: Recording, p: InclusionTest, scene: Scene) -> Registered:

@@ -6,6 +6,7 @@ One for every experiment, at holds or over time, with a twin's truth beside or w
 from collections.abc import Mapping
 
 from validate.compare.exhibit import captioned
+from validate.compare.inputs import Declared
 from validate.compare.published import Published
 from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import Kind, MethodResult, Result
@@ -14,7 +15,7 @@ from validate.compare.track import track_scores
 from validate.fem.locking import locking_warning
 from validate.parameters import describe
 from validate.register.markers import MarkerObservation
-from validate.replay.checks import checks_of, effects_of, variants_of
+from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
 from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
@@ -66,6 +67,7 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         seed=experiment.seed,
         twin_notice="" if road.kind == "measured" else experiment.twin_notice,
         inputs=_inputs(experiment),
+        joint=joint_inputs(road) if any(m.accepted for m in results) else (),
         exhibits=tuple(
             captioned(exhibit, experiment.captions)
             for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
@@ -172,6 +174,6 @@ def _locking(main: Mapping[str, Followed]) -> tuple[str, ...]:
     return tuple(f"{warning} ({'; '.join(labels)})" for warning, labels in found.items())
 
 
-def _inputs(experiment: Experiment) -> tuple[str, ...]:
+def _inputs(experiment: Experiment) -> tuple[Declared, ...]:
     declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
-    return tuple(f"{i.name}: {i.doc}" for i in declared)
+    return tuple(Declared(i.name, i.doc, i.source) for i in declared)

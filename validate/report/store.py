@@ -78,7 +78,8 @@ def document(result: Result, created: str) -> Json:
         "rest": [_rest(r) for r in result.rest],
         "identified": [_score(s) for s in result.identified],
         "published": [_published(p) for p in result.published],
-        "uncertain_inputs": list(result.inputs),
+        "uncertain_inputs": [members(i) for i in result.inputs],
+        "joint_inputs": [members(j) | {"percent": recorded(j.percent)} for j in result.joint],
         "exhibits": exhibits(result.exhibits),
     }  # fmt: skip
 

@@ -1,6 +1,9 @@
 """The checks: error against the uncertainty of the comparison, after ASME V&V 20."""
 
+from collections.abc import Iterator
+
 from validate.compare.exhibit import Emphasis, Exhibit, NumberTable, TableCell
+from validate.compare.inputs import Joint
 from validate.compare.result import KINDS, Result
 from validate.compare.verdict import Check
 from validate.report.tables import unit_cell
@@ -8,6 +11,7 @@ from validate.report.tables import unit_cell
 _EMPHASIS: dict[str, Emphasis] = {
     "agrees": "good", "differs": "bad", "cannot decide": "open", "fitted": "", "repeats itself": "",
 }  # fmt: skip
+_BEYOND = 25.0  # %: a difference that a dozen draws of a linear model hardly show
 _HEADINGS = (
     "method", "check", "unit", "raw rms", "noise rms", "E", "2 u_val", "u_D", "u_num", "u_input",
     "limit", "values", "verdict", "why",
@@ -50,8 +54,37 @@ def checks(result: Result) -> Exhibit | None:
         f"corrected for {found.total} checks (Holm, 1979), {len(found.differs)} differ and "
         f"{len(found.alone)} differ alone only."
     )
-    inputs = (f"Declared input range behind u_input: {text}" for text in result.inputs)
-    return Exhibit("checks", "Checks", (words, corrected, *inputs), (table,))
+    return Exhibit("checks", "Checks", (words, corrected), (table, *_inputs(result)))
+
+
+def _inputs(result: Result) -> Iterator[NumberTable]:
+    """Where the ranges behind u_input come from, and what first order leaves out of it."""
+    if result.inputs:
+        rows = tuple((i.name, i.range, i.source) for i in result.inputs)
+        title = "Uncertain inputs behind u_input; a range that nobody measured says so."
+        yield NumberTable("inputs", title, ("input", "range", "source"), rows)
+    if result.joint:
+        yield NumberTable(
+            "joint_inputs",
+            "u_input by first order, one input at a time, beside draws of all inputs at once "
+            "(Latin hypercube of uniform ranges; rms distance from what was simulated). Checks use "
+            "first order.",
+            ("quantity", "unit", "first order", "sampled", "difference / %", "draws"),
+            tuple(_joint(j) for j in result.joint),
+        )
+
+
+def _joint(found: Joint) -> tuple[TableCell | int, ...]:
+    percent = found.percent
+    beyond = percent is not None and abs(percent) > _BEYOND
+    return (
+        TableCell(found.name, emphasis="strong"),
+        unit_cell(found.unit),
+        TableCell(found.first_order, found.unit),
+        TableCell(found.sampled, found.unit),
+        TableCell(percent, emphasis="open" if beyond else ""),
+        found.draws,
+    )
 
 
 def _row(check: Check) -> tuple[TableCell | int | str, ...]:

@@ -22,7 +22,7 @@ from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation, placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
-from validate.replay.cards import QuarterGrid, changed, finer_quarter
+from validate.replay.cards import QuarterGrid, finer_quarter, moved
 from validate.replay.experiment import Input, Progress, Uncertainty
 from validate.replay.followed import Truth
 from validate.scene.mesh import quadratic
@@ -181,10 +181,11 @@ UNCERTAINTY = Uncertainty(
     finer=finer_quarter,
     refinement=lambda p: float((p.mesh.finer_axial / p.mesh.axial) ** 2 - 1),
     inputs=(
-        Input("modulus", changed("material", scale=lambda p: 1.02 * p.material.scale),
-              lambda p: p.ranges.modulus / 0.02, "shear modulus"),
-        Input("nu", changed("material", nu=lambda p: p.material.nu - 0.0005),
-              lambda p: p.ranges.nu / 0.0005, "Poisson ratio"),
+        Input("modulus",
+              moved("material", scale=lambda p, z: p.material.scale * (1 + z * p.ranges.modulus)),
+              "shear modulus", "assumed; the paper prints none"),
+        Input("nu", moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu),
+              "Poisson ratio, below the incompressible limit", "assumed; the paper prints .5"),
     ),
     surrogate="plate_p2",
 )  # fmt: skip

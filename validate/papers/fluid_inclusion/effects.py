@@ -1,6 +1,6 @@
 """What is uncertain of paper 000's phantom, and what each choice of a model moves."""
 
-from validate.replay.cards import changed, one
+from validate.replay.cards import changed, moved
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
 from validate.replay.inclusion import INPUTS
 
@@ -12,16 +12,20 @@ finer = changed(
 )
 ALL = (
     *INPUTS,
-    Input("image pose x", changed("registration", image_shift_x=lambda p: p.ranges.pose), one,
-          "image plane along the stage; the meshed inclusion follows"),
-    Input("image pose z", changed("registration", image_shift_z=lambda p: p.ranges.pose), one,
-          "image plane sideways; the meshed inclusion follows"),
+    Input("image pose x",
+          moved("registration",
+                image_shift_x=lambda p, z: p.registration.image_shift_x + z * p.ranges.pose),
+          "image plane along the stage; the meshed inclusion follows", "assumed"),
+    Input("image pose z",
+          moved("registration",
+                image_shift_z=lambda p, z: p.registration.image_shift_z + z * p.ranges.pose),
+          "image plane sideways; the meshed inclusion follows", "assumed"),
     Input("inclusion radius",
-          changed("inclusion", wider=lambda p: p.inclusion.wider + p.ranges.radius), one,
-          "radius of the meshed inclusion"),
+          moved("inclusion", wider=lambda p, z: p.inclusion.wider + z * p.ranges.radius),
+          "radius of the meshed inclusion", "assumed"),
     Input("inclusion length",
-          changed("inclusion", longer=lambda p: p.inclusion.longer + p.ranges.length), one,
-          "length of the meshed inclusion"),
+          moved("inclusion", longer=lambda p, z: p.inclusion.longer + z * p.ranges.length),
+          "length of the meshed inclusion", "assumed"),
 )  # fmt: skip
 UNCERTAINTY = Uncertainty(finer, lambda p: float(p.mesh.ratio**2 - 1), ALL, surrogate="md_fluid")
 

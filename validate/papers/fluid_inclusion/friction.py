@@ -15,17 +15,14 @@ from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified
 from validate.replay.method import Method
 from validate.replay.solved import solve
+from validate.scene.plates import plates_of_share
 
 SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
-HALF = 1e6  # N/m3: the tangential stiffness at a share of one half
 
 
 def _rubbing(p: Phantom, share: float) -> Phantom:
-    """Share 0 slips, 1 bonds, between them springs of HALF share/(1 - share)."""
-    p = replace(p, mesh=replace(p.mesh, order=None))
-    if share in (0.0, 1.0):
-        return replace(p, plates="slip" if share == 0 else "bonded")
-    return replace(p, plates="partial", friction=HALF * share / (1 - share))
+    plates, friction = plates_of_share(share, p.material.E, p.block.x)
+    return replace(p, mesh=replace(p.mesh, order=None), plates=plates, friction=friction)
 
 
 def friction_from_rise(
@@ -64,7 +61,7 @@ def _mesh_share(weighed: Floats, best: int, finer: Floats, refinement: float) ->
 
 
 def _scores(fit: Interval) -> tuple[Score, ...]:
-    words = "tangential plate stiffness k as k/(k + 1e6 N/m3): 0 slips, 1 bonds; from the rise"
+    words = "tangential plate stiffness k as k/(k + 4 E/x): 0 slips, 1 bonds; from the rise"
     rows = {"share": fit.best, "share.low": fit.low, "share.high": fit.high}
     rows["share.mesh"] = fit.mesh
     rows["chi_square"] = fit.chi_square
@@ -79,5 +76,5 @@ def _said(fit: Interval) -> str:
         f"Plate friction from the markers' vertical rise ({fit.count} values): share "
         f"{fit.best:.2f}, between {fit.low:.2f} and {fit.high:.2f} (two standard deviations, "
         f"one of {fit.mesh:.1g} from the mesh among them), where 0 is slipping, 1 bonded and 0.5 a "
-        "tangential stiffness of 1e6 N/m3."
+        "tangential stiffness of 4 E/x."
     )

@@ -1,0 +1,43 @@
+"""The ranges of shipped experiments: each says where it comes from, and moves what it names."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from validate.errors import ComparisonError
+from validate.papers.fluid_inclusion.phantom import Phantom, PhantomRanges
+from validate.replay.cards import rubbed
+from validate.replay.experiment import Input
+from validate.replay.find import find
+from validate.scene.plates import plates_of_share, rubbing_share
+
+
+@pytest.mark.parametrize("name", ["fluid_phantom", "ekf_cone", "ecoflex_cylinder"])
+def test_every_range_has_a_source_or_says_assumed(name: str) -> None:
+    declared = find(name, Path(__file__)).uncertainty
+    assert declared is not None
+    assert {i.name: i.source for i in declared.inputs if i.source.startswith("assumed")}
+
+
+def test_a_range_without_a_source_is_refused() -> None:
+    with pytest.raises(ComparisonError, match="'modulus' has no source; cite what its range"):
+        Input("modulus", rubbed, "E", " ")
+
+
+def test_plates_rub_by_the_models_own_share() -> None:
+    """One standard uncertainty from slipping is the stiffness that friction is identified by, not a
+    share of the response of bonded plates, which is 1.4 to 2.3 times less."""
+    p = Phantom(ranges=PhantomRanges(friction=0.03))
+    k = 4 * 15_200 / 0.060 * 0.03 / 0.97
+    assert (rubbed(p, 1.0).plates, rubbed(p, 1.0).friction) == ("partial", pytest.approx(k))
+    assert rubbed(p, -1.0) == rubbed(p, 1.0)
+
+
+def test_bonded_and_partial_plates_are_uncertain_too() -> None:
+    bonded = rubbed(replace(Phantom(), plates="bonded"), 1.0)
+    assert rubbing_share("partial", bonded.friction, 15_200, 0.060) == pytest.approx(0.97)
+    contact, friction = plates_of_share(0.5, 15_200, 0.060)
+    half = replace(Phantom(), plates=contact, friction=friction)
+    more = rubbed(half, 1.0)
+    assert rubbing_share("partial", more.friction, 15_200, 0.060) == pytest.approx(0.53)
