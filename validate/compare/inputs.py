@@ -69,5 +69,5 @@ def joint(base: Residual, parts: Sequence[Sensitivity], drawn: Sequence[Residual
     first = float(np.sqrt(sum((p.scale * rms(p.change.values)) ** 2 for p in parts)))
     sampled = rms(np.array([[rms(one.values - base.values)] for one in drawn]))
     least = _ROUNDING * rms(base.values)  # an input that moves nothing leaves rounding
-    shown = (u if u > least else 0.0 for u in (first, sampled))
-    return Joint(base.name, base.unit, *shown, len(drawn))
+    first, sampled = (u if u > least else 0.0 for u in (first, sampled))
+    return Joint(base.name, base.unit, first, sampled, len(drawn))

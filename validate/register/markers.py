@@ -6,10 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats, rms
+from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
 from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
 from validate.recording.types import Markers, Recording
+from validate.register.clock import clock_sd, slopes, with_clock
 from validate.register.labels import require_steady_labels
 from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
 from validate.register.quality import LINE, Registration, register_points
@@ -37,7 +38,7 @@ class MarkerObservation:
 
     `sd` m per axis; `tre` (k,) m, the predicted registration error at every marker. Each marker is
     a quantity of its own, read from the run's probe of its name, unless `together` gathers them:
-    then the run's fields are read at their places.
+    then the run's fields are read at their places. `sd_t` s: how uncertain their clock is.
     """
 
     name: str
@@ -51,6 +52,7 @@ class MarkerObservation:
     tre: Floats
     registration: Registration
     together: tuple[Together, ...] = ()
+    sd_t: float = 0.0
 
     def simulated(self, u: Floats) -> Floats:
         """Marker positions (k, d) m under nodal displacements u (n, d) m."""
@@ -97,10 +99,16 @@ class MarkerObservation:
         off = (shown - self.x[samples]).reshape(-1, self.x.shape[2])
         off = off[np.isfinite(off).all(axis=1)]
         tre = rms(self.tre) / float(np.sqrt(3))
-        return tuple(
+        found = (
             Deviation(g.quantity, off[:, list(g.axes)], "m", self.sd, tre, g.words)
             for g in self.together
         )
+        sd_t = float(np.hypot(self.sd_t, selection.sd_t))
+        if sd_t == 0:
+            return tuple(found)
+        speed = self._speed(slice(None), samples, sd_t)
+        axes = (list(g.axes) for g in self.together)
+        return tuple(with_clock(d, sd_t, speed[..., a]) for d, a in zip(found, axes, strict=True))
 
     def _one(self, run: Simulated, selection: Selection, j: int) -> Deviation | None:
         """One marker's displacement, by the run's probe of its name."""
@@ -116,7 +124,15 @@ class MarkerObservation:
         probe = [selection.read(run.t, run.traces[f"{name}.{c}"].y, t) for c in axes]
         words = "estimate less measured displacement of the marker, at the times it was seen"
         off = (np.stack(probe, axis=1) - moved[samples])[seen]
-        return Deviation(name, off, "m", self.sd, float(self.tre[j]), words)
+        found = Deviation(name, off, "m", self.sd, float(self.tre[j]), words)
+        sd_t = float(np.hypot(self.sd_t, selection.sd_t))
+        return with_clock(found, sd_t, self._speed(j, samples, sd_t)) if sd_t > 0 else found
+
+    def _speed(self, which: int | slice, samples: Ints, sd_t: float) -> Floats:
+        """Velocities (m, ..., d) m/s of a marker or of all of them at the samples (m,)."""
+        x = self.x[:, which]
+        flat = slopes(self.t, x.reshape(len(x), -1), samples, sd_t)
+        return flat.reshape(len(samples), *x.shape[1:])
 
 
 def observe_markers(
@@ -130,6 +146,7 @@ def observe_markers(
     name: str = "markers",
     role: Role = "validates",
     together: tuple[Together, ...] = (),
+    sd_t: float = 0.0,
 ) -> MarkerObservation:
     """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
 
@@ -158,7 +175,7 @@ def observe_markers(
     require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
     return MarkerObservation(
         name, role, markers.t, markers.names, x[..., :d], places, rows, markers.sd,
-        registration.tre_at(rest), registration, together,
+        registration.tre_at(rest), registration, together, sd_t,
     )  # fmt: skip
 
 
@@ -189,7 +206,7 @@ def placed_markers(
     axes = (seen_up, np.array(up)) if _planar(layout, markers.sd) else None
     return observe_markers(
         markers, layout, mesh, method=method, sampling=sampling, up=axes, name=topic,
-        together=together,
+        together=together, sd_t=clock_sd(recording, topic),
     )  # fmt: skip
 
 

@@ -52,12 +52,14 @@ class Simulated(Protocol):
 class Selection:
     """The instants t (m,) s that are compared under one label; None: every sample of a sensor.
 
-    A hold is one instant, a window of a curve many. `words` say which, for definitions.
+    A hold is one instant, a window of a curve many. `words` say which, for definitions. `sd_t` s is
+    the standard uncertainty of the drive's clock against the sensors'.
     """
 
     label: str
     t: Floats | None = None
     words: str = ""
+    sd_t: float = 0.0
 
     def instants(self, run: "Simulated") -> "Selection":
         """Itself, or for every sample the times whose fields the run kept."""

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.fem.locate import Rows
 from validate.recording.types import Contours
+from validate.register.clock import around, with_clock
 from validate.register.observation import (
     Deviation,
     Role,
@@ -35,7 +36,8 @@ class Corner:
 class OutlineObservation:
     """Outlines (k_i, 2) m in image coordinates, and the wall that the simulation moves.
 
-    `rest` s is the unloaded instant, from which displacements of the outline count.
+    `rest` s is the unloaded instant, from which displacements of the outline count; `sd_t` s says
+    how uncertain the clock is.
     """
 
     name: str
@@ -47,6 +49,7 @@ class OutlineObservation:
     wall: SurfaceSampler
     rest: float
     corners: tuple[Corner, ...] = ()
+    sd_t: float = 0.0
 
     def simulated(self, u: Floats) -> Floats:
         """The section (k, 2) m of the deformed wall with the image plane."""
@@ -74,14 +77,28 @@ class OutlineObservation:
         """Of every instant: distance; where loaded also displacement, area, centroid, corners."""
         instants = selection.instants(run)
         times = np.asarray(instants.t)
-        start = self.simulated(frame_at(run, Selection("rest", np.array([self.rest])))[0])
+        still = self.measured(self.rest)
+        start = self.simulated(frame_at(run, Selection("rest", np.array([self.rest])))[0]), still
+        sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         found: list[Deviation] = []
         for t, u in zip(times, frame_at(run, instants), strict=True):
-            pair = (self.simulated(u), self.measured(float(t)))
-            found.append(self._distance(*pair))
-            if t != self.rest:
-                found += self._changes((start, self.measured(self.rest)), pair)
+            one = self._between(start, (self.simulated(u), self.measured(float(t))), float(t))
+            found += self._on_clock(one, float(t), sd_t) if sd_t > 0 else one
         return _stacked(found)
+
+    def _between(
+        self, start: tuple[Floats, Floats], end: tuple[Floats, Floats], t: float
+    ) -> list[Deviation]:
+        return [self._distance(*end), *(self._changes(start, end) if t != self.rest else [])]
+
+    def _on_clock(self, found: list[Deviation], t: float, sd_t: float) -> list[Deviation]:
+        """Speeds are what the same quantities make of the outlines before and after."""
+        near = around(self.t, nearest_sample(self.t, t, self.name), sd_t)
+        span = float(np.ptp(self.t[near])) or np.nan
+        still, outlines = self.measured(self.rest), self.outlines[near]
+        moved = self._between((still, still), (outlines[-1], outlines[0]), t)
+        pairs = zip(found, moved, strict=True)
+        return [with_clock(d, sd_t, m.values / span) for d, m in pairs]
 
     def _distance(self, simulated: Floats, measured: Floats) -> Deviation:
         apart = normal_distances(simulated, measured)[:, None]
@@ -139,9 +156,8 @@ def merged(group: list[Deviation]) -> Deviation:
     """Deviations of one quantity as one."""
     values = np.vstack([d.values for d in group])
     first = group[0]
-    return Deviation(
-        first.quantity, values, first.unit, first.sd, first.systematic, first.definition
-    )
+    systematic = rms([d.systematic for d in group])
+    return Deviation(first.quantity, values, first.unit, first.sd, systematic, first.definition)
 
 
 def observe_outlines(
@@ -152,9 +168,19 @@ def observe_outlines(
     name: str = "outline",
     role: Role = "validates",
     corners: tuple[Corner, ...] = (),
+    sd_t: float = 0.0,
 ) -> OutlineObservation:
     """Outlines with their pose checked; raises `RegistrationError` for an improper pose."""
     require_rigid(contours.pose, "outline")
     return OutlineObservation(
-        name, role, contours.t, contours.outlines, contours.pose, contours.sd, wall, rest, corners
+        name,
+        role,
+        contours.t,
+        contours.outlines,
+        contours.pose,
+        contours.sd,
+        wall,
+        rest,
+        corners,
+        sd_t,
     )

@@ -1,6 +1,6 @@
 """A recording in the scene's frame: its observations, and what of them is compared."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -38,6 +38,9 @@ class Registered:
             raise ComparisonError(
                 f"{len(drives)} driving signals on different times; resample them onto one clock"
             )
+        sd_t = max(d.sd_t for d in drives)
+        selections = tuple(replace(s, sd_t=sd_t) for s in self.selections)
+        object.__setattr__(self, "selections", selections)
 
     @property
     def drives(self) -> tuple[SignalObservation, ...]:

@@ -9,6 +9,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import Rows
 from validate.recording.types import Recording
+from validate.register.clock import clock_sd, slopes, with_clock
 from validate.register.observation import (
     Deviation,
     Role,
@@ -22,7 +23,7 @@ from validate.register.observation import (
 class SignalObservation:
     """y (nt, c) in its own `unit` at t (nt,) s; the run's `trace` predicts it, where it validates.
 
-    `quantity` is what scores call it.
+    `quantity` is what scores call it, `sd_t` s how uncertain its clock is.
     """
 
     name: str
@@ -33,6 +34,7 @@ class SignalObservation:
     sd: float
     quantity: str = ""
     trace: str = ""
+    sd_t: float = 0.0
 
     def at(self, t: float) -> float:
         """The sample nearest in time; raises `ComparisonError` when none is within a second."""
@@ -59,7 +61,11 @@ class SignalObservation:
         words = f"{self.quantity}, {selection.words or 'simulated less measured at every sample'}"
         one = (float(simulated[0]), float(measured[0])) if len(at) == 1 else (None, None)
         off = (simulated - measured)[:, None]
-        return (Deviation(self.quantity, off, self.unit, self.sd, 0.0, words, *one),)
+        found = Deviation(self.quantity, off, self.unit, self.sd, 0.0, words, *one)
+        sd_t = float(np.hypot(self.sd_t, selection.sd_t))
+        if sd_t > 0:
+            found = with_clock(found, sd_t, slopes(self.t, self.y[:, :1], at, sd_t))
+        return (found,)
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return () if self.trace in run.traces else (self.name,)
@@ -74,7 +80,8 @@ def driving(
     """The signal that drives, in `unit`; `after_rest` begins after t = 0, where all is at rest."""
     s = recording.signal(name, unit)
     kept = s.t > 0 if after_rest else np.ones(len(s.t), bool)
-    return SignalObservation(name, "drives", s.t[kept], s.y[kept], s.unit, s.sd)
+    sd_t = clock_sd(recording, name)
+    return SignalObservation(name, "drives", s.t[kept], s.y[kept], s.unit, s.sd, sd_t=sd_t)
 
 
 def validating(
@@ -82,7 +89,8 @@ def validating(
 ) -> SignalObservation:
     """The signal that a run's `trace` must predict, scored as `quantity`."""
     s = recording.signal(name, unit)
-    return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace)
+    sd_t = clock_sd(recording, name)
+    return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace, sd_t)
 
 
 def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from validate.compare.verdict import Accept
 from validate.parameters import Ranges, quantity
 from validate.recording.types import Contours, Recording
+from validate.register.clock import clock_sd
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Together, placed_markers
 from validate.register.observation import nearest_sample
@@ -213,8 +214,9 @@ def placed(
         require_rising(stage, signals[-1])
     rest, *holds = holds_at(stage, contours.t, loads, within=_WITHIN)
     outline = observe_outlines(
-        contours, wall, rest=instant(rest), corners=corners, name=streams.outline
-    )
+        contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
+        sd_t=clock_sd(recording, streams.outline),
+    )  # fmt: skip
     markers = placed_markers(
         recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
         up=(0.0, 1.0, 0.0), **registration,

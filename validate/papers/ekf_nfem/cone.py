@@ -158,7 +158,7 @@ def _plate(markers: MarkerObservation, cell: SignalObservation) -> Registered:
     powers = markers.t[:, None] ** np.arange(1, 4)
     path = powers @ np.linalg.lstsq(powers[seen], down[seen], rcond=None)[0]
     y = np.interp(cell.t, markers.t, path)[:, None]
-    plate = SignalObservation("plate", "drives", cell.t, y, "m", markers.sd)
+    plate = SignalObservation("plate", "drives", cell.t, y, "m", markers.sd, sd_t=markers.sd_t)
     force = replace(cell, role="validates", quantity="force", trace="plate.force")
     return Registered((plate, markers, force))
 
