@@ -93,7 +93,7 @@ def test_the_list_of_experiments_loads_none_of_the_heavy_libraries() -> None:
 def test_looking_into_a_recording_loads_only_what_reads_it(project_root: Path) -> None:
     shown, modules = loaded("inspect", str(project_root / "recordings" / "kf_cube.mcap"))
     assert "integrity: verified" in shown
-    assert not modules & (HEAVY - {"scipy"})
+    assert not modules & HEAVY
 
 
 def test_usage_errors_are_one_line_with_the_nearest_name() -> None:

@@ -1,12 +1,12 @@
-"""At which lag one signal follows another: found on a grid, then refined between the samples."""
+"""At which lag one signal follows another: found on a grid, then refined between the samples.
+
+scipy is loaded by what computes a lag: looking into a recording needs none of it.
+"""
 
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import gaussian_filter1d
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
@@ -96,6 +96,8 @@ def _masked_correlation(
     a: Floats, a_seen: Floats, b: Floats, b_seen: Floats, lags: Ints
 ) -> tuple[Floats, Floats]:
     """Correlation and overlap of b(i) with a(i + lag), means and variances over the overlap."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
     size = next_fast_len(len(a) + len(b), real=True)
     A, A1, A2 = (rfft(x, size) for x in (a, a_seen, a * a))
     B, B1, B2 = (np.conj(rfft(x, size)) for x in (b, b_seen, b * b))
@@ -123,6 +125,8 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
     b do not count. Least squares itself would be drawn to the samples, where interpolation keeps
     most noise.
     """
+    from scipy.interpolate import CubicSpline
+
     x_of = CubicSpline(*_distinct(known))
     width = max(step_of(known.t), step_of(seen.t))
     smooth, slope = _smoothed(known, SMOOTHING * width)
@@ -180,6 +184,8 @@ def _smoothed(
     signal: Signal, width: float
 ) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
     """The signal and its slope (1/s) under a Gaussian of `width` s, as functions of time."""
+    from scipy.ndimage import gaussian_filter1d
+
     t, y = _distinct(signal)
     step = step_of(t)
     grid = np.arange(t[0], t[-1] + step, step)
