@@ -45,6 +45,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def here(own: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(own)
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")  # renders have tests of their own
     return own
 
 
