@@ -97,7 +97,7 @@ def printed_rows(results: dict[str, Result]) -> list[list[str]]:
                 "-" if v is None else f"{factor * v:.3g}{unit}"
                 for v in (figure.ours, figure.theirs)
             )
-            found.append([f"`{name}`: {figure.name}", ours, theirs, figure.verdict])
+            found.append([f"`{name}`: {figure.name}", ours, theirs, figure.line])
     return found
 
 

@@ -47,7 +47,9 @@ def test_the_checks_hold_and_count_every_sample(result: Result) -> None:
     assert result.passed
     assert [c.count for m in result.methods if m.name == "slip" for c in m.checks] == [450]
     assert len(result.recordings) == 5
-    assert [(p.verdict, p.fault) for p in result.published] == [("reproduced", "")]
+    # A coarser mesh than the experiment's own: no printed figure was written for it.
+    assert {p.verdict for p in result.published} == {"other data"}
+    assert "mesh.radial = 4" in result.published[0].why
     assert any("Whether the plates slipped" in note for note in result.notes)
     assert "kPa (bonded plates) and 107.7 ± 0.9 kPa (slipping)" in result.sentence
 

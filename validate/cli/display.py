@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 if TYPE_CHECKING:  # what only names a type costs `validate list` nothing
+    from validate.compare.published import Published
     from validate.compare.verdict import Check
 
 
@@ -29,6 +30,16 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     for row in rows:
         made.add_row(*row)
     return made
+
+
+def figures_table(published: "Sequence[Published]") -> Table:
+    """Printed figures beside ours, with today's verdict."""
+    rows = [[p.name, _value(p.ours, p), _value(p.theirs, p), p.line, p.why] for p in published]
+    return table("Published figures", ["figure", "ours", "theirs", "verdict", "why"], rows)
+
+
+def _value(value: float | None, figure: "Published") -> str:
+    return "-" if value is None else shown(value, figure.unit)
 
 
 @contextmanager

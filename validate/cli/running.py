@@ -6,7 +6,15 @@ from time import perf_counter
 
 from validate.catalogue import experiment_files
 from validate.cli.arguments import FAILED, pairs
-from validate.cli.display import console, error_shown, progress, relative, shown, table
+from validate.cli.display import (
+    console,
+    error_shown,
+    figures_table,
+    progress,
+    relative,
+    shown,
+    table,
+)
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, root_of
@@ -26,7 +34,7 @@ def run(
     methods: str,
     as_json: bool,
 ) -> int:
-    """Runs experiments and writes their reports; 0 when all checks of all hold."""
+    """Runs experiments and writes their reports; 0 when all checks hold and all figures stand."""
     gl.ask()
     start = Path.cwd()
     chosen = [find(n, start) for n in (experiment_files(start) if everything else names)]
@@ -54,7 +62,7 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     screen = console()
     rows = [
         [m.name, c.name, error_shown(c), shown(2 * c.u_val, c.unit),
-         shown(c.limit, c.unit), str(c.count), c.verdict, c.why]
+         shown(c.limit, c.unit), str(c.count), c.verdict, m.why(c)]
         for m in result.methods for c in m.checks
     ]  # fmt: skip
     head = ["method", "check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
@@ -65,5 +73,7 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     screen.print(f"{result.title}\n", soft_wrap=True)
     if rows:
         screen.print(table("Checks", head, rows))
+    if result.published:
+        screen.print(figures_table(result.published))
     screen.print(f"\n{result.sentence}", soft_wrap=True)
     screen.print(f"{seconds:.1f} s wall time; report: {relative(page)}", soft_wrap=True)

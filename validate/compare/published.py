@@ -1,21 +1,28 @@
-"""Printed figures: declared before anything runs, computed from scores, shown with a verdict."""
+"""Printed figures: declared before anything runs, judged by today's value wherever they are shown.
 
+A figure belongs to the data it was printed for: beside other data it is not compared at all.
+"""
+
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-PublishedVerdict = Literal[
-    "reproduced", "not reproduced", "not reproducible as printed", "not comparable"
-]
+from validate.errors import ComparisonError
+
+Claim = Literal["reproduced", "not reproduced", "not reproducible as printed", "not comparable"]
+PublishedVerdict = Claim | Literal["moved", "not computed", "other data"]
 Values = Mapping[str, Mapping[str, float]]  # scores by owner (a method, "told", ...) and name
+_WIDEST = 0.1  # of a reference's scale; a wider tolerance decides nothing
 
 
 @dataclass(frozen=True)
 class Published:
-    """A printed figure beside ours: `verdict` says whether it reproduces and `reason` why not.
+    """A printed figure beside ours: `verdict` follows from today's value, `claim` was declared.
 
-    `expected` is our own value when the verdict was written, good to `drift` (absolute, in `unit`).
-    `missing` names what our value needs and nothing computed.
+    `expected` is our own value when the claim was written, good to `drift` (absolute, in `unit`).
+    `missing` names what our value needs and nothing computed; `other` what the figure was printed
+    for, where this data is not that; `window` where of a run the value was counted.
     """
 
     name: str
@@ -23,30 +30,60 @@ class Published:
     theirs: float | None
     tolerance: float | None
     unit: str
-    verdict: PublishedVerdict
+    claim: Claim
     reason: str
     source: str
     expected: float | None = None
     drift: float | None = None
     missing: str = ""
+    window: str = ""
+    other: str = ""
+
+    @property
+    def verdict(self) -> PublishedVerdict:
+        return self._judged[0]
 
     @property
     def fault(self) -> str:
-        """Why the verdict no longer stands: ours moved, or it left its tolerance; else empty."""
+        """Why the claim does not stand today; else empty."""
+        return self._judged[1]
+
+    @property
+    def line(self) -> str:
+        """The verdict as it is shown, with the window that it rests on."""
+        return f"{self.verdict} (within {self.window})" if self.window else self.verdict
+
+    @property
+    def why(self) -> str:
+        """What stands beside the verdict."""
+        return "; ".join(part for part in (self.fault, self.other or self.reason) if part)
+
+    @property
+    def _judged(self) -> tuple[PublishedVerdict, str]:
+        ours = self.ours
+        if self.other:
+            return "other data", ""
         if self.missing:
-            return f"not computed: {self.missing}"
-        if self.verdict == "reproduced" and self.ours is None:
-            return "marked reproduced, and compared nothing"
-        if self.ours is None:
-            return ""
-        if self.expected is not None and abs(self.ours - self.expected) > (self.drift or 0.0):
-            return f"ours moved from {self.expected:g} to {self.ours:g}, beyond {self.drift:g}"
-        known = self.theirs is not None and self.tolerance is not None
-        if self.verdict == "reproduced" and known:
-            off = abs(self.ours - float(self.theirs or 0.0))
-            if off > float(self.tolerance or 0.0):
-                return f"off by {off:g}, beyond the tolerance {self.tolerance:g}"
-        return ""
+            return "not computed", f"not computed: {self.missing}"
+        if ours is None:
+            nothing = self.claim == "reproduced"
+            return ("not computed", "compared nothing") if nothing else (self.claim, "")
+        if not math.isfinite(ours):
+            return "not computed", f"not computed: ours is {ours}"
+        if self.expected is not None and abs(ours - self.expected) > (self.drift or 0.0):
+            return "moved", f"ours moved from {self.expected:g} to {ours:g}, beyond {self.drift:g}"
+        return self._beside(ours)
+
+    def _beside(self, ours: float) -> tuple[PublishedVerdict, str]:
+        """A finite value of ours against theirs, where both claim and tolerance compare them."""
+        if self.theirs is None or self.tolerance is None:
+            return self.claim, ""
+        off = abs(ours - self.theirs)
+        if self.claim == "reproduced" and off > self.tolerance:
+            return "not reproduced", f"off by {off:g}, beyond the tolerance {self.tolerance:g}"
+        if self.claim == "not reproduced" and off <= self.tolerance:
+            return "reproduced", f"off by {off:g}, within the tolerance {self.tolerance:g}"
+        return self.claim, ""
 
 
 @dataclass(frozen=True)
@@ -56,7 +93,11 @@ class Figure:
     `of` is the score that stands beside it, "owner:score" (a method's, or "told:" for what the
     experiment's own exhibits computed, "identified:"), or a function of all values, which may find
     that there is none; None where nothing of ours can stand there. `reason` may be a function of
-    the values too.
+    the values too. `scale` is what the tolerance is held against (0: the printed number itself).
+
+    Raises `ComparisonError` for a claim that could not fail: reproduced without a printed number, a
+    value of ours or a tolerance; a tolerance wider than a tenth of the scale; an expected value
+    without the drift it is good to.
     """
 
     name: str
@@ -64,23 +105,52 @@ class Figure:
     theirs: float | None
     tolerance: float | None
     unit: str
-    verdict: PublishedVerdict
+    claim: Claim
     reason: str | Callable[[Values], str]
     source: str
     expected: float | None = None
     drift: float | None = None
+    window: str = ""
+    scale: float = 0.0
+    other: str = ""
+
+    def __post_init__(self) -> None:
+        held = (self.of, self.theirs, self.tolerance)
+        if self.claim == "reproduced" and None in held:
+            raise ComparisonError(
+                f"figure '{self.name}': reproduced needs a printed number, a value of ours and a "
+                f"tolerance, found theirs = {self.theirs}, of = {self.of}, tolerance = "
+                f"{self.tolerance}; without them it is 'not comparable'"
+            )
+        if (self.expected is None) != (self.drift is None):
+            raise ComparisonError(
+                f"figure '{self.name}': expected = {self.expected} with drift = {self.drift}; "
+                "give both or neither"
+            )
+        if self.tolerance is not None:
+            self._require_narrow(self.tolerance)
+
+    def _require_narrow(self, tolerance: float) -> None:
+        scale = self.scale or abs(self.theirs or 0.0)
+        if not tolerance <= _WIDEST * scale * (1 + 1e-9):
+            raise ComparisonError(
+                f"figure '{self.name}': a tolerance of {tolerance:g} {self.unit} is wider than a "
+                f"tenth of its reference's scale, {scale:g} {self.unit}; at most "
+                f"{_WIDEST * scale:g} could fail"
+            )
 
     def beside(self, values: Values) -> Published:
         """The figure with our value; one that cannot be computed says what it lacks."""
         ours, reason, missing = None, "", ""
         try:
-            ours = self._ours(values)
-            reason = self.reason if isinstance(self.reason, str) else self.reason(values)
+            if not self.other:
+                ours = self._ours(values)
+                reason = self.reason if isinstance(self.reason, str) else self.reason(values)
         except KeyError as absent:
             missing = f"no score {absent}"
         return Published(
-            self.name, ours, self.theirs, self.tolerance, self.unit, self.verdict, reason,
-            self.source, self.expected, self.drift, missing,
+            self.name, ours, self.theirs, self.tolerance, self.unit, self.claim, reason,
+            self.source, self.expected, self.drift, missing, self.window, self.other,
         )  # fmt: skip
 
     def _ours(self, values: Values) -> float | None:

@@ -33,7 +33,8 @@ KINDS: Mapping[Kind, str] = MappingProxyType(
 class MethodResult:
     """One method: its scene; per recording the registration and the run; scores and checks.
 
-    `band`: relative standard uncertainty of the force from the modulus; 0: not declared.
+    `band`: relative standard uncertainty of the force from the modulus; 0: not declared. `chosen`:
+    what was chosen on the twin that judges it.
     """
 
     name: str
@@ -46,9 +47,19 @@ class MethodResult:
     scores: tuple[Score, ...]
     checks: tuple[Check, ...]
     band: float = 0.0
+    chosen: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "residuals", MappingProxyType(dict(self.residuals)))
+
+    @property
+    def called(self) -> str:
+        """The label, with what was chosen on the judging twin."""
+        return f"{self.label} ({self.chosen})" if self.chosen else self.label
+
+    def why(self, check: Check) -> str:
+        """What stands beside a verdict on the method."""
+        return f"{check.why}; {self.chosen}" if self.chosen else check.why
 
     @property
     def run(self) -> Run:
@@ -98,6 +109,12 @@ class Result:
         return judge_all(self.checks)
 
     @property
+    def fallen(self) -> tuple[Published, ...]:
+        """The printed figures whose claim does not stand today."""
+        return tuple(p for p in self.published if p.fault)
+
+    @property
     def passed(self) -> bool:
-        """What the exit code follows: a run that compares nothing has failed."""
-        return self.overall.passed
+        """What the exit code follows: a run that compares nothing has failed, and one where a
+        printed figure does not stand."""
+        return self.overall.passed and not self.fallen

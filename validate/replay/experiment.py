@@ -147,6 +147,10 @@ class Told:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
+def _as_declared(experiment: Any, recordings: Sequence[Recording], parameters: Any) -> Any:
+    return experiment
+
+
 def _sets_nothing(parameters: Any, seen: Registered) -> Mapping[str, Any]:
     return {}
 
@@ -165,6 +169,8 @@ class Experiment:
     component that displacement charts follow, `reference` the method that speeds are compared with.
     `captions` are sentences under charts, by name; `frames` how many fields of a run are kept.
     `ladder` is how it enters the studies; what it leaves out is derived from the scene.
+    `follows` is the experiment as its recordings have it (title, limits, what figures belong to);
+    `locates` are parameters that only say where recordings lie, so that `follows` judges these.
     """
 
     name: str
@@ -192,6 +198,8 @@ class Experiment:
     reference: str = ""
     frames: int = 200
     ladder: Ladder | None = None
+    follows: Callable[[Any, Sequence[Recording], Any], Any] = _as_declared
+    locates: tuple[str, ...] = ()
     quick: Change = unchanged
     path: Path | None = field(default=None, compare=False)
 

@@ -19,7 +19,8 @@ class Method:
     The fields of both are the method's own to `--set`: `methods.NAME.tolerance=1e-3`. `markers`
     are those that a filter is given. `steps`: run only so many, as a baseline that is timed and
     not scored. `stride` above 1: a longer step than the recording's, so
-    that many times the `dt` that the experiment gives.
+    that many times the `dt` that the experiment gives. `chosen`: which settings were chosen on the
+    very twin that judges the method, so that its verdict is shown with that beside.
     """
 
     label: str = quantity("", "1", "what reports call it")
@@ -28,6 +29,7 @@ class Method:
     markers: tuple[str, ...] = quantity((), "1", "markers that a filter is given")
     steps: int | None = quantity(None, "1", "steps to run; none: all")
     stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
+    chosen: str = quantity("", "1", "what was chosen on the twin that judges it; empty: nothing")
 
     def prepare(self, system: System, seen: Registered, given: Mapping[str, Any]) -> Stepper:
         """The prepared scheme or filter, with the experiment's settings where it has them.

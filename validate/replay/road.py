@@ -4,6 +4,8 @@ One for every experiment, at holds or over time, with a twin's truth beside or w
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 from validate.compare.exhibit import captioned
 from validate.compare.inputs import Declared
@@ -13,15 +15,17 @@ from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.fem.locking import locking_warning
-from validate.parameters import describe
+from validate.parameters import Parameter, describe
+from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
 from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
+from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, configure, folder_of
 from validate.replay.runs import Road
-from validate.replay.sentence import verdict_sentence
+from validate.replay.sentence import figures_sentence, verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
 
 _AGAINST: Mapping[Kind, str] = {
@@ -35,6 +39,7 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
     shipped = experiment.load(parameters, folder_of(experiment))
+    experiment = _following(experiment, shipped, parameters, methods)
     identified = None
     if experiment.identify:
         identified = experiment.identify(shipped, parameters, all_methods(experiment, options))
@@ -48,18 +53,21 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     told = _told(road, {MAIN: main, **others})
     results = tuple(_method(road, main[name], others) for name in methods)
     effects = effects_of(road, results)
+    published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
     return Result(
         name=experiment.name,
         title=experiment.title,
         source=experiment.source,
-        sentence=_opening(identified) + verdict_sentence(results, road.kind, quick=options.quick),
-        parameters=describe(used) + describe(methods, "methods."),
+        sentence=_opening(identified)
+        + verdict_sentence(results, road.kind, quick=options.quick)
+        + figures_sentence(published),
+        parameters=_settings(used, methods),
         methods=results,
         recordings=road.recordings,
         rest=rest_residuals(first.seen, first.run),
         effects=effects,
-        published=_published(road, results, identified, told),
+        published=published,
         identified=identified.scores if identified else (),
         notes=_notes(remade, identified, main),
         quick=options.quick,
@@ -73,6 +81,32 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
             for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
         ),
     )
+
+
+def _following(
+    experiment: Experiment,
+    shipped: tuple[Recording, ...],
+    parameters: Any,
+    methods: Mapping[str, Method],
+) -> Experiment:
+    """The experiment as its recordings have it; no figure belongs to what the user changed."""
+    followed: Experiment = experiment.follows(experiment, shipped, parameters)
+    own = {p.path: p.default for p in _settings(experiment.parameters, experiment.methods)}
+    changed = [
+        f"{p.path} = {p.default}"
+        for p in _settings(parameters, methods)
+        if own.get(p.path) != p.default and p.path not in experiment.locates
+    ]
+    if not changed:
+        return followed
+    other = f"printed for this experiment's own settings; not compared with {', '.join(changed)}"
+    return replace(
+        followed, published=tuple(replace(f, other=f.other or other) for f in followed.published)
+    )
+
+
+def _settings(parameters: Any, methods: Mapping[str, Method]) -> tuple[Parameter, ...]:
+    return describe(parameters) + describe(methods, "methods.")
 
 
 def _told(road: Road, cases: Cases) -> Told:
@@ -104,6 +138,7 @@ def _method(road: Road, mine: Followed, others: Cases) -> MethodResult:
         ),
         checks=checks_of(road, mine) if accepted else (),
         band=experiment.band(road.parameters) if experiment.band else 0.0,
+        chosen=road.methods[mine.method].chosen,
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from validate.compare.overall import Overall, judge_all
+from validate.compare.published import Published
 from validate.compare.result import Kind, MethodResult
 from validate.compare.verdict import Check, Verdict
 
@@ -36,13 +37,22 @@ def verdict_sentence(results: tuple[MethodResult, ...], kind: Kind, *, quick: bo
     )
 
 
+def figures_sentence(published: tuple[Published, ...]) -> str:
+    """Which printed figures do not stand, and that those of other data are not compared."""
+    fallen = [p for p in published if p.fault]
+    foreign = sum(bool(p.other) for p in published)
+    told = [f" {len(fallen)} of {len(published)} printed figures do not stand ({_named(fallen)})."]
+    told += [f" {foreign} of {len(published)} printed figures belong to other data: not compared."]
+    return "".join(t for t, there in zip(told, (fallen, foreign), strict=True) if there)
+
+
 def _of(method: MethodResult, kind: Kind) -> str:
     """One method: how many checks have which verdict."""
     checks = method.checks
     if all(c.verdict == "agrees" for c in checks):
         points = sum(c.count for c in checks)
         return (
-            f"{method.label} {_ALL_AGREE[kind]}: {len(checks)} of {len(checks)} checks agree over "
+            f"{method.called} {_ALL_AGREE[kind]}: {len(checks)} of {len(checks)} checks agree over "
             f"{points} compared values"
         )
     told = []
@@ -51,7 +61,7 @@ def _of(method: MethodResult, kind: Kind) -> str:
         if found:
             which = f" ({_named(found)})" if verdict in _NAMED else ""
             told.append(f"{len(found)} of {len(checks)} checks {words}{which}")
-    return f"{method.label}: " + ", ".join(told)
+    return f"{method.called}: " + ", ".join(told)
 
 
 def _corrected(found: Overall) -> str:
@@ -69,7 +79,7 @@ def _corrected(found: Overall) -> str:
     return ""
 
 
-def _named(checks: Iterable[Check]) -> str:
-    names = [c.name for c in checks]
+def _named(found: Iterable[Check | Published]) -> str:
+    names = [f.name for f in found]
     shown = ", ".join(names[:4])
     return shown if len(names) <= 4 else f"{shown} and {len(names) - 4} others"

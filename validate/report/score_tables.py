@@ -20,10 +20,15 @@ _PRINTED: dict[str, Emphasis] = {
     "not reproduced": "bad",
     "not reproducible as printed": "open",
     "not comparable": "open",
+    "moved": "bad",
+    "not computed": "bad",
+    "other data": "open",
 }
 _SCORE = ("name", "value", "unit", "count", "against", "definition")
 _RESIDUAL = ("method", "quantity", "load", "point", "a", "b", "c", "length", "sd", "unit")
-_PUBLISHED = ("figure", "ours", "theirs", "tolerance", "unit", "verdict", "reason", "source")
+_PUBLISHED = (
+    "figure", "ours", "expected", "theirs", "tolerance", "unit", "verdict", "reason", "source",
+)  # fmt: skip
 Found = Mapping[str, Mapping[str, Score]]  # by row, then by column
 
 
@@ -50,7 +55,7 @@ def _cost_row(method: MethodResult) -> tuple[Entry | TableCell, ...]:
     end = next((r.outcome for r in method.runs if not r.finished), method.run.outcome)
     ended = "finished" if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
     return (
-        TableCell(method.label + (" (checked)" if method.accepted else ""), emphasis="strong"),
+        TableCell(method.called + (" (checked)" if method.accepted else ""), emphasis="strong"),
         method.name,
         ended,
         TableCell(steps, text=rate(steps)),
@@ -206,9 +211,12 @@ def published(result: Result) -> Exhibit | None:
 def _printed(figure: Published) -> tuple[Entry | TableCell, ...]:
     return (
         figure.name,
-        *(TableCell(v, figure.unit) for v in (figure.ours, figure.theirs, figure.tolerance)),
+        *(
+            TableCell(v, figure.unit)
+            for v in (figure.ours, figure.expected, figure.theirs, figure.tolerance)
+        ),
         unit_cell(figure.unit),
-        TableCell(figure.verdict, emphasis=_PRINTED[figure.verdict]),
-        figure.reason,
+        TableCell(figure.line, emphasis="bad" if figure.fault else _PRINTED[figure.verdict]),
+        figure.why,
         figure.source,
     )

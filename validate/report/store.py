@@ -77,7 +77,7 @@ def document(result: Result, created: str) -> Json:
         "effects": recorded(result.effects),
         "rest": [_rest(r) for r in result.rest],
         "identified": [_score(s) for s in result.identified],
-        "published": [_published(p) for p in result.published],
+        "published": [figure_members(p) for p in result.published],
         "uncertain_inputs": [members(i) for i in result.inputs],
         "joint_inputs": [members(j) | {"percent": recorded(j.percent)} for j in result.joint],
         "exhibits": exhibits(result.exhibits),
@@ -120,6 +120,7 @@ def _method(method: MethodResult, result: Result, share: _Share) -> Json:
     return {
         "name": method.name,
         "label": method.label,
+        "chosen": method.chosen,
         "accepted": method.accepted,
         "outcome": recorded(end),
         "setup_s": recorded(first.setup_s),
@@ -131,9 +132,9 @@ def _method(method: MethodResult, result: Result, share: _Share) -> Json:
             for name, run in zip(names[1:], method.runs[1:], strict=False)
         ],
         "scores": [_score(s) for s in method.scores],
-        "checks": [_check(c) for c in method.checks],
+        "checks": [check_members(c) for c in method.checks],
         "published": [
-            _published(p) for p in result.published if p.name.startswith(f"{method.name}: ")
+            figure_members(p) for p in result.published if p.name.startswith(f"{method.name}: ")
         ],
     }  # fmt: skip
 
@@ -178,14 +179,16 @@ def _overall(found: Overall) -> Json:
     }
 
 
-def _check(check: Check) -> Json:
+def check_members(check: Check) -> Json:
     """A check that compared nothing has no error and no uncertainty."""
     parts = ("value", "raw", "noise", "u_val", "u_D", "u_num", "u_input")
     return members(check) | ({} if check.count else dict.fromkeys(parts))
 
 
-def _published(figure: Published) -> Json:
-    return members(figure) | {"fault": figure.fault}
+def figure_members(figure: Published) -> Json:
+    """A printed figure with its verdict of today, and why the claim does not stand, if so."""
+    judged = {"verdict": figure.verdict, "reason": figure.why, "fault": figure.fault}
+    return members(figure) | judged
 
 
 def _rest(r: Residual) -> Json:

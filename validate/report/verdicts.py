@@ -26,7 +26,8 @@ _BANDS = {
 
 def band(result: Result) -> tuple[str, str]:
     """The colour class of the sentence and the word that says the same."""
-    return _BANDS[result.overall.word]
+    fallen = ("bad", "A printed figure does not stand") if result.fallen else None
+    return (result.overall.word != "differs" and fallen) or _BANDS[result.overall.word]
 
 
 def checks(result: Result) -> Exhibit | None:
@@ -43,9 +44,9 @@ def checks(result: Result) -> Exhibit | None:
         "decide: 2 u_val exceeds the limit. Fitted: the data served to identify; repeats itself: "
         "recording and model are one; neither is evidence.",
         _HEADINGS,
-        tuple((m.name, *_row(c)) for m in result.methods for c in m.checks),
+        tuple((m.name, *_row(c), m.why(c)) for m in result.methods for c in m.checks),
     )
-    checked = "; ".join(f"{m.name} ({m.label})" for m in result.methods if m.checks)
+    checked = "; ".join(f"{m.name} ({m.called})" for m in result.methods if m.checks)
     words = f"Checked: {checked}. Other methods are rivals, shown for discrimination."
     found = result.overall
     corrected = (
@@ -100,7 +101,6 @@ def _row(check: Check) -> tuple[TableCell | int | str, ...]:
         TableCell(check.limit, check.unit),
         check.count,
         TableCell(check.verdict, emphasis=_EMPHASIS[check.verdict]),
-        check.why,
     )
 
 

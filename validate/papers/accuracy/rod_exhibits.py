@@ -64,6 +64,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     quasi = errors["quasi_static"]
     numbers = {
         "ordered": ordered_share(errors, until=_MOVING),
+        "ordered.all": ordered_share(errors),
         "sum": sum_ratio(errors)[0],
         "explicit.over.lumped": sum_ratio(errors)[1],
         "restriction.over.lumping": ratio,

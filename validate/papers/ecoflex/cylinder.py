@@ -78,7 +78,9 @@ class CylinderModel:
     order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
 
 
-WINDOWS = ("5pct", "10pct", "25pct", "50pct")
+def window(strain: float) -> str:
+    """The name of the window that ends at a strain."""
+    return f"{100 * strain:g}pct"
 
 
 def _limits(p: LoggedCylinder) -> tuple[float, float, float]:
@@ -91,8 +93,8 @@ def load(parameters: LoggedCylinder, folder: Path) -> tuple[Recording, ...]:
     files = sorted(where.glob(parameters.logs))
     if not files:
         raise RecordingError(
-            f"no logs {parameters.logs} in {where}: get {DATA_SET} and pass --set data=FOLDER or "
-            "set VALIDATE_SHARED_DATA to the folder above force/"
+            f"no logs '{parameters.logs}' in {where}: get {DATA_SET} and pass --set data=FOLDER "
+            "and --set logs=PATTERN, or set VALIDATE_SHARED_DATA to the folder above force/"
         )
     return tuple(read_instron(f) for f in files)
 
@@ -129,13 +131,16 @@ def grid_of(p: LoggedCylinder, model: CylinderModel) -> tuple[int, int]:
 
 
 def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Registered:
-    """To the law's limit, in windows that end where one of the laws does."""
+    """To the law's limit, in windows that end where one of the laws does and the log reaches."""
     p = parameters
     limit: float = getattr(p, f"limit_{scene.material.law}")
     fit = fit_modulus(recording, window=(p.fit_from, p.fit_to))
-    strains = zip(WINDOWS, pairwise((p.fit_from, p.fit_to, *_limits(p))), strict=True)
-    shown = {label: (a, b) for label, (a, b) in strains if b <= limit}
-    return pressed_log(recording, fit, specimen_size(recording, p)[1], limit, shown, fit.noise)
+    height = specimen_size(recording, p)[1]
+    d = recording.signal("displacement", "m").y
+    reached = float(d.max() - fit.contact) / height - fit.toe
+    strains = pairwise((p.fit_from, p.fit_to, *_limits(p)))
+    shown = {window(b): (a, b) for a, b in strains if b <= min(limit, reached)}
+    return pressed_log(recording, fit, height, limit, shown, fit.noise)
 
 
 def specimen_size(recording: Recording, p: LoggedCylinder) -> tuple[float, float]:

@@ -1,0 +1,109 @@
+"""A printed figure belongs to the data and settings it was printed for."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tiny import TINY, Card
+
+from validate.compare.published import Figure
+from validate.compare.result import Result
+from validate.errors import RecordingError
+from validate.papers.ecoflex.cylinder import LoggedCylinder, load
+from validate.papers.ecoflex.logged import follows, material_of
+from validate.replay import load as experiment_named
+from validate.replay.experiment import Experiment, Told
+from validate.replay.followed import Cases
+from validate.replay.options import Options
+from validate.replay.road import compare
+
+FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here", 3.0, 0.0)
+
+
+def tiny(frames: float, **settings: str) -> Result:
+    def told(card: Card, cases: Cases, progress: object) -> Told:
+        return Told((), {"frames": frames})
+
+    experiment = replace(TINY, exhibits=told, published=(FIGURE,), cases=())
+    return compare(experiment, Options(settings))
+
+
+def test_run_fails_and_says_so_where_our_value_moved() -> None:
+    assert tiny(3.0).passed
+    moved = tiny(4.0)
+    assert not moved.passed
+    assert [p.verdict for p in moved.published] == ["moved"]
+    assert moved.sentence.endswith("1 of 1 printed figures do not stand (frames).")
+
+
+def test_other_settings_are_not_compared_with_a_printed_figure() -> None:
+    (figure,) = (other := tiny(4.0, **{"E": "10001", "methods.kf.modes": "4"})).published
+    assert (figure.verdict, figure.ours) == ("other data", None)
+    assert "not compared with E = 10001.0, methods.kf.modes = 4" in figure.why
+    assert other.sentence.endswith("1 of 1 printed figures belong to other data: not compared.")
+    (same,) = tiny(3.0, E="10000").published
+    assert same.verdict == "reproduced"
+
+
+# --- the Ecoflex cylinder -------------------------------------------------------------------------
+
+
+def followed(folder: Path, logs: str) -> Experiment:
+    experiment = experiment_named("ecoflex_cylinder")
+    p = replace(LoggedCylinder(), data=str(folder), logs=logs)
+    return follows(experiment, load(p, Path()), p)
+
+
+@pytest.fixture(scope="module")
+def logs(shared_data: Path) -> Path:
+    return shared_data / "force" / "ecoflex-compression"
+
+
+def test_the_five_logs_leave_the_experiment_as_declared(logs: Path) -> None:
+    declared, p = experiment_named("ecoflex_cylinder"), LoggedCylinder()
+    one = load(replace(p, data=str(logs), logs="EF30_0T_A1.csv"), logs)[0]
+    found = follows(declared, [replace(one, name=f"EF30_0T_A{k}") for k in range(1, 6)], p)
+    assert (found.title, found.accept) == (declared.title, declared.accept)
+    kept = [(f.name, f.expected, f.other) for f in found.published]
+    assert kept == [(f.name, f.expected, "") for f in declared.published]
+
+
+def test_another_material_has_its_own_title_and_limit_and_no_printed_figure(logs: Path) -> None:
+    found = followed(logs, "EF50_0T_A*.csv")
+    assert found.title == "EF50_0T: cylinder compressed between plates, 1 log"
+    assert "Ecoflex 00-30" not in found.title + found.source
+    figures = [f.beside({}) for f in found.published]
+    assert {f.verdict for f in figures} == {"other data"}
+    assert figures[0].why == "printed for EF30_0T; not compared with this data (EF50_0T)"
+    (accept,) = found.accept
+    assert accept.limit == pytest.approx(3.40, abs=0.01)  # 34 N at 10 % strain in the log itself
+    assert "these logs" in accept.source
+    assert found.uncertainty is not None
+    assert all("of EF30_0T, assumed" in i.doc for i in found.uncertainty.inputs)
+
+
+def test_a_file_that_was_renamed_is_still_the_material_it_says(logs: Path, tmp_path: Path) -> None:
+    (tmp_path / "EF30_0T_A1.csv").write_bytes((logs / "EF50_0T_A1.csv").read_bytes())
+    found = followed(tmp_path, "EF30_0T_A*.csv")
+    assert {f.beside({}).verdict for f in found.published} == {"other data"}
+
+
+def test_other_logs_of_the_printed_material_are_held_to_its_number_alone(logs: Path) -> None:
+    found = followed(logs, "EF30_0T_A1.csv")
+    assert found.title == "EF30_0T: cylinder compressed between plates, 1 log"
+    figure = found.published[0]
+    assert figure.beside({"identified": {"modulus.E": 112e3}}).verdict == "reproduced"
+    assert figure.beside({"identified": {"modulus.E": 173e3}}).verdict == "not reproduced"
+
+
+def test_windows_are_named_by_the_strains_they_end_at(logs: Path) -> None:
+    experiment = experiment_named("ecoflex_cylinder")
+    p = replace(LoggedCylinder(), data=str(logs), logs="EF30_0T_A1.csv", limit_linear=0.125)
+    (accept,) = follows(experiment, recordings := load(p, Path()), p).accept
+    assert accept.loads == ("12.5pct",)
+    assert material_of(recordings[0]) == "EF30_0T"
+
+
+def test_missing_logs_name_both_settings(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"--set data=FOLDER and --set logs=PATTERN"):
+        load(replace(LoggedCylinder(), data=str(tmp_path), logs="*.csv"), tmp_path)

@@ -1,0 +1,80 @@
+"""The experiment as its logs have it: title, limit and printed figures belong to a material."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from validate.papers.ecoflex.cylinder import LoggedCylinder, specimen_size, window
+from validate.recording.types import Recording
+from validate.replay.experiment import Experiment
+
+MATERIAL = "EF30_0T"  # Ecoflex 00-30 without thinner, as the data set calls it
+LOGS = frozenset(f"{MATERIAL}_A{k}" for k in range(1, 6))
+_SAMPLE = re.compile(r"(.+)_[A-Z]_sample_\d+")
+
+
+def material_of(recording: Recording) -> str:
+    """The material as the log's first line names it, less specimen and repeat; else the file."""
+    found = _SAMPLE.fullmatch(recording.metadata["header"].get("line 1", "").strip())
+    return found[1] if found else recording.name
+
+
+def follows(
+    experiment: Experiment, recordings: Sequence[Recording], p: LoggedCylinder
+) -> Experiment:
+    """The experiment for the logs given.
+
+    Other logs of the printed material are held to its figure, not to our value of the five logs.
+    Another material has its own title and limit, and no printed figure.
+    """
+    judged = tuple(replace(a, loads=(window(p.limit_linear),)) for a in experiment.accept)
+    experiment = replace(experiment, accept=judged)
+    materials = tuple(dict.fromkeys(material_of(r) for r in recordings))
+    if {r.name for r in recordings} == LOGS and materials == (MATERIAL,):
+        return experiment
+    logs = f"{len(recordings)} log{'s' if len(recordings) > 1 else ''}"
+    title = f"{', '.join(materials)}: cylinder compressed between plates, {logs}"
+    if materials == (MATERIAL,):
+        own = tuple(replace(f, expected=None, drift=None) for f in experiment.published)
+        return replace(experiment, title=title, published=own)
+    return _foreign(replace(experiment, title=title), recordings, p, materials)
+
+
+def _foreign(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    p: LoggedCylinder,
+    materials: tuple[str, ...],
+) -> Experiment:
+    """Another material: nothing of the printed one is taken for its own without saying so."""
+    limit = _tenth(recordings, p)
+    source = f"a tenth of the force measured at {100 * p.limit_linear:g} % strain, these logs"
+    other = f"printed for {MATERIAL}; not compared with this data ({', '.join(materials)})"
+    uncertainty = experiment.uncertainty
+    return replace(
+        experiment,
+        source=f"logs in {', '.join(sorted({Path(r.source.path).name for r in recordings}))}",
+        accept=tuple(replace(a, limit=limit, source=source) for a in experiment.accept),
+        published=tuple(replace(f, other=other) for f in experiment.published),
+        uncertainty=uncertainty
+        and replace(
+            uncertainty,
+            inputs=tuple(
+                replace(i, doc=f"{i.doc} of {MATERIAL}, assumed for this material")
+                for i in uncertainty.inputs
+            ),
+        ),
+    )
+
+
+def _tenth(recordings: Sequence[Recording], p: LoggedCylinder) -> float:
+    """A tenth of the force N at the linear law's strain, mean over the logs."""
+    forces = []
+    for recording in recordings:
+        d, force = recording.signal("displacement", "m").y, recording.signal("force", "N").y
+        last = int(np.argmax(d[:, 0] >= p.limit_linear * specimen_size(recording, p)[1]))
+        forces.append(float(force[last, 0]))
+    return 0.1 * float(np.mean(forces))
