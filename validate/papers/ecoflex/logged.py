@@ -63,7 +63,7 @@ def _foreign(
         and replace(
             uncertainty,
             inputs=tuple(
-                replace(i, doc=f"{i.doc} of {MATERIAL}, assumed for this material")
+                replace(i, source=f"assumed, as for {MATERIAL}: {i.source}")
                 for i in uncertainty.inputs
             ),
         ),
