@@ -15,6 +15,7 @@ from validate.register.measures import (
     Reflection,
     chi_square_bound,
     find_outliers,
+    fitted_scale,
     localisation_error,
     looks_mirrored,
     reflection,
@@ -374,9 +375,8 @@ def test_outliers_do_not_blur_which_markers_are_swapped():
 # --- outliers and excess ---
 
 
-@pytest.mark.parametrize("size", [0.005, 0.1])
-def test_an_outlier_is_named_with_its_distance_and_stays_in_the_fit(size):
-    y = grid(0.002)
+def test_an_outlier_is_named_with_its_distance_and_stays_in_the_fit():
+    y, size = grid(0.002), 0.005
     x, T = measured(y, 9)
     x[5] += size * T.R.T @ [0, 0.6, 0.8]
     found = register(x, y)
@@ -391,11 +391,64 @@ def test_an_outlier_is_named_with_its_distance_and_stays_in_the_fit(size):
     assert register(x, y, exclude=["m05"]).outliers == ()
 
 
-def test_several_outliers_do_not_hide_each_other():
+def test_an_outlier_that_moves_the_result_is_refused_with_its_effect_and_both_settings():
+    """Far beyond twice the 0.22 mm that 42 markers leave at themselves."""
+    y = grid(0.002)
+    x, T = measured(y, 9)
+    x[5] += 0.1 * T.R.T @ [0, 0.6, 0.8]
+    said = message(x, y)
+    others = np.delete(np.arange(42), 5)
+    moved = fit_rigid(x, y).apply(x[others]) - fit_rigid(x[others], y[others]).apply(x[others])
+    assert said.startswith("outliers among the markers (m05 by 1")
+    assert f"move the others by {1e3 * rms(moved):.3g} mm, twice" in said
+    assert said.endswith("set registration.exclude=m05 or registration.robust=true")
+    without = fit_rigid(x[others], y[others]).matrix
+    np.testing.assert_allclose(register(x, y, exclude=["m05"]).transform.matrix, without)
+
+
+def test_a_robust_fit_leaves_outliers_out_and_names_them():
     y = cloud(10, 8)
     x, T = measured(y, 10)
     x[[2, 5]] += 0.02 * T.R.T @ [0, 0.6, 0.8]
-    assert [o.name for o in register(x, y).outliers] == ["m02", "m05"]
+    assert "set registration.exclude=m02,m05 or" in message(x, y)
+    found = register(x, y, robust=True)
+    kept = [0, 1, 3, 4, 6, 7]
+    assert found.rejected == ("m02", "m05") == tuple(o.name for o in found.outliers)
+    assert found.names == tuple(NAMES[i] for i in kept)
+    assert found.findings[0].endswith("it is left out by the robust fit")
+    np.testing.assert_allclose(found.transform.matrix, fit_rigid(x[kept], y[kept]).matrix)
+    clean = measured(y, 10)[0]
+    np.testing.assert_allclose(
+        register(clean, y, robust=True).transform.matrix, fit_rigid(clean, y).matrix
+    )
+
+
+# --- scale ---
+
+
+def test_the_scale_is_fitted_whether_it_is_used_or_not():
+    y = grid(0.002)
+    x = measured(y, 21)[0]
+    for method in METHODS:
+        found = register(x, y, method=method)
+        assert found.scale.value == pytest.approx(1, abs=found.scale.half)
+        assert found.findings == ()
+    large = register(1.05 * x, y)
+    assert large.scale.value == pytest.approx(1.05, abs=large.scale.half)
+    assert "not used; check units and calibration" in large.findings[0]
+    assert f"are {large.scale.value:.5f} +- {large.scale.half:.2g} times" in large.findings[0]
+    assert "and this scale is used" in register(1.05 * x, y, method="similarity").findings[0]
+
+
+def test_the_scales_interval_is_that_of_many_draws():
+    """3.29 standard deviations; by hand sd / (sqrt(k) f)."""
+    y, rng = grid(0.002), np.random.default_rng(4)
+    found = [fitted_scale(y + rng.normal(0, SD, y.shape), y, SD) for _ in range(200)]
+    half = 3.2905 * SD / (np.sqrt(42) * rms(y - y.mean(axis=0)))
+    assert np.mean([s.half for s in found]) == pytest.approx(half, rel=0.1)
+    values = np.array([s.value for s in found])
+    assert values.std() * 3.2905 == pytest.approx(half, rel=0.15)
+    assert values.mean() == pytest.approx(1, abs=half / 10)
 
 
 @pytest.mark.slow
@@ -437,7 +490,7 @@ def test_unrelated_points_are_an_excess_not_a_permutation():
 def test_few_unrelated_points_are_no_permutation(seed):
     """Relabelling brings them 3 times closer now and then, but not within their spacing."""
     flat = np.array([1, 1, 0])
-    found = register(cloud(seed + 1000, 6) * flat, cloud(seed, 6) * flat)
+    found = register(cloud(seed + 1000, 6) * flat, cloud(seed, 6) * flat, robust=True)
     assert "times the noise of 0.577 mm" in found.findings[-1]
 
 

@@ -64,7 +64,7 @@ def test_a_marker_outside_a_plane_mesh_is_refused() -> None:
     with pytest.raises(RegistrationError, match="outside"):
         observe_markers(
             markers, layout, grid((1.0, 1.0), (2, 2)),
-            method="rigid", sampling="barycentric", up=up,
+            up=up,
         )  # fmt: skip
 
 

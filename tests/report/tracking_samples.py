@@ -66,7 +66,7 @@ def seen() -> tuple[Recording, Registered]:
         signals={"push": push}, markers={"markers": markers},
     )  # fmt: skip
     layout = {name: np.array(point) for name, point in NODES.items()}
-    observed = observe_markers(markers, layout, body().mesh, method="rigid", sampling="barycentric")
+    observed = observe_markers(markers, layout, body().mesh)
     return recording, Registered((driving(recording, "push", "N"), observed))
 
 

@@ -11,6 +11,7 @@ from validate.errors import RegistrationError
 from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
 from validate.recording.types import Markers, Recording
 from validate.register.clock import clock_sd, slopes, with_clock
+from validate.register.fitting import MarkerFit
 from validate.register.labels import require_steady_labels
 from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
 from validate.register.quality import LINE, Registration, register_points
@@ -140,7 +141,7 @@ def observe_markers(
     layout: Mapping[str, Floats],
     mesh: Mesh,
     *,
-    method: Literal["rigid", "similarity", "two_step"] = "rigid",
+    how: MarkerFit = MarkerFit(),
     sampling: Sampling = "barycentric",
     up: tuple[Floats, Floats] | None = None,
     name: str = "markers",
@@ -164,8 +165,9 @@ def observe_markers(
     rest = np.array([layout[marker] for marker in markers.names])
     _require_scale(markers.x[0], rest)
     registration = register_points(
-        markers.names, markers.x[0], rest, method=method, expected_sd=markers.sd, up=up
-    )
+        markers.names, markers.x[0], rest, method=how.method, exclude=how.exclude,
+        robust=how.robust, expected_sd=markers.sd, up=up,
+    )  # fmt: skip
     d = mesh.dimension
     places = rest[:, :d]
     rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, places)
@@ -184,7 +186,7 @@ def placed_markers(
     mesh: Mesh,
     *,
     topic: str = "markers",
-    method: Literal["rigid", "similarity", "two_step"] = "rigid",
+    how: MarkerFit = MarkerFit(),
     sampling: Sampling = "barycentric",
     together: tuple[Together, ...] = (),
     tracker: str = "camera",
@@ -205,7 +207,7 @@ def placed_markers(
     seen_up = vector(recording.record(tracker).get("up", ""), f"{tracker} 'up'")
     axes = (seen_up, np.array(up)) if _planar(layout, markers.sd) else None
     return observe_markers(
-        markers, layout, mesh, method=method, sampling=sampling, up=axes, name=topic,
+        markers, layout, mesh, how=how, sampling=sampling, up=axes, name=topic,
         together=together, sd_t=clock_sd(recording, topic),
     )  # fmt: skip
 

@@ -38,6 +38,13 @@ class Reflection(NamedTuple):
     improper: float
 
 
+class Scale(NamedTuple):
+    """Size of the source over that of the target, and the half-width of its 99.9 % interval."""
+
+    value: float
+    half: float
+
+
 class Outlier(NamedTuple):
     """A marker far from the fit to the others: its distance from where they put it, m."""
 
@@ -110,6 +117,19 @@ def looks_mirrored(found: Reflection, bound: float) -> bool:
         return False
     factor = BETTER if found.improper <= bound else CLEARLY
     return found.proper > factor * found.improper
+
+
+def fitted_scale(source: Floats, target: Floats, noise: float) -> Scale:
+    """The scale of points (k, d) m with noise m per axis in the source, unbiased by it.
+
+    Fitted onto the source, where the noise is; sd of a relative scale as in `target_covariance`.
+    """
+    k, d = source.shape
+    back = fit_similarity(target, source)
+    fle = localisation_error(rms(back.apply(target) - source), k, d, scaled=True)
+    sd = max(noise, fle / float(np.sqrt(d))) if np.isfinite(fle) else noise
+    size = rms(target - target.mean(axis=0))
+    return Scale(back.s, float(np.sqrt(chi_square_bound(1) / k)) * sd / size)
 
 
 def robust_noise(residuals: Floats) -> float:

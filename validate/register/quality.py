@@ -13,7 +13,7 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,12 +21,12 @@ from numpy.typing import ArrayLike
 from validate.arrays import Floats, checked, rms
 from validate.errors import RegistrationError
 from validate.register import measures
-from validate.register.measures import FEWEST, Fit, Outlier, Reflection
+from validate.register.fitting import Method
+from validate.register.measures import FEWEST, Fit, Mask, Outlier, Reflection, Scale
 from validate.register.relabel import label_fault
 from validate.register.transform import Similarity, check_spread, spread
 from validate.register.two_step import Up, fit_plane, fit_two_step
 
-Method = Literal["rigid", "similarity", "two_step", "two_step_scaled"]
 LINE = 3.0  # spread across the markers' line, over the noise, that a rotation about it needs
 
 
@@ -35,7 +35,8 @@ class Registration:
     """T_target_from_source with the residuals of the k markers that entered the fit.
 
     names (k,), markers (k, d) m their positions in the target frame, residuals (k, d) m mapped
-    source minus target; `outliers` stay in the fit. `missing` were NaN, `excluded` were asked for.
+    source minus target. `missing` were NaN, `excluded` were asked for, `rejected` are outliers that
+    a robust fit left out; other `outliers` stay in it. `scale` is fitted whether it is used or not.
     """
 
     transform: Similarity
@@ -45,9 +46,11 @@ class Registration:
     expected_sd: float
     method: Method
     reflection: Reflection
+    scale: Scale
     outliers: tuple[Outlier, ...] = ()
     missing: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -94,6 +97,7 @@ def register_points(
     method: Method = "rigid",
     expected_sd: float,
     exclude: Sequence[str] = (),
+    robust: bool = False,
     up: Up | None = None,
 ) -> Registration:
     """Register named markers: source (k, d) m measured, target (k, d) m, NaN rows = not seen.
@@ -105,8 +109,11 @@ def register_points(
 
     A residual that noise exceeds with probability `P_EXCESS` is explained in this order: mirrored
     or permuted markers raise `RegistrationError` with both residuals; outliers and an unexplained
-    excess are findings. Raises `RegistrationError` also for fewer than `FEWEST` markers, degenerate
-    sets, a set no thicker across its line than `LINE` times the noise, and unknown names.
+    excess are findings. An outlier that moves the others by more than twice the uncertainty of the
+    fit without it raises `RegistrationError`, unless `robust`: least squares are then repeated
+    without the outliers, weights 0 or 1 (Rousseeuw & Leroy (1987), reweighted least squares).
+    Raises `RegistrationError` also for fewer than `FEWEST` markers, degenerate sets, a set no
+    thicker across its line than `LINE` times the noise, and unknown names.
     """
     x, y, kept, missing = _used(names, source, target, exclude)
     _check_settings(method, expected_sd, x, y)
@@ -119,23 +126,30 @@ def register_points(
         _refuse_relabelled(kept, x, y, fit, noise)
     outliers = measures.find_outliers(kept, x, y, noise, _scaled(method))
     regular = ~np.isin(kept, [o.name for o in outliers])
+    if outliers and not robust:
+        _refuse_moved(outliers, x, y, regular, fit, noise, _scaled(method))
+    scale = measures.fitted_scale(x[regular], y[regular], noise)
     findings = [
         *_left_out(len(names), missing, tuple(exclude)),
-        *_outlying(outliers),
+        *_outlying(outliers, robust),
+        *_other_size(scale, _scaled(method)),
         *_excess(x[regular], y[regular], fit, noise, len(outliers), method),
     ]
-    transform = fit(x, y)
+    used = regular if robust else np.ones(len(kept), bool)
+    transform = fit(x[used], y[used])
     return Registration(
         transform=transform,
-        names=kept,
-        markers=y,
-        residuals=transform.apply(x) - y,
+        names=tuple(n for n, use in zip(kept, used, strict=True) if use),
+        markers=y[used],
+        residuals=transform.apply(x[used]) - y[used],
         expected_sd=float(expected_sd),
         method=method,
         reflection=mirror,
+        scale=scale,
         outliers=outliers,
         missing=missing,
         excluded=tuple(exclude),
+        rejected=tuple(o.name for o in outliers) if robust else (),
         findings=tuple(findings),
     )
 
@@ -236,11 +250,44 @@ def _left_out(k: int, missing: tuple[str, ...], excluded: tuple[str, ...]) -> li
     return [f"{len(who)} of {k} markers {what}: {', '.join(who)}" for who, what in said if who]
 
 
-def _outlying(outliers: Sequence[Outlier]) -> list[str]:
+def _refuse_moved(
+    outliers: Sequence[Outlier], x: Floats, y: Floats, regular: Mask, fit: Fit, noise: float,
+    scaled: bool,
+) -> None:  # fmt: skip
+    """How far the outliers move the other markers, against what the fit without them leaves."""
+    whole, x, y = fit(x, y), x[regular], y[regular]
+    without = fit(x, y)
+    k, d = x.shape
+    fle = measures.localisation_error(rms(without.apply(x) - y), k, d, scaled)
+    own = max(noise * np.sqrt(d), fle)
+    covariance = measures.target_covariance(y, y, own, scaled)
+    doubt = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()))
+    moved = rms(whole.apply(x) - without.apply(x))
+    if moved > 2 * doubt:
+        names = ",".join(o.name for o in outliers)
+        far = ", ".join(f"{o.name} by {1e3 * o.residual:.3g} mm" for o in outliers)
+        raise RegistrationError(
+            f"outliers among the markers ({far}) move the others by {1e3 * moved:.3g} mm, "
+            f"twice the registration's uncertainty is {2e3 * doubt:.3g} mm; leave them out of the "
+            f"fit: set registration.exclude={names} or registration.robust=true"
+        )
+
+
+def _outlying(outliers: Sequence[Outlier], robust: bool) -> list[str]:
+    fate = "left out by the robust fit" if robust else "in the fit (exclude it to leave it out)"
     return [
         f"marker {o.name} is an outlier: {1e3 * o.residual:.3g} mm from where the others put it; "
-        "it is in the fit (exclude it by name to leave it out)"
+        f"it is {fate}"
         for o in outliers
+    ]
+
+
+def _other_size(scale: Scale, used: bool) -> list[str]:
+    if abs(scale.value - 1) <= scale.half:
+        return []
+    return [
+        f"the markers are {scale.value:.5f} +- {scale.half:.2g} times (99.9 %) as large as their "
+        f"layout, and this scale is {'used' if used else 'not used'}; check units and calibration"
     ]
 
 

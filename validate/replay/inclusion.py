@@ -12,6 +12,7 @@ from validate.compare.verdict import Accept
 from validate.parameters import Ranges, quantity
 from validate.recording.types import Contours, Recording
 from validate.register.clock import clock_sd
+from validate.register.fitting import MarkerFit
 from validate.register.inclusion import outlined_capsule
 from validate.register.markers import Together, placed_markers
 from validate.register.observation import nearest_sample
@@ -100,6 +101,7 @@ class InclusionTest:
     mesh: BlockGrid = BlockGrid()
     ranges: InclusionRanges = InclusionRanges()
     streams: Streams = Streams()
+    registration: MarkerFit = MarkerFit()
     plates: Contact = quantity("slip", "1", "contact of both plates")
     friction: float = quantity(0.0, "N/m3", "tangential stiffness of the plates, if partial")
     loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
@@ -160,7 +162,9 @@ def _place(recording: Recording, p: InclusionTest, scene: Scene) -> Registered:
     contours = recording.contour(p.streams.outline)
     wall = cavity_sampler(scene.mesh, "cavity", measured_capsule(recording, contours, p.streams))
     units = {topic: _unit(recording, topic) for topic in p.streams.signals}
-    return placed(recording, contours, scene, wall, p.streams, units, p.loads, _PLANE)
+    return placed(
+        recording, contours, scene, wall, p.streams, units, p.loads, _PLANE, how=p.registration
+    )
 
 
 def _unit(recording: Recording, topic: str) -> str:

@@ -43,7 +43,10 @@ def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
     rows = (
         ("method", found.method, "fitted once, on the rest state, then frozen"),
         ("markers in the fit", str(found.k_effective), f"{len(found.missing)} not seen, "
-         f"{len(found.excluded)} excluded, {len(found.outliers)} outliers"),
+         f"{len(found.excluded)} excluded, {len(found.outliers)} outliers ("
+         f"{len(found.rejected)} left out by a robust fit); all that were seen are compared"),
+        ("fitted scale", f"{found.scale.value:.5f} ± {found.scale.half:.2g}",
+         f"markers over layout, 99.9 %; {'not ' * (found.transform.s == 1)}used"),
         ("declared noise", with_unit(found.expected_sd, "m"), "standard deviation per axis"),
         ("FRE", with_unit(found.fre, "m"), "rms residual at the markers; no measure of accuracy"),
         ("FLE", with_unit(found.fle, "m"), "rms localisation error of one marker, from the FRE"),

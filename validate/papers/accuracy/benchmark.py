@@ -13,6 +13,7 @@ from validate.arrays import Floats
 from validate.papers.accuracy.needle import STEP
 from validate.parameters import quantity
 from validate.recording.types import Recording
+from validate.register.fitting import MarkerFit
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
 from validate.replay.cards import DampedTissue, TimeSteps
@@ -63,6 +64,7 @@ class SolverTest:
     clock: TimeSteps
     twin: RefinedTwin
     recording: str = quantity("", "1", "the recording")
+    registration: MarkerFit = MarkerFit()
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class Benchmark:
         return self.scene(p.material.material, p.body)
 
     def place(self, recording: Recording, p: SolverTest, scene: Scene) -> Registered:
-        return follow_signal(recording, scene.mesh, self.input, self.unit)
+        return follow_signal(recording, scene.mesh, self.input, self.unit, p.registration)
 
     def sets(self, p: SolverTest, seen: Registered) -> Mapping[str, Any]:
         return {"dt": p.clock.dt}

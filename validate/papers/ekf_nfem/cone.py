@@ -19,6 +19,7 @@ from validate.papers.ekf_nfem.cone_twin import (
 )
 from validate.parameters import Ranges, quantity
 from validate.recording.types import Recording
+from validate.register.fitting import MarkerFit
 from validate.register.markers import MarkerObservation, placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
@@ -72,6 +73,7 @@ class PressedCone:
     clock: ScaledTime = ScaledTime()
     ranges: ConeRanges = ConeRanges()
     twin: ConeTwin = ConeTwin()
+    registration: MarkerFit = MarkerFit()
     recording: str = quantity("", "1", "the recording")
 
 
@@ -142,7 +144,9 @@ def _table(s: ConeTwin) -> LoadTable:
 def place(recording: Recording, parameters: PressedCone, scene: Scene) -> Registered:
     """The plate's path, or the load cell's ramp, each fitted by least squares; explicit runs in
     scaled time."""
-    whole = placed_markers(recording, read_mesh(Path(parameters.mesh.file)))
+    whole = placed_markers(
+        recording, read_mesh(Path(parameters.mesh.file)), how=parameters.registration
+    )
     markers = whole.within(scene.mesh)
     cell = driving(recording, "load_cell", "N", after_rest=True)
     if scene.drives:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from validate.parameters import quantity
 from validate.recording.types import Recording
+from validate.register.fitting import MarkerFit
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
 from validate.replay.cards import TimeSteps, TrackedTwin
@@ -79,6 +80,7 @@ class PushedCube:
     loading: Ramp = Ramp()
     clock: TimeSteps = TimeSteps(2e-4, 750)
     twin: TrackedTwin = TrackedTwin(seed=2020)
+    registration: MarkerFit = MarkerFit()
     recording: str = quantity("", "1", "the recording")
 
 
@@ -97,7 +99,7 @@ def _scene(p: PushedCube, material: Material) -> Scene:
 
 
 def place(recording: Recording, p: PushedCube, scene: Scene) -> Registered:
-    return follow_signal(recording, scene.mesh, "push", "N")
+    return follow_signal(recording, scene.mesh, "push", "N", p.registration)
 
 
 def sets(p: PushedCube, seen: Registered) -> Mapping[str, Any]:

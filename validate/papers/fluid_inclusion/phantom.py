@@ -14,6 +14,7 @@ from validate.parameters import quantity
 from validate.recording.images.outline import outlines_of
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
+from validate.register.fitting import MarkerFit
 from validate.register.markers import Sampling, Together
 from validate.register.outlines import Corner
 from validate.register.plane import cavity_sampler
@@ -72,10 +73,7 @@ class PhantomGrid(BlockNodes):
 
 
 @dataclass(frozen=True)
-class Placing:
-    method: Literal["rigid", "similarity", "two_step"] = quantity(
-        "rigid", "1", "marker registration, on the rest state only"
-    )
+class Placing(MarkerFit):
     sampling: Sampling = quantity("barycentric", "1", "markers to nodes")
     wall: Literal["measured", "facets", "nearest_node"] = quantity(
         "measured", "1", "wall on the measured circle, on the mesh's facets, or by nearest node"
@@ -165,7 +163,7 @@ def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered
     wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
     seen = placed(
         recording, contours, scene, wall, STREAMS, SIGNALS, p.loads, TOP_FACE,
-        corners=(TOP_LEFT,), method=how.method, sampling=how.sampling,
+        corners=(TOP_LEFT,), how=how, sampling=how.sampling,
     )  # fmt: skip
     return replace(seen, findings=_misplaced(capsule, inclusion(recording, p)))
 

@@ -13,6 +13,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.parameters import quantity
 from validate.recording.types import Recording
+from validate.register.fitting import MarkerFit
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
 from validate.replay.cards import DampedTissue, TimeSteps, TrackedTwin
@@ -77,6 +78,7 @@ class PulledBlock:
     loading: Traction = Traction()
     clock: TimeSteps = TimeSteps(0.002, 500)
     twin: LayeredTwin = LayeredTwin()
+    registration: MarkerFit = MarkerFit()
     recording: str = quantity("", "1", "the recording")
 
 
@@ -95,7 +97,7 @@ def _scene(p: PulledBlock, material: Material) -> Scene:
 
 
 def place(recording: Recording, p: PulledBlock, scene: Scene) -> Registered:
-    return follow_signal(recording, scene.mesh, "pull", "N")
+    return follow_signal(recording, scene.mesh, "pull", "N", p.registration)
 
 
 def sets(p: PulledBlock, seen: Registered) -> Mapping[str, Any]:

@@ -1,0 +1,17 @@
+"""How markers are fitted to their layout: the card that every experiment with markers shares."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from validate.parameters import quantity
+
+Method = Literal["rigid", "similarity", "two_step", "two_step_scaled"]
+
+
+@dataclass(frozen=True)
+class MarkerFit:
+    """Fitted once, on the rest state. What is left out of the fit is compared like any other."""
+
+    method: Method = quantity("rigid", "1", "marker registration, on the rest state only")
+    exclude: tuple[str, ...] = quantity((), "1", "markers left out of the fit, still compared")
+    robust: bool = quantity(False, "1", "leave outliers out of the fit, still compared")
