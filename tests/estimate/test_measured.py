@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from cubes import DT, PAPER, case, cube
+from scipy import sparse
 
 from validate.errors import ComparisonError
 from validate.estimate.kalman import best_gain, innovation
-from validate.estimate.measurements import measurements, timetable
+from validate.estimate.measurements import Measurements, measurements, on_steps, timetable
 from validate.fem.locate import barycentric_rows
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
@@ -44,7 +45,7 @@ def test_a_step_that_does_not_meet_the_times_is_refused_with_one_that_does() -> 
         timetable(seen, 0.003)
     assert len(timetable(seen, 0.0025).z) == 12
     irregular = replace(seen, t=np.sort(np.random.default_rng(0).uniform(0.01, 1, 12)))
-    with pytest.raises(ComparisonError, match="resample the recording"):
+    with pytest.raises(ComparisonError, match="no step lands on all of them"):
         timetable(irregular, DT)
 
 
@@ -55,6 +56,45 @@ def test_two_measurements_in_a_step_are_refused() -> None:
         match=r"60 measurements land on 1 steps of 0.01 s; take a step of at most 1e-06 s",
     ):
         timetable(replace(seen, t=0.01 + 1e-6 * np.arange(60)), 0.01)
+
+
+def test_jittered_looks_are_interpolated_and_their_error_counted() -> None:
+    """A ramp is exact; of c t^2 the error is c (s - a)(b - s), by hand."""
+    rng = np.random.default_rng(3)
+    steps = 0.01 * np.arange(1, 101)
+    t = 0.03 * np.arange(33) + rng.uniform(0.0, 0.004, 33)
+    z = np.stack([2e-3 * t, 5e-3 * t**2, np.where(t < 0.5, t, np.nan)], axis=1)
+    s, found, sd = on_steps(t, z, np.full(3, 1e-6), steps)
+    assert np.allclose(s / 0.01, np.rint(s / 0.01))
+    assert len(s) >= 30
+    assert found[:, 0] == pytest.approx(2e-3 * s)
+    off = found[:, 1] - 5e-3 * s**2
+    assert np.abs(off).max() > 1e-7
+    assert sd[0] == pytest.approx(1e-6, rel=1e-6)
+    assert sd[1] == pytest.approx(np.sqrt(1e-12 + (off**2).mean()), rel=1e-6)
+    assert np.isnan(found[s > 0.5, 2]).all()
+    H = sparse.csr_array(sparse.eye_array(3))
+    assert len(timetable(Measurements(s, H, found, sd, ("a", "b", "c")), 0.01).z) >= 30
+
+
+def test_a_jittering_camera_is_taken() -> None:
+    points = np.array([[0.001, 0.002, 0.003]])
+    x = points + 1e-4 * np.arange(12)[:, None, None] ** 2
+    even = observed(("a",), points, x)
+    (markers,) = even.of(MarkerObservation)
+    late = markers.t + np.random.default_rng(2).uniform(0.0, 0.02, 12)
+    jittered = replace(even, observations=(*even.drives, replace(markers, t=late)))
+    found = measurements(jittered, case().system.scene.mesh)
+    assert len(timetable(found, 0.1).z) >= 10
+    assert (found.sd > 2e-5).all()
+
+
+def test_looks_that_a_smaller_step_meets_are_left_to_the_filters_advice() -> None:
+    t = 0.025 * np.arange(1, 20)
+    z, sd = np.ones((19, 1)), np.ones(1)
+    assert on_steps(t, z, sd, 0.01 * np.arange(1, 60))[0] is t
+    on_time = 0.03 * np.arange(1, 20)
+    assert on_steps(on_time, z, sd, 0.01 * np.arange(1, 60))[0] is on_time
 
 
 def observed(names: tuple[str, ...], points: np.ndarray, x: np.ndarray) -> Registered:  # type: ignore[type-arg]

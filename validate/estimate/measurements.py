@@ -131,19 +131,24 @@ def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:
 
 def _landing(t: Floats, dt: float) -> str:
     """The largest step up to `dt` on which all times land, as advice."""
+    step = _landed(t, dt)
+    return "no step lands on all of them" if step is None else f"take dt = {step:.6g} s"
+
+
+def _landed(t: Floats, dt: float) -> float | None:
+    """The largest step up to `dt`, of not too many in an interval, on which all times land."""
     gaps = np.diff(np.concatenate([[0.0], t]))
     gap = float(gaps[gaps > 0].min()) if (gaps > 0).any() else dt
     first = int(np.ceil(gap / dt))
-    for parts in range(first, first + _FINEST):
-        if _nearest(t, gap / parts)[1].max() <= OFF_STEP:
-            return f"take dt = {gap / parts:.6g} s"
-    return "no step lands on all of them: resample the recording"
+    parts = range(first, first + _FINEST)
+    return next((gap / n for n in parts if _nearest(t, gap / n)[1].max() <= OFF_STEP), None)
 
 
 def measurements(registered: Registered, mesh: Mesh) -> Measurements:
     """Displacements of the registered markers from their rest layout.
 
-    Raises `ComparisonError` without markers and for rows of another mesh.
+    Looks of a jittering camera, which no step meets, are interpolated onto the steps; see
+    `on_steps`. Raises `ComparisonError` without markers and for rows of another mesh.
     """
     found = registered.of(MarkerObservation)
     if not found:
@@ -158,4 +163,28 @@ def measurements(registered: Registered, mesh: Mesh) -> Measurements:
     H = sparse.csr_array(sparse.kron(weights, sparse.eye_array(d), format="csr"))
     z = (seen.x - seen.rest).reshape(len(seen.t), -1)
     names = tuple(f"{name}.{_AXES[c]}" for name in seen.names for c in range(d))
-    return Measurements(seen.t, H, z, np.full(len(names), seen.sd), names)
+    t, z, sd = on_steps(seen.t, z, np.full(len(names), seen.sd), registered.t)
+    return Measurements(t, H, z, sd, names)
+
+
+def on_steps(t: Floats, z: Floats, sd: Floats, steps: Floats) -> tuple[Floats, Floats, Floats]:
+    """Looks z (nt, m) at t (nt,) s of sd (m,), interpolated onto the nearest of 0 and `steps` (n,).
+
+    Only of times that jitter: those that a smaller step meets are left as they are, for the filter
+    says which. Linear between two looks, whose error is f''/2 (s - a)(b - s): its rms is added to
+    sd, with f'' by divided differences, noise included. Steps beyond the looks get none.
+    """
+    dt = float(steps[0]) if len(steps) == 1 else float(np.diff(steps).min())
+    if len(t) < 3 or _nearest(t, dt)[1].max() <= OFF_STEP or _landed(t, dt) is not None:
+        return t, z, sd
+    grid = np.concatenate([[0.0], steps[steps > 0]])
+    s = np.unique(grid[np.searchsorted((grid[1:] + grid[:-1]) / 2, t)])
+    s = s[(s >= t[0]) & (s <= t[-1])]
+    b = np.clip(np.searchsorted(t, s), 1, len(t) - 1)
+    w = ((s - t[b - 1]) / (t[b] - t[b - 1]))[:, None]
+    slope = np.diff(z, axis=0) / np.diff(t)[:, None]
+    bend = 2 * np.diff(slope, axis=0) / (t[2:] - t[:-2])[:, None]
+    error = bend[np.clip(b - 1, 0, len(bend) - 1)] / 2 * ((s - t[b - 1]) * (t[b] - s))[:, None]
+    squared = np.nansum(error**2, axis=0) / np.maximum(np.isfinite(error).sum(axis=0), 1)
+    shown = np.where(w == 0, z[b - 1], np.where(w == 1, z[b], (1 - w) * z[b - 1] + w * z[b]))
+    return s, shown, np.sqrt(sd**2 + squared)
