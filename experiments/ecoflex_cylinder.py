@@ -16,6 +16,7 @@ from validate.papers.ecoflex.cylinder import CylinderModel as Model
 from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
 from validate.replay.cards import finer_quarter, moved
+from validate.replay.compression import stated_sizes
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.solve.fluid import NoFluid
@@ -101,6 +102,7 @@ EXPERIMENT = Experiment(
     place=place,
     uncertainty=UNCERTAINTY,
     published=PUBLISHED,
+    stated=stated_sizes,
     identify=identified,
     band=lambda p: float(p.ranges.specimen),
     frames=2,

@@ -13,10 +13,23 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from validate.errors import UsageError
 
+# Read from the recording; given in the experiment's file or by --set; the library's; or fitted.
+Origin = Literal["recorded", "entered", "default", "identified"]
 
-def quantity(default: Any, unit: str, doc: str) -> Any:
-    """A dataclass field with default, SI unit ("1" for none) and what it is."""
-    return field(default=default, metadata={"unit": unit, "doc": doc})
+
+def quantity(default: Any, unit: str, doc: str, *, asked: bool = False) -> Any:
+    """A dataclass field with default, SI unit ("1" for none) and what it is.
+
+    `asked`: nothing may run while it is None; the recording says it, or the user does.
+    """
+    return field(default=default, metadata={"unit": unit, "doc": doc, "asked": asked})
+
+
+def known(value: float | None, path: str) -> float:
+    """A value that must be set; raises `UsageError` where it is None."""
+    if value is None:
+        raise UsageError(f"{path} is not set; give it with --set {path}=VALUE")
+    return value
 
 
 def part(default: Any, doc: str) -> Any:
@@ -27,28 +40,53 @@ def part(default: Any, doc: str) -> Any:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One settable value, as `validate list NAME` shows it."""
+    """One settable value, as `validate list NAME` shows it, and where the value comes from."""
 
     path: str
     type: str
     unit: str
     default: Any
     doc: str
+    origin: Origin = "default"
+    asked: bool = False
+
+    @property
+    def missing(self) -> bool:
+        return self.asked and self.default is None
 
 
-def describe(settings: Any, prefix: str = "") -> tuple[Parameter, ...]:
-    """Every parameter of a nested dataclass (or mapping of dataclasses), in order."""
+def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Parameter, ...]:
+    """Every parameter of a nested dataclass (or mapping of dataclasses), in order.
+
+    `library` holds the defaults that its owner has for it (None: the fields' own): what differs
+    from them was entered.
+    """
     found: list[Parameter] = []
     for name, value, hint, meta in _members(settings):
-        path = f"{prefix}{name}"
+        path, default = f"{prefix}{name}", _default(settings, name, library)
         if meta.get("part"):
-            found += describe(value, prefix) if is_dataclass(value) else ()
+            found += describe(value, prefix, default) if is_dataclass(value) else ()
         elif is_dataclass(value) or isinstance(value, Mapping):
-            found += describe(value, f"{path}.")
+            found += describe(value, f"{path}.", default)
         else:
             unit, doc = meta.get("unit", "1"), meta.get("doc", "")
-            found.append(Parameter(path, _type_name(hint), unit, _plain(value), doc))
+            origin: Origin = "default" if value == default else "entered"
+            found.append(
+                Parameter(
+                    path, _type_name(hint), unit, _plain(value), doc, origin,
+                    meta.get("asked", False),
+                )
+            )  # fmt: skip
     return tuple(found)
+
+
+def _default(settings: Any, name: str, library: Any) -> Any:
+    """What a member is unless somebody gives it."""
+    if isinstance(settings, Mapping):
+        return None
+    if type(library) is type(settings):
+        return getattr(library, name)
+    return next(f.default for f in fields(settings) if f.name == name)
 
 
 def with_values(settings: Any, values: Mapping[str, str]) -> Any:

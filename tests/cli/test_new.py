@@ -36,6 +36,7 @@ def log(name: str = "gel", **specimen: str) -> Recording:
                      metadata={"specimen": specimen} if specimen else {})  # fmt: skip
 
 
+BLOCK = {"block.x": "0.06", "block.y": "0.045", "block.z": "0.07"}
 SIZES = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT)}
 
 
@@ -61,17 +62,78 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     assert [(c.name, c.verdict) for c in result.checks] == [
         ("force.rms@fit", "fitted"), ("force.rms@beyond", "agrees"),
     ]  # fmt: skip
-    values = {p.path: p.default for p in result.parameters}
-    assert values["material.E"] == pytest.approx(E, rel=0.02)
+    values = {p.path: (p.default, p.origin) for p in result.parameters}
+    assert values["material.E"] == (pytest.approx(E, rel=0.02), "identified")
+    assert values["specimen.diameter"] == (DIAMETER, "recorded")
+    assert values["limit"][1] == "entered"
+    assert values["material.nu"] == (0.499, "default")
+    assert (result.passed, result.warnings) == (True, ())
+
+
+def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> None:
+    write_recording(log(), tmp_path / "gel.mcap")
+    assert in_folder(tmp_path, "new", "bare", "--from", "gel.mcap")[0] == 0
+    file = tmp_path / "experiments" / "bare.py"
+    lines = file.read_text("utf-8").splitlines()
+    places = {k: next(i for i, s in enumerate(lines, 1) if f" {k}=None," in s)
+              for k in ("diameter", "height")}  # fmt: skip
+    assert "ranges=CompressionRanges(E=0.05, diameter=0.005)" in "".join(lines)
+    for command in (("run", "bare"), ("study", "tradeoff", "bare", "--quick", "--workers", "0")):
+        code, message = in_folder(tmp_path, *command)
+        assert code == 2
+        assert "\n" not in message
+        for name, line in places.items():
+            at = str(Path("experiments") / "bare.py") + f":{line}: specimen.{name} (m) is not set"
+            assert at in message
+            assert f"--set specimen.{name}=VALUE" in message
+
+
+def test_a_part_of_the_sizes_is_enough_where_the_recording_says_the_rest(tmp_path: Path) -> None:
+    write_recording(log(height_m=repr(HEIGHT)), tmp_path / "gel.mcap")
+    in_folder(tmp_path, "new", "half", "--from", "gel.mcap")
+    mine = load_file(tmp_path / "experiments" / "half.py")
+    result = compare(mine, {"specimen.diameter": repr(DIAMETER), "specimen.height": "none"})
+    found = {p.path: (p.default, p.origin) for p in result.parameters}
+    assert found["specimen.diameter"] == (DIAMETER, "entered")
+    assert found["specimen.height"] == (HEIGHT, "recorded")
+    assert result.passed
+
+
+def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) -> None:
+    """What is identified follows the size, so that the checks agree all the same."""
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    in_folder(tmp_path, "new", "big", "--from", "gel.mcap")
+    slip = ("--methods", "slip")
+    code, output = in_folder(tmp_path, "run", "big", "--set", "specimen.diameter=30", *slip)
+    assert (code, " agrees " in output) == (0, True)
+    first = "\n".join(output.splitlines()[1:5])
+    assert "specimen.diameter = 30 m is 1000 times 30 mm: were millimetres meant?" in first
+    assert "material.E (identified) is a modulus of 0.02 Pa" in first
+    assert "is a stress of" in first
+    assert "was entered; the recording says 0.03 m, 1e+03 times" in first
+    folder = tmp_path / "reports" / "big"
+    stored = json.loads((folder / "results.json").read_text("utf-8"))
+    assert stored["parameters"]["specimen.diameter"] == {
+        "value": 30.0, "unit": "m", "origin": "entered",
+    }  # fmt: skip
+    assert stored["parameters"]["material.E"]["origin"] == "identified"
+    assert stored["sentence"].startswith("Doubtful input")
+    page = (folder / "report.html").read_text("utf-8")
+    assert 'class="band good"' not in page
+    assert page.index("were millimetres meant?") < page.index("<nav")
+    assert "identified" in page.split("Origin: recorded")[1]
 
 
 def test_it_names_channels_rates_units_and_what_is_not_recorded(tmp_path: Path) -> None:
     text = written("my_gel", log(), "../gel.mcap")
     assert "displacement: signal in m, sd 0; 200 in 19.9 s, 10 Hz" in text
-    assert "not in the recording: measure it" in text
-    assert "from the recording's header" in written("my_gel", log(**SIZES), "../gel.mcap")
+    assert "diameter=None,  # m, not in the recording: measure it" in text
+    sized = written("my_gel", log(**SIZES), "../gel.mcap")
+    assert "height=0.02,  # m, recorded: in the header" in sized
     sides = written("g", log(area_m2="0.0004", height_m="0.02"), "../gel.mcap")
-    assert "diameter=0.0225676,  # m, of the header's area" in sides
+    assert "diameter=0.0225676,  # m, recorded: of the header's area" in sides
+    odd = written("g", log(diameter_m="-3", height_m="1e"), "../gel.mcap")
+    assert odd.count("=None,  # m, not in the recording") == 2
     assert len(text.splitlines()) <= 60
     assert "$" not in text
     assert "TODO" not in text
@@ -130,8 +192,10 @@ def test_outlines_stage_and_markers_become_an_experiment(
     listed = json.loads(in_folder(tmp_path, "list", "mine", "--json")[1])
     defaults = {p["path"]: p["default"] for p in listed["parameters"]}
     assert defaults["loads"] == [0.003, 0.006, 0.009]
-    assert [defaults[f"block.{axis}"] for axis in "xyz"] == [0.06, 0.045, 0.07]
-    coarse = {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
+    assert [defaults[f"block.{axis}"] for axis in "xyz"] == [None] * 3
+    code, message = in_folder(tmp_path, "run", "mine")
+    assert (code, message.count("(m) is not set"), message.count("mine.py:")) == (2, 3, 3)
+    coarse = BLOCK | {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
     mine = load_file(tmp_path / "experiments" / "mine.py")
     result = compare(mine, coarse, methods=("p1_fluid", "p1_dry"))
     rms = {m.name: {s.name: s.value for s in m.scores} for m in result.methods}
@@ -142,7 +206,8 @@ def test_outlines_stage_and_markers_become_an_experiment(
 def test_the_phantoms_experiment_agrees_as_written(tmp_path: Path, project_root: Path) -> None:
     source = project_root / "recordings" / "fluid_phantom.mcap"
     in_folder(tmp_path, "new", "mine", "--from", str(source))
-    code, output = in_folder(tmp_path, "run", "mine")
+    sizes = [part for path, value in BLOCK.items() for part in ("--set", f"{path}={value}")]
+    code, output = in_folder(tmp_path, "run", "mine", *sizes)
     assert code == 0, output
     assert "9 of 9 checks agree" in output
 

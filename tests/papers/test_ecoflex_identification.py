@@ -1,14 +1,13 @@
 """The modulus of a round body from a meshed one, on logs whose modulus is known."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
 
-from validate.papers.ecoflex.cylinder import LoggedCylinder, QuarterGrid
+from validate.papers.ecoflex.cylinder import LoggedCylinder, LoggedSpecimen, QuarterGrid
 from validate.papers.ecoflex.modulus import identified
 from validate.parameters import with_values
 from validate.recording.types import Recording, Signal, Source
@@ -17,7 +16,12 @@ from validate.replay.find import load_file
 from validate.replay.method import Method
 
 DIAMETER, HEIGHT, E = 0.05, 0.03, 90e3
-SMALL = replace(LoggedCylinder(), mesh=QuarterGrid(2, 2), limit_svk=0.11, limit_neo_hooke=0.12)
+SMALL = LoggedCylinder(
+    specimen=LoggedSpecimen(DIAMETER, HEIGHT),
+    mesh=QuarterGrid(2, 2),
+    limit_svk=0.11,
+    limit_neo_hooke=0.12,
+)
 
 
 def pressed() -> Recording:
@@ -26,12 +30,10 @@ def pressed() -> Recording:
     d = np.linspace(0, 0.13 * HEIGHT, len(t))
     stretch = 1 - d / HEIGHT
     force = E / 3 * np.pi * DIAMETER**2 / 4 * (stretch**-2 - stretch)
-    named = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT)}
     return Recording(
         "known", Source("x", "", 0, "x"), 0,
         signals={"displacement": Signal(t, d[:, None], "m", 0.0, "machine"),
                  "force": Signal(t, force[:, None], "N", 0.0, "machine")},
-        metadata={"specimen": named},
     )  # fmt: skip
 
 

@@ -24,6 +24,11 @@ class Outer:
     on: bool = quantity(True, "1", "switch")
 
 
+@dataclass(frozen=True)
+class Owner:
+    inner: Inner = Inner(E=5.0)
+
+
 def test_every_leaf_is_described_with_its_unit() -> None:
     found = {p.path: (p.type, p.unit, p.default) for p in describe(Outer(), "x.")}
     assert found == {
@@ -34,6 +39,13 @@ def test_every_leaf_is_described_with_its_unit() -> None:
         "x.loads": ("tuple[float, ...]", "m", [1.0, 2.0]),
         "x.on": ("bool", "1", True),
     }
+
+
+def test_what_differs_from_the_librarys_value_was_entered() -> None:
+    """The owner's default for a part counts, not the part's own."""
+    origins = {p.path: p.origin for p in describe(Owner(Inner(E=5.0, n=4)))}
+    assert (origins["inner.E"], origins["inner.n"]) == ("default", "entered")
+    assert {p.origin for p in describe(Outer(Inner(E=5.0))) if p.path == "inner.E"} == {"entered"}
 
 
 def test_values_are_parsed_by_type_and_the_original_stays() -> None:

@@ -7,7 +7,6 @@ ends, never as code.
 import os
 import re
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 
@@ -17,6 +16,7 @@ from validate.cli.display import console
 from validate.errors import UsageError
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
+from validate.replay.compression import stated_sizes
 
 TEMPLATES = {"force": "new_force.py.txt", "inclusion": "new_inclusion.py.txt"}
 _MOST_CHANNELS = 7  # lines of what the recording holds: the file stays short
@@ -115,38 +115,34 @@ def _plain(text: str) -> str:
 
 
 def _force(recording: Recording) -> dict[str, str]:
-    sizes = _sizes(recording.metadata.get("specimen", {}))
-    height = sizes["height"][0]
+    stated = stated_sizes(recording)
+    height = stated.get("specimen.height")
     moved = recording.signal("displacement", "m").y[:, 0]
     force = recording.signal("force", "N").y[:, 0]
-    strain = float(np.ptp(moved)) / height
-    limit = min(0.10, 0.9 * strain)
-    inside = np.abs(moved - moved[0]) <= limit * height
-    accept = 0.1 * float(np.ptp(force[inside]))
+    limit, inside, judged = 0.10, np.full(len(force), True), "the largest force recorded"
+    if height is not None:
+        limit = min(limit, 0.9 * float(np.ptp(moved)) / height)
+        inside = np.abs(moved - moved[0]) <= limit * height
+        judged = "the force at the strain limit"
+    by_area = "diameter_m" not in recording.metadata.get("specimen", {})
     return {
-        **{key: f"{value:.6g}" for key, (value, _) in sizes.items()},
-        **{f"{key}_from": words for key, (_, words) in sizes.items()},
+        "diameter": _size(stated.get("specimen.diameter"), by_area=by_area),
+        "height": _size(height),
         "fit_from": f"{0.05 * limit:.3g}",
         "fit_to": f"{0.5 * limit:.3g}",
         "limit": f"{limit:.3g}",
-        "accept": f"{accept:.3g}",
+        "accept": f"{0.1 * float(np.ptp(force[inside])):.3g}",
+        "judged": judged,
     }
 
 
-def _sizes(specimen: Mapping[str, str]) -> dict[str, tuple[float, str]]:
-    """Diameter and height m, each with where it comes from."""
-    stated = {k: float(v) for k, v in specimen.items() if re.fullmatch(r"[0-9.e+-]+", v)}
-    sides = [stated[k] for k in ("width_m", "thickness_m", "length_m") if k in stated]
-    guess = "not in the recording: measure it"
-    found = {"diameter": (0.05, guess), "height": (0.03, guess)}
-    if "height_m" in stated:
-        found["height"] = (stated["height_m"], "from the recording's header")
-    if "diameter_m" in stated:
-        found["diameter"] = (stated["diameter_m"], "from the recording's header")
-    elif "area_m2" in stated or len(sides) >= 2:
-        area = stated.get("area_m2") or sides[0] * sides[1]
-        found["diameter"] = (2 * float(np.sqrt(area / np.pi)), "of the header's area")
-    return found
+def _size(stated: float | None, *, by_area: bool = False) -> str:
+    """A value and its comment; what the recording does not say is left open."""
+    if stated is None:
+        return "None,  # m, not in the recording: measure it, write it here"
+    return f"{stated:.6g},  # m, recorded: " + (
+        "of the header's area" if by_area else "in the header"
+    )
 
 
 def _block(recording: Recording) -> dict[str, str]:
@@ -162,9 +158,9 @@ def _block(recording: Recording) -> dict[str, str]:
     streams = [f"{key}={value!r}" for key, value in named.items() if key != value]
     streams.append(f"signals={_scalars(recording)!r}")
     return {
-        "block_x": f"{_side(places[:, 0]):.6g}",
-        "block_y": f"{float(places[:, 1].max()):.6g}",
-        "block_z": f"{_side(places[:, 2]):.6g}",
+        "highest": f"{float(places[:, 1].max()):.6g}",
+        "side_x": f"{_side(places[:, 0]):.6g}",
+        "side_z": f"{_side(places[:, 2]):.6g}",
         "loads": repr(loads),
         "streams": ", ".join(streams),
     }

@@ -70,6 +70,8 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     screen.print(
         f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", soft_wrap=True
     )
+    for warning in result.warnings:
+        screen.print(f"warning: {warning}", style="yellow", markup=False, soft_wrap=True)
     screen.print(f"{result.title}\n", soft_wrap=True)
     if rows:
         screen.print(table("Checks", head, rows))

@@ -71,7 +71,8 @@ class MethodResult:
 class Result:
     """An experiment compared: all that a report needs.
 
-    `kind` is what the recording is: measured, a twin, or the judged model's own.
+    `kind` is what the recording is: measured, a twin, or the judged model's own. `warnings` doubt
+    what was given.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Result:
     published: tuple[Published, ...]
     identified: tuple[Score, ...] = ()
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     quick: bool = False
     kind: Kind = "measured"
     seed: int | None = None

@@ -6,6 +6,7 @@ fitted line reaches zero force), force from the cell's own offset; the first win
 the modulus where none is given, the second predicts.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.identify.modulus import Cylinder, ModulusFit, fit_modulus, identify_modulus
-from validate.parameters import Ranges, quantity
+from validate.parameters import Ranges, known, quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
@@ -37,14 +38,53 @@ SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))  # of a qu
 _LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
 
 
+def size_of(diameter: float | None, height: float | None) -> Cylinder:
+    """The cylinder of a card; raises `UsageError` while a size is not set."""
+    return Cylinder(known(diameter, "specimen.diameter"), known(height, "specimen.height"))
+
+
+def stated_sizes(recording: Recording) -> dict[str, float]:
+    """What a recording's record `specimen` says of a cylinder, m, by parameter.
+
+    Another cross-section has the diameter of the circle of its area.
+    """
+    said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
+    found = {k: v for k, v in said.items() if v is not None}
+    sizes = {}
+    area = found.get("area_m2")
+    sides = [found[k] for k in ("width_m", "thickness_m", "length_m") if k in found]
+    if area is None and len(sides) >= 2:
+        area = sides[0] * sides[1]
+    if "diameter_m" in found:
+        sizes["specimen.diameter"] = found["diameter_m"]
+    elif area is not None:
+        sizes["specimen.diameter"] = 2 * math.sqrt(area / math.pi)
+    if "height_m" in found:
+        sizes["specimen.height"] = found["height_m"]
+    return sizes
+
+
+def _above_zero(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and value > 0 else None
+
+
 @dataclass(frozen=True)
 class Specimen:
     """A cylinder; or the body of a mesh file of linear tetrahedra, axis z, with the facet sets
     "lower_plate" and "upper_plate", whose equivalent diameter is then that of equal area."""
 
-    diameter: float = quantity(0.0, "m", "diameter")
-    height: float = quantity(0.0, "m", "height between the plates")
+    diameter: float | None = quantity(None, "m", "diameter; none: the recording's", asked=True)
+    height: float | None = quantity(None, "m", "height; none: the recording's", asked=True)
     mesh: str | None = quantity(None, "1", "mesh file (npz); none: a cylinder")
+
+    @property
+    def size(self) -> Cylinder:
+        """Raises `UsageError` while a size is not set."""
+        return size_of(self.diameter, self.height)
 
 
 @dataclass(frozen=True)
@@ -111,7 +151,7 @@ def compression(
     """The experiment: `force` is judged in the windows "fit" and "beyond"."""
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
-        sets=_sets, identify=_identify, frames=2,
+        sets=_sets, stated=stated_sizes, identify=_identify, frames=2,
         uncertainty=Uncertainty(
             finer=changed("mesh", radial=_finer, axial=_finer, halvings=_halved),
             refinement=_refinement,
@@ -126,17 +166,17 @@ def compression(
     )  # fmt: skip
 
 
-def _size(p: Compression) -> Cylinder:
-    return Cylinder(p.specimen.diameter, p.specimen.height)
-
-
 def _identify(
     recordings: Sequence[Recording], p: Compression, methods: Mapping[str, Method]
 ) -> Identified:
     if p.material.E is not None:
         return Identified(p, (), ())
-    E = identify_modulus(recordings, _size(p), (p.fit_from, p.fit_to)).mean
-    note = f"E = {E:.0f} Pa was identified from the recording in the window 'fit', slipping plates."
+    found = identify_modulus(recordings, p.specimen.size, (p.fit_from, p.fit_to))
+    E = found.mean
+    note = (
+        f"E = {E:.5g} ± {2 * found.sd_mean:.3g} Pa (two sd of the fit; uniform compression owes "
+        "the mesh nothing) was identified from the recording in the window 'fit', slipping plates."
+    )
     used = replace(p, material=replace(p.material, E=E))
     return Identified(used, (), (note,), calibrated=("force@fit",))
 
@@ -163,7 +203,7 @@ def _body(p: Compression) -> Mesh:
     """The body of the mesh file, or a quarter of the cylinder."""
     if p.specimen.mesh is not None:
         return read_mesh(Path(p.specimen.mesh))
-    size, grid = _size(p), p.mesh
+    size, grid = p.specimen.size, p.mesh
     return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
 
 
@@ -186,10 +226,10 @@ def _pins(mesh: Mesh) -> tuple[Pin, ...]:
 
 
 def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
-    fit = fit_modulus(recording, _size(p), (p.fit_from, p.fit_to))
+    fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to))
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
-    return pressed_log(recording, fit, p.specimen.height, p.limit, strains, noise)
+    return pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise)
 
 
 def pressed_log(
@@ -218,7 +258,7 @@ def pressed_log(
 
 def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
     """Large strain is solved on a grid of loads to the limit."""
-    return {"step": p.limit * p.specimen.height / _LOAD_STEPS}
+    return {"step": p.limit * p.specimen.size.height / _LOAD_STEPS}
 
 
 # --- what is uncertain ----------------------------------------------------------------------------

@@ -151,6 +151,10 @@ def _as_declared(experiment: Any, recordings: Sequence[Recording], parameters: A
     return experiment
 
 
+def _states_nothing(recording: Recording) -> Mapping[str, float]:
+    return {}
+
+
 def _sets_nothing(parameters: Any, seen: Registered) -> Mapping[str, Any]:
     return {}
 
@@ -162,8 +166,9 @@ class Experiment:
     `methods` maps a name to a `Method`. `load` gets the parameters and the experiment's folder;
     `build` a recording, the parameters and a method's `scene` options; `place` registers a
     recording in that scene. `sets` are settings that the experiment itself gives every method that
-    has them, from the parameters and the registered recording: a time step, say. `identify` finds
-    parameters from the recordings, by the methods as the user set them. `exhibits` adds
+    has them, from the parameters and the registered recording: a time step, say. `stated` is
+    what a recording itself says of parameters, by path: it stands where none are set. `identify`
+    finds parameters from the recordings, by the methods as the user set them. `exhibits` adds
     what this experiment shows besides, from all runs by case ("" is the recorded one) and method.
     `band` is the relative standard uncertainty of the force that the modulus brings. `axis` is the
     component that displacement charts follow, `reference` the method that speeds are compared with.
@@ -184,6 +189,7 @@ class Experiment:
     build: Callable[[Recording, Any, Any], AnyScene]
     place: Callable[[Recording, Any, Any], Registered]
     sets: Callable[[Any, Registered], Mapping[str, Any]] = _sets_nothing
+    stated: Callable[[Recording], Mapping[str, float]] = _states_nothing
     identify: Callable[[Sequence[Recording], Any, Mapping[str, Method]], Identified] | None = None
     uncertainty: Uncertainty | None = None
     twin: Twin | None = None

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from validate.compare.verdict import Accept
-from validate.parameters import Ranges, quantity
+from validate.parameters import Ranges, known, quantity
 from validate.recording.types import Contours, Recording
 from validate.register.clock import clock_sd
 from validate.register.fitting import MarkerFit
@@ -42,13 +42,14 @@ _PLANE = (
 
 @dataclass(frozen=True)
 class BlockCard:
-    x: float = quantity(0.0, "m", "from the fixed plate to the moving one")
-    y: float = quantity(0.0, "m", "height")
-    z: float = quantity(0.0, "m", "lateral size")
+    x: float | None = quantity(None, "m", "from the fixed plate to the moving one", asked=True)
+    y: float | None = quantity(None, "m", "height", asked=True)
+    z: float | None = quantity(None, "m", "lateral size", asked=True)
 
     @property
     def size(self) -> Block:
-        return Block(self.x, self.y, self.z)
+        """Raises `UsageError` while a size is not set."""
+        return Block(known(self.x, "block.x"), known(self.y, "block.y"), known(self.z, "block.z"))
 
 
 @dataclass(frozen=True)

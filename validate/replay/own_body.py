@@ -16,7 +16,7 @@ from validate.parameters import Parameter, describe, with_values
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
-from validate.replay.options import folder_of
+from validate.replay.origins import opened
 from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.refine import refined
@@ -101,8 +101,8 @@ class OwnBody:
 
 def own_body(experiment: Experiment) -> OwnBody:
     """With what the experiment identifies from its recordings."""
-    parameters = experiment.parameters
-    recordings = experiment.load(parameters, folder_of(experiment))
+    found = opened(experiment, experiment.parameters)
+    recordings, parameters = found.recordings, found.parameters
     if experiment.identify is not None:
         parameters = experiment.identify(recordings, parameters, experiment.methods).parameters
     return OwnBody(experiment, parameters, recordings[0])

@@ -23,7 +23,9 @@ from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
 from validate.replay.method import Method
-from validate.replay.options import Options, Report, all_methods, configure, folder_of
+from validate.replay.options import Options, Report, all_methods, configure
+from validate.replay.origins import Opened, marked, opened
+from validate.replay.plausible import doubts
 from validate.replay.runs import Road
 from validate.replay.sentence import figures_sentence, verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
@@ -38,8 +40,9 @@ _AGAINST: Mapping[Kind, str] = {
 def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
-    shipped = experiment.load(parameters, folder_of(experiment))
-    experiment = _following(experiment, shipped, parameters, methods)
+    found = opened(experiment, parameters)
+    experiment = _following(experiment, found, parameters, methods)
+    shipped, parameters = found.recordings, found.parameters
     identified = None
     if experiment.identify:
         identified = experiment.identify(shipped, parameters, all_methods(experiment, options))
@@ -55,14 +58,17 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     effects = effects_of(road, results)
     published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
+    parameters_used = marked(experiment, options, found, _settings(used, methods))
+    warnings = doubts(parameters_used, found.stated, shipped, first)
     return Result(
         name=experiment.name,
         title=experiment.title,
         source=experiment.source,
-        sentence=_opening(identified)
+        sentence=_doubtful(warnings)
+        + _opening(identified)
         + verdict_sentence(results, road.kind, quick=options.quick)
         + figures_sentence(published),
-        parameters=_settings(used, methods),
+        parameters=parameters_used,
         methods=results,
         recordings=road.recordings,
         rest=rest_residuals(first.seen, first.run),
@@ -70,6 +76,7 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         published=published,
         identified=identified.scores if identified else (),
         notes=_notes(remade, identified, main),
+        warnings=warnings,
         quick=options.quick,
         kind=road.kind,
         seed=experiment.seed,
@@ -84,13 +91,11 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
 
 
 def _following(
-    experiment: Experiment,
-    shipped: tuple[Recording, ...],
-    parameters: Any,
-    methods: Mapping[str, Method],
+    experiment: Experiment, found: Opened, parameters: Any, methods: Mapping[str, Method]
 ) -> Experiment:
-    """The experiment as its recordings have it; no figure belongs to what the user changed."""
-    followed: Experiment = experiment.follows(experiment, shipped, parameters)
+    """The experiment as its recordings have it; no figure belongs to what the user changed in
+    `parameters`, before the recordings filled what stood open."""
+    followed: Experiment = experiment.follows(experiment, found.recordings, found.parameters)
     own = {p.path: p.default for p in _settings(experiment.parameters, experiment.methods)}
     changed = [
         f"{p.path} = {p.default}"
@@ -178,6 +183,10 @@ def _published(
     figures = [figure.beside(values) for figure in road.experiment.published]
     whole = set(road.methods) == set(road.experiment.methods)
     return tuple(figure for figure in figures if whole or not figure.missing)
+
+
+def _doubtful(warnings: tuple[str, ...]) -> str:
+    return "Doubtful input, see the warnings; " if warnings else ""
 
 
 def _opening(identified: Identified | None) -> str:

@@ -82,12 +82,14 @@ def _metadata(record: Recording) -> NumberTable:
 def parameters(result: Result) -> Exhibit:
     """Every parameter with the value used."""
     rows = tuple(
-        (p.path, _plain(p.default), "" if p.unit == "1" else p.unit, p.doc)
+        (p.path, _plain(p.default), "" if p.unit == "1" else p.unit, p.origin, p.doc)
         for p in result.parameters
     )
     used = NumberTable(
-        "", "Parameters as used, SI. Change one with --set path=value.",
-        ("path", "value", "unit", "meaning"), rows, folded=True,
+        "", "Parameters as used, SI. Change one with --set path=value. Origin: recorded (the "
+        "recording says it), entered (the experiment's file or --set), default (the library's), "
+        "identified.",
+        ("path", "value", "unit", "origin", "meaning"), rows, folded=True,
     )  # fmt: skip
     seed = f"{result.seed}" if result.seed is not None else "none"
     around = tuple({"seed": seed, **environment()}.items())

@@ -67,10 +67,12 @@ def document(result: Result, created: str) -> Json:
         "twin_notice": result.twin_notice,
         "seed": result.seed,
         "notes": list(result.notes),
+        "warnings": list(result.warnings),
         "inputs": [members(r.source) | {"path": file_name(r.source.path)}
                    for r in result.recordings],
         "parameters": {
-            p.path: {"value": recorded(p.default), "unit": p.unit} for p in result.parameters
+            p.path: {"value": recorded(p.default), "unit": p.unit, "origin": p.origin}
+            for p in result.parameters
         },
         "environment": environment(),
         "methods": [_method(m, result, share) for m in result.methods],

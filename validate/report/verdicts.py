@@ -26,8 +26,10 @@ _BANDS = {
 
 def band(result: Result) -> tuple[str, str]:
     """The colour class of the sentence and the word that says the same."""
-    fallen = ("bad", "A printed figure does not stand") if result.fallen else None
-    return (result.overall.word != "differs" and fallen) or _BANDS[result.overall.word]
+    colour, word = _BANDS[result.overall.word]
+    if result.fallen and result.overall.word != "differs":
+        return "bad", "A printed figure does not stand"
+    return ("open", f"{word}, in doubt") if result.warnings and colour == "good" else (colour, word)
 
 
 def checks(result: Result) -> Exhibit | None:

@@ -6,18 +6,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from validate.errors import RecordingError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
-from validate.identify.modulus import cylinder_of, fit_modulus
+from validate.identify.modulus import Cylinder, fit_modulus
 from validate.parameters import Ranges, quantity
 from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import QuarterGrid
-from validate.replay.compression import STAGE, SYMMETRY, between, pressed_log
+from validate.replay.compression import STAGE, SYMMETRY, between, pressed_log, size_of
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element
@@ -39,8 +37,13 @@ class SiliconeCard:
 
 @dataclass(frozen=True)
 class LoggedSpecimen:
-    diameter: float | None = quantity(None, "m", "diameter; none: from the logs' header")
-    height: float | None = quantity(None, "m", "height; none: from the logs' header")
+    diameter: float | None = quantity(None, "m", "diameter; none: the logs'", asked=True)
+    height: float | None = quantity(None, "m", "height; none: the logs'", asked=True)
+
+    @property
+    def size(self) -> Cylinder:
+        """Raises `UsageError` while a size is not set."""
+        return size_of(self.diameter, self.height)
 
 
 @dataclass(frozen=True)
@@ -111,14 +114,13 @@ def build(recording: Recording, parameters: LoggedCylinder, model: CylinderModel
     E: float | None = getattr(p.material, f"E_{model.modulus}")
     if E is None:
         raise RecordingError(f"no modulus identified; set material.E_{model.modulus}")
-    return model_scene(specimen_size(recording, p), p, model, E)
+    return model_scene(p, model, E)
 
 
-def model_scene(
-    size: tuple[float, float], p: LoggedCylinder, model: CylinderModel, E: float
-) -> Scene:
+def model_scene(p: LoggedCylinder, model: CylinderModel, E: float) -> Scene:
     """A quarter of the cylinder with its planes of symmetry, the upper plate driven down."""
-    mesh = quarter_cylinder(*size, *grid_of(p, model), p.mesh.grading)
+    size = p.specimen.size
+    mesh = quarter_cylinder(size.diameter, size.height, *grid_of(p, model), p.mesh.grading)
     supports = (*between(model.plates), *SYMMETRY)
     material = Material(E, p.material.nu, model.law)
     scene = Scene(mesh, material, supports, drives=(STAGE,), copies=4)
@@ -134,8 +136,8 @@ def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Reg
     """To the law's limit, in windows that end where one of the laws does and the log reaches."""
     p = parameters
     limit: float = getattr(p, f"limit_{scene.material.law}")
-    fit = fit_modulus(recording, window=(p.fit_from, p.fit_to))
-    height = specimen_size(recording, p)[1]
+    fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to))
+    height = p.specimen.size.height
     d = recording.signal("displacement", "m").y
     reached = float(d.max() - fit.contact) / height - fit.toe
     strains = pairwise((p.fit_from, p.fit_to, *_limits(p)))
@@ -143,19 +145,8 @@ def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Reg
     return pressed_log(recording, fit, height, limit, shown, fit.noise)
 
 
-def specimen_size(recording: Recording, p: LoggedCylinder) -> tuple[float, float]:
-    """Diameter and height m: what the user set, else the header's."""
-    stated = cylinder_of(recording)
-    own = p.specimen
-    return (
-        stated.diameter if own.diameter is None else own.diameter,
-        stated.height if own.height is None else own.height,
-    )
-
-
-def stiffening(size: tuple[float, float], p: LoggedCylinder, model: CylinderModel) -> float:
+def stiffening(p: LoggedCylinder, model: CylinderModel) -> float:
     """Apparent over true modulus of a method's meshed cylinder: E_app = F h / (A d) at E = 1 Pa."""
-    diameter, height = size
-    scene = model_scene(size, p, model, 1.0)
+    scene = model_scene(p, model, 1.0)
     force = responses(build_system(scene)).reactions[0, 0]
-    return float(force * height / (np.pi * diameter**2 / 4))
+    return float(force * p.specimen.size.height / p.specimen.size.area)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.papers.ecoflex.cylinder import LoggedCylinder, specimen_size, window
+from validate.papers.ecoflex.cylinder import LoggedCylinder, window
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
 
@@ -75,6 +75,6 @@ def _tenth(recordings: Sequence[Recording], p: LoggedCylinder) -> float:
     forces = []
     for recording in recordings:
         d, force = recording.signal("displacement", "m").y, recording.signal("force", "N").y
-        last = int(np.argmax(d[:, 0] >= p.limit_linear * specimen_size(recording, p)[1]))
+        last = int(np.argmax(d[:, 0] >= p.limit_linear * p.specimen.size.height))
         forces.append(float(force[last, 0]))
     return 0.1 * float(np.mean(forces))

@@ -17,7 +17,6 @@ from validate.fem.system import build as build_system
 from validate.identify.interval import mesh_share
 from validate.identify.law import LawFit, fit_scale
 from validate.identify.modulus import (
-    Cylinder,
     ModulusSummary,
     gent_correction,
     identify_modulus,
@@ -28,7 +27,6 @@ from validate.papers.ecoflex.cylinder import (
     grid_of,
     model_scene,
     place,
-    specimen_size,
     stiffening,
 )
 from validate.recording.types import Recording
@@ -50,15 +48,15 @@ def identified(
 ) -> Identified:
     """The modulus for which each method, on its own mesh, has the measured slope or force."""
     p = parameters
-    size = specimen_size(recordings[0], p)
-    found = identify_modulus(recordings, Cylinder(*size), (p.fit_from, p.fit_to))
-    factors = {name: _stiffening(size, p, methods[name].scene) for name in ("slip", "bonded")}
+    size = p.specimen.size
+    found = identify_modulus(recordings, size, (p.fit_from, p.fit_to))
+    factors = {name: _stiffening(p, methods[name].scene) for name in ("slip", "bonded")}
     laws = {name: _law_fit(recordings, p, methods[name]) for name in LAWS}
     moduli = {name: found.mean / factor for name, (factor, _) in factors.items()}
     moduli |= {name: fit.scale for name, (fit, _) in laws.items()}
     chosen = {f"E_{k}": getattr(p.material, f"E_{k}") or v for k, v in moduli.items()}
     bonded, _ = factors["bonded"]
-    scores = _scores(found, factors, gent_correction(*size))
+    scores = _scores(found, factors, gent_correction(size.diameter, size.height))
     for name, (fit, mesh) in laws.items():
         scores += _law_scores(name, methods[name].label, fit, mesh, len(recordings))
     headline = (
@@ -66,8 +64,9 @@ def identified(
         f"plates) and {_span(moduli['slip'], found, factors['slip'])} (slipping): force alone "
         "cannot say which"
     )
-    squat = stiffening((size[0], size[1] / 2), p, methods["bonded"].scene)
-    notes = _notes(found, moduli, squat / bonded, size[1])
+    squat = replace(p, specimen=replace(p.specimen, height=size.height / 2))
+    half = stiffening(squat, methods["bonded"].scene) / bonded
+    notes = _notes(found, moduli, half, size.height)
     fitted = p.material.E_slip is None or p.material.E_bonded is None
     calibrated = ("force@5pct",) if fitted else ()
     used = replace(p, material=replace(p.material, **chosen))
@@ -77,8 +76,8 @@ def identified(
 Factor = tuple[float, float]  # apparent over true modulus, and its uncertainty from the mesh
 
 
-def _stiffening(size: tuple[float, float], p: LoggedCylinder, model: CylinderModel) -> Factor:
-    return _meshed(p, model, lambda m: stiffening(size, p, m), float)
+def _stiffening(p: LoggedCylinder, model: CylinderModel) -> Factor:
+    return _meshed(p, model, lambda m: stiffening(p, m), float)
 
 
 def _law_fit(
@@ -108,7 +107,7 @@ def _meshed(
 
 
 def _fitted(recordings: Sequence[Recording], p: LoggedCylinder, method: Method) -> LawFit:
-    scene = model_scene(specimen_size(recordings[0], p), p, method.scene, 1.0)
+    scene = model_scene(p, method.scene, 1.0)
     stepper = method.settings.prepare(build_system(scene))
     curves, forces = [], []
     for recording in recordings:

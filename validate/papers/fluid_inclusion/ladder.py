@@ -61,7 +61,8 @@ def phantom_trial(
 
 def _cell_size(p: Any, level: int) -> float:
     x, y, z = GRIDS[level]
-    volume = p.block.x * p.block.y * p.block.z
+    block = p.block.size
+    volume = block.x * block.y * block.z
     return float((volume / ((x - 1) * (y - 1) * (z - 1))) ** (1 / 3))
 
 
