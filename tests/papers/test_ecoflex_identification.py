@@ -1,19 +1,30 @@
 """The modulus of a round body from a meshed one, on logs whose modulus is known."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
 
-from validate.papers.ecoflex.cylinder import LoggedCylinder, LoggedSpecimen, QuarterGrid
+from validate.errors import UsageError
+from validate.papers.ecoflex.cylinder import (
+    CylinderModel,
+    LoggedCylinder,
+    LoggedSpecimen,
+    model_scene,
+    place,
+)
 from validate.papers.ecoflex.modulus import identified
 from validate.parameters import with_values
 from validate.recording.types import Recording, Signal, Source
+from validate.register.signals import SignalObservation
+from validate.replay.cards import QuarterGrid
 from validate.replay.experiment import Identified
 from validate.replay.find import load_file
 from validate.replay.method import Method
+from validate.replay.origins import opened
 
 DIAMETER, HEIGHT, E = 0.05, 0.03, 90e3
 SMALL = LoggedCylinder(
@@ -85,3 +96,29 @@ def test_it_follows_the_methods_as_they_are_set(methods: Mapping[str, Method]) -
     assert set_otherwise.parameters.material.E_bonded == pytest.approx(
         scores["modulus.E"], rel=1e-9
     )
+
+
+def test_logs_without_a_header_take_the_sizes_that_are_set(project_root: Path) -> None:
+    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py")
+    bare = replace(shipped, load=lambda p, folder: (pressed(), pressed()))
+    with pytest.raises(UsageError, match=r"ecoflex_cylinder.py:\d+: specimen.diameter") as refused:
+        opened(bare, bare.parameters)
+    assert "--set specimen.height=VALUE" in str(refused.value)
+    sizes = {"specimen.diameter": repr(DIAMETER), "specimen.height": repr(HEIGHT)}
+    used = opened(bare, with_values(bare.parameters, sizes)).parameters
+    scene = model_scene(used, CylinderModel(), E)
+    (force,) = place(pressed(), used, scene).of(SignalObservation)
+    assert np.ptp(scene.mesh.nodes[:, 2]) == pytest.approx(HEIGHT)
+    assert len(force.y) > 100
+
+
+def test_what_logs_say_differently_is_asked_for(project_root: Path) -> None:
+    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py")
+    logs = [
+        replace(pressed(), metadata={"specimen": {"diameter_m": "0.05", "height_m": height}})
+        for height in ("0.03", "0.02")
+    ]
+    mixed = replace(shipped, load=lambda p, folder: tuple(logs))
+    with pytest.raises(UsageError, match=r"specimen.height \(m\) is not set\. The rec") as refused:
+        opened(mixed, mixed.parameters)
+    assert "specimen.diameter" not in str(refused.value)

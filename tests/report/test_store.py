@@ -37,7 +37,9 @@ def test_content() -> None:
     assert soft["published"][0]["ours"] == 4.0
     assert content["methods"][1]["published"] == []
     assert [r["recording"] for r in soft["further_runs"]] == ["cube_b"]
-    assert content["parameters"]["material.E"] == {"value": 1e4, "unit": "Pa"}
+    assert content["parameters"]["material.E"] == {
+        "value": 1e4, "unit": "Pa", "origin": "default",
+    }  # fmt: skip
 
 
 def test_unfinished_method_is_valid() -> None:
