@@ -15,6 +15,7 @@ from validate.replay import load as experiment_named
 from validate.replay.experiment import Experiment, Told
 from validate.replay.followed import Cases
 from validate.replay.options import Options
+from validate.replay.origins import opened
 from validate.replay.road import compare
 
 FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here", 3.0, 0.0)
@@ -51,7 +52,8 @@ def test_other_settings_are_not_compared_with_a_printed_figure() -> None:
 def followed(folder: Path, logs: str) -> Experiment:
     experiment = experiment_named("ecoflex_cylinder")
     p = replace(LoggedCylinder(), data=str(folder), logs=logs)
-    return follows(experiment, load(p, Path()), p)
+    found = opened(experiment, p)
+    return follows(experiment, found.recordings, found.parameters)
 
 
 @pytest.fixture(scope="module")

@@ -96,7 +96,7 @@ def moved(part: str = "", **values: Callable[[Any, float], Any]) -> Callable[[An
 def rubbed(p: Any, z: float) -> Any:
     """A block whose plates rub by z `ranges.friction` more; what lies beyond slipping or bonded is
     mirrored back."""
-    E, apart = p.material.E, p.block.x
+    E, apart = p.material.E, p.block.size.size_x
     share = abs(rubbing_share(p.plates, p.friction, E, apart) + z * p.ranges.friction)
     plates, friction = plates_of_share(min(share, 2 - share), E, apart)
     return replace(p, plates=plates, friction=friction)

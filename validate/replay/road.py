@@ -16,7 +16,6 @@ from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.fem.locking import locking_warning
 from validate.parameters import Parameter, describe
-from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
 from validate.replay.consistency import consistency_scores

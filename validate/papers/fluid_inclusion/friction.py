@@ -21,7 +21,7 @@ SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
 
 
 def _rubbing(p: Phantom, share: float) -> Phantom:
-    plates, friction = plates_of_share(share, p.material.E, p.block.size.x)
+    plates, friction = plates_of_share(share, p.material.E, p.block.size.size_x)
     return replace(p, mesh=replace(p.mesh, order=None), plates=plates, friction=friction)
 
 

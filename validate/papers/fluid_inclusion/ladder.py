@@ -61,8 +61,7 @@ def phantom_trial(
 
 def _cell_size(p: Any, level: int) -> float:
     x, y, z = GRIDS[level]
-    block = p.block.size
-    volume = block.x * block.y * block.z
+    volume = p.block.size.sizes.prod()
     return float((volume / ((x - 1) * (y - 1) * (z - 1))) ** (1 / 3))
 
 
