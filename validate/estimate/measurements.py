@@ -163,7 +163,9 @@ def measurements(registered: Registered, mesh: Mesh) -> Measurements:
     H = sparse.csr_array(sparse.kron(weights, sparse.eye_array(d), format="csr"))
     z = (seen.x - seen.rest).reshape(len(seen.t), -1)
     names = tuple(f"{name}.{_AXES[c]}" for name in seen.names for c in range(d))
-    t, z, sd = on_steps(seen.t, z, np.full(len(names), seen.sd), registered.t)
+    t, z, sd = on_steps(
+        seen.t, z, np.tile([seen.along([c]) for c in range(d)], len(seen.names)), registered.t
+    )
     return Measurements(t, H, z, sd, names)
 
 

@@ -1,6 +1,6 @@
 """Tracked markers: registered at rest, read from a run where they sit in the body."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -40,6 +40,7 @@ class MarkerObservation:
     `sd` m per axis; `tre` (k,) m, the predicted registration error at every marker. Each marker is
     a quantity of its own, read from the run's probe of its name, unless `together` gathers them:
     then the run's fields are read at their places. `sd_t` s: how uncertain their clock is.
+    `axis_sd` (d,) m where the noise differs between the scene's axes; `sd` is then their rms.
     """
 
     name: str
@@ -54,10 +55,15 @@ class MarkerObservation:
     registration: Registration
     together: tuple[Together, ...] = ()
     sd_t: float = 0.0
+    axis_sd: tuple[float, ...] = ()
 
     def simulated(self, u: Floats) -> Floats:
         """Marker positions (k, d) m under nodal displacements u (n, d) m."""
         return self.rest + self.positions.apply(u)
+
+    def along(self, axes: Sequence[int]) -> float:
+        """Standard deviation m per component along some axes."""
+        return rms([self.axis_sd[a] for a in axes]) if self.axis_sd else self.sd
 
     def rows(self) -> Rows | None:
         return self.positions
@@ -101,7 +107,7 @@ class MarkerObservation:
         off = off[np.isfinite(off).all(axis=1)]
         tre = rms(self.tre) / float(np.sqrt(3))
         found = (
-            Deviation(g.quantity, off[:, list(g.axes)], "m", self.sd, tre, g.words)
+            Deviation(g.quantity, off[:, list(g.axes)], "m", self.along(g.axes), tre, g.words)
             for g in self.together
         )
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
@@ -125,7 +131,7 @@ class MarkerObservation:
         probe = [selection.read(run.t, run.traces[f"{name}.{c}"].y, t) for c in axes]
         words = "estimate less measured displacement of the marker, at the times it was seen"
         off = (np.stack(probe, axis=1) - moved[samples])[seen]
-        found = Deviation(name, off, "m", self.sd, float(self.tre[j]), words)
+        found = Deviation(name, off, "m", self.along(range(len(axes))), float(self.tre[j]), words)
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         return with_clock(found, sd_t, self._speed(j, samples, sd_t)) if sd_t > 0 else found
 
@@ -166,9 +172,10 @@ def observe_markers(
     _require_scale(markers.x[0], rest)
     registration = register_points(
         markers.names, markers.x[0], rest, method=how.method, exclude=how.exclude,
-        robust=how.robust, expected_sd=markers.sd, up=up,
+        robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
     )  # fmt: skip
     d = mesh.dimension
+    sds = _along_axes(registration, d)
     places = rest[:, :d]
     rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, places)
     if sampling == "barycentric":
@@ -176,9 +183,18 @@ def observe_markers(
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
     require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
     return MarkerObservation(
-        name, role, markers.t, markers.names, x[..., :d], places, rows, markers.sd,
-        registration.tre_at(rest), registration, together, sd_t,
+        name, role, markers.t, markers.names, x[..., :d], places, rows,
+        rms(sds) if sds else registration.expected_sd,
+        registration.tre_at(rest), registration, together, sd_t, sds,
     )  # fmt: skip
+
+
+def _along_axes(found: Registration, d: int) -> tuple[float, ...]:
+    """Noise m along the first d axes of the scene where it differs between directions."""
+    if found.noise is None:
+        return ()
+    R = found.transform.R
+    return tuple(np.sqrt(np.diag(R @ found.noise @ R.T))[:d].tolist())
 
 
 def placed_markers(

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from validate.arrays import Floats, checked, rms
 from validate.errors import RegistrationError
 from validate.register import measures
+from validate.register.anisotropic import covariance_of, fit_weighted, weighted_covariance
 from validate.register.fitting import Method
 from validate.register.measures import FEWEST, Fit, Mask, Outlier, Reflection, Scale
 from validate.register.relabel import label_fault
@@ -37,6 +38,7 @@ class Registration:
     names (k,), markers (k, d) m their positions in the target frame, residuals (k, d) m mapped
     source minus target. `missing` were NaN, `excluded` were asked for, `rejected` are outliers that
     a robust fit left out; other `outliers` stay in it. `scale` is fitted whether it is used or not.
+    `noise` (3, 3) m^2, in the source frame, where it differs between directions.
     """
 
     transform: Similarity
@@ -47,6 +49,7 @@ class Registration:
     method: Method
     reflection: Reflection
     scale: Scale
+    noise: Floats | None = None
     outliers: tuple[Outlier, ...] = ()
     missing: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
@@ -86,6 +89,8 @@ class Registration:
     def _covariance(self, points: ArrayLike) -> Floats:
         d = len(self.transform.t)
         at = checked(points, "target points [m]", (None, d), error=RegistrationError)
+        if self.noise is not None:
+            return weighted_covariance(at, self.markers, self.noise, self.transform)
         return measures.target_covariance(at, self.markers, self.fle, _scaled(self.method))
 
 
@@ -95,14 +100,16 @@ def register_points(
     target: ArrayLike,
     *,
     method: Method = "rigid",
-    expected_sd: float,
+    expected_sd: ArrayLike,
     exclude: Sequence[str] = (),
     robust: bool = False,
     up: Up | None = None,
 ) -> Registration:
     """Register named markers: source (k, d) m measured, target (k, d) m, NaN rows = not seen.
 
-    expected_sd: declared measurement noise, m per axis, 0 for exact data. `up`: directions in the
+    expected_sd: declared measurement noise, m per axis, 0 for exact data; or for the rigid method
+    three along the source's axes, or a covariance (3, 3) m^2: the fit is then weighted, and what
+    may be noise is judged by the worst direction. `up`: directions in the
     source and target frame to the same side of a planar marker set; it alone reveals a mirror
     within the plane. Methods: rigid; similarity (scale free); two_step and two_step_scaled (paper
     000; 3-D, planar).
@@ -116,14 +123,21 @@ def register_points(
     thicker across its line than `LINE` times the noise, and unknown names.
     """
     x, y, kept, missing = _used(names, source, target, exclude)
-    _check_settings(method, expected_sd, x, y)
-    fit = _fitter(method, up)
-    noise = max(expected_sd, measures.ROUNDING * float(spread(y)[0]))
-    mirror = measures.reflection(x, y, fit, _across(x.shape[1], up))
+    C = _anisotropic(expected_sd, method)
+    declared = (
+        float(np.sqrt(np.linalg.eigvalsh(C)[-1]))
+        if C is not None
+        else float(np.asarray(expected_sd))
+    )
+    _check_settings(method, declared, x, y)
+    plain = _fitter(method, up)
+    fit = plain if C is None else partial(_weighted, first=plain, C=C)
+    noise = max(declared, measures.ROUNDING * float(spread(y)[0]))
+    mirror = measures.reflection(x, y, plain, _across(x.shape[1], up))
     bound = noise * np.sqrt(measures.chi_square_bound(_freedom(y, method)) / len(y))
     if mirror.proper > bound:
         _refuse_mirrored(mirror, bound)
-        _refuse_relabelled(kept, x, y, fit, noise)
+        _refuse_relabelled(kept, x, y, plain, noise)
     outliers = measures.find_outliers(kept, x, y, noise, _scaled(method))
     regular = ~np.isin(kept, [o.name for o in outliers])
     if outliers and not robust:
@@ -142,10 +156,11 @@ def register_points(
         names=tuple(n for n, use in zip(kept, used, strict=True) if use),
         markers=y[used],
         residuals=transform.apply(x[used]) - y[used],
-        expected_sd=float(expected_sd),
+        expected_sd=declared,
         method=method,
         reflection=mirror,
         scale=scale,
+        noise=C,
         outliers=outliers,
         missing=missing,
         excluded=tuple(exclude),
@@ -183,7 +198,7 @@ def _check_settings(method: str, expected_sd: float, x: Floats, y: Floats) -> No
     if method not in get_args(Method):
         raise RegistrationError(f"method '{method}': expected one of {get_args(Method)}")
     if not (np.isfinite(expected_sd) and expected_sd >= 0):
-        raise RegistrationError(f"expected_sd {expected_sd} m is not a number >= 0")
+        raise RegistrationError(f"expected_sd {expected_sd:g} m is not a number >= 0")
     for points, name in ((x, "source markers"), (y, "target markers")):
         check_spread(points, name)
         values = spread(points)
@@ -194,6 +209,20 @@ def _check_settings(method: str, expected_sd: float, x: Floats, y: Floats) -> No
                 f"{name}: {len(points)} points on a line within the noise (spread {shown} mm, "
                 f"noise {1e3 * expected_sd:.3g} mm, needed {LINE:g} times it): add one off the line"
             )
+
+
+def _anisotropic(sd: ArrayLike, method: Method) -> Floats | None:
+    """The noise's covariance (3, 3) m^2, None for one sd."""
+    given = np.asarray(sd, dtype=np.float64)
+    if given.ndim == 0:
+        return None
+    if method != "rigid":
+        raise RegistrationError(f"noise by direction with method '{method}': use method rigid")
+    return covariance_of(given)
+
+
+def _weighted(source: Floats, target: Floats, *, first: Fit, C: Floats) -> Similarity:
+    return fit_weighted(source, target, C, first(source, target))
 
 
 def _fitter(method: Method, up: Up | None) -> Fit:
