@@ -26,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LONG_RUNS = ("phantom_result", "whole")
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         shared = next((name for name in LONG_RUNS if name in item.fixturenames), "")
