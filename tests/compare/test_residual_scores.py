@@ -70,7 +70,8 @@ def test_every_metric_of_zero_is_zero_and_scales(metric) -> None:  # type: ignor
 def test_scores_carry_unit_count_and_definition() -> None:
     scores = scores_of(residual(THREE), "measured")
     assert [s.name for s in scores] == [f"contour.{m}@9mm" for m in ("rms", "mean", "max", "bias")]
-    assert [s.value for s in scores] == [m(THREE) for _, m, _ in METRICS]
+    by_hand = [np.sqrt(50 / 3), 10 / 3, 5.0, np.sqrt(1 + 1 / 9)]
+    assert [s.value for s in scores] == pytest.approx(by_hand, rel=1e-15)
     assert {(s.unit, s.count, s.against) for s in scores} == {("m", 3, "measured")}
     assert scores[0].definition == "what it is; root mean square over the points"
 

@@ -10,8 +10,15 @@ from cubes import case
 from validate.errors import ComparisonError
 from validate.estimate.filterpy_guest import GUESTS, Guest, kalman
 from validate.estimate.filterpy_oracle import OracleRow, oracle_table
+from validate.estimate.kalman import Gaussian
 from validate.estimate.linear_model import LinearModel
 from validate.estimate.reduced_kf import ReducedKf
+from validate.estimate.sampled_kalman import (
+    SigmaPoints,
+    enkf_update,
+    ensemble_gaussian,
+    ukf_predict,
+)
 
 
 @pytest.mark.parametrize("row", oracle_table(), ids=lambda r: r.pair)
@@ -84,3 +91,20 @@ def test_models_are_checked_at_the_door() -> None:
         LinearModel(one, one, one, np.eye(3), one, np.zeros(2), one)
     with pytest.raises(ComparisonError, match="model P0: differs from its transpose"):
         LinearModel(one, one, one, one, one, np.zeros(2), np.array([[1.0, 1], [0, 1]]))
+
+
+def test_the_sigma_points_own_beta_is_that_of_a_gaussian() -> None:
+    """x^2 of a Gaussian about 0 has mean s^2 and variance 2 s^4, which beta = 2 gives exactly."""
+    prior = Gaussian(np.zeros(1), np.array([[9.0]]))
+    found = ukf_predict(prior, np.square, np.zeros((1, 1)), SigmaPoints(alpha=0.5))
+    assert found.x == pytest.approx([9.0], rel=1e-14)
+    assert pytest.approx(np.array([[2 * 81.0]]), rel=1e-13) == found.P
+
+
+def test_an_ensemble_of_three_by_hand() -> None:
+    """Members 1, 2, 6 (variance 7) see themselves with variance 7: halfway to what they draw."""
+    members, seen = np.array([[1.0], [2.0], [6.0]]), np.array([4.0])
+    assert ensemble_gaussian(members).x == pytest.approx([3.0])
+    assert pytest.approx(np.array([[7.0]])) == ensemble_gaussian(members).P
+    moved = enkf_update(members, seen, lambda x: x, np.array([[7.0]]), np.array([[0], [2], [-2]]))
+    assert moved.ravel() == pytest.approx([2.5, 4.0, 4.0])

@@ -16,13 +16,14 @@ from validate.estimate.displacement_filter import DisplacementStepper, Estimate
 from validate.estimate.gains import Claims, gain_sequence, schedule
 from validate.estimate.kalman import Gaussian, kf_predict, kf_update
 from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
-from validate.estimate.load_scale import LoadScale
+from validate.estimate.load_scale import LoadScale, ScaleCore
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.modal_kernel import advance, mirrored
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.observable import Observed, observed
 from validate.estimate.reduced_kf import ReducedKf, dense_covariance, steady
 from validate.estimate.reduced_linear import LoadDoubt, reduced_model
+from validate.estimate.small_state import CoreStepper
 from validate.fem.system import build
 from validate.scene.scene import Drive, Region
 from validate.solve.march import march
@@ -49,7 +50,7 @@ def with_gaps(pulled: Case, every: int):  # type: ignore[no-untyped-def]
 def test_dense_shared_and_modal_are_one_filter(pulled: Case, structure: str, every: int) -> None:
     """The printed dense recursion, the same in modes, and both beforehand, to rounding."""
     seen = with_gaps(pulled, every)
-    given = {"structure": structure, "settled": 0.0}
+    given = {"structure": structure, "settled": 0.0, "P0": 4e-9}
     filters = [KfFem(gains="every_step", **given), KfFem(**given)]  # type: ignore[arg-type]
     filters += [ModalKf(**given), ModalKf(gains="shared", **given)]  # type: ignore[arg-type, list-item]
     runs = [pulled.march(f.prepare(pulled.system, seen), at=(9, 40, 59)) for f in filters]
@@ -69,7 +70,7 @@ def test_the_printed_filter_is_filterpys(pulled: Case, recursion: str) -> None:
     n = len(free)
     guest = KalmanFilter(n, 3, n)
     guest.x, guest.F, guest.B = np.zeros(n), p.transition(), np.eye(n)
-    guest.P, guest.Q, guest.R = 1e-9 * np.eye(n), 1e-9 * np.eye(n), SD**2 * np.eye(3)
+    guest.P, guest.Q, guest.R = 4e-9 * np.eye(n), 1e-9 * np.eye(n), SD**2 * np.eye(3)
     guest.H = seen.free(free)
     f = pulled.system.loads[free] @ pulled.inputs[0]
     v, a = np.zeros(n), np.linalg.solve(p.M.toarray(), f)
@@ -80,7 +81,7 @@ def test_the_printed_filter_is_filterpys(pulled: Case, recursion: str) -> None:
         prior = guest.x.copy()
         guest.update(z)
         v, a = p.rates(prior if recursion == "prior" else guest.x, x, v, a)
-    settings = KfFem(gains="every_step", recursion=recursion)  # type: ignore[arg-type]
+    settings = KfFem(gains="every_step", P0=4e-9, recursion=recursion)  # type: ignore[arg-type]
     run = pulled.march(settings.prepare(pulled.system, seen))
     assert run.sd is not None
     assert run.u[-1].ravel()[free] == pytest.approx(guest.x, rel=1e-9, abs=1e-15)
@@ -336,6 +337,44 @@ def test_what_a_filter_cannot_do_is_refused(pulled: Case) -> None:
     for name, value in (("Q", -1.0), ("P0", np.nan), ("R", 0.0)):
         with pytest.raises(SceneError, match=f"variance {name}"):
             KfFem(**{name: value})  # type: ignore[arg-type]
+
+
+def test_a_step_of_the_load_scale_by_hand() -> None:
+    """a' = a/4 + 3/4 of the .1 m/N that 10 N of the load reach; the scale walks for .5 s."""
+    settings = LoadScale(dt=0.5, scale_sd=0.5, walk=0.2, Q=3.0)
+    core = ScaleCore(settings, np.array([1.0, 2.0]), np.array([2.0]), np.array([4.0]), 0.25, 0.1)
+    prior, _ = core.step(core.start(), 1, np.array([10.0]), None)
+    assert prior.x == pytest.approx([0.75, 1.0], rel=1e-14)
+    known = np.array([[3 + 0.75**2 / 4, 0.75 / 4], [0.75 / 4, 0.25 + 0.2**2 / 2]])
+    assert pytest.approx(known, rel=1e-14) == prior.P
+    assert core.free(prior) == pytest.approx([0.75, 1.5])
+    assert core.variances(prior) == pytest.approx(known[0, 0] * np.array([1.0, 4.0]))
+    after, seen = core.step(core.start(), 1, np.array([10.0]), np.array([2.5]))
+    gain = 2 * known[0] / (4 * known[0, 0] + 4)
+    assert after.x == pytest.approx([0.75, 1.0] + gain * 1.0, rel=1e-14)
+    assert seen.y == pytest.approx([1.0])
+
+
+def test_a_load_scales_shape_creeps_to_statics_and_swings_below_twice_critical(
+    pulled: Case,
+) -> None:
+    """All modes creep with the stiffness damping; the shape's ratio is that times omega / 2."""
+    scene, seen, free = pulled.system.scene, pulled.measured(1), pulled.system.free
+    stepper = LoadScale(dt=DT).prepare(pulled.system, seen)
+    assert isinstance(stepper, CoreStepper)
+    assert isinstance(stepper.core, ScaleCore)
+    K, M = (X[free][:, free].toarray() for X in (pulled.system.K, pulled.system.M))
+    s = np.linalg.solve(K, pulled.system.loads[free, 0])
+    assert stepper.core.keep == pytest.approx(np.exp(-DT / 0.1), rel=1e-12)
+    assert stepper.core.per_newton * stepper.core.shape == pytest.approx(s, rel=1e-9)
+    omega = np.sqrt(s @ K @ s / (s @ M @ s))
+    damped = [
+        build(replace(scene, material=replace(scene.material, stiffness_damping=2 * r / omega)))
+        for r in (1.99, 2.01)
+    ]
+    with pytest.raises(SceneError, match=r"damping ratio 2, it swings.* needs 2;"):
+        LoadScale().prepare(damped[0], seen)
+    LoadScale().prepare(damped[1], seen)
 
 
 def test_regions_of_other_damping_fall_back_on_the_dense_recursion(pulled: Case) -> None:

@@ -1,6 +1,7 @@
 """Errors over time, orders and limits of paper 002's claims, on small inputs with known answers."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,14 @@ import pytest
 from validate.compare.exhibit import NodeMap
 from validate.compare.pair import Common
 from validate.fem.system import build
-from validate.papers.accuracy.errors import Errors, errors_of, ordered_share, stable_of, sum_ratio
+from validate.papers.accuracy.errors import (
+    Errors,
+    errors_of,
+    ordered_share,
+    shape_maps,
+    stable_of,
+    sum_ratio,
+)
 from validate.papers.accuracy.needle import MP1, needle_block, needle_depth, needle_from_above
 from validate.papers.accuracy.rules import limit_of, rules_exhibit
 from validate.report.maps import ranges, words
@@ -107,3 +115,14 @@ def test_a_map_on_a_deformed_body_says_so() -> None:
     mesh = needle_block(2).mesh
     shown = NodeMap("m", "A map", mesh, np.ones(9), "mm", surface="the deformed body")
     assert "at 9 nodes, on the deformed body" in words(shown, ranges([shown])["m"])
+
+
+def test_a_shape_is_the_body_moved_by_its_displacement() -> None:
+    """In the frame nearest to the time; a method that did not come to its end has none."""
+    run = still(2)
+    done = SimpleNamespace(whole=True, run=run, scene=needle_block(2), label="Still")
+    case = {"done": done, "ended": SimpleNamespace(whole=False)}
+    (shown,) = shape_maps(case, ("done", "ended", "absent"), 0.11)  # type: ignore[arg-type]
+    assert shown.mesh.nodes == pytest.approx(done.scene.mesh.nodes + run.u[2], abs=1e-16)
+    assert shown.values == pytest.approx(1e3 * np.linalg.norm(run.u[2], axis=1))
+    assert "Still at 0.1 s" in shown.title

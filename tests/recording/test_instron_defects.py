@@ -8,6 +8,7 @@ import pytest
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.exports.instron import read_instron
+from validate.recording.exports.rows import fitted
 from validate.recording.types import Recording
 
 T = np.arange(60) * 0.1
@@ -233,3 +234,13 @@ def test_a_missing_file_is_a_usage_error(tmp_path: Path) -> None:
         read_instron(tmp_path / "absent.csv")
     with pytest.raises(UsageError, match="cannot read"):
         read_instron(tmp_path)
+
+
+def test_only_rows_that_end_early_are_told() -> None:
+    """Whole rows leave no note; two of three that lack a sparse column are counted and filled."""
+    names = (1, ["Time", "Force", "Mark"])
+    whole = [(2, ["0", "1", "a"]), (3, ["1", "2", "b"])]
+    assert fitted(names, whole).notes == ()
+    some = fitted(names, [(2, ["0", "1", "a"]), (3, ["1", "2"]), (4, ["2", "3"])])
+    assert some.notes == ("2 rows end early, first line 3",)
+    assert [cells for _, cells in some.rows][1:] == [["1", "2", ""], ["2", "3", ""]]

@@ -8,8 +8,10 @@ import pytest
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import nearest_node_rows
-from validate.register.markers import MarkerObservation, Together
+from validate.recording.types import Markers
+from validate.register.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import EVERYTHING, Selection, frame_at, nearest_samples
+from validate.register.outlines import Corner, OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import (
     SignalObservation,
@@ -131,6 +133,22 @@ def markers(*groups: Together) -> MarkerObservation:
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(("above", "kept"), [(0.09e-3, 2), (0.11e-3, 1)])
+def test_a_marker_belongs_to_the_body_within_a_tenth_of_a_millimetre(
+    above: float, kept: int
+) -> None:
+    """At a part of the body it is left out, of the whole body it is refused."""
+    rest = TOP + np.array([[0, 0, above], [0, 0, 0]])
+    assert len(replace(markers(), rest=rest).within(MESH).names) == kept
+    places = {"a": rest[0], "b": rest[1], "c": np.zeros(3), "d": np.eye(3)[0]}
+    seen = Markers(np.zeros(1), tuple(places), np.array([list(places.values())]), 1e-4, "scene")
+    if kept == 2:
+        observe_markers(seen, places, MESH)
+        return
+    with pytest.raises(RegistrationError, match=r"'a' by 0\.11 mm"):
+        observe_markers(seen, places, MESH)
+
+
 def still(*probes: str) -> Simulated:
     """A run in which nothing moves, with these probes."""
     zero = Trace(np.zeros(5), "m")
@@ -162,6 +180,41 @@ def test_markers_together_are_read_from_the_field_along_their_axes() -> None:
     assert len(every.values) == 2 + 2 + 1
     assert seen.unanswered(still()) == ()
     assert set(seen.units) == {"up", "across"}
+
+
+# --- outlines -------------------------------------------------------------------------------------
+
+ROUND = 8e-3 * np.stack([f(np.deg2rad(np.arange(0, 360, 10))) for f in (np.cos, np.sin)], axis=1)
+DIAGONAL = np.array([-np.cos(np.deg2rad(50)), -np.sin(np.deg2rad(50))])
+
+
+@dataclass(frozen=True)
+class Round(OutlineObservation):
+    """A wall that is simulated as a circle that stays."""
+
+    def simulated(self, u: Floats) -> Floats:
+        return ROUND
+
+
+def test_the_sd_of_an_outline_is_the_scatter_of_noisy_ones() -> None:
+    """400 draws of noise along the normal at 36 points; the outline moves by 3 mm to its corner."""
+    rng, none, sd = np.random.default_rng(3), None, 0.1e-3
+    corner = Corner("corner", np.deg2rad(230.0), "")
+    found: dict[str, list[Floats]] = {}
+    for _ in range(400):
+        still, moved = (ROUND * (1 + rng.normal(0, sd, (36, 1)) / 8e-3) for _ in range(2))
+        outlines = (still, moved + 3e-3 * DIAGONAL)
+        seen = Round("o", "validates", T[:2], outlines, np.eye(4), sd, none, 0.0, (corner,))  # type: ignore[arg-type]
+        devs = seen.deviations(ramp(()), Selection("1s", T[1:2]))
+        for d in devs:
+            found.setdefault(d.quantity, []).append(d.values / d.sd)
+    for quantity in ("contour.area", "contour.centroid", "corner"):
+        assert np.std(found[quantity], axis=0) == pytest.approx(1.0, rel=0.12), quantity
+    assert np.mean(found["corner"]) * np.sqrt(2) * sd == pytest.approx(-3e-3, rel=0.01)
+    (still_one,) = Round("o", "validates", T[:1], (ROUND,), np.eye(4), sd, none, 0.0).deviations(  # type: ignore[arg-type]
+        ramp(()), Selection("rest", T[:1])
+    )
+    assert (still_one.quantity, still_one.sd) == ("contour", sd)
 
 
 # --- a recording ----------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """The ranges of shipped experiments: each says where it comes from, and moves what it names."""
 
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from validate.papers.fluid_inclusion.phantom import Phantom, PhantomRanges
 from validate.replay.cards import rubbed
 from validate.replay.experiment import Input
 from validate.replay.find import find
+from validate.replay.inclusion import InclusionRanges
 from validate.scene.plates import plates_of_share, rubbing_share
 
 
@@ -41,3 +43,13 @@ def test_bonded_and_partial_plates_are_uncertain_too() -> None:
     half = replace(Phantom(), plates=contact, friction=friction)
     more = rubbed(half, 1.0)
     assert rubbing_share("partial", more.friction, 15_200, 0.060) == pytest.approx(0.53)
+
+
+def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
+    """Also the friction, three hundredths of the share."""
+    template = files("validate.cli").joinpath("new_inclusion.py.txt").read_text("utf-8")
+    assert "ranges=InclusionRanges(E=0.05, nu=0.005, friction=0.03)," in template
+    assert InclusionRanges() == InclusionRanges(E=0.05, nu=0.005, friction=0.03)
+    assert rubbing_share("partial", rubbed(Phantom(), 1.0).friction, 15_200, 0.060) == (
+        pytest.approx(0.03)
+    )

@@ -4,6 +4,7 @@ from dataclasses import replace
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from report_samples import small_result
 
 from validate.compare.exhibit import Animation
 from validate.compare.result import Result
+from validate.register.observation import Selection
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
 from validate.report.animation import moving_outline
 from validate.report.encode import gif
 from validate.report.loads import at_times, held, in_steps
@@ -60,6 +64,16 @@ def test_never_beyond_what_was_computed(result: Result) -> None:
     others = tuple(o for o in seen.observations if o is not stage)
     (_, instant, *_) = at_times(replace(seen, observations=(over, *others)), run, np.array([8.0]))
     assert instant.u == pytest.approx(run.u[1], abs=1e-15)
+
+
+def test_between_two_loads_at_one_place_of_the_drive_the_first_holds() -> None:
+    """What moves there is no share of the drive: nothing is interpolated."""
+    t = np.arange(3.0)
+    stage = SignalObservation("stage", "drives", t, np.array([[0.0], [1.0], [1.0]]), "m", 0.0)
+    at = tuple(Selection(f"{k}s", t[k : k + 1], "") for k in (1, 2))
+    run = SimpleNamespace(u=np.array([[[3.0, 0.0]], [[5.0, 0.0]]]))
+    found = at_times(Registered((stage,), at, None), run, np.array([1.5]))  # type: ignore[arg-type]
+    assert [float(i.u[0, 0]) for i in found] == [3.0, 3.0, 5.0]
 
 
 def test_a_run_that_ended_early_shows_what_it_has(result: Result) -> None:

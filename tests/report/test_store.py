@@ -11,6 +11,7 @@ from report_samples import CHECK, bare_result, small_result
 
 from validate.compare.result import Result
 from validate.compare.score import Score
+from validate.report.environment import without_folder
 from validate.report.store import Json, document, schema, write_json, write_runs
 
 CREATED = "2026-11-21T04:00:00Z"
@@ -77,6 +78,15 @@ def test_no_folders() -> None:
     text = json.dumps(document(small_result(), CREATED))
     assert "private" not in text
     assert "cube_a.mcap" in text
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [("/home/a/log.csv", "log.csv"), (r"C:\a\log.csv", "log.csv"), ("a/log.csv", "a/log.csv"),
+     ("", ""), (3, 3)],
+)  # fmt: skip
+def test_places_of_either_system_are_not_told(value: object, shown: object) -> None:
+    assert without_folder(value) == shown
 
 
 def test_schema_refuses_a_wrong_verdict() -> None:

@@ -136,6 +136,18 @@ def test_inclusion_smaller_than_an_element_is_refused() -> None:
         block_with_inclusion(BLOCK, (4, 4, 4), Capsule((0.03, 0.0225, 0.035), 0.0005, 0.001))
 
 
+def test_an_element_counts_as_the_widest_beside_the_inclusion() -> None:
+    """Off centre the grid is 26.7 mm along z; what it is along the inclusion does not count."""
+
+    def diameter(mm: float) -> Capsule:
+        return Capsule((0.03, 0.0225, 0.040), mm / 2e3, 0.030)
+
+    with pytest.raises(SceneError, match=r"diameter 26.6 mm is smaller than an element of 26.7 mm"):
+        block_with_inclusion(BLOCK, (4, 4, 4), diameter(26.6))
+    with pytest.raises(SceneError, match="no node of"):  # the next rule's words
+        block_with_inclusion(BLOCK, (4, 4, 4), diameter(26.7))
+
+
 def test_inclusion_between_the_nodes_is_refused() -> None:
     """As wide as an element, yet every node is outside."""
     with pytest.raises(SceneError, match=r"no node of the \(8, 8, 8\) mesh .* radius 5.2 mm"):

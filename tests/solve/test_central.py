@@ -1,6 +1,7 @@
 """Explicit dynamics: order, energy, the critical step, and how runs end that should end."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from validate.fem.system import System
 from validate.scene.scene import LawName
 from validate.solve.central import CentralDifference, CentralStepper
 from validate.solve.implicit import NewtonDynamics
+from validate.solve.types import State
 
 LAWS: tuple[LawName, ...] = ("svk", "neo_hooke")
 
@@ -132,6 +134,19 @@ def test_divergence_is_seen_before_numbers_are_lost() -> None:
     late = ran(blind, system, np.full(50, 0.1), dt)
     assert late.outcome.state == "diverged"
     assert run.outcome.step < late.outcome.step
+
+
+@pytest.mark.parametrize(("energy", "failed"), [(2.09, False), (2.12, True), (np.nan, True)])
+def test_five_percent_beyond_the_most_work_done_is_the_alarm(energy: float, failed: bool) -> None:
+    """A body at rest that has given back what it was brought, and damping that took more."""
+    stepper = CentralDifference(1e-6).prepare(pulled())
+    assert isinstance(stepper, CentralStepper)
+    past = replace(stepper.start, work=2.0, taken=energy, most=2.0)
+    failure = stepper.step(State(0, past), np.zeros(1)).failure
+    assert (failure is not None) == failed
+    if energy == 2.12:
+        assert failure is not None
+        assert "energy 1.06 times the work done" in failure[1]
 
 
 @pytest.mark.parametrize("kind", ["shock", "release", "noise"])
