@@ -1,12 +1,15 @@
 """The list of experiments says what their files say, and runs none of them."""
 
+import random
+import sys
 from pathlib import Path
 
 import pytest
 
-from validate.catalogue import Card, card, experiment_files
+from validate.catalogue import Card, card, experiment_files, shipped
 from validate.errors import UsageError
-from validate.replay.find import load_file
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file, root_of
 
 
 def test_a_card_says_what_the_experiment_itself_says(project_root: Path) -> None:
@@ -37,21 +40,62 @@ def test_literal_texts_are_read_without_running(
 def test_a_file_that_is_no_python_has_a_line_of_its_own(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
     path.write_text("EXPERIMENT = (", "utf-8")
-    assert "cannot be read" in card(path).title
+    assert card(path).note == "cannot be read: '(' was never closed (mine.py, line 1)"
     path.write_bytes(b"\xff\xfe\x00")
-    assert "cannot be read" in card(path).title
+    assert "cannot be read" in card(path).note
+    path.write_text("def f(): pass", "utf-8")
+    assert card(path).note == "defines no EXPERIMENT"
+    path.write_text("from other import EXPERIMENT", "utf-8")
+    assert card(path).note == ""
 
 
-def test_the_nearest_folder_upward_is_taken(tmp_path: Path, project_root: Path) -> None:
-    below = tmp_path / "experiments" / "a" / "b"
-    below.mkdir(parents=True)
-    assert "fluid_phantom" in experiment_files(below)  # an empty folder is none
-    (tmp_path / "experiments" / "mine.py").touch()
-    (tmp_path / "experiments" / "_part.py").touch()
-    assert list(experiment_files(below)) == ["mine"]
+def test_a_folder_is_looked_at_only_where_it_is_the_projects_the_current_or_named(
+    tmp_path: Path,
+) -> None:
+    above, project = tmp_path, tmp_path / "project"
+    here, named = project / "deep" / "here", tmp_path / "named"
+    for folder in (above, project, project / "deep", here):
+        (folder / "experiments").mkdir(parents=True)
+        (folder / "experiments" / f"of_{folder.name}.py").touch()
+        (folder / "experiments" / "_part.py").touch()
+    (project / "pyproject.toml").touch()
+    named.mkdir()
+    (named / "of_named.py").touch()
+    own = [name for name in experiment_files(here, [named]) if name.startswith("of_")]
+    assert own == ["of_project", "of_here", "of_named"]
+    assert "of_named" not in experiment_files(here)
+    outside = experiment_files(above / "named")
+    assert outside.keys() == {path.stem for path in shipped().glob("*.py")}
 
 
-def test_no_folder_anywhere_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.catalogue.__file__", str(tmp_path / "validate" / "x.py"))
+def test_of_two_with_one_name_the_nearer_is_meant(tmp_path: Path) -> None:
+    for folder in ("experiments", "named"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "kf_cube.py").touch()
+    assert experiment_files(tmp_path)["kf_cube"].parent == tmp_path / "experiments"
+    named = experiment_files(tmp_path, [tmp_path / "named"])
+    assert named["kf_cube"].parent == tmp_path / "named"
+
+
+def test_no_experiment_anywhere_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("validate.catalogue._PACKAGE", tmp_path / "validate")
     with pytest.raises(UsageError, match="no experiments/ folder"):
         experiment_files(tmp_path)
+    with pytest.raises(UsageError, match=r"--experiments .*: no experiment file"):
+        experiment_files(tmp_path, [tmp_path / "nowhere"])
+
+
+def test_a_file_named_as_a_module_leaves_that_module_alone(tmp_path: Path) -> None:
+    path = tmp_path / "random.py"
+    path.write_text("EXPERIMENT = 1", "utf-8")
+    with pytest.raises(UsageError, match="of type Experiment"):
+        load_file(path)
+    assert sys.modules["random"] is random
+
+
+def test_reports_go_where_the_user_stands(phantom: Experiment, tmp_path: Path) -> None:
+    project = shipped().parent
+    assert root_of(phantom, project / "docs") == project
+    assert root_of(phantom, tmp_path) == tmp_path

@@ -5,47 +5,85 @@ appear at once and must not fail with one that is being edited.
 """
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from validate.errors import UsageError
 
+_PACKAGE = Path(__file__).resolve().parent
+_PROJECT = (".git", "pyproject.toml")  # what the top folder of a project holds
+
 
 @dataclass(frozen=True)
 class Card:
-    """An experiment's own words about itself; an empty source where it does not print one."""
+    """An experiment's own words about itself; an empty source where it does not print one.
+
+    `note` says why a file cannot be an experiment; empty for one that can.
+    """
 
     name: str
     title: str
     source: str
+    note: str = ""
 
 
-def experiment_files(start: Path) -> dict[str, Path]:
-    """Experiment name -> file, of the nearest `experiments/` folder from `start` upward.
+def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]:
+    """Experiment name -> file: the shipped ones and those of the project around `start`, of the
+    `experiments/` in `start` itself and of the `named` folders.
 
-    Where there is none, those of the installed clone; `UsageError` when that has none either.
+    Of two with one name the later of these is meant. No other folder is looked at. Raises
+    `UsageError` for a named folder without a file that could be an experiment.
     """
-    for folder in _folders(start):
-        files = {f.stem: f for f in sorted(folder.glob("*.py")) if not f.stem.startswith("_")}
-        if files:
-            return files
-    raise UsageError("no experiments/ folder here or above, and none in the installed clone")
+    own = (folder / "experiments" for folder in (_project(start), start))
+    found = {f.stem: f for folder in (shipped(), *own) for f in _files(folder)}
+    for folder in named:
+        files = _files(folder.resolve())
+        if not files:
+            raise UsageError(f"--experiments {folder}: no experiment file (*.py) in this folder")
+        found |= {f.stem: f for f in files}
+    if not found:
+        raise UsageError("no experiments/ folder here or in this project, and none was installed")
+    return found
+
+
+def shipped() -> Path:
+    """The folder of the experiments that come with the package: in its wheel, else in its clone."""
+    carried = _PACKAGE / "shipped" / "experiments"
+    return carried if carried.is_dir() else _PACKAGE.parent / "experiments"
+
+
+def _project(start: Path) -> Path:
+    tops = (f for f in (start, *start.parents) if any((f / name).exists() for name in _PROJECT))
+    return next(tops, start)
+
+
+def _files(folder: Path) -> list[Path]:
+    return [f for f in sorted(folder.glob("*.py")) if not f.stem.startswith("_")]
 
 
 def card(path: Path) -> Card:
     """Name, title and source as the file's `EXPERIMENT = ...` spells them.
 
     Texts that are computed are unknown without running the file: its docstring's first line is the
-    title then, or the reason why there is none.
+    title then.
     """
     try:
-        module = ast.parse(path.read_text("utf-8"))
-    except (OSError, SyntaxError, ValueError) as error:
-        return Card(path.stem, f"cannot be read: {error}", "")
+        module = ast.parse(path.read_text("utf-8"), path.name)
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        return Card(path.stem, "", "", f"cannot be read: {error}")
+    if not any(_names_experiment(node) for node in ast.walk(module)):
+        return Card(path.stem, "", "", "defines no EXPERIMENT")
     texts = _spelt(module)
     docstring = (ast.get_docstring(module) or "").partition("\n")[0]
     return Card(path.stem, texts.get("title", docstring), texts.get("source", ""))
+
+
+def _names_experiment(node: ast.AST) -> bool:
+    """Whether something is called EXPERIMENT here, or names are imported that nobody lists."""
+    if isinstance(node, ast.alias):
+        return (node.asname or node.name) in ("EXPERIMENT", "*")
+    return isinstance(node, ast.Name) and node.id == "EXPERIMENT"
 
 
 def _spelt(module: ast.Module) -> dict[str, str]:
@@ -74,9 +112,3 @@ def _text(node: ast.expr, constants: dict[str, str]) -> str | None:
         parts = [_text(part, constants) for part in node.values]
         return None if None in parts else "".join(part or "" for part in parts)
     return None
-
-
-def _folders(start: Path) -> Iterator[Path]:
-    for folder in (start, *start.parents):
-        yield folder / "experiments"
-    yield Path(__file__).resolve().parents[1] / "experiments"

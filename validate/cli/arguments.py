@@ -1,8 +1,15 @@
 """What the commands share: exit codes, and texts of the form PATH=VALUE."""
 
+import click
+
 from validate.errors import UsageError
 
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
+
+
+def complain(message: str) -> None:
+    """One line on standard error."""
+    click.echo("validate: " + " ".join(message.split()), err=True)
 
 
 def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:

@@ -4,31 +4,32 @@ import json
 from pathlib import Path
 from typing import Any
 
-from validate.catalogue import experiment_files
-from validate.cli.arguments import FAILED
+from validate.cli.chosen import each
 from validate.cli.display import console, error_shown, figures_table, progress, shown, table
 from validate.compare.result import KINDS, Result
-from validate.replay.find import find
+from validate.replay.experiment import Experiment
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.report.store import check_members, figure_members
 
 
-def check(names: tuple[str, ...], as_json: bool) -> int:
+def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int:
     """Runs the experiments and holds every figure; 0 when none failed and one was compared."""
-    start = Path.cwd()
     found = []
-    for name in names or tuple(experiment_files(start)):
-        experiment = find(name, start)
-        with progress(f"check {name}") as report:
+
+    def one(experiment: Experiment) -> bool:
+        with progress(f"check {experiment.name}") as report:
             result = compare(experiment, Options({}), report)
         found.append((result, _holds(result, declared=bool(experiment.published))))
+        return found[-1][1]
+
+    code = each(names, named, one)
     if as_json:
         print(json.dumps([_document(*pair) for pair in found], indent=1, allow_nan=False))
     else:
         for result, _ in found:
             _print(result)
-    return 0 if all(holds for _, holds in found) else FAILED
+    return code
 
 
 def _holds(result: Result, *, declared: bool) -> bool:

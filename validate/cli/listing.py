@@ -10,9 +10,9 @@ from validate.replay.experiment import Experiment
 from validate.replay.find import find
 
 
-def show(name: str, as_json: bool) -> None:
+def show(name: str, named: tuple[Path, ...], as_json: bool) -> None:
     """Prints parameters, methods and accepted limits of an experiment."""
-    experiment = find(name, Path.cwd())
+    experiment = find(name, Path.cwd(), named)
     if as_json:
         document = _summary(experiment) | _details(experiment)
         print(json.dumps(document, indent=2, allow_nan=False))

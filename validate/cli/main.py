@@ -8,11 +8,15 @@ from typing import Any
 import click
 
 from validate import __version__
-from validate.cli.arguments import BAD_INPUT, BUG, INTERRUPTED
+from validate.cli.arguments import BAD_INPUT, BUG, INTERRUPTED, complain
 from validate.errors import UsageError, ValidateError
 
 _OUT = click.Path(file_okay=False, path_type=Path)
 _FILE = click.Path(dir_okay=False, path_type=Path)
+_EXPERIMENTS = click.option(
+    "--experiments", "named", multiple=True, type=_OUT, metavar="DIR",
+    help="A folder of experiment files to look at too.",
+)  # fmt: skip
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -31,14 +35,14 @@ def run(argv: list[str]) -> int:
     try:
         return int(cli.main(argv, prog_name="validate", standalone_mode=False) or 0)
     except ValidateError as error:
-        _complain(str(error))
+        complain(str(error))
     except click.exceptions.NoArgsIsHelpError as wanted:
         click.echo(wanted.ctx.get_help())
         return 0
     except click.UsageError as error:
-        _complain(f"{error.format_message()} Try 'validate --help'.")
+        complain(f"{error.format_message()} Try 'validate --help'.")
     except (click.Abort, KeyboardInterrupt):
-        _complain("interrupted")
+        complain("interrupted")
         return INTERRUPTED
     except BrokenPipeError:
         return INTERRUPTED
@@ -50,10 +54,6 @@ def run(argv: list[str]) -> int:
     return BAD_INPUT
 
 
-def _complain(message: str) -> None:
-    click.echo("validate: " + " ".join(message.split()), err=True)
-
-
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="validate")
 def cli() -> None:
@@ -62,23 +62,27 @@ def cli() -> None:
 
 @cli.command("list")
 @click.argument("name", required=False)
+@_EXPERIMENTS
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def list_(name: str | None, as_json: bool) -> None:
+def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
     """Experiments; with NAME its parameters, methods, scores and source."""
     if name is None:
         from validate.cli import names
 
-        return names.show(as_json)
+        return names.show(named, as_json)
     from validate.cli import listing
 
-    return listing.show(name, as_json)
+    return listing.show(name, named, as_json)
 
 
 @cli.command("run")
 @click.argument("names", nargs=-1, metavar="NAME|FILE.py ...")
 @click.option("--all", "everything", is_flag=True, help="Every experiment.")
+@_EXPERIMENTS
 @click.option("--quick", is_flag=True, help="Coarser and fewer comparisons; a banner says so.")
-@click.option("--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone).")
+@click.option(
+    "--out", type=_OUT, help="Where reports go (default: reports/ of the project, or here)."
+)
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
 @click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
@@ -88,17 +92,18 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
 
     if everything == bool(names):
         raise UsageError("name one or more experiments, or --all; see 'validate list'")
-    return running.run(names, everything=everything, **options)
+    return running.run(names, **options)
 
 
 @cli.command()
 @click.argument("names", nargs=-1, metavar="[NAME ...]")
+@_EXPERIMENTS
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def check(names: tuple[str, ...], as_json: bool) -> int:
+def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int:
     """Every published figure and accepted limit: ours, theirs, verdict, count."""
     from validate.cli import checking
 
-    return checking.check(names, as_json)
+    return checking.check(names, named, as_json)
 
 
 @cli.command()
@@ -123,9 +128,12 @@ def _studied(command: Any) -> Any:
         click.option("--scheduler", default="", metavar="ADDRESS", help="A running scheduler."),
         click.option("--workers", type=int, help="Local processes (0: this one; else one a core)."),
         click.option(
-            "--out", type=_OUT, help="Folder for the reports (default: reports/ of the clone)."
+            "--out",
+            type=_OUT,
+            help="Where reports go (default: reports/ of the project, or here).",
         ),
         click.option("--quick", is_flag=True, help="Coarser and fewer runs; a banner says so."),
+        _EXPERIMENTS,
         click.argument("name", metavar="NAME|FILE.py"),
     ):
         command = option(command)
@@ -254,8 +262,9 @@ def new(name: str, source: Path, out: Path | None) -> None:
 @click.argument("name")
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
-def record(name: str, out: Path, values: tuple[str, ...]) -> None:
+@_EXPERIMENTS
+def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...]) -> None:
     """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
     from validate.cli import making
 
-    making.record(name, out, values)
+    making.record(name, out, values, named)

@@ -14,9 +14,9 @@ from validate.replay.find import find
 from validate.replay.remade import stamped
 
 
-def record(name: str, out: Path, values: tuple[str, ...]) -> None:
+def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...] = ()) -> None:
     """Makes an experiment's twin recording, with a JSON beside it of what must be read."""
-    experiment = find(name, Path.cwd())
+    experiment = find(name, Path.cwd(), named)
     twin = experiment.twin
     if twin is None:
         raise UsageError(f"experiment '{name}' has no synthetic recording; its data are measured")

@@ -4,15 +4,28 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from validate.catalogue import card, experiment_files
-from validate.cli.display import console, table
+from validate.catalogue import card, experiment_files, shipped
+from validate.cli.display import console, relative, table
 
 
-def show(as_json: bool) -> None:
-    """Prints name, title and source of every experiment."""
-    cards = [card(path) for path in experiment_files(Path.cwd()).values()]
+def show(named: tuple[Path, ...], as_json: bool) -> None:
+    """Prints name, title and source of every experiment; a line for each file that is none."""
+    files = experiment_files(Path.cwd(), named)
+    cards = [card(path) for path in files.values()]
     if as_json:
         print(json.dumps([asdict(c) for c in cards], indent=2))
         return
-    rows = [[c.name, c.title, c.source] for c in cards]
-    console().print(table("Experiments", ["name", "what", "source"], rows))
+    rows = [[c.name, c.title, c.source] for c in cards if not c.note]
+    screen = console()
+    screen.print(table("Experiments", ["name", "what", "source"], rows))
+    for c in cards:
+        for line in (c.note, _hides(files[c.name])):
+            if line:
+                screen.print(f"{relative(files[c.name])}: {line}", soft_wrap=True, markup=False)
+
+
+def _hides(file: Path) -> str:
+    """What a file of the user's stands for, when the package has one of that name."""
+    theirs = shipped() / file.name
+    other = file.resolve() != theirs.resolve() and theirs.is_file()
+    return "is meant by this name, not the shipped one" if other else ""

@@ -4,8 +4,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from validate.catalogue import experiment_files
-from validate.cli.arguments import FAILED, pairs
+from validate.cli.arguments import pairs
+from validate.cli.chosen import each
 from validate.cli.display import (
     console,
     error_shown,
@@ -17,7 +17,7 @@ from validate.cli.display import (
 )
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
-from validate.replay.find import find, root_of
+from validate.replay.find import root_of
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.report import gl
@@ -27,7 +27,7 @@ from validate.report.write import write_report
 def run(
     names: tuple[str, ...],
     *,
-    everything: bool,
+    named: tuple[Path, ...],
     quick: bool,
     out: Path | None,
     values: tuple[str, ...],
@@ -36,21 +36,19 @@ def run(
 ) -> int:
     """Runs experiments and writes their reports; 0 when all checks hold and all figures stand."""
     gl.ask()
-    start = Path.cwd()
-    chosen = [find(n, start) for n in (experiment_files(start) if everything else names)]
     wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
     options = Options(pairs(values, "--set"), wanted, quick)
-    passed = [_one(e, options, out or root_of(e, start) / "reports", as_json) for e in chosen]
-    return 0 if all(passed) else FAILED
+    return each(names, named, lambda e: _one(e, options, out, as_json))
 
 
-def _one(experiment: Experiment, options: Options, out: Path, as_json: bool) -> bool:
+def _one(experiment: Experiment, options: Options, out: Path | None, as_json: bool) -> bool:
     start = perf_counter()
+    reports = out or root_of(experiment, Path.cwd()) / "reports"
     with progress(experiment.name) as report:
         result = compare(experiment, options, report)
         report(1, 1, "report")
         created = datetime.now(UTC).isoformat(timespec="seconds")
-        page = write_report(result, out / experiment.name, created=created)
+        page = write_report(result, reports / experiment.name, created=created)
     if as_json:
         print((page.parent / "results.json").read_text(encoding="utf-8"))
     else:

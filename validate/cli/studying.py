@@ -35,13 +35,15 @@ _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interv
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """What every study is told: where its folder lies, where its cells run, how it prints."""
+    """What every study is told: where its folder lies, where its cells run, how it prints, which
+    folders of experiments the user named."""
 
     out: Path | None
     quick: bool
     workers: int | None
     scheduler: str
     as_json: bool
+    named: tuple[Path, ...] = ()
 
     @property
     def where(self) -> Where:
@@ -59,7 +61,7 @@ def filters(
     by: str,
 ) -> int:
     """Ranks filters; 0."""
-    experiment = find(name, Path.cwd())
+    experiment = find(name, Path.cwd(), common.named)
     chosen = tuple(m.strip() for m in methods.split(",") if m.strip())
     with _running(experiment, "filters", "filters", common) as report:
         found = study(
@@ -76,7 +78,7 @@ def filters(
 
 def stability_map(name: str, common: StudyOptions) -> int:
     """Maps where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
-    experiment = find(name, Path.cwd())
+    experiment = find(name, Path.cwd(), common.named)
     with _running(experiment, "stability", "stability", common) as report:
         found = stability(
             experiment, quick=common.quick, out=common.out, where=common.where, report=report
@@ -143,7 +145,7 @@ def seeds_of(text: str) -> int | tuple[int, ...]:
 
 
 def _measured(name: str, common: StudyOptions) -> Trade:
-    experiment = find(name, Path.cwd())
+    experiment = find(name, Path.cwd(), common.named)
     with _running(experiment, "tradeoff", "pilot runs", common) as report:
         return trade(
             experiment, quick=common.quick, out=common.out, where=common.where, report=report

@@ -2,40 +2,43 @@
 
 import importlib.util
 import sys
+import traceback
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
-from validate.catalogue import experiment_files
+from validate.catalogue import card, experiment_files
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
 
 
-def find(name: str, start: Path) -> Experiment:
+def find(name: str, start: Path, named: Sequence[Path] = ()) -> Experiment:
     """The experiment of that name, or of that file when it ends in .py.
 
-    Raises `UsageError` naming the nearest ones when there is none.
+    Names are looked for as `experiment_files` says. Raises `UsageError` naming the nearest ones
+    when there is none.
     """
     if name.endswith(".py"):
         return load_file(Path(name))
-    files = experiment_files(start)
+    files = experiment_files(start, named)
     if name not in files:
         raise UsageError(f"unknown experiment '{name}'; {nearest_names(name, set(files))}")
     return load_file(files[name])
 
 
 def load_file(path: Path) -> Experiment:
-    """Runs an experiment file (it is code) and returns its EXPERIMENT, which knows its path."""
+    """Runs an experiment file (it is code) and returns its EXPERIMENT, which knows its path.
+
+    Raises `UsageError` with line and reason for a file that fails, and before anything of it is
+    run for one that is no Python or defines none.
+    """
     if not path.is_file():
         raise UsageError(f"no experiment file {path}")
-    spec = importlib.util.spec_from_file_location(path.stem, path.resolve())
-    if spec is None or spec.loader is None:
-        raise UsageError(f"{path} cannot be loaded as Python")
-    module = importlib.util.module_from_spec(spec)
-    # Dataclasses look their module up by name while they are made.
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    experiment = getattr(module, "EXPERIMENT", None)
+    if note := card(path).note:
+        raise UsageError(f"{path}: {note}")
+    experiment = getattr(_executed(path), "EXPERIMENT", None)
     if not isinstance(experiment, Experiment):
         raise UsageError(f"{path} defines no EXPERIMENT of type Experiment")
     if experiment.name != path.stem:
@@ -43,7 +46,36 @@ def load_file(path: Path) -> Experiment:
     return replace(experiment, path=path.resolve())
 
 
+def _executed(path: Path) -> ModuleType:
+    # Not by its bare name: a file called random.py would be everybody's module of that name.
+    name = f"validate_experiment_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    if spec is None or spec.loader is None:
+        raise UsageError(f"{path} cannot be loaded as Python")
+    module = importlib.util.module_from_spec(spec)
+    # Dataclasses look their module up by name while they are made.
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise UsageError(
+            f"{path}{_place(error, path)}: {type(error).__name__}: {error}; "
+            f"mend the file (`python {path}` shows the whole way there)"
+        ) from error
+    return module
+
+
+def _place(error: BaseException, path: Path) -> str:
+    """The file's own line that failed, whatever lies below it; "" where there is none."""
+    own = str(path.resolve())
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == own]
+    return f", line {lines[-1]}" if lines else ""
+
+
 def root_of(experiment: Experiment, start: Path) -> Path:
-    """The clone an experiment belongs to, else the folder the command was called from."""
+    """The project an experiment belongs to where `start` lies in it, else `start`: nothing is
+    written where nobody looks."""
     path = experiment.path
-    return path.parents[1] if path is not None and path.parent.name == "experiments" else start
+    own = path is not None and path.parent.name == "experiments"
+    return path.parents[1] if path and own and start.is_relative_to(path.parents[1]) else start

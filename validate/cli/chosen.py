@@ -1,0 +1,29 @@
+"""One command over several experiments: each ends for itself."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from validate.catalogue import experiment_files
+from validate.cli.arguments import BAD_INPUT, FAILED, OK, complain
+from validate.errors import ValidateError
+from validate.replay.experiment import Experiment
+from validate.replay.find import find, load_file
+
+
+def each(names: tuple[str, ...], named: tuple[Path, ...], do: Callable[[Experiment], bool]) -> int:
+    """The exit code of what is done to the experiments of these names, or to all without names.
+
+    Names are looked up before anything is done. Of several, one that cannot be done is one line and
+    exit code 2, and hides no other.
+    """
+    start = Path.cwd()
+    chosen: Iterable[Experiment | Path] = [find(n, start, named) for n in names]
+    return max(_code(do, e) for e in chosen or experiment_files(start, named).values())
+
+
+def _code(do: Callable[[Experiment], bool], one: Experiment | Path) -> int:
+    try:
+        return OK if do(load_file(one) if isinstance(one, Path) else one) else FAILED
+    except ValidateError as error:
+        complain(str(error))
+        return BAD_INPUT
