@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from validate.cli.main import cli, run
 from validate.cli.new import written
+from validate.compare.score import bias
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
@@ -106,7 +107,7 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
     slip = ("--methods", "slip")
     code, output = in_folder(tmp_path, "run", "big", "--set", "specimen.diameter=30", *slip)
     assert (code, " agrees " in output) == (0, True)
-    first = "\n".join(output.splitlines()[1:5])
+    first = "\n".join(output.splitlines()[1:6])
     assert "specimen.diameter = 30 m is 1000 times 30 mm: were millimetres meant?" in first
     assert "material.E (identified) is a modulus of 0.02 Pa" in first
     assert "is a stress of" in first
@@ -122,6 +123,21 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
     assert 'class="band good"' not in page
     assert page.index("were millimetres meant?") < page.index("<nav")
     assert "identified" in page.split("Origin: recorded")[1]
+
+
+def test_each_rival_is_fitted_as_what_it_is(tmp_path: Path) -> None:
+    """Bonded plates stiffen the body, so the modulus that has the measured slope is lower; given a
+    modulus by the user, both take it."""
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
+    mine = load_file(tmp_path / "experiments" / "my_gel.py")
+    fitted = compare(mine)
+    off = {m.name: bias(m.residuals["force@fit"].values) for m in fitted.methods}
+    assert off["bonded"] == pytest.approx(off["slip"], abs=0.02)
+    moduli = {m.name: m.scene.material.E for m in fitted.methods}
+    assert moduli["bonded"] < 0.95 * moduli["slip"]
+    given = compare(mine, {"material.E": "20000"})
+    assert {m.scene.material.E for m in given.methods} == {20000.0}
 
 
 def test_it_names_channels_rates_units_and_what_is_not_recorded(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ the modulus where none is given, the second predicts.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 
 from validate.compare.verdict import Accept
+from validate.fem.system import build as build_system
+from validate.fem.system import responses
 from validate.identify.modulus import Cylinder, ModulusFit, fit_modulus, identify_modulus
 from validate.parameters import Ranges, known, quantity
 from validate.recording.types import Recording
@@ -90,6 +92,9 @@ class Specimen:
 @dataclass(frozen=True)
 class Gel:
     E: float | None = quantity(None, "Pa", "Young's modulus; none: identified, slipping plates")
+    E_bonded: float | None = quantity(
+        None, "Pa", "of models with bonded plates; none: E, or identified with bonded plates"
+    )
     nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
 
 
@@ -156,9 +161,9 @@ def compression(
             finer=changed("mesh", radial=_finer, axial=_finer, halvings=_halved),
             refinement=_refinement,
             inputs=(
-                Input("modulus", moved("material", E=_stiffer),
+                Input("modulus", moved("material", E=_stiffer("E"), E_bonded=_stiffer("E_bonded")),
                       "E within its declared uncertainty", "assumed"),
-                Input("diameter", moved("material", E=_wider),
+                Input("diameter", moved("material", E=_wider("E"), E_bonded=_wider("E_bonded")),
                       "diameter within its declared range", "assumed"),
             ),
             surrogate=accepted[0],
@@ -177,8 +182,23 @@ def _identify(
         f"E = {E:.5g} ± {2 * found.sd_mean:.3g} Pa (two sd of the fit; uniform compression owes "
         "the mesh nothing) was identified from the recording in the window 'fit', slipping plates."
     )
-    used = replace(p, material=replace(p.material, E=E))
-    return Identified(used, (), (note,), calibrated=("force@fit",))
+    material, notes = replace(p.material, E=E), [note]
+    if p.material.E_bonded is None and any(m.scene.plates == "bonded" for m in methods.values()):
+        material = replace(material, E_bonded=E / _stiffening(recordings[0], p))
+        notes.append(f"E = {material.E_bonded:.5g} Pa for bonded plates: they stiffen the body.")
+    return Identified(replace(p, material=material), (), tuple(notes), calibrated=("force@fit",))
+
+
+def _stiffening(recording: Recording, p: Compression) -> float:
+    """Force between bonded over force between slipping plates, of one body and modulus.
+
+    A rival is fitted as what it is: each contact gets the modulus that has the measured slope.
+    """
+    bonded, slip = (
+        responses(build_system(_build(recording, p, Pressed(contact)))).reactions[0, 0]
+        for contact in ("bonded", "slip")
+    )
+    return float(bonded / slip)
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -186,9 +206,10 @@ def _identify(
 
 def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
     mesh, whole = _body(p), p.specimen.mesh is not None
+    own = p.material.E_bonded if model.plates == "bonded" else None
     scene = Scene(
         mesh,
-        Material(p.material.E or 1.0, p.material.nu, model.law),
+        Material(own or p.material.E or 1.0, p.material.nu, model.law),
         (*between(model.plates), *(() if whole else SYMMETRY)),
         pins=_pins(mesh) if whole and model.plates == "slip" else (),
         drives=(STAGE,),
@@ -278,10 +299,22 @@ def _refinement(p: Compression) -> float:
     return ratio**2 - 1
 
 
-def _stiffer(p: Compression, z: float) -> float:
-    return (p.material.E or 0.0) * (1 + z * p.ranges.E)
+def _stiffer(name: str) -> Callable[[Compression, float], float | None]:
+    return _times(name, lambda p, z: 1 + z * p.ranges.E)
 
 
-def _wider(p: Compression, z: float) -> float:
+def _wider(name: str) -> Callable[[Compression, float], float | None]:
     """A wider specimen is as much stiffer as its area is larger."""
-    return (p.material.E or 0.0) * (1 + z * p.ranges.diameter) ** 2
+    return _times(name, lambda p, z: (1 + z * p.ranges.diameter) ** 2)
+
+
+def _times(
+    name: str, factor: Callable[[Compression, float], float]
+) -> Callable[[Compression, float], float | None]:
+    """A modulus, where there is one, times a factor."""
+
+    def scaled(p: Compression, z: float) -> float | None:
+        E: float | None = getattr(p.material, name)
+        return None if E is None else E * factor(p, z)
+
+    return scaled
