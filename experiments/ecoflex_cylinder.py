@@ -15,7 +15,7 @@ from validate.papers.ecoflex.cylinder import DATA_SET, LoggedCylinder, build, lo
 from validate.papers.ecoflex.cylinder import CylinderModel as Model
 from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
-from validate.replay.cards import finer_quarter, moved
+from validate.replay.cards import moved, quarter_meshes
 from validate.replay.compression import stated_sizes
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
@@ -59,8 +59,7 @@ def _scaled(p: LoggedCylinder, z: float) -> LoggedCylinder:
 
 
 UNCERTAINTY = Uncertainty(
-    finer_quarter,
-    lambda p: float((p.mesh.finer_radial / p.mesh.radial) ** 2 - 1),
+    quarter_meshes(lambda p: float(p.specimen.height or 0.03)),
     (
         Input("modulus", _scaled, "E within its declared scatter between specimens",
               f"{DATA_SET}: 4.5 of 104 kPa"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from validate.compare.numerical import Numerical
+from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.verdict import (

@@ -266,10 +266,6 @@ def test_bad_recordings_are_refused_in_one_line(
         ({"mesh.nodes_x": "100000"}, "at most 100000 are taken"),
         ({"ranges.E": "-0.5"}, "ranges.E = -0.5"),
         ({"ranges.friction": "5"}, "ranges.friction = 5"),
-        (
-            {"mesh.finer_x": "7", "mesh.finer_y": "8", "mesh.finer_z": "11"},
-            "the second mesh is not finer",
-        ),
     ],
     ids=lambda x: next(iter(x)) if isinstance(x, dict) else "",
 )

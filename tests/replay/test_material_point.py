@@ -58,8 +58,6 @@ POINT = Experiment(
     ("neo",), (Accept("stress", 5e3, "a tenth of the largest stress"),),
     lambda card, folder: (recorded(),), build, place,
     uncertainty=Uncertainty(
-        finer=lambda card: card,
-        refinement=lambda card: 1.0,
         inputs=(Input("mu", lambda c, z: replace(c, mu=c.mu * (1 + z / 100)), "", "assumed"),),
         surrogate="neo",
     ),

@@ -10,6 +10,7 @@ import pytest
 from tiny import AT_HOLDS, LOADS, STEPS, TINY, Breaks, Card, stiffer
 
 from validate.arrays import rms
+from validate.compare.convergence import convergence
 from validate.compare.effects import Sensor
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.compare.inputs import Declared
@@ -28,6 +29,7 @@ from validate.replay.experiment import (
     Experiment,
     Identified,
     Input,
+    MeshLadder,
     Told,
     Uncertainty,
     Variant,
@@ -39,11 +41,9 @@ from validate.replay.road import compare
 from validate.scene.scene import Scene
 from validate.solve.fluid import NoFluid
 
-RATIO = 0.75  # r^p - 1
 
-
-def finer(card: Card) -> Card:
-    return replace(card, cells=4)
+def cells(n: int) -> Callable[[Card], Card]:
+    return lambda card: replace(card, cells=n)
 
 
 def harder(card: Card) -> Card:
@@ -54,7 +54,8 @@ def shifted(card: Card) -> Card:
     return replace(card, sd=2 * card.sd)
 
 
-FINER = Uncertainty(finer, lambda card: RATIO, (), surrogate="fem")
+MESHES = MeshLadder((cells(6), cells(9)), lambda card: 0.01 / card.cells)
+FINER = Uncertainty(MESHES)
 ROADS = pytest.mark.parametrize("road", [TINY, AT_HOLDS], ids=["over time", "at holds"])
 
 
@@ -219,8 +220,8 @@ def test_own_exhibits_printed_figures_and_captions(road: Experiment) -> None:
 
 
 @ROADS
-def test_a_stand_in_takes_a_slow_methods_place_on_the_finer_mesh(road: Experiment) -> None:
-    """The slow one is never built there; the change between the meshes is the stand-in's."""
+def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -> None:
+    """The slow one is never built there; u_num is the stand-in's, and the check says so."""
     built: list[tuple[str, int]] = []
 
     def build(recording: Recording, card: Card, model: str) -> Scene:
@@ -228,29 +229,30 @@ def test_a_stand_in_takes_a_slow_methods_place_on_the_finer_mesh(road: Experimen
         return road.build(recording, card, None)
 
     methods = {name: replace(road.methods["fem"], scene=name) for name in ("slow", "fast")}
-    uncertainty = replace(FINER, surrogate="fast", stand_in={"slow": "fast"})
+    uncertainty = replace(FINER, stand_in={"slow": "fast"})
     experiment = declared(
         road, build=build, methods=methods, accepted=("slow",), uncertainty=uncertainty,
         reference="fast",
     )  # fmt: skip
     check = compare(experiment, Options({})).checks[-1]
-    assert sorted(built) == [("fast", 3), ("fast", 4), ("slow", 3)]
+    assert sorted(built) == [("fast", 3), ("fast", 6), ("fast", 9), ("slow", 3)]
+    assert check.numerical.endswith("by fast in its place")
     name = "force@0.3mm" if road is AT_HOLDS else "node_B@all"
     own = declared(road)
     same = replace(own, twin=replace(road.twin, same_model=True))  # type: ignore[type-var]
-    coarse, fine = (
-        of(compare(same, Options({"cells": cells})), "fem").residuals[name].values
-        for cells in ("3", "4")
-    )
-    assert check.u_num == pytest.approx(1.5 * rms(fine - coarse) / RATIO, rel=1e-9)
-    assert check.u_num > 0
+    answers = [
+        of(compare(same, Options({"cells": n})), "fem").residuals[name].values for n in "369"
+    ]
+    assert check.u_num == convergence((6, 3, 2), answers, 0, 2.0).u
+    assert 0 < check.u_num < np.inf
 
 
 @ROADS
 def test_inputs(road: Experiment) -> None:
     """One standard uncertainty of an input, by the surrogate, is part of u_val."""
     source = Input("modulus", lambda c, z: replace(c, E=(1 + 0.03 * z) * c.E), "E", "assumed")
-    result = compare(declared(road, uncertainty=replace(FINER, inputs=(source,))), Options({}))
+    uncertain = replace(FINER, inputs=(source,), surrogate="fem")
+    result = compare(declared(road, uncertainty=uncertain), Options({}))
     check = result.checks[-1]
     assert check.u_input > 0
     assert check.u_val == pytest.approx(np.sqrt(check.u_D**2 + check.u_num**2 + check.u_input**2))
@@ -265,7 +267,8 @@ def test_inputs(road: Experiment) -> None:
 def test_a_quick_run_draws_nothing(road: Experiment) -> None:
     source = Input("modulus", lambda c, z: replace(c, E=(1 + 0.03 * z) * c.E), "E", "assumed")
     quick = Options({}, quick=True)
-    assert compare(declared(road, uncertainty=replace(FINER, inputs=(source,))), quick).joint == ()
+    uncertain = replace(FINER, inputs=(source,), surrogate="fem")
+    assert compare(declared(road, uncertainty=uncertain), quick).joint == ()
 
 
 # --- what is compared with nothing ----------------------------------------------------------------

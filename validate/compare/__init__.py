@@ -4,7 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "residual": ("Residual", "residuals"),
-    "numerical": ("Numerical",),
+    "convergence": ("GridConvergence", "Numerical", "convergence"),
     "score": ("Score", "scores_of"),
     "inputs": ("Declared", "Joint"),
     "verdict": ("Accept", "Check", "Sensitivity", "judge"),

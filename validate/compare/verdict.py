@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from validate.arrays import rms
-from validate.compare.numerical import Numerical
+from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual
 from validate.errors import ComparisonError
 from validate.estimate.consistency import chi_square_quantile

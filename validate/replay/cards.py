@@ -9,7 +9,7 @@ from typing import Any
 from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
-from validate.replay.experiment import Change
+from validate.replay.experiment import Change, MeshLadder
 from validate.scene.plates import plates_of_share, rubbing_share
 from validate.scene.scene import Material
 from validate.twin.tracked import Camera, require_noise
@@ -109,11 +109,34 @@ class QuarterGrid:
     radial: int = quantity(6, "1", "cells from axis to rim")
     axial: int = quantity(8, "1", "cells along the axis")
     grading: float = quantity(2.0, "1", "above 1: smaller cells towards rim and plates")
-    finer_radial: int = quantity(8, "1", "the second mesh, for u_num")
-    finer_axial: int = quantity(10, "1", "the second mesh, for u_num")
+    finer: float = quantity(1.3, "1", "how many times finer the finest mesh is, for u_num")
 
 
-#: The second mesh of a `QuarterGrid`.
-finer_quarter = changed(
-    "mesh", radial=lambda p: p.mesh.finer_radial, axial=lambda p: p.mesh.finer_axial
-)
+#: Cells of the coarser meshes over those of the nominal one, along every edge; all cheap.
+COARSER = (0.5, 0.625, 0.75, 0.875)
+
+
+def scaled(share: float | None, *counts: str) -> Change:
+    """The mesh with `share` of its cells along every edge (none: its own `finer`), in the fields
+    `counts`, rounded."""
+
+    def change(p: Any) -> Any:
+        by = p.mesh.finer if share is None else share
+        new = {k: max(round(getattr(p.mesh, k) * by), 1) for k in counts}
+        return replace(p, mesh=replace(p.mesh, **new))
+
+    return change
+
+
+def quarter_meshes(size: Callable[[Any], float]) -> MeshLadder:
+    """Meshes of a quarter of a round body of `size` (m), the finest `finer` times as fine.
+
+    Order 2: corners of bonded plates limit that of quadratic elements.
+    """
+    levels = [scaled(share, "radial", "axial") for share in (0.5, 0.75, None)]
+
+    def cell(p: Any) -> float:
+        cells: int = p.mesh.radial**2 * p.mesh.axial
+        return float(size(p) / cells ** (1 / 3))
+
+    return MeshLadder(tuple(levels), cell)

@@ -1,4 +1,4 @@
-"""Verdicts of the accepted methods: u_num from a finer mesh, u_input from declared inputs."""
+"""Verdicts of the accepted methods: u_num from meshes and steps, u_input from declared inputs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats, rms
+from validate.compare.convergence import Numerical
 from validate.compare.effects import Effect, effect
 from validate.compare.inputs import Joint, joint, joint_draws
-from validate.compare.numerical import Numerical
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
 from validate.compare.verdict import (
@@ -23,12 +23,11 @@ from validate.compare.verdict import (
 )
 from validate.errors import ComparisonError
 from validate.fem.locate import barycentric_rows
-from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant, unchanged
+from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
 from validate.replay.followed import Followed
+from validate.replay.refined import Refined, mesh_errors, variants
 from validate.replay.runs import Road
 
-# Two meshes: Roache's factor 3 on the Richardson difference is a 95 % band, half of it u.
-_SAFETY = 3.0 / 2
 _DRAWS = 12  # of all inputs at once
 _NO_UNIT = "-"  # of a quantity that no observation has
 
@@ -39,9 +38,10 @@ def variants_of(road: Road) -> list[Variant]:
     accepted = [name for name in road.experiment.accepted if name in road.methods]
     uncertainty = road.experiment.uncertainty
     if accepted and uncertainty:
-        own = [uncertainty.stand_in.get(name, name) for name in accepted]
-        wanted += [Variant(o, change) for o in own for change in (unchanged, uncertainty.finer)]
-        wanted += [Variant(uncertainty.surrogate)]
+        wanted += [
+            v for n in accepted for levels in variants(uncertainty, n).values() for v in levels
+        ]
+        wanted += [Variant(uncertainty.surrogate)] if uncertainty.inputs else []
         wanted += [Variant(uncertainty.surrogate, i.by(1.0)) for i in uncertainty.inputs]
         wanted += _joint_variants(road)
     return wanted + [v for e in shown_effects(road) for v in (e.one, e.other)]
@@ -52,7 +52,7 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
-    errors = _mesh_errors(road, mine.method, mine.residuals)
+    refined = _refined(road, mine.method)
     inputs, own = _sensitivities(road), _own_doubt(mine)
     found: list[Check] = []
     for accept in road.experiment.accept:
@@ -65,7 +65,9 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
                 judge(
                     mine.residuals[key],
                     accept.limit,
-                    Numerical({"mesh": errors[key]}),
+                    refined.numerical(mine.residuals[key], accept.limit)
+                    if refined
+                    else Numerical(),
                     inputs.get(key, []) + own.get(key, []),
                 ),
             )
@@ -93,28 +95,10 @@ def _accepts(accept: Accept, residual: Residual) -> bool:
     )
 
 
-def _mesh_errors(road: Road, name: str, residuals: Mapping[str, Residual]) -> dict[str, float]:
-    """u_num of every residual of a method, SI: by itself or its stand-in on the finer mesh.
-
-    A twin of the same model on the same mesh has no discretisation error: u_num is zero there.
-    """
+def _refined(road: Road, name: str) -> Refined | None:
+    """None for a twin of the same model on the same mesh: it has no discretisation error."""
     uncertainty = _declared(road)
-    if uncertainty is None:
-        return dict.fromkeys(residuals, 0.0)
-    own = uncertainty.stand_in.get(name, name)
-    coarse = road.main(Variant(own)).residuals
-    finer = road.main(Variant(own, uncertainty.finer)).residuals
-    scale = _SAFETY / _refinement(uncertainty, road)
-    return {key: scale * rms(finer[key].values - coarse[key].values) for key in residuals}
-
-
-def _refinement(uncertainty: Uncertainty, road: Road) -> float:
-    found = uncertainty.refinement(road.parameters)
-    if found <= 0:
-        raise ComparisonError(
-            f"the second mesh is not finer than the first (r^p - 1 = {found:.3g}); set a finer one"
-        )
-    return found
+    return Refined(road, uncertainty, name) if uncertainty else None
 
 
 def _declared(road: Road) -> Uncertainty | None:
@@ -128,7 +112,7 @@ def _sensitivities(road: Road) -> dict[str, list[Sensitivity]]:
     """Per residual name: what one standard uncertainty of each input does, by the surrogate."""
     uncertainty = _declared(road)
     found: dict[str, list[Sensitivity]] = {}
-    if uncertainty is None:
+    if uncertainty is None or not uncertainty.inputs:
         return found
     base = road.main(Variant(uncertainty.surrogate)).residuals
     for source in uncertainty.inputs:
@@ -219,7 +203,8 @@ def effects_of(road: Road, results: tuple[MethodResult, ...]) -> tuple[Effect, .
     if not shown:
         return ()
     inputs = _sensitivities(road)
-    meshes = [_mesh_errors(road, m.name, m.residuals) for m in results if m.accepted]
+    accepted = [m for m in results if m.accepted]
+    meshes = [mesh_errors(_refined(road, m.name), m.residuals) for m in accepted]
     return tuple(
         effect(
             e.name,

@@ -22,11 +22,18 @@ from validate.parameters import Ranges, known, quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
-from validate.replay.cards import beside, changed, moved
-from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+from validate.replay.cards import beside, moved, scaled
+from validate.replay.experiment import (
+    Change,
+    Experiment,
+    Identified,
+    Input,
+    MeshLadder,
+    Uncertainty,
+)
 from validate.replay.method import Method
 from validate.scene.cylinder import quarter_cylinder
-from validate.scene.mesh import Mesh
+from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element, refined
@@ -102,7 +109,7 @@ class Gel:
 class CylinderGrid:
     radial: int = quantity(4, "1", "elements from axis to rim")
     axial: int = quantity(4, "1", "elements along the axis")
-    finer: int = quantity(6, "1", "both, on the second mesh, for u_num")
+    finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
     halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
 
 
@@ -158,8 +165,7 @@ def compression(
         name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
         sets=_sets, stated=stated_sizes, identify=_identify, frames=2,
         uncertainty=Uncertainty(
-            finer=changed("mesh", radial=_finer, axial=_finer, halvings=_halved),
-            refinement=_refinement,
+            mesh=_MESHES,
             inputs=(
                 Input("modulus", moved("material", E=_stiffer("E"), E_bonded=_stiffer("E_bonded")),
                       "E within its declared uncertainty", "assumed"),
@@ -285,18 +291,26 @@ def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
 # --- what is uncertain ----------------------------------------------------------------------------
 
 
-def _finer(p: Compression) -> int:
-    return p.mesh.finer
+def _level(share: float | None, halvings: int) -> Change:
+    """The cylinder with `share` of its cells an edge, or the mesh file with its edges halved."""
+
+    def change(p: Compression) -> Any:
+        if p.specimen.mesh is None:
+            return scaled(share, "radial", "axial")(p)
+        return replace(p, mesh=replace(p.mesh, halvings=p.mesh.halvings + halvings))
+
+    return change
 
 
-def _halved(p: Compression) -> int:
-    return p.mesh.halvings + 1
+def _cell(p: Compression) -> float:
+    """The edge m of a cube as large as a mean cell."""
+    if p.specimen.mesh is None:
+        return float(p.specimen.height / (p.mesh.radial**2 * p.mesh.axial) ** (1 / 3))
+    return float(cell_volumes(_body(p)).mean() ** (1 / 3)) / 2**p.mesh.halvings
 
 
-def _refinement(p: Compression) -> float:
-    """r^2 - 1: corners of bonded plates limit the order to 2."""
-    ratio = 2.0 if p.specimen.mesh is not None else p.mesh.finer / p.mesh.radial
-    return ratio**2 - 1
+# A mesh file has no coarser ones. Order 2: corners of bonded plates limit that.
+_MESHES = MeshLadder((_level(0.5, 0), _level(0.75, 1), _level(None, 2)), _cell)
 
 
 def _stiffer(name: str) -> Callable[[Compression, float], float | None]:

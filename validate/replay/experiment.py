@@ -32,10 +32,11 @@ def unchanged(parameters: Any) -> Any:
 
 @dataclass(frozen=True)
 class Variant:
-    """A method with changed parameters."""
+    """A method with changed parameters, and `split` of its steps in one of its own."""
 
     method: str
     change: Change = unchanged
+    split: int = 1
 
 
 @dataclass(frozen=True)
@@ -77,19 +78,38 @@ class EffectSpec:
 
 
 @dataclass(frozen=True)
-class Uncertainty:
-    """How u_num and u_input are found: a finer mesh, the inputs, and a cheap method for them.
-
-    `refinement` is r^p - 1 from the parameters: ratio of cell sizes r, order of convergence p.
-    `stand_in` names, for a method too slow on the finer mesh, a faster one of the same element
-    whose change between the meshes is taken for its own.
+class MeshLadder:
+    """Meshes beside the nominal one: `levels` change the parameters, `size` is that of a cell (m)
+    from them; two levels and more, coarser ones are cheap. `order`: the formal one of the error.
     """
 
-    finer: Change
-    refinement: Callable[[Any], float]
-    inputs: tuple[Input, ...]
-    surrogate: str
+    levels: tuple[Change, ...]
+    size: Callable[[Any], float]
+    order: float = 2.0
+
+
+@dataclass(frozen=True)
+class StepLadder:
+    """Time steps beside the nominal one, so many in its place; inputs between are interpolated."""
+
+    order: float
+    splits: tuple[int, ...] = (2, 4)
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How u_num and u_input are found: meshes and steps, the inputs, and a cheap method for them.
+
+    None for `mesh` or `steps`: the truth is the model's own there, or there is none. `stand_in`
+    names, for a method too slow on every mesh, a faster one of the same element that takes its
+    place there; the check says so.
+    """
+
+    mesh: MeshLadder | None = None
+    inputs: tuple[Input, ...] = ()
+    surrogate: str = ""
     stand_in: Mapping[str, str] = field(default_factory=dict)
+    steps: StepLadder | None = None
 
 
 @dataclass(frozen=True)

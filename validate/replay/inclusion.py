@@ -4,9 +4,12 @@ what a file of one's own declares, and the experiment that follows.
 Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import Any, Literal
+
+import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.parameters import Ranges, known, quantity
@@ -20,8 +23,8 @@ from validate.register.outlines import Corner, observe_outlines
 from validate.register.plane import SurfaceSampler, cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
-from validate.replay.cards import beside, moved, rubbed
-from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.cards import COARSER, beside, moved, rubbed
+from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import Mesh, quadratic
@@ -71,7 +74,7 @@ class BlockNodes:
 
 @dataclass(frozen=True)
 class BlockGrid(BlockNodes):
-    finer: float = quantity(1.27, "1", "how many times finer the second mesh is, for u_num")
+    finer: float = quantity(1.25, "1", "how many times finer the finest mesh is, for u_num")
 
 
 @dataclass(frozen=True)
@@ -143,8 +146,7 @@ def inclusion_test(
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
         uncertainty=Uncertainty(
-            finer=_finer,
-            refinement=lambda p: float(p.mesh.finer**2 - 1),
+            mesh=block_meshes(lambda p: p.block),
             inputs=INPUTS,
             surrogate=next(n for n, m in methods.items() if m.scene == Filled(1)),
         ),
@@ -229,7 +231,27 @@ def placed(
     return Registered((stage, outline, markers, *signals), tuple(holds), rest)
 
 
-def _finer(p: InclusionTest) -> InclusionTest:
-    g = p.mesh
-    nodes = [round((n - 1) * g.finer) + 1 for n in g.nodes]
-    return replace(p, mesh=replace(g, nodes_x=nodes[0], nodes_y=nodes[1], nodes_z=nodes[2]))
+def block_meshes(block: Callable[[Any], BlockCard]) -> MeshLadder:
+    """Meshes of a block whose inclusion is cut from a grid: not similar, hence more than three.
+
+    Order 2: corners at the plates and facets on the wall limit that of quadratic elements.
+    """
+
+    def cell(p: Any) -> float:
+        size, g = block(p), p.mesh
+        cells = float(np.prod(np.array(g.nodes) - 1))
+        return float((size.x * size.y * size.z / cells) ** (1 / 3))
+
+    return MeshLadder(tuple(gridded(share) for share in (*COARSER, None)), cell)
+
+
+def gridded(share: float | None) -> Change:
+    """The grid with `share` of its cells along every edge (none: its own `finer`)."""
+
+    def change(p: Any) -> Any:
+        g = p.mesh
+        by = g.finer if share is None else share
+        nodes = {k: ceil((getattr(g, k) - 1) * by) + 1 for k in ("nodes_x", "nodes_y", "nodes_z")}
+        return replace(p, mesh=replace(g, **nodes))
+
+    return change

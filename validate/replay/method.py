@@ -19,8 +19,9 @@ class Method:
     The fields of both are the method's own to `--set`: `methods.NAME.tolerance=1e-3`. `markers`
     are those that a filter is given. `steps`: run only so many, as a baseline that is timed and
     not scored. `stride` above 1: a longer step than the recording's, so
-    that many times the `dt` that the experiment gives. `chosen`: which settings were chosen on the
-    very twin that judges the method, so that its verdict is shown with that beside.
+    that many times the `dt` that the experiment gives; `split` above 1: a shorter one. `chosen`:
+    which settings were chosen on the very twin that judges the method, so that its verdict is shown
+    with that beside.
     """
 
     label: str = quantity("", "1", "what reports call it")
@@ -30,6 +31,7 @@ class Method:
     steps: int | None = quantity(None, "1", "steps to run; none: all")
     stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
     chosen: str = quantity("", "1", "what was chosen on the twin that judges it; empty: nothing")
+    split: int = quantity(1, "1", "steps of this method in one of those, inputs interpolated")
 
     def prepare(self, system: System, seen: Registered, given: Mapping[str, Any]) -> Stepper:
         """The prepared scheme or filter, with the experiment's settings where it has them.
@@ -51,7 +53,7 @@ class Method:
         defaults = {f.name: f.default for f in fields(self.settings)}
         mine = {k: v for k, v in given.items() if k in defaults}
         if "dt" in mine:
-            mine["dt"] = self.stride * mine["dt"]
+            mine["dt"] = self.stride / self.split * mine["dt"]
         for name, value in mine.items():
             own = getattr(self.settings, name)
             if own not in (defaults[name], value) and defaults[name] is not MISSING:

@@ -7,7 +7,7 @@ from typing import Any
 from validate.compare.result import Kind
 from validate.errors import ComparisonError
 from validate.recording.types import Recording
-from validate.replay.experiment import Case, Experiment, Variant
+from validate.replay.experiment import Case, Experiment, Variant, unchanged
 from validate.replay.followed import MAIN, Followed, Truth
 from validate.replay.method import Method
 from validate.replay.options import Report, folder_of
@@ -70,7 +70,7 @@ class Road:
     def main(self, variant: Variant) -> Followed:
         """A variant on the experiment's own recordings."""
         changed = variant.change(self.parameters)
-        return self._followed(MAIN, self.recordings, variant.method, changed, self._true)
+        return self._followed(MAIN, self.recordings, variant, changed, self._true)
 
     def other(self, case: Case) -> dict[str, Followed]:
         """A case: the truth's parameters changed, its recording shipped or made in memory."""
@@ -86,7 +86,7 @@ class Road:
             true = case.change(self._true)
             recordings = (experiment.twin.record(true, self.tell),)
         return {
-            name: self._followed(case.name, recordings, name, self.parameters, true)
+            name: self._followed(case.name, recordings, Variant(name), self.parameters, true)
             for name in _of_case(self.methods, case)
         }
 
@@ -103,12 +103,14 @@ class Road:
         return (recording,), true, said
 
     def _followed(
-        self, case: str, recordings: tuple[Recording, ...], name: str, parameters: Any, true: Any
+        self, case: str, recordings: tuple[Recording, ...], as_: Variant, parameters: Any, true: Any
     ) -> Followed:
-        key = self._key(case, Variant(name), parameters)
+        key = self._key(case, replace(as_, change=unchanged), parameters)
         if key not in self._done:
-            self.tell(f"{name} {case}".strip())
-            found = solve(self.experiment, recordings, name, self.settings[name], parameters, case)
+            self.tell(f"{as_.method} {case}".strip())
+            settings = self.settings[as_.method]
+            method = replace(settings, split=as_.split * settings.split)
+            found = solve(self.experiment, recordings, as_.method, method, parameters, case)
             self._done[key] = self._with_truth(found, true)
         return self._done[key]
 
@@ -121,7 +123,8 @@ class Road:
         return replace(followed, truth=self._truths[followed.case])
 
     def _key(self, case: str, variant: Variant, parameters: Any) -> tuple[Any, ...]:
-        return case, variant.method, self.settings[variant.method], variant.change(parameters)
+        settings = self.settings[variant.method]
+        return case, variant.method, settings, variant.split, variant.change(parameters)
 
 
 def _cases(experiment: Experiment, methods: Mapping[str, Method]) -> tuple[Case, ...]:

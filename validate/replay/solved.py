@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
+from validate.arrays import Floats
 from validate.compare.residual import residuals, stacked
 from validate.fem.system import System
 from validate.fem.system import build as build_system
@@ -61,7 +64,7 @@ class _Runs:
         """The run through the recorded inputs, as many of them as the method takes."""
         method = self._method
         every = slice(method.stride - 1, None, method.stride)
-        t, inputs = seen.t[every], seen.inputs[every]
+        t, inputs = between(seen.t[every], seen.inputs[every], method.split)
         steps = method.steps or len(t)
         at = seen.frames(t, self._experiment.frames)
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
@@ -81,6 +84,16 @@ class _Runs:
             stepper = self._method.prepare(self._system, seen, given)
             self._prepared = stepper, self._built + perf_counter() - start
         return self._prepared
+
+
+def between(t: Floats, inputs: Floats, split: int) -> tuple[Floats, Floats]:
+    """Times (nt,) s and inputs (nt, k) with so many steps in one, straight from rest at 0 s."""
+    if split == 1:
+        return t, inputs
+    at = np.arange(split * len(t) + 1) / split
+    known = np.arange(len(t) + 1)
+    finer = [np.interp(at, known, np.append(0.0, y))[1:] for y in (t, *inputs.T)]
+    return finer[0], np.stack(finer[1:], axis=1)
 
 
 def _label(method: Method, scene: AnyScene) -> str:

@@ -23,7 +23,7 @@ from validate.register.fitting import MarkerFit
 from validate.register.markers import MarkerObservation, placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
-from validate.replay.cards import QuarterGrid, finer_quarter, moved
+from validate.replay.cards import QuarterGrid, moved, quarter_meshes
 from validate.replay.experiment import Input, Progress, Uncertainty
 from validate.replay.followed import Truth
 from validate.scene.mesh import quadratic
@@ -69,7 +69,7 @@ class PressedCone:
     """Parameters; `recording` is a path."""
 
     material: ShearCard = ShearCard()
-    mesh: ConeMesh = ConeMesh(4, 5, finer_radial=6, finer_axial=7)
+    mesh: ConeMesh = ConeMesh(4, 5, finer=1.4)
     clock: ScaledTime = ScaledTime()
     ranges: ConeRanges = ConeRanges()
     twin: ConeTwin = ConeTwin()
@@ -180,10 +180,8 @@ def sets(parameters: PressedCone, seen: Registered) -> Mapping[str, Any]:
     return {"dt": float(seen.t[0]), "substeps": p.clock.substeps, "step": p.mesh.load_step}
 
 
-# Corners of bonded plates limit the order of quadratic elements to 2.
 UNCERTAINTY = Uncertainty(
-    finer=finer_quarter,
-    refinement=lambda p: float((p.mesh.finer_axial / p.mesh.axial) ** 2 - 1),
+    mesh=quarter_meshes(lambda p: float(p.twin.height)),
     inputs=(
         Input("modulus",
               moved("material", scale=lambda p, z: p.material.scale * (1 + z * p.ranges.modulus)),

@@ -2,14 +2,8 @@
 
 from validate.replay.cards import changed, moved
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
-from validate.replay.inclusion import INPUTS
+from validate.replay.inclusion import INPUTS, block_meshes, gridded
 
-finer = changed(
-    "mesh",
-    nodes_x=lambda p: p.mesh.finer_x,
-    nodes_y=lambda p: p.mesh.finer_y,
-    nodes_z=lambda p: p.mesh.finer_z,
-)
 ALL = (
     *INPUTS,
     Input("image pose x",
@@ -27,7 +21,8 @@ ALL = (
           moved("inclusion", longer=lambda p, z: p.inclusion.longer + z * p.ranges.length),
           "length of the meshed inclusion", "assumed"),
 )  # fmt: skip
-UNCERTAINTY = Uncertainty(finer, lambda p: float(p.mesh.ratio**2 - 1), ALL, surrogate="md_fluid")
+MESHES = block_meshes(lambda p: p.block)
+UNCERTAINTY = Uncertainty(MESHES, ALL, surrogate="md_fluid")
 
 BASE = Variant("md_fluid")
 
@@ -51,7 +46,7 @@ EFFECTS = (
                Variant("p2_fluid"), Variant("p1_fluid")),
     EffectSpec("element", "P1 mean dilatation instead of P2 on the same mesh",
                Variant("p2_fluid"), BASE),
-    EffectSpec("mesh", "the second, finer mesh", BASE, _base(finer)),
+    EffectSpec("mesh", "the finest mesh", BASE, _base(gridded(None))),
     EffectSpec("loop", "the paper's loop at 1 % instead of the exact pressure",
                Variant("p1_fluid"), Variant("p1_loop")),
     EffectSpec("nearest node", "nearest node instead of interpolation",

@@ -22,7 +22,7 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Progress
 from validate.replay.inclusion import (
     BlockCard,
-    BlockNodes,
+    BlockGrid,
     GelCard,
     InclusionRanges,
     Streams,
@@ -56,20 +56,10 @@ class WallCard:
 
 
 @dataclass(frozen=True)
-class PhantomGrid(BlockNodes):
-    finer_x: int = quantity(11, "1", "nodes along x of the second mesh, for u_num")
-    finer_y: int = quantity(13, "1", "nodes along y of the second mesh")
-    finer_z: int = quantity(19, "1", "nodes along z of the second mesh")
+class PhantomGrid(BlockGrid):
     order: Literal[1, 2] | None = quantity(
         None, "1", "1 or 2 for every method; none: each method's own"
     )
-
-    @property
-    def ratio(self) -> float:
-        """Ratio of cell sizes of the two meshes."""
-        fine = (self.finer_x - 1) * (self.finer_y - 1) * (self.finer_z - 1)
-        coarse = (self.nodes_x - 1) * (self.nodes_y - 1) * (self.nodes_z - 1)
-        return float((fine / coarse) ** (1 / 3))
 
 
 @dataclass(frozen=True)

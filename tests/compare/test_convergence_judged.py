@@ -1,0 +1,142 @@
+"""u_num by the observed order: exact truths, what is not asymptotic, and how often it covers."""
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats, rms
+from validate.compare.convergence import GridConvergence, Numerical, convergence
+from validate.errors import ComparisonError
+
+H = (2.0, 1.5, 1.0, 0.7)
+
+
+def scalars(h: tuple[float, ...], p: float, a: float = 1.0) -> list[Floats]:
+    return [np.array([[5.0 + a * x**p]]) for x in h]
+
+
+@pytest.mark.parametrize("h", [(2.0, 1.0, 0.5), (1.9, 1.0, 0.8), H, (0.7, 2.0, 1.0, 1.5)])
+@pytest.mark.parametrize("p", [1.0, 1.4, 2.0])
+def test_a_pure_power_gives_its_order_and_the_error_of_the_judged_mesh(
+    h: tuple[float, ...], p: float
+) -> None:
+    """The error of the mesh of size 1 is 3, whatever finer one there is: u is half of 1.25 x 3."""
+    found = convergence(h, scalars(h, p, 3.0), h.index(1.0), p)
+    assert found.order == pytest.approx(p, abs=1e-4)
+    assert (found.conduct, found.safety, found.asymptotic) == ("monotone", 1.25, True)
+    assert found.u == pytest.approx(1.25 * 3.0 / 2, rel=1e-3)
+
+
+def test_the_judged_mesh_is_not_the_finest() -> None:
+    coarse, fine = (convergence((2.0, 1.0, 0.5), scalars((2.0, 1.0, 0.5), 2.0), j, 2.0).u
+                    for j in (0, 2))  # fmt: skip
+    assert coarse == pytest.approx(16 * fine, rel=1e-3)
+
+
+def test_arrays_share_one_order_and_their_rms_stands_for_the_error() -> None:
+    a = np.array([[3.0, -4.0], [0.0, 5.0]])
+    found = convergence(H, [a * x**2 for x in H], 2, 2.0)
+    assert found.order == pytest.approx(2.0, abs=1e-4)
+    assert found.u == pytest.approx(1.25 * rms(a) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize(("p", "safety"), [(0.7, 1.25), (1.2, 1.25), (2.4, 1.25), (2.9, 3.0)])
+def test_an_order_far_above_the_formal_one_has_the_larger_factor(p: float, safety: float) -> None:
+    found = convergence(H, scalars(H, p), 2, 2.0)
+    assert found.safety == safety
+    assert found.u > 0.999 * safety / 2
+
+
+def test_an_order_above_the_formal_one_is_not_believed() -> None:
+    """Richardson by order 4 would give the error 1; the formal order gives more."""
+    found = convergence((2.0, 1.0, 0.5), scalars((2.0, 1.0, 0.5), 4.0), 1, 2.0)
+    assert found.u > 3.0 * 1.0 / 2
+
+
+@pytest.mark.parametrize(
+    ("values", "conduct"),
+    [
+        ((1.0, -0.8, 0.64), "oscillating"),
+        ((0.0, 1.0, 0.9), "oscillating"),
+        ((0.0, 0.1, 1.0), "diverging"),
+        ((0.0, 1.0, 2.1), "diverging"),
+        ((1.0, 0.9, 0.8), "diverging"),  # halved twice, the same step again: order 0
+    ],
+)
+def test_nothing_bounds_the_error_of_what_does_not_converge(
+    values: tuple[float, ...], conduct: str
+) -> None:
+    found = convergence((2.0, 1.0, 0.5), [np.array([[v]]) for v in values], 1, 2.0)
+    assert found.conduct == conduct
+    if conduct == "diverging" or values[0] == 1.0:
+        assert (found.u, found.order) == (np.inf, None)
+        assert "not asymptotic" in found.words
+    else:
+        assert found.safety == 3.0
+
+
+def test_differences_below_rounding_are_the_uncertainty() -> None:
+    answers = [np.array([[7.0 + d]]) for d in (2e-12, 0.0, -3e-12)]
+    found = convergence((2.0, 1.0, 0.5), answers, 1, 2.0, rounding=1e-11)
+    assert (found.conduct, found.asymptotic) == ("at rounding", True)
+    assert found.u == pytest.approx(3e-12, rel=1e-2)
+    alike = convergence((2.0, 1.0, 0.5), [np.ones((1, 1))] * 3, 1, 2.0)
+    assert alike.u == 0.0
+
+
+@pytest.mark.parametrize("h", [(1.0, 0.5), (1.0, 0.5, 0.5), (1.0, 0.5, 0.0)])
+def test_fewer_than_three_meshes_are_refused(h: tuple[float, ...]) -> None:
+    with pytest.raises(ComparisonError, match="u_num needs three and more different ones"):
+        convergence(h, scalars(h, 2.0), 0, 2.0)
+
+
+@pytest.mark.parametrize("h", [(2.0, 1.4, 1.0), (1.27, 1.0, 0.79), (2.0, 1.0, 0.5), H])
+@pytest.mark.parametrize("p", [1.0, 2.0])
+@pytest.mark.parametrize("scatter", [0.0, 0.03])
+def test_twice_u_covers_the_true_error_in_95_of_100(
+    h: tuple[float, ...], p: float, scatter: float
+) -> None:
+    """h^p + b h^(p + 1) with b normal, and meshes that are not quite similar."""
+    rng, judged, size = np.random.default_rng(5), h.index(1.0), np.array(h)
+    covered = []
+    for b in rng.normal(size=80):
+        error = size**p * (1 + b * size + scatter * rng.normal(size=len(h)))
+        found = convergence(h, [np.array([[e]]) for e in error], judged, p)
+        if found.asymptotic:
+            covered.append(abs(error[judged]) <= 2 * found.u)
+    assert len(covered) > 20
+    assert np.mean(covered) >= 0.95
+
+
+@pytest.mark.parametrize("scatter", [0.03, 0.3, 1.0])
+def test_arrays_of_unlike_meshes_are_covered(scatter: float) -> None:
+    """Every point has its own error, and its own scatter from mesh to mesh."""
+    rng, size, covered = np.random.default_rng(6), np.array((2.0, 1.6, 1.3, 1.0, 0.8)), []
+    for _ in range(60):
+        a, noise = rng.normal(size=(20, 2)), scatter * rng.normal(size=(5, 20, 2))
+        error = a * size[:, None, None] ** 2 + noise
+        found = convergence(size.tolist(), list(error), 3, 2.0)
+        covered.append(found.asymptotic and rms(error[3]) <= 2 * found.u)
+    assert np.mean(covered) >= 0.95
+
+
+def test_the_size_that_decides_is_extrapolated_by_the_order_at_hand() -> None:
+    """At that size 2 u is half of the limit; without an order at most half the finest one."""
+    found = convergence(H, scalars(H, 2.0, 3.0), 2, 2.0)
+    share = found.deciding(0.1)
+    assert 2 * found.u * share**2 == pytest.approx(0.05, rel=1e-3)
+    assert found.deciding(1e9) == 1.0
+    lost = convergence((2.0, 1.0, 0.5), [np.array([[v]]) for v in (0.0, 0.1, 1.0)], 1, 2.0)
+    assert lost.deciding(1e9) == 0.25
+    assert lost.deciding(1e-2) < 0.05
+
+
+def test_parts_add_in_squares_and_one_unbounded_part_leaves_none() -> None:
+    assert Numerical({"mesh": 3.0, "time step": 4.0}).u == 5.0
+    assert Numerical({"mesh": np.inf, "time step": 4.0}).u == np.inf
+    assert Numerical().u == 0.0
+
+
+def test_words_say_what_was_found() -> None:
+    found = convergence(H, scalars(H, 2.0), 2, 2.0)
+    assert found.words == "monotone over 4 sizes, order 2 of formal 2, safety 1.25"
+    assert isinstance(found, GridConvergence)
