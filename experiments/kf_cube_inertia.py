@@ -12,7 +12,7 @@ from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.reduced_kf import ReducedKf
 from validate.papers.kf_fem.ladders import SWINGING_LADDER
-from validate.replay.experiment import Case
+from validate.replay.experiment import Case, StepLadder, Uncertainty
 from validate.replay.find import load_file
 from validate.replay.method import Method
 from validate.solve.modal import Modal
@@ -67,6 +67,7 @@ EXPERIMENT = replace(
         Accept("corner", 0.3e-3, "a tenth of the largest displacement there (ours)"),
     ),
     reference="average",
+    uncertainty=Uncertainty(steps=StepLadder(2.0)),
     cases=tuple(_named(name) for name in ("stiff_model", "layer", "sparse")),
     exhibits=None,
     ladder=SWINGING_LADDER,

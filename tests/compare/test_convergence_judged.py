@@ -80,7 +80,7 @@ def test_differences_below_rounding_are_the_uncertainty() -> None:
     assert (found.conduct, found.asymptotic) == ("at rounding", True)
     assert found.u == pytest.approx(3e-12, rel=1e-2)
     alike = convergence((2.0, 1.0, 0.5), [np.ones((1, 1))] * 3, 1, 2.0)
-    assert alike.u == 0.0
+    assert (alike.u, alike.deciding(1.0)) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("h", [(1.0, 0.5), (1.0, 0.5, 0.5), (1.0, 0.5, 0.0)])

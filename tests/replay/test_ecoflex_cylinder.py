@@ -7,7 +7,7 @@ import pytest
 from validate.compare.result import Result
 from validate.replay import compare, load
 
-COARSE = {"mesh.radial": "4", "mesh.axial": "6", "mesh.finer": "1.2"}
+COARSE = {"mesh.radial": "4", "mesh.axial": "6", "mesh.finer": "1.3"}
 
 
 @pytest.fixture(scope="module")

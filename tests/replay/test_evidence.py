@@ -12,7 +12,8 @@ from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.recording.types import Recording
-from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty
+from validate.replay.cards import changed
+from validate.replay.experiment import Experiment, Identified, MeshLadder, Twin, Uncertainty
 from validate.replay.options import Options
 from validate.replay.remade import stamped
 from validate.replay.road import compare
@@ -23,7 +24,8 @@ FEM = {"fem": TINY.methods["fem"]}
 def other_model(**more: Any) -> Experiment:
     """The block and its twin, declared as made by another model; the twin is a file."""
     twin = replace(TINY.twin or Twin(record), same_model=False, remake=("twin.", "sd"))
-    uncertainty = Uncertainty(lambda card: replace(card, cells=4), lambda card: 1.0, (), "fem")
+    levels = tuple(changed(cells=n) for n in (6, 9))
+    uncertainty = Uncertainty(MeshLadder(levels, lambda card: 0.01 / card.cells))
     own = replace(TINY, twin=twin, uncertainty=uncertainty, methods=FEM, cases=(), load=shipped)
     return replace(own, **more)
 

@@ -73,11 +73,13 @@ class GridConvergence:
         Extrapolated by the order at hand; where there is none by the formal one from the range, and
         then at most half the finest size.
         """
+        if self.conduct == "at rounding":
+            return 1.0
         if self.order is None:
             size = (limit / 2 / (FAR * self.range)) ** (1 / self.formal)
             return float(min(size, self.finest / 2))
         order = min(self.order, self.formal)
-        return float(min(limit / 4 / self.u, 1.0) ** (1 / order)) if self.u else 1.0
+        return float(min(limit / 4 / self.u, 1.0) ** (1 / order))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -118,11 +118,11 @@ COARSER = (0.5, 0.625, 0.75, 0.875)
 
 def scaled(share: float | None, *counts: str) -> Change:
     """The mesh with `share` of its cells along every edge (none: its own `finer`), in the fields
-    `counts`, rounded."""
+    `counts`, rounded up."""
 
     def change(p: Any) -> Any:
         by = p.mesh.finer if share is None else share
-        new = {k: max(round(getattr(p.mesh, k) * by), 1) for k in counts}
+        new = {k: ceil(getattr(p.mesh, k) * by) for k in counts}
         return replace(p, mesh=replace(p.mesh, **new))
 
     return change

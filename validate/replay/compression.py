@@ -305,8 +305,9 @@ def _level(share: float | None, halvings: int) -> Change:
 def _cell(p: Compression) -> float:
     """The edge m of a cube as large as a mean cell."""
     if p.specimen.mesh is None:
-        return float(p.specimen.height / (p.mesh.radial**2 * p.mesh.axial) ** (1 / 3))
-    return float(cell_volumes(_body(p)).mean() ** (1 / 3)) / 2**p.mesh.halvings
+        cells: int = p.mesh.radial**2 * p.mesh.axial
+        return float(p.specimen.height / cells ** (1 / 3))
+    return float(np.cbrt(cell_volumes(_body(p)).mean()) / 2**p.mesh.halvings)
 
 
 # A mesh file has no coarser ones. Order 2: corners of bonded plates limit that.
