@@ -306,7 +306,7 @@ def _cell(p: Compression) -> float:
     """The edge m of a cube as large as a mean cell."""
     if p.specimen.mesh is None:
         cells: int = p.mesh.radial**2 * p.mesh.axial
-        return float(p.specimen.height / cells ** (1 / 3))
+        return float(p.specimen.size.height / cells ** (1 / 3))
     return float(np.cbrt(cell_volumes(_body(p)).mean()) / 2**p.mesh.halvings)
 
 

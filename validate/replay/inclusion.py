@@ -4,7 +4,7 @@ what a file of one's own declares, and the experiment that follows.
 Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Literal
@@ -146,7 +146,7 @@ def inclusion_test(
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
         uncertainty=Uncertainty(
-            mesh=block_meshes(lambda p: p.block),
+            mesh=BLOCK_MESHES,
             inputs=INPUTS,
             surrogate=next(n for n, m in methods.items() if m.scene == Filled(1)),
         ),
@@ -231,20 +231,6 @@ def placed(
     return Registered((stage, outline, markers, *signals), tuple(holds), rest)
 
 
-def block_meshes(block: Callable[[Any], BlockCard]) -> MeshLadder:
-    """Meshes of a block whose inclusion is cut from a grid: not similar, hence more than three.
-
-    Order 2: corners at the plates and facets on the wall limit that of quadratic elements.
-    """
-
-    def cell(p: Any) -> float:
-        size, g = block(p), p.mesh
-        cells = float(np.prod(np.array(g.nodes) - 1))
-        return float((size.x * size.y * size.z / cells) ** (1 / 3))
-
-    return MeshLadder(tuple(gridded(share) for share in (*COARSER, None)), cell)
-
-
 def gridded(share: float | None) -> Change:
     """The grid with `share` of its cells along every edge (none: its own `finer`)."""
 
@@ -255,3 +241,14 @@ def gridded(share: float | None) -> Change:
         return replace(p, mesh=replace(g, **nodes))
 
     return change
+
+
+def _cell(p: Any) -> float:
+    """The edge m of a cube as large as a mean cell."""
+    cells = np.prod(np.array(p.mesh.nodes) - 1)
+    return float(np.cbrt(np.prod(p.block.size.sizes) / cells))
+
+
+# Cut from grids, the meshes are not similar: hence more than three. Order 2: corners at the plates
+# and facets on the wall limit that of quadratic elements.
+BLOCK_MESHES = MeshLadder(tuple(gridded(share) for share in (*COARSER, None)), _cell)

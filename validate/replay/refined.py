@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import inf
+from math import inf, isfinite
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from validate.replay.experiment import Uncertainty, Variant
 from validate.replay.followed import Followed
 from validate.replay.runs import Road
 
-_ROUNDING = 1e-9  # of the largest number compared: below lies rounding, and what solvers leave
+# Below lies rounding, and what solvers leave: of the largest number compared, or of the limit.
+_ROUNDING, _IMMATERIAL = 1e-9, 1e-5
 
 
 def variants(uncertainty: Uncertainty, name: str) -> dict[str, list[Variant]]:
@@ -41,13 +42,15 @@ class Refined:
         }
         self._sizes = {part: self._size_of(part, road, name) for part in self._runs}
 
-    def of(self, residual: Residual) -> dict[str, GridConvergence | None]:
+    def of(self, residual: Residual, limit: float) -> dict[str, GridConvergence | None]:
         """By part; None where fewer than three meshes or steps compare the same points."""
-        return {part: self._converged(part, residual) for part in self._runs}
+        immaterial = _IMMATERIAL * limit if isfinite(limit) else 0.0
+        rounding = max(_ROUNDING * _scale(residual), immaterial)
+        return {part: self._converged(part, residual, rounding) for part in self._runs}
 
     def numerical(self, residual: Residual, limit: float = inf) -> Numerical:
         """The parts of u_num, how each was found, and what would decide within `limit`."""
-        found = self.of(residual)
+        found = self.of(residual, limit)
         deciding = {part: self._deciding(part, c, limit) for part, c in found.items() if c}
         lost = [part for part, c in found.items() if c is None or not c.asymptotic]
         words = [f"{part}: {self._words(part, c)}" for part, c in found.items()]
@@ -79,7 +82,7 @@ class Refined:
         assert found is not None
         return found
 
-    def _converged(self, part: str, residual: Residual) -> GridConvergence | None:
+    def _converged(self, part: str, residual: Residual, rounding: float) -> GridConvergence | None:
         answers: dict[float, Floats] = {}
         for size, run in zip(self._sizes[part], self._runs[part], strict=True):
             mine = run.residuals.get(residual.name) if run else None
@@ -87,7 +90,6 @@ class Refined:
                 answers.setdefault(size, mine.values)
         if len(answers) < 3 or self._sizes[part][0] not in answers:
             return None
-        rounding = _ROUNDING * _scale(residual)
         return convergence(list(answers), list(answers.values()), 0, self._formal(part), rounding)
 
     def _formal(self, part: str) -> float:

@@ -2,7 +2,7 @@
 
 from validate.replay.cards import changed, moved
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
-from validate.replay.inclusion import INPUTS, block_meshes, gridded
+from validate.replay.inclusion import BLOCK_MESHES, INPUTS, gridded
 
 ALL = (
     *INPUTS,
@@ -21,8 +21,7 @@ ALL = (
           moved("inclusion", longer=lambda p, z: p.inclusion.longer + z * p.ranges.length),
           "length of the meshed inclusion", "assumed"),
 )  # fmt: skip
-MESHES = block_meshes(lambda p: p.block)
-UNCERTAINTY = Uncertainty(MESHES, ALL, surrogate="md_fluid")
+UNCERTAINTY = Uncertainty(BLOCK_MESHES, ALL, surrogate="md_fluid")
 
 BASE = Variant("md_fluid")
 

@@ -9,11 +9,10 @@ from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.identify.interval import SAFETY, Interval, profile_interval
-from validate.papers.fluid_inclusion.effects import MESHES
 from validate.papers.fluid_inclusion.phantom import Phantom
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified
-from validate.replay.inclusion import gridded
+from validate.replay.inclusion import BLOCK_MESHES, gridded
 from validate.replay.method import Method
 from validate.replay.solved import solve
 from validate.scene.plates import plates_of_share
@@ -41,8 +40,8 @@ def friction_from_rise(
     best = int(np.argmin(chi_square))
     refined = gridded(None)(parameters)
     finer = _weighed(rise(float(SHARES[best]), refined))
-    ratio = MESHES.size(parameters) / MESHES.size(refined)
-    mesh = _mesh_share(weighed, best, finer, ratio**MESHES.order - 1)
+    ratio = BLOCK_MESHES.size(parameters) / BLOCK_MESHES.size(refined)
+    mesh = _mesh_share(weighed, best, finer, ratio**BLOCK_MESHES.order - 1)
     fit = profile_interval(SHARES, chi_square, sum(r.count for r in risen[-1]), mesh)
     return Identified(parameters, _scores(fit), (_said(fit),))
 
