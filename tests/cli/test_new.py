@@ -4,14 +4,16 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from validate.cli.main import cli, run
-from validate.cli.new import written
+from validate.cli.new import _kind, written
 from validate.compare.score import bias
+from validate.errors import UsageError
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
@@ -240,3 +242,16 @@ def test_a_mesh_file_is_a_body_too(tmp_path: Path) -> None:
     result = compare(mine, {"specimen.mesh": str(tmp_path / "body.npz")})
     assert [c.verdict for c in result.checks] == ["fitted", "agrees"]
     assert result.methods[0].scene.copies == 1
+
+
+def test_two_records_make_an_inclusions_experiment() -> None:
+    """Outlines, markers, a length that drives; no other record is needed."""
+    stage, records = SimpleNamespace(unit="m"), {"marker_layout": {}, "inclusion": {}}
+    seen = SimpleNamespace(
+        name="x", signals={"stage": stage}, metadata=records, contours={"o": 1}, markers={"m": 1},
+        frames={},
+    )  # fmt: skip
+    assert _kind(seen) == "inclusion"  # type: ignore[arg-type]
+    del records["inclusion"]
+    with pytest.raises(UsageError, match="records 'inclusion' and 'marker_layout'"):
+        _kind(seen)  # type: ignore[arg-type]

@@ -51,6 +51,13 @@ def test_a_late_force_has_a_positive_phase_error(late: float) -> None:
     assert found["F.phase"] == pytest.approx(late, abs=1e-4)
 
 
+def test_half_of_the_run_must_overlap_for_a_phase() -> None:
+    enough, little = (signal(pulse(T[end >= T]), T[end >= T]) for end in (3.6, 2.4))
+    assert scores(signal(pulse(T)), enough)["F.phase"] == pytest.approx(0.0, abs=1e-4)
+    with pytest.raises(ComparisonError, match="at least 50 % are needed"):
+        scores(signal(pulse(T)), little)
+
+
 def test_only_times_that_the_run_meets_are_counted() -> None:
     """The run stops at 3 s and has a gap of 1 s, which also takes the sample it begins with."""
     t = T[(T <= 3.0) & ~((T > 0.5) & (T < 1.5))]

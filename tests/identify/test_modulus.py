@@ -129,6 +129,14 @@ def test_unloading_is_not_fitted() -> None:
     assert fit_modulus(softer).count == fit_modulus(log(d, force)).count
 
 
+def test_the_window_holds_its_ends() -> None:
+    """Strains of 1/64 are exact in binary: 16 + 1 of them from 0 to a quarter."""
+    d = np.arange(33) / 64 * DISC.height
+    cylinder = Cylinder(DISC.diameter, 1.0)
+    fit = fit_modulus(log(np.arange(33) / 64, 10.0 * d), cylinder, window=(0.0, 0.25))
+    assert fit.count == 17
+
+
 def test_definition_is_the_mean_slope_with_free_intercept() -> None:
     """F = A0 (a e + b e^2) densely sampled: slope a + b (low + high), by hand."""
     e = np.linspace(0, 0.06, 60001)

@@ -171,3 +171,11 @@ def test_what_decided_the_encoding_is_told() -> None:
     assert decode("Łódź\n".encode("cp1250"), "cp1250").text == "Łódź\n"
     with pytest.raises(UsageError, match="no such encoding"):
         decode(b"abc", "klingon")
+
+
+@pytest.mark.parametrize("still", ["displacement", "force"])
+def test_a_signal_that_does_not_move_takes_the_others_sign(still: str, tmp_path: Path) -> None:
+    d, f = (D * (still != "displacement"), F * (still != "force"))
+    names = "Time (s),Extension (mm),Load (N)\n"
+    for sign in (1, -1):
+        assert_test(read(tmp_path, names + rows(d=sign * d, f=sign * f)), d, f)

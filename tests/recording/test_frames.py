@@ -14,7 +14,7 @@ import pytest
 from mcap_samples import ABSENT, T0, signal_json, walk, write_foreign
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.images.image import MAX_SIDE, decode_png, encode_png
+from validate.recording.images.image import MAX_SIDE, decode_png, encode_png, sampled
 from validate.recording.images.png_stack import read_png_stack
 from validate.recording.images.raster import coverage
 from validate.recording.mcap.read import read_recording
@@ -248,3 +248,12 @@ def test_coverage_of_a_box_and_a_disc() -> None:
     disc = np.array([20.3, 18.9]) + 12.5 * np.stack([np.cos(a), np.sin(a)], axis=1)
     assert coverage(disc, (40, 41)).sum() == pytest.approx(np.pi * 12.5**2, rel=1e-3)
     assert coverage(disc - 30, (40, 41)).sum() < np.pi * 12.5**2 / 4  # cut by the border
+
+
+def test_values_between_pixels_end_half_a_pixel_outside() -> None:
+    """Bilinear inside, the border's own value up to its outer edge, nothing beyond."""
+    image = np.arange(6.0).reshape(2, 3)
+    x, y = np.array([[0.5, -0.5, 2.5, 1.0, 1.0], [0.5, 0.0, 1.0, -0.5, 1.5]])[:, None]
+    assert sampled(image, x, y).ravel() == pytest.approx([2.0, 0.0, 5.0, 1.0, 4.0])
+    for out in ((-0.51, 0.0), (2.51, 0.0), (0.0, -0.51), (0.0, 1.51)):
+        assert np.isnan(sampled(image, *np.array(out)[:, None, None]))

@@ -9,7 +9,7 @@ import pytest
 from exports import rows
 from mcap_samples import sample_recording
 
-from validate.errors import UsageError, ValidateError
+from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.digest import digest
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.read import read_recording
@@ -17,7 +17,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.reader import Reader
 from validate.recording.readers import READERS, named, recognised
-from validate.recording.types import Recording
+from validate.recording.types import Recording, Signal
 
 LENGTH = 3  # bytes cut off an end: a record, a number and a chunk are incomplete without them
 
@@ -158,3 +158,9 @@ def test_every_reader_is_in_the_tuple_and_has_a_sample(project_root: Path) -> No
     )
     assert len(READERS) == made == len({r.name for r in READERS})
     assert MAKE.keys() == {r.name for r in READERS}
+
+
+@pytest.mark.parametrize("sd", [-0.1, np.nan, np.inf])
+def test_a_standard_deviation_below_zero_or_none_is_refused(sd: float) -> None:
+    with pytest.raises(RecordingError, match="is not a number >= 0"):
+        Signal(np.zeros(1), np.zeros((1, 1)), "N", sd, "cell")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from validate.errors import ComparisonError
+from validate.papers.ekf_nfem.cone import PressedCone
 from validate.papers.fluid_inclusion.phantom import Phantom, PhantomRanges
 from validate.replay.cards import rubbed
 from validate.replay.experiment import Input
@@ -53,3 +54,13 @@ def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
     assert rubbing_share("partial", rubbed(Phantom(), 1.0).friction, 15_200, 0.060) == (
         pytest.approx(0.03)
     )
+
+
+def test_an_inputs_standard_uncertainty_is_its_own_range() -> None:
+    """The modulus up by its relative range, nu down, whatever else stays."""
+    cone, gel = PressedCone(), Phantom()
+    by = {i.name: i for i in find("ekf_cone", Path(__file__)).uncertainty.inputs}  # type: ignore[union-attr]
+    assert by["modulus"].by(2.0)(cone).material.scale == pytest.approx(1.04 * cone.material.scale)
+    by = {i.name: i for i in find("fluid_phantom", Path(__file__)).uncertainty.inputs}  # type: ignore[union-attr]
+    assert pytest.approx(1.1 * gel.material.E) == by["modulus"].by(2.0)(gel).material.E
+    assert by["Poisson ratio"].by(2.0)(gel).material.nu == pytest.approx(gel.material.nu - 0.01)

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from report_samples import CHECK, bare_result, small_result
 
+from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import Score
+from validate.report.discrimination import _row
 from validate.report.environment import without_folder
-from validate.report.store import Json, document, schema, write_json, write_runs
+from validate.report.registration import _statistics
+from validate.report.store import Json, _rest, document, schema, write_json, write_runs
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -41,6 +44,18 @@ def test_content() -> None:
     assert content["parameters"]["material.E"] == {
         "value": 1e4, "unit": "Pa", "origin": "default",
     }  # fmt: skip
+
+
+def test_every_table_shows_the_root_mean_square() -> None:
+    """Three points by hand, each of two components: in the file, at rest, and over the noise."""
+    values = np.array([[3.0, 4.0], [0.0, 0.0], [0.0, -5.0]])
+    seen = Residual("force.plate", "2mm", values, 0.3, 0.4, "N", "plate force")
+    rms = np.sqrt(50 / 3)
+    assert _rest(seen)["rms"] == pytest.approx(rms)
+    assert _statistics(seen) == pytest.approx((rms, 5.0, np.sqrt(2) * 0.3))
+    method = replace(small_result().methods[0], residuals={seen.name: seen})
+    ((_, ratio),) = _row([method], "force.plate").ratios
+    assert ratio == pytest.approx(rms / np.sqrt(2 * (0.3**2 + 0.4**2)))
 
 
 def test_unfinished_method_is_valid() -> None:

@@ -204,6 +204,21 @@ def test_factorisations_are_kept_and_change_nothing() -> None:
     assert last[0.2] == pytest.approx(last[0.0], rel=1e-7)
 
 
+def test_where_the_body_lies_changes_nothing() -> None:
+    """A tangent is taken anew after a share of the body's size, wherever it lies."""
+    made = []
+    for away in (0.0, 10.0):
+        scene = cube("neo_hooke", 0.45, n=2)
+        mesh = replace(scene.mesh, nodes=scene.mesh.nodes + np.array([away, 0.0, 0.0]))
+        state = (stepper := prepared(replace(scene, mesh=mesh))).rest()
+        total = 0.0
+        for d in np.linspace(0, 0.02, 21)[1:]:
+            state = at(stepper, state, d)
+            total += state.numbers["newton.factorisations"]
+        made.append(total)
+    assert made[0] == made[1] > 1
+
+
 def test_a_step_depends_on_its_state_only() -> None:
     stepper = prepared(cube("neo_hooke", 0.45, "bonded"))
     early = pressed(stepper, 0.005)

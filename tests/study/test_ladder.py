@@ -9,8 +9,13 @@ from study_samples import experiment_file
 
 from validate.errors import SceneError, UsageError
 from validate.fem.system import Responses
+from validate.papers.accuracy.ladders import NEEDLE_LADDER
+from validate.papers.accuracy.needle import MP1, MP2
+from validate.papers.kf_fem.block import PulledBlock
+from validate.papers.kf_fem.ladders import PRINTED_LADDER
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
+from validate.replay.ladder import LARGEST, Rival, StabilityBody, Turned
 from validate.replay.ladder_default import body_of, trial_of
 from validate.replay.own_body import OwnBody, own_body
 from validate.scene.box import box
@@ -18,6 +23,7 @@ from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import boundary_facets, cell_volumes
 from validate.scene.refine import linear, of_element, refined
 from validate.scene.scene import Material, Region, Scene, Support
+from validate.solve.quasi_static import QuasiStatic
 from validate.study.gain import GainBench, GainCell, run_cell
 from validate.study.stability import stability
 
@@ -152,3 +158,39 @@ def test_a_material_point_enters_no_study(pulled: Experiment) -> None:
     lone = replace(pulled, build=lambda recording, parameters, options: point)
     with pytest.raises(SceneError, match="no mesh and no steps"):
         trial_of(lone, quick=True)
+
+
+# --- what is declared -----------------------------------------------------------------------------
+
+
+def test_a_body_of_just_the_largest_number_of_unknowns_is_mapped() -> None:
+    """20 x 25 nodes of two unknowns are a thousand; one row more is refused."""
+    variant = Turned(1e4, 0.3, 1000.0, 0.0, 0.0, 19)
+
+    def strip(n: int, material: Material) -> Scene:
+        return Scene(box((1.0, 1.0), (n, 24)), material, (Support("x0", (0, 1)),))
+
+    body = StabilityBody("strip", strip, variant, (19,), 1e-3)
+    assert body.build(variant).mesh.nodes.size == LARGEST
+    with pytest.raises(SceneError, match=r"1050 unknowns at mesh 20: .* at most 1000"):
+        body.build(replace(variant, mesh=20))
+
+
+def test_a_rival_takes_the_steps_and_meshes_it_declares() -> None:
+    plain, steps = Rival("a", "nodes", lambda dt: QuasiStatic()), (1.0, 0.5)
+    assert plain.steps("P1", 9, steps) == steps
+    assert replace(plain, stepped=False).steps("P1", 1, steps) == (0.5,)
+    assert replace(plain, shortest=1.0).steps("P1", 1, steps) == (1.0,)
+    assert replace(plain, elements=("P2",)).steps("P1", 1, steps) == ()
+    assert replace(plain, finest=2).steps("P1", 2, steps) == steps
+    assert replace(plain, finest=2).steps("P1", 3, steps) == ()
+
+
+def test_printed_settings_are_those_of_the_papers_experiments() -> None:
+    """Paper 001's block as its experiment has it; paper 002's materials on one mesh of ten."""
+    own = PulledBlock().material.material
+    (paper,) = PRINTED_LADDER.body.papers  # type: ignore[union-attr]
+    assert (paper.variant.material, paper.dt) == (replace(own, law="linear"), 0.002)
+    papers = NEEDLE_LADDER.body.papers  # type: ignore[union-attr]
+    assert [p.variant.mesh for p in papers] == [10, 10]
+    assert [p.variant.material for p in papers] == [MP1, MP2]
