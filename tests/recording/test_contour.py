@@ -12,6 +12,7 @@ import scipy.io
 from validate.errors import RecordingError
 from validate.recording.images.closed_path import closed_path
 from validate.recording.images.outline import Outline, extract_outline, outlines_of
+from validate.recording.images.polar import speckle_area
 from validate.recording.images.shapes import circle_points, ellipse_points
 from validate.recording.types import Frames
 from validate.register.outline_geometry import normal_distances
@@ -172,6 +173,11 @@ def test_pure_speckle_is_refused(seed: int) -> None:
 def test_an_even_image_is_refused() -> None:
     with pytest.raises(RecordingError, match="no disc is darker than its surroundings"):
         extract_outline(np.full((64, 64), 90, np.uint8), PX)
+
+
+def test_a_black_image_has_the_smallest_speckle_that_can_be() -> None:
+    """One pixel, 1 mm by 2 mm: nothing goes together."""
+    assert speckle_area(np.zeros((32, 32)), (1e-3, 2e-3)) == pytest.approx(2e-6)
 
 
 def test_a_region_cut_by_the_border_is_refused() -> None:

@@ -3,14 +3,19 @@
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from validate.compare.residual import Residual
+from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.papers.ekf_nfem.cone import PressedCone
 from validate.papers.fluid_inclusion.phantom import Phantom, PhantomRanges
 from validate.replay.cards import rubbed
-from validate.replay.experiment import Input
+from validate.replay.checks import joint_inputs
+from validate.replay.experiment import Input, Variant
 from validate.replay.find import find
 from validate.replay.inclusion import InclusionRanges
 from validate.scene.plates import plates_of_share, rubbing_share
@@ -64,3 +69,25 @@ def test_an_inputs_standard_uncertainty_is_its_own_range() -> None:
     by = {i.name: i for i in find("fluid_phantom", Path(__file__)).uncertainty.inputs}  # type: ignore[union-attr]
     assert pytest.approx(1.1 * gel.material.E) == by["modulus"].by(2.0)(gel).material.E
     assert by["Poisson ratio"].by(2.0)(gel).material.nu == pytest.approx(gel.material.nu - 0.01)
+
+
+def test_first_order_is_one_standard_uncertainty_of_each_input() -> None:
+    """A linear model: 3 and -4 N make 5 N, which draws of both at once show too."""
+    inputs = (
+        Input("a", lambda p, z: (p[0] + 3 * z, p[1]), "first", "assumed"),
+        Input("b", lambda p, z: (p[0], p[1] - 4 * z), "second", "assumed"),
+    )
+
+    def main(variant: Variant) -> SimpleNamespace:
+        force = np.array([[2.0 + sum(variant.change((0.0, 0.0)))]])
+        seen = Residual("force", "3mm", force, 0.0, 0.0, "N", "force")
+        return SimpleNamespace(residuals={seen.name: seen})
+
+    declared = SimpleNamespace(surrogate="m", inputs=inputs)
+    experiment = SimpleNamespace(
+        name="x", uncertainty=declared, accept=(Accept("force", 1.0, "assumed"),)
+    )
+    road = SimpleNamespace(experiment=experiment, kind="measured", quick=False, main=main)
+    (found,) = joint_inputs(road)  # type: ignore[arg-type]
+    assert found.first_order == pytest.approx(5.0, rel=1e-12)
+    assert found.sampled == pytest.approx(5.0, rel=0.05)
