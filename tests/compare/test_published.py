@@ -79,3 +79,9 @@ def test_reproduced_needs_a_printed_number() -> None:
 def test_an_expected_value_needs_its_drift() -> None:
     with pytest.raises(ComparisonError, match="drift = None; give both or neither"):
         replace(FIGURE, drift=None)
+
+
+@pytest.mark.parametrize("name", ["theirs", "tolerance", "expected", "drift"])
+def test_a_declared_number_is_finite(name: str) -> None:
+    with pytest.raises(ComparisonError, match="not finite compares with nothing"):
+        replace(FIGURE, **{name: float("nan")})  # type: ignore[arg-type]

@@ -1,6 +1,5 @@
 """Tables and progress bars on the terminal; plain lines when it is not one."""
 
-import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,6 +9,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+from validate.report.numbers import duration, significant, with_unit
 
 if TYPE_CHECKING:  # what only names a type costs `validate list` nothing
     from validate.compare.published import Published
@@ -68,16 +69,10 @@ def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 
 def shown(value: float, unit: str) -> str:
-    """A value as people read it: m as mm, Pa as kPa above 1000, s as us."""
-    if math.isinf(value):
-        return "unknown"
-    if unit == "m":
-        return f"{1e3 * value:.3f} mm"
-    if unit == "Pa":
-        return f"{value / 1e3:.3f} kPa" if abs(value) >= 1000 else f"{value:.1f} Pa"
-    if unit == "s":
-        return f"{1e6 * value:.1f} us" if value < 1e-2 else f"{value:.2f} s"
-    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+    """A value with its unit as people read it, four significant digits: a small one is no zero."""
+    if unit == "Pa" and abs(value) >= 1000:
+        return f"{significant(value / 1e3, 4)} kPa"
+    return duration(value) if unit == "s" else with_unit(value, unit, 4)
 
 
 def error_shown(check: "Check") -> str:

@@ -95,7 +95,7 @@ class Figure:
     that there is none; None where nothing of ours can stand there. `reason` may be a function of
     the values too. `scale` is what the tolerance is held against (0: the printed number itself).
 
-    Raises `ComparisonError` for a claim that could not fail: reproduced without a printed number, a
+    Raises `ComparisonError` for a number that is not finite and for a claim that could not fail: reproduced without a printed number, a
     value of ours or a tolerance; a tolerance wider than a tenth of the scale; an expected value
     without the drift it is good to.
     """
@@ -115,6 +115,12 @@ class Figure:
     other: str = ""
 
     def __post_init__(self) -> None:
+        numbers = (self.theirs, self.tolerance, self.expected, self.drift)
+        if not all(x is None or math.isfinite(x) for x in numbers):
+            raise ComparisonError(
+                f"figure '{self.name}': theirs, tolerance, expected and drift are {numbers}; a "
+                "number that is not finite compares with nothing"
+            )
         held = (self.of, self.theirs, self.tolerance)
         if self.claim == "reproduced" and None in held:
             raise ComparisonError(
