@@ -95,9 +95,9 @@ class Figure:
     that there is none; None where nothing of ours can stand there. `reason` may be a function of
     the values too. `scale` is what the tolerance is held against (0: the printed number itself).
 
-    Raises `ComparisonError` for a number that is not finite and for a claim that could not fail: reproduced without a printed number, a
-    value of ours or a tolerance; a tolerance wider than a tenth of the scale; an expected value
-    without the drift it is good to.
+    Raises `ComparisonError` for a number that is not finite, and for a claim that could not fail:
+    reproduced without a printed number, a value of ours or a tolerance; a tolerance wider than a
+    tenth of the scale; an expected value without the drift it is good to.
     """
 
     name: str
