@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny import TINY, Card, record
+from tiny import TINY, Card, record, scene
 
 from validate.cli.running import run as run_command
 from validate.compare.result import Result
@@ -17,6 +17,7 @@ from validate.replay.experiment import Experiment, Identified, MeshLadder, Twin,
 from validate.replay.options import Options
 from validate.replay.remade import stamped
 from validate.replay.road import compare
+from validate.scene.scene import Material, Scene
 
 FEM = {"fem": TINY.methods["fem"]}
 
@@ -103,9 +104,11 @@ def test_the_terminals_first_line_says_what_was_judged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
-    monkeypatch.setattr("validate.cli.running.find", lambda name, start: replace(TINY, cases=()))
+    monkeypatch.setattr(
+        "validate.cli.chosen.find", lambda name, start, named: replace(TINY, cases=())
+    )
     code = run_command(
-        ("tiny",), everything=False, quick=True, out=tmp_path, values=(), methods="fem",
+        ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
         as_json=False,
     )  # fmt: skip
     first = capsys.readouterr().out.splitlines()[0]
@@ -114,3 +117,25 @@ def test_the_terminals_first_line_says_what_was_judged(
         "tiny: no evidence; evidence: 0 of 1 checks; same model, the recording and the judged "
         "model are one"
     )
+
+
+def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page's notes alone left a quick run of linear cells at nu .4999 without a word."""
+
+    def build(recording: Recording, card: Card, model: None) -> Scene:
+        return replace(scene(card.E, card.cells), material=Material(card.E, 0.4999, rho=1000.0))
+
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    locks = replace(TINY, cases=(), build=build)
+    monkeypatch.setattr("validate.cli.chosen.find", lambda name, start, named: locks)
+    run_command(
+        ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
+        as_json=False,
+    )  # fmt: skip
+    said = "nu = 0.4999: linear tetrahedra lock near incompressibility"
+    (line,) = (x for x in capsys.readouterr().out.splitlines() if said in x)
+    assert line.startswith("warning: ")
+    (stored,) = tmp_path.rglob("results.json")
+    assert said in stored.read_text("utf-8")

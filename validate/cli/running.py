@@ -16,6 +16,7 @@ from validate.cli.display import (
     table,
 )
 from validate.compare.result import KINDS, Result
+from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
 from validate.replay.find import root_of
 from validate.replay.options import Options
@@ -68,7 +69,8 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     screen.print(
         f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", soft_wrap=True
     )
-    for warning in result.warnings:
+    locked = locking_notes((m.label, m.scene) for m in result.methods)
+    for warning in (*result.warnings, *locked):
         screen.print(f"warning: {warning}", style="yellow", markup=False, soft_wrap=True)
     screen.print(f"{result.title}\n", soft_wrap=True)
     if rows:

@@ -14,7 +14,7 @@ from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
-from validate.fem.locking import locking_warning
+from validate.fem.locking import locking_notes
 from validate.parameters import Parameter, describe
 from validate.register.markers import MarkerObservation
 from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
@@ -203,18 +203,13 @@ def _notes(
     found += [
         f for pair in zip(first.registered, first.runs, strict=True) for f in unanswered(*pair)
     ]
-    said = (*remade, *(identified.notes if identified else ()), *found, *_locking(main))
+    said = (
+        *remade,
+        *(identified.notes if identified else ()),
+        *found,
+        *locking_notes((f.label, f.scene) for f in main.values()),
+    )
     return tuple(dict.fromkeys(said))
-
-
-def _locking(main: Mapping[str, Followed]) -> tuple[str, ...]:
-    """Which methods' cells lock near incompressibility, by warning."""
-    found: dict[str, list[str]] = {}
-    for followed in main.values():
-        warning = locking_warning(followed.scene)
-        if warning:
-            found.setdefault(warning, []).append(followed.label)
-    return tuple(f"{warning} ({'; '.join(labels)})" for warning, labels in found.items())
 
 
 def _inputs(experiment: Experiment) -> tuple[Declared, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.fem.assemble import shape_gradients
+from validate.fem.locking import LOCKING_FROM
 from validate.fem.modes import modes_of
 from validate.fem.system import build
 from validate.replay.ladder import RUNGS, Rung, Trial
@@ -28,7 +29,6 @@ from validate.units import si_factor
 _WATER = 1000.0  # kg/m3, of a soft tissue whose density nobody declared
 _SLOW = 10.0  # periods of the lowest mode within which a load that rises is nearly static
 _SMALL_STRAIN = 0.02  # strain at which the square terms of Green's strain are 1 % of the linear
-_LOCKS = 0.45  # Poisson ratio from which linear tetrahedra lock noticeably
 _TRIES = 4  # cells that are run again at the rate's own step
 _QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
 
@@ -289,8 +289,8 @@ def principal_strains(mesh: Mesh, u: Floats) -> Floats:
 
 def _poisson(body: Scene) -> Fact:
     nu = body.material.nu
-    locks = f"above {_LOCKS:g} linear tetrahedra lock: see P1 beside the other elements"
-    return Fact("Poisson ratio", f"{nu:g}", locks if nu >= _LOCKS else "no locking to expect")
+    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: see P1 beside the other elements"
+    return Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect")
 
 
 def _fluid(body: Scene) -> Fact:
