@@ -257,3 +257,11 @@ def test_values_between_pixels_end_half_a_pixel_outside() -> None:
     assert sampled(image, x, y).ravel() == pytest.approx([2.0, 0.0, 5.0, 1.0, 4.0])
     for out in ((-0.51, 0.0), (2.51, 0.0), (0.0, -0.51), (0.0, 1.51)):
         assert np.isnan(sampled(image, *np.array(out)[:, None, None]))
+
+
+def test_a_mirrored_outline_covers_mirrored_pixels() -> None:
+    """Scan lines lie in the middle of their share of a pixel."""
+    x, y = np.array([[0.6, 2.2, 1.9, 0.6], [0.6, 0.6, 2.4, 2.4]])
+    seen = coverage(np.stack([x, y], axis=1), (4, 4))
+    assert coverage(np.stack([x, 3 - y], axis=1), (4, 4)) == pytest.approx(seen[::-1])
+    assert seen[:, 1] == pytest.approx([0.0, 0.9, 0.9, 0.0])

@@ -6,7 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from validate.errors import RegistrationError
+from validate.recording.types import Contours
 from validate.register.circle import fit_circle
+from validate.register.inclusion import outlined_capsule
 
 
 def circle(centre, radius, k, first=0.0):
@@ -67,3 +69,33 @@ def test_outline_far_from_a_circle_is_refused():
     stretched = circle((0, 0), 0.01, 40) * [1.0, 0.2]
     with pytest.raises(RegistrationError, match=r"no circle: \d\.\d\d mm rms off a radius of"):
         fit_circle(stretched, 0.0)
+
+
+POSE = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0.0225], [0, 1, 0, 0], [0, 0, 0, 1]])
+SWEEP = {"centre_x_m": "0.030", "centre_y_m": "0.021", "centre_z_m": "0.035",
+         "sd_centre_m": "0.0003", "length_m": "0.028"}  # fmt: skip
+
+
+def outlined(off, allowance=0.0, sweep=SWEEP):
+    """The inclusion of an outline whose centre is `off` m from the sweep's, along a diagonal."""
+    centre = np.array([0.030, 0.035]) + off * np.array([0.6, -0.8])
+    seen = Contours(np.zeros(1), (circle(centre, 0.0085, 50),), 0.15e-3, POSE, "scene")
+    return outlined_capsule(seen, 0, sweep, allowance)
+
+
+def test_an_outline_places_the_inclusion_in_its_plane_and_the_sweep_along_it():
+    found = outlined(0.5e-3)
+    assert found.centre == pytest.approx((0.0303, 0.021, 0.0346), abs=1e-9)
+    assert (found.radius, found.length) == (pytest.approx(0.0085), 0.028)
+
+
+def test_an_outline_further_off_than_four_standard_deviations_is_refused():
+    """The sweep's .3 mm and the circle's .15 mm sqrt(2/50) together, and what is allowed beyond."""
+    allowed = 4 * np.hypot(0.3e-3, 0.03e-3)
+    outlined(0.999 * allowed)
+    outlined(0.999 * allowed + 1e-3, 1e-3)
+    for off, allowance in ((1.001 * allowed, 0.0), (1.001 * allowed + 1e-3, 1e-3)):
+        with pytest.raises(RegistrationError, match="mirrored image or wrong pose"):
+            outlined(off, allowance)
+    with pytest.raises(RegistrationError, match="lacks a number 'length_m'"):
+        outlined(0.0, sweep={k: v for k, v in SWEEP.items() if k != "length_m"})
