@@ -118,6 +118,22 @@ def _by_filterpy(
     return np.array(us), np.array(sds), np.array(nis)
 
 
+def test_what_a_second_adds_is_as_declared_whatever_the_step(small: System) -> None:
+    """Rms displacements by mass (1000 kg/m3 of a 0.1 m cube is 1 kg) and newtons, by hand."""
+    seen = unmeasured(small)
+    for noise, walk in (("white", 4.0 * np.eye(12)), ("load", None)):
+        settings = ReducedEKF(H, shapes=12, noise=noise, load_walk=3.0, load_sd=7.0, process=2.0)  # type: ignore[arg-type]
+        for parts in (1, 3):
+            steps = explicit_step(small, H, parts)
+            claim = shapes_covariance(settings, steps, modes(small, 12), seen)
+            second = claim.Q * parts / H
+            assert second[-1, -1] == pytest.approx(9.0)
+            assert claim.P0[-1, -1] == pytest.approx(49.0)
+            assert np.trace(second[:12, :12]) == pytest.approx(4.0 if walk is None else 48.0)
+            assert walk is None or second[:12, :12] == pytest.approx(walk)
+            assert not claim.Q[12:24, :].any()
+
+
 def test_on_truths_of_its_own_model_it_is_consistent(small: System) -> None:
     """NIS over 30 seeds x 30 measurements within the 99.9 % band of chi-square, and NEES."""
     settings = ReducedEKF(H, shapes=12, load_walk=1e-5, load_sd=1e-6, process=1e-8)

@@ -1,5 +1,6 @@
 """Clock offsets: exact truths, uncertainties over seeds, refusals with numbers, shifts shown."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -108,6 +109,17 @@ def test_ambiguous_signals_are_refused(name: str, noise: float) -> None:
     says = says.replace(" 0 N", "") if noise else says
     with pytest.raises(RecordingError, match=says):
         offset_by_correlation(signal(T, y, noise, 1), signal(T - 0.123, y, noise, 2), 2.5)
+
+
+def test_the_other_lag_of_an_ambiguous_pair_is_named() -> None:
+    """A sine of one second: the rival lies a whole number of periods from the best."""
+    y = AMBIGUOUS["sine"][0]
+    with pytest.raises(RecordingError, match="ambiguous") as told:
+        offset_by_correlation(signal(T, y, 0.05, 1), signal(T - 0.123, y, 0.05, 2), 2.5)
+    best, other = (float(x) for x in re.findall(r" at ([-+][\d.]+) s", str(told.value)))
+    periods = abs(best - other)
+    assert round(periods) >= 1
+    assert periods == pytest.approx(round(periods), abs=0.05)
 
 
 def test_unrelated_signals_and_offsets_beyond_the_search_are_refused() -> None:

@@ -11,8 +11,8 @@ import scipy.io
 
 from validate.errors import RecordingError
 from validate.recording.images.closed_path import closed_path
-from validate.recording.images.outline import Outline, extract_outline, outlines_of
-from validate.recording.images.polar import speckle_area
+from validate.recording.images.outline import Outline, _fitted, extract_outline, outlines_of
+from validate.recording.images.polar import Grey, speckle_area
 from validate.recording.images.shapes import circle_points, ellipse_points
 from validate.recording.types import Frames
 from validate.register.outline_geometry import normal_distances
@@ -173,6 +173,18 @@ def test_pure_speckle_is_refused(seed: int) -> None:
 def test_an_even_image_is_refused() -> None:
     with pytest.raises(RecordingError, match="no disc is darker than its surroundings"):
         extract_outline(np.full((64, 64), 90, np.uint8), PX)
+
+
+def test_only_what_noise_does_not_explain_is_misfit() -> None:
+    """Points .1 mm in and out of a circle: with that noise the three numbers of the fit are its sd;
+    without it the .1 mm is misfit."""
+    angle = np.deg2rad(np.arange(0, 360, 3))
+    radii = 5e-3 + 0.1e-3 * np.tile([1.0, -1.0], 60)
+    points = radii[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    grey = Grey(np.zeros((4, 4)), (1e-4, 1e-4), (2 * np.pi * 5e-3 / 400) ** 2)
+    for sd, expected in ((0.1e-3, 0.1e-3 * np.sqrt(3 / 100)), (0.0, 0.1e-3)):
+        free = Outline(points, sd, np.zeros(2), 5e-3, 1.0, 1.0, 0.0, "free")
+        assert _fitted(free, "circle", grey).sd == pytest.approx(expected, rel=0.03)
 
 
 def test_a_black_image_has_the_smallest_speckle_that_can_be() -> None:

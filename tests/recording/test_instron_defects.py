@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.exports.columns import _same
 from validate.recording.exports.instron import read_instron
 from validate.recording.exports.rows import fitted
 from validate.recording.types import Recording
@@ -244,3 +245,10 @@ def test_only_rows_that_end_early_are_told() -> None:
     some = fitted(names, [(2, ["0", "1", "a"]), (3, ["1", "2"]), (4, ["2", "3"])])
     assert some.notes == ("2 rows end early, first line 3",)
     assert [cells for _, cells in some.rows][1:] == [["1", "2", ""], ["2", "3", ""]]
+
+
+def test_columns_are_one_where_they_move_alike_or_not_at_all() -> None:
+    a = np.linspace(0.0, 2.0, 9)
+    assert _same(a, 5.0 - a)
+    assert _same(0 * a, 0 * a + 3.0)
+    assert not _same(a, 1.01 * a)
