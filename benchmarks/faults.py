@@ -190,18 +190,22 @@ def broken(fault: Fault) -> str:
 
 
 def nearest(fault: Fault, uses: Mapping[str, set[str]]) -> Iterator[str]:
-    """Test files: same name, direct imports, imports through other modules; in each ring those
-    first that say the name of what is broken."""
+    """Test files: same name, direct imports, those that import nothing of the package (they read
+    its source), imports through other modules; in each ring those first that say the name of what
+    is broken."""
     module = fault.path.removesuffix(".py").replace("/", ".")
     seen, reached = set(), {module}
     named = [f for f in uses if f.endswith(f"test_{module.rsplit('.', 1)[-1]}.py")]
     seen.update(named)
     yield from named
+    readers = [f for f, used in uses.items() if f.startswith("tests") and not used]
     for _ in range(_RINGS):
         ring = [f for f, used in uses.items() if f.startswith("tests") and used & reached]
         said = {f: (ROOT / f).read_text(encoding="utf-8").count(fault.within) for f in ring}
         yield from sorted((f for f in ring if f not in seen), key=lambda f: -said[f])
         seen.update(ring)
+        yield from (f for f in readers if f not in seen)
+        seen.update(readers)
         reached |= {f for f, used in uses.items() if f.startswith("validate.") and used & reached}
 
 

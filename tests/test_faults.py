@@ -54,9 +54,11 @@ def test_nearest_tests_come_first() -> None:
         "tests/test_uses.py": {"validate.a.b"},
         "tests/a/test_b.py": {"validate.a.b"},
         "tests/test_other.py": {"validate.d"},
+        "tests/test_reads.py": set(),
     }
     texts = dict.fromkeys(uses, "")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Path, "read_text", lambda self, encoding: texts.get(str(self), ""))
         found = list(faults.nearest(fault, uses))
-    assert found == ["tests/a/test_b.py", "tests/test_uses.py", "tests/test_far.py"]
+    told = ["tests/a/test_b.py", "tests/test_uses.py", "tests/test_reads.py", "tests/test_far.py"]
+    assert found == told
