@@ -1,7 +1,8 @@
 """Parameters of an experiment: nested frozen dataclasses whose fields carry a unit and a sentence.
 
 One grammar of paths reaches them all: `material.E`, `methods.p2_fluid.tolerance`. Values given as
-text are checked against the field's type; an unknown path is an error naming the nearest ones.
+text are checked against the field's type and unit (`15kPa`; a bare number is in SI); an unknown
+path is an error naming the nearest ones.
 """
 
 import difflib
@@ -12,6 +13,10 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from validate.errors import UsageError
+from validate.units import in_si, split
+
+# Where sizes and moduli of bodies lie, and the unit whose name is forgotten most easily.
+_PLAUSIBLE = {"Pa": (100.0, 1e9, "kPa"), "m": (1e-5, 1.0, "mm")}
 
 # Read from the recording; given in the experiment's file or by --set; the library's; or fitted.
 Origin = Literal["recorded", "entered", "default", "identified"]
@@ -92,15 +97,63 @@ def _default(settings: Any, name: str, library: Any) -> Any:
 def with_values(settings: Any, values: Mapping[str, str]) -> Any:
     """A copy with the texts parsed into the fields at their paths.
 
-    Raises `UsageError` for an unknown path (naming the nearest) or a value of another type.
+    Raises `UsageError` for an unknown path (naming the nearest), a value of another type or a unit
+    of another dimension.
     """
     for path, text in values.items():
-        names = _resolved(settings, path.split("."))
-        if names is None:
-            known = {p.path for p in describe(settings)}
-            raise UsageError(f"unknown parameter '{path}'; {_nearest(path, known)}")
-        settings = _set(settings, names, path, text)
+        settings = _set(settings, _names(settings, path), path, text)
     return settings
+
+
+def doubts(settings: Any, values: Mapping[str, str]) -> tuple[str, ...]:
+    """A line for each path with a bare number so far off that its unit may have been forgotten.
+
+    Only of fields whose default lies where such values do; a value that says its unit is meant.
+    Raises what `with_values` does.
+    """
+    with_values(settings, values)
+    asked = (_doubt(path, text, *_leaf(settings, _names(settings, path)))
+             for path, text in values.items())  # fmt: skip
+    return tuple(line for line in asked if line)
+
+
+def _doubt(path: str, text: str, unit: str, default: Any) -> str:
+    if unit not in _PLAUSIBLE:
+        return ""
+    low, high, short = _PLAUSIBLE[unit]
+    usual = default if isinstance(default, tuple) else (default,)
+    odd = [v for v in map(_bare, text.split(",")) if v > 0 and not low <= v <= high]
+    if not odd or not all(v is None or low <= v <= high for v in usual):
+        return ""
+    near = low <= (in_si(odd[0], short, unit) or 0.0) <= high
+    meant = f"a factor 1000? {path}=" if near else f"with its unit it is taken: {path}="
+    return (
+        f"{path}={text}: {odd[0]:g} {unit} is outside {low:g} to {high:g} {unit} (default "
+        f"{_plain(default)}); {meant}{odd[0]:g}{short if near else unit}"
+    )
+
+
+def _bare(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _leaf(settings: Any, names: list[str]) -> tuple[str, Any]:
+    """Unit and value at the end of a resolved way."""
+    for name in names[:-1]:
+        settings = settings[name] if isinstance(settings, Mapping) else getattr(settings, name)
+    found = {name: (meta.get("unit", "1"), value) for name, value, _, meta in _members(settings)}
+    return found[names[-1]]
+
+
+def _names(settings: Any, path: str) -> list[str]:
+    names = _resolved(settings, path.split("."))
+    if names is None:
+        known = {p.path for p in describe(settings)}
+        raise UsageError(f"unknown parameter '{path}'; {_nearest(path, known)}")
+    return names
 
 
 def _resolved(settings: Any, names: list[str]) -> list[str] | None:
@@ -165,36 +218,52 @@ def _set(settings: Any, names: list[str], path: str, text: str) -> Any:
     if rest:
         value = _set(inner, rest, path, text)
     else:
-        value = _parse(get_type_hints(type(settings))[head], path, text)
+        unit, _ = _leaf(settings, names)
+        value = _parse(get_type_hints(type(settings))[head], path, text, unit)
     if isinstance(settings, Mapping):
         return types.MappingProxyType({**settings, head: value})
     return replace(settings, **{head: value})
 
 
-def _parse(hint: Any, path: str, text: str) -> Any:
+def _parse(hint: Any, path: str, text: str, unit: str) -> Any:
     if get_origin(hint) in (Union, types.UnionType):
         options = [a for a in get_args(hint) if a is not type(None)]
-        return None if text.lower() in ("none", "null") else _parse(options[0], path, text)
+        return None if text.lower() in ("none", "null") else _parse(options[0], path, text, unit)
     if get_origin(hint) is Literal:
         choices = {str(choice): choice for choice in get_args(hint)}
         if text not in choices:
             raise UsageError(f"{path}={text}: one of {', '.join(choices)}")
         return choices[text]
     if get_origin(hint) is tuple:
-        return tuple(_parse(get_args(hint)[0], path, part) for part in text.split(","))
+        parts = text.split(",")
+        if len({bool(found[1]) for found in map(split, parts) if found}) > 1:
+            raise UsageError(f"{path}={text}: all in {unit} without unit, or each with its own")
+        return tuple(_parse(get_args(hint)[0], path, part, unit) for part in parts)
     if hint is bool:
         if text.lower() not in ("true", "false"):
             raise UsageError(f"{path}={text}: true or false")
         return text.lower() == "true"
-    return _number(hint, path, text) if hint in (int, float) else text
+    if hint is int:
+        return _whole(path, text)
+    return _number(path, text, unit) if hint is float else text
 
 
-def _number(hint: type[int] | type[float], path: str, text: str) -> int | float:
+def _whole(path: str, text: str) -> int:
     try:
-        value = hint(text)
+        return int(text)
     except ValueError:
-        kind = "a whole number" if hint is int else "a number in SI units"
-        raise UsageError(f"{path}={text}: not {kind}") from None
+        raise UsageError(f"{path}={text}: not a whole number") from None
+
+
+def _number(path: str, text: str, unit: str) -> float:
+    """In SI: a bare number, or one with a unit of the field's dimension."""
+    given = split(text)
+    value = in_si(given[0], given[1] or unit, unit) if given else _bare(text)
+    if value is None:
+        expected = "a number without unit, or %" if unit == "1" else f"{unit}, or a unit like it"
+        raise UsageError(f"{path}={text}: expected {expected}")
+    if given is None and math.isnan(value) and text.strip().lower() != "nan":
+        raise UsageError(f"{path}={text}: not a number, in {unit} or with a unit like it")
     if not math.isfinite(value):
         raise UsageError(f"{path}={text}: not finite")
     return value

@@ -1,8 +1,9 @@
-"""Units as foreign files write them, turned into SI factors. The only file that imports pint.
+"""Units as files and users write them, turned into SI. The only file that imports pint.
 
 Pint is imported when the first unit is read: the import costs more than reading a small file.
 """
 
+import math
 import re
 import unicodedata
 from functools import cache
@@ -37,11 +38,14 @@ _SPELLED = {
     "msec": "millisecond",
     "PSI": "psi",
 }
+_OWN = ("px", "dB")  # a library's are others: its pixel is 1/96 inch
 _WHOLE = {
     '"': "in", "牛": "N", "牛顿": "N", "千牛": "kN", "毫米": "mm", "厘米": "cm", "米": "m",
     "秒": "s", "毫秒": "ms", "兆帕": "MPa", "千帕": "kPa", "帕": "Pa", "公斤力": "kgf",
     "Н": "N", "кН": "kN", "мм": "mm", "с": "s", "сек": "s", "МПа": "MPa", "кПа": "kPa",
 }  # fmt: skip
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 # A product of powers and nothing else: text from a file is never given to a parser unchecked.
 _FACTOR = r"[A-Za-z]{1,12}(?:\^-?[1-4])?"
@@ -64,6 +68,39 @@ def si_factor(unit: str, quantity: str) -> float:
             f"unit '{unit}' is no unit of {quantity}: {meant}; examples: {_EXAMPLES[quantity]}"
         )
     return factor
+
+
+def split(text: str) -> tuple[float, str] | None:
+    """Number and unit of a text as `15kPa` ("" without); None for one that begins otherwise."""
+    found = _QUANTITY.fullmatch(text)
+    return (float(found[1]), found[2]) if found else None
+
+
+def in_si(number: float, unit: str, si_unit: str) -> float | None:
+    """`number` of `unit` in `si_unit`, e.g. (9.0, "mm", "m") -> 0.009; None for another dimension.
+
+    `si_unit` is "1" for none (then `unit` may be %) or any product of powers, as "kg/m3".
+    """
+    if unit == si_unit:
+        return number
+    if si_unit in _OWN or unit in _OWN:
+        return None
+    if si_unit == "1":
+        factor = _NUMBERS.get(unit) if unit in ("%", "percent") else None
+    else:
+        text = _spelling(unit)
+        known = _PRODUCT.fullmatch(text) is not None
+        factor = _convert(text, _spelling(si_unit)) if known else None
+    return None if factor is None else _times(number, factor)
+
+
+def _times(number: float, factor: float) -> float:
+    """Decimal steps give the number that would have been written: 9 mm are 0.009 m to the last bit,
+    9 * 0.001 are not."""
+    whole, parts = round(factor), round(1 / factor)
+    if parts > 1 and math.isclose(parts * factor, 1, rel_tol=1e-12):
+        return number / parts
+    return number * (whole if math.isclose(whole, factor, rel_tol=1e-12) else factor)
 
 
 def is_unit(text: str) -> bool:
@@ -119,11 +156,11 @@ def _convert(text: str, target: str) -> float | None:
     try:
         found = registry.parse_units(text.replace("·", "*").replace(".", "*"))
         wanted = registry.parse_units(target)
+        if found.dimensionality != wanted.dimensionality:
+            return None
+        return float(registry.Quantity(1.0, found).to(wanted).magnitude)
     except (pint.errors.PintError, ValueError, AttributeError):
         return None
-    if found.dimensionality != wanted.dimensionality:
-        return None
-    return float(registry.Quantity(1.0, found).to(wanted).magnitude)
 
 
 @cache

@@ -218,6 +218,30 @@ def test_png_stack_is_sorted_by_number(tmp_path: Path) -> None:
         assert np.array_equal(a, b)
 
 
+@pytest.mark.parametrize("scale", ["0.1", "8", "1e-7", "1e999"])
+def test_a_pixel_beyond_reason_is_asked_back(tmp_path: Path, scale: str) -> None:
+    (tmp_path / "1.png").write_bytes(encode_png(IMAGES[0]))
+    with pytest.raises(UsageError, match=f"m_per_px={scale}: .* outside 1e-06 to 0.01 m; mm or um"):
+        read_png_stack(tmp_path, {"m_per_px": scale, "rate": "1"})
+
+
+@pytest.mark.parametrize(
+    ("scale", "side"), [("0.1mm", 1e-4), ("0.3 um", 3e-7), ("0.02m", 0.02), ("0.01", 0.01)]
+)
+def test_a_pixel_may_say_its_unit_and_is_taken_then(
+    tmp_path: Path, scale: str, side: float
+) -> None:
+    (tmp_path / "1.png").write_bytes(encode_png(IMAGES[0]))
+    got = read_png_stack(tmp_path, {"m_per_px": scale, "rate": "1"})
+    assert got.frame("images").m_per_px == (side, side)
+
+
+@pytest.mark.parametrize("scale", ["0", "-1mm", "1kPa", "small"])
+def test_a_pixel_is_a_length_above_zero(tmp_path: Path, scale: str) -> None:
+    with pytest.raises(UsageError, match="expected a length above 0"):
+        read_png_stack(tmp_path, {"m_per_px": scale, "rate": "1"})
+
+
 def test_png_stacks_that_cannot_be_ordered_or_timed_are_refused(tmp_path: Path) -> None:
     options = {**SCALE, "rate": "1"}
     with pytest.raises(RecordingError, match=r"no \*.png files"):

@@ -1,16 +1,18 @@
 """The inspection of our own files and of files with every defect."""
 
 import json
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.writer import IndexType
 from mcap_samples import T0, markers_json, sample_recording, signal_json, write_foreign
 
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
+from validate.recording.types import Frames
 
 MS = 1_000_000
 
@@ -43,6 +45,15 @@ def test_a_sound_recording_has_topics_units_and_no_defects(tmp_path: Path) -> No
     }
     outline = got.topics[-1]
     assert (outline.first_ns, outline.last_ns) == (T0 + 10 * MS, T0 + 20 * MS)
+
+
+@pytest.mark.parametrize("side", [0.1, 1e-4])
+def test_a_pixel_beyond_reason_is_a_defect(tmp_path: Path, side: float) -> None:
+    image = np.zeros((4, 5), np.uint8)
+    frames = Frames(np.array([0.0]), (image,), (side, 1e-4), np.eye(4), "probe")
+    write_recording(replace(sample_recording(), frames={"/us": frames}), tmp_path / "a.mcap")
+    odd = "'/us': 0.1 x 0.0001 m a pixel is outside 1e-06 to 0.01 m"
+    assert inspect_recording(tmp_path / "a.mcap").defects == ((odd,) if side == 0.1 else ())
 
 
 def test_an_inspection_is_frozen_and_plain_json(tmp_path: Path) -> None:

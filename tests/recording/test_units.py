@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from validate.errors import RecordingError
-from validate.units import is_unit, si_factor
+from validate.units import in_si, is_unit, si_factor, split
 
 EXACT = [
     ("N", "force", 1.0),
@@ -72,3 +72,40 @@ def test_pint_is_imported_only_when_a_unit_is_read() -> None:
     code = "import sys, validate.recording.exports.instron; print('pint' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(
+    ("number", "unit", "si_unit", "value"),
+    [
+        (9.0, "mm", "m", 0.009),
+        (15.2, "kPa", "Pa", 15200.0),
+        (1.1, "g/cm^3", "kg/m3", 1100.0),
+        (7.0, "um", "m", 7e-6),
+        (5.0, "%", "1", 0.05),
+        (3.0, "kHz", "1/s", 3000.0),
+        (4.0, "N/s^0.5", "N/s^0.5", 4.0),
+        (2.0, "dB", "dB", 2.0),
+    ],
+)
+def test_a_value_is_the_number_that_would_be_written_in_si(
+    number: float, unit: str, si_unit: str, value: float
+) -> None:
+    assert in_si(number, unit, si_unit) == value
+
+
+@pytest.mark.parametrize(
+    ("unit", "si_unit"),
+    [("mm", "Pa"), ("kPa", "1"), ("dB/cm", "m"), ("mm", "px"), ("px", "m"), ("m", "N/s^0.5"),
+     ("furlongs", "Pa"), ("__class__", "m"), ("m**9", "m")],
+)  # fmt: skip
+def test_another_dimension_or_an_unknown_unit_has_no_value(unit: str, si_unit: str) -> None:
+    assert in_si(1.0, unit, si_unit) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [("15kPa", (15.0, "kPa")), (" -1.5e-3 m ", (-1.5e-3, "m")), (".5", (0.5, "")), ("soft", None),
+     ("", None), ("kPa15", None)],
+)  # fmt: skip
+def test_number_and_unit_of_a_text(text: str, parts: tuple[float, str] | None) -> None:
+    assert split(text) == parts

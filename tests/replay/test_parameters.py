@@ -6,7 +6,7 @@ from typing import Literal
 import pytest
 
 from validate.errors import UsageError
-from validate.parameters import describe, quantity, with_values
+from validate.parameters import describe, doubts, quantity, with_values
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class Outer:
     inner: Inner = Inner()
     loads: tuple[float, ...] = quantity((1.0, 2.0), "m", "loads")
     on: bool = quantity(True, "1", "switch")
+    share: float = quantity(0.1, "1", "share")
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ def test_every_leaf_is_described_with_its_unit() -> None:
         "x.inner.maybe": ("float | None", "m", None),
         "x.loads": ("tuple[float, ...]", "m", [1.0, 2.0]),
         "x.on": ("bool", "1", True),
+        "x.share": ("float", "1", 0.1),
     }
 
 
@@ -73,8 +75,54 @@ def test_values_are_parsed_by_type_and_the_original_stays() -> None:
         ("inner.kind", "c", "one of a, b"),
         ("on", "yes", "true or false"),
         ("loads", "1,x", "not a number"),
+        ("loads", "3,6,9mm", "all in m without unit, or each with its own"),
+        ("loads", "3mm,6kPa", "loads=6kPa: expected m"),
+        ("inner.E", "15mm", "inner.E=15mm: expected Pa"),
+        ("inner.E", "15 furlong Pa", "expected Pa"),
+        ("inner.E", "1e999kPa", "not finite"),
+        ("inner.n", "3mm", "whole number"),
+        ("share", "3mm", "without unit, or %"),
     ],
 )
 def test_wrong_values_are_refused_with_the_reason(path: str, text: str, says: str) -> None:
     with pytest.raises(UsageError, match=says):
         with_values(Outer(), {path: text})
+
+
+def test_a_value_may_carry_its_unit_and_is_the_number_that_would_be_written() -> None:
+    given = {
+        "inner.E": "15.2kPa",
+        "inner.maybe": " 9 mm",
+        "loads": "3mm,0.6cm,9e3um",
+        "share": "5%",
+    }
+    after = with_values(Outer(), given)
+    assert after == Outer(Inner(15200.0, maybe=0.009), (0.003, 0.006, 0.009), share=0.05)
+
+
+@dataclass(frozen=True)
+class Gel:
+    E: float = quantity(15200.0, "Pa", "modulus")
+    noise: float = quantity(10.0, "Pa", "of a pressure, below every modulus")
+    radius: float | None = quantity(None, "m", "radius")
+    loads: tuple[float, ...] = quantity((0.003, 0.006), "m", "loads")
+    mesh: float = quantity(2.0, "1", "no unit")
+
+
+def test_a_bare_number_a_thousand_off_is_asked_about() -> None:
+    said = doubts({"gel": Gel()}, {"gel.E": "15.2", "gel.radius": "8", "gel.loads": "0.003,6"})
+    assert [line.partition("; ")[2] for line in said] == [
+        "a factor 1000? gel.E=15.2kPa",
+        "a factor 1000? gel.radius=8mm",
+        "a factor 1000? gel.loads=6mm",
+    ]
+    assert said[0].startswith("gel.E=15.2: 15.2 Pa is outside 100 to 1e+09 Pa (default 15200.0)")
+    assert doubts(Gel(), {"E": "2e10"})[0].endswith("; with its unit it is taken: E=2e+10Pa")
+
+
+@pytest.mark.parametrize(
+    "value", ["E=15200", "E=15.2Pa", "E=-1", "noise=1", "radius=0.5", "mesh=2000"]
+)
+def test_a_plausible_value_or_one_with_its_unit_is_not_asked_about(value: str) -> None:
+    path, _, text = value.partition("=")
+    assert doubts(Gel(), {path: text}) == ()

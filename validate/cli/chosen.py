@@ -1,6 +1,6 @@
-"""One command over several experiments: each ends for itself."""
+"""Experiments of a command, each of which ends for itself, and what is odd about their values."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from validate.catalogue import experiment_files
@@ -8,6 +8,7 @@ from validate.cli.arguments import BAD_INPUT, FAILED, OK, complain
 from validate.errors import ValidateError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, load_file
+from validate.replay.options import doubtful
 
 
 def each(names: tuple[str, ...], named: tuple[Path, ...], do: Callable[[Experiment], bool]) -> int:
@@ -19,6 +20,12 @@ def each(names: tuple[str, ...], named: tuple[Path, ...], do: Callable[[Experime
     start = Path.cwd()
     chosen: Iterable[Experiment | Path] = [find(n, start, named) for n in names]
     return max(_code(do, e) for e in chosen or experiment_files(start, named).values())
+
+
+def ask_about(experiment: Experiment, values: Mapping[str, str]) -> None:
+    """A line on standard error for each value that looks like one whose unit was forgotten."""
+    for line in doubtful(experiment, values):
+        complain(line)
 
 
 def _code(do: Callable[[Experiment], bool], one: Experiment | Path) -> int:

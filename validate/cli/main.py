@@ -218,7 +218,7 @@ def inspect(file: Path, as_json: bool) -> None:
     metavar="ROLE=COLUMN[:UNIT][:-]",
     help="Overrides: column, unit, sign of time, displacement, force; specimen=2; encoding=cp1250.",
 )
-@click.option("--m-per-px", type=float, help="png-stack: size of a pixel, m.")
+@click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
 @click.option("--rate", type=float, help="png-stack: images a second, Hz.")
 @click.option("--topic", help="png-stack: its topic (default: images).")
 def import_(

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from validate.cli.arguments import pairs
+from validate.cli.chosen import ask_about
 from validate.cli.display import progress
 from validate.cli.recordings import written as say
 from validate.errors import UsageError
@@ -20,7 +21,9 @@ def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...
     twin = experiment.twin
     if twin is None:
         raise UsageError(f"experiment '{name}' has no synthetic recording; its data are measured")
-    parameters = with_values(experiment.parameters, pairs(values, "--set"))
+    given = pairs(values, "--set")
+    parameters = with_values(experiment.parameters, given)
+    ask_about(experiment, given)
     with progress(f"record {name}") as bar:
         done = iter(range(10))
         made = twin.record(parameters, lambda text: bar(next(done), 3, text))

@@ -5,7 +5,7 @@ from pathlib import Path
 from time import perf_counter
 
 from validate.cli.arguments import pairs
-from validate.cli.chosen import each
+from validate.cli.chosen import ask_about, each
 from validate.cli.display import (
     console,
     error_shown,
@@ -45,6 +45,7 @@ def run(
 def _one(experiment: Experiment, options: Options, out: Path | None, as_json: bool) -> bool:
     start = perf_counter()
     reports = out or root_of(experiment, Path.cwd()) / "reports"
+    ask_about(experiment, options.values)
     with progress(experiment.name) as report:
         result = compare(experiment, options, report)
         report(1, 1, "report")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.arguments import FAILED, OK, pairs
+from validate.cli.chosen import ask_about
 from validate.cli.display import console, progress, relative, table
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
@@ -63,9 +64,11 @@ def filters(
     """Ranks filters; 0."""
     experiment = find(name, Path.cwd(), common.named)
     chosen = tuple(m.strip() for m in methods.split(",") if m.strip())
+    given = pairs(values, "--set")
+    ask_about(experiment, given)
     with _running(experiment, "filters", "filters", common) as report:
         found = study(
-            experiment, sweeps, methods=chosen, values=pairs(values, "--set"),
+            experiment, sweeps, methods=chosen, values=given,
             seeds=seeds_of(seeds), by=by, quick=common.quick, out=common.out, where=common.where,
             report=report,
         )  # fmt: skip

@@ -23,7 +23,7 @@ from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIR
 from validate.recording.mcap.streams import Collected, fill, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.readers import READERS
-from validate.recording.types import Clock, Source
+from validate.recording.types import Clock, Frames, Source, odd_scale
 
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
 _KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours", IMAGE: "frames"}
@@ -174,10 +174,11 @@ def _content(verified: Verified, raw: Collected | None) -> tuple[Ints | None, li
         stamps = raw.stamps_ns
         if len(raw.samples) != len(raw.publish_ns):
             return None, []  # stopped at a limit, which the file's defects name
-        stream_of(raw, int(raw.times_ns.min()), by_name(verified.metadata))
+        stream = stream_of(raw, int(raw.times_ns.min()), by_name(verified.metadata))
     except RecordingError as error:
         return stamps, [str(error)]
-    return stamps, []
+    odd = odd_scale(stream.m_per_px) if isinstance(stream, Frames) else ""
+    return stamps, [f"{raw.channel.topic!r}: {odd}"] if odd else []
 
 
 def _file_defects(verified: Verified) -> list[str]:

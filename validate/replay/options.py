@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.errors import ComparisonError, UsageError
-from validate.parameters import nearest_names, with_values
+from validate.parameters import doubts, nearest_names, with_values
 from validate.replay.experiment import Experiment
 from validate.replay.method import Method
 
@@ -29,7 +29,7 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
         if name not in known:
             raise UsageError(f"unknown method '{name}'; {nearest_names(name, known)}")
     parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
-    mine = {k: v for k, v in options.values.items() if not k.startswith("methods.")}
+    mine, _ = _split(options.values)
     methods = all_methods(experiment, options)
     chosen = options.methods or tuple(methods)
     return with_values(parameters, mine), {name: methods[name] for name in chosen}
@@ -37,8 +37,19 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
 
 def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
     """Every method with the user's values, whether it is run or not: what identifies follows."""
-    theirs = {k[8:]: v for k, v in options.values.items() if k.startswith("methods.")}
-    return dict(with_values(experiment.methods, theirs))
+    return dict(with_values(experiment.methods, _split(options.values)[1]))
+
+
+def doubtful(experiment: Experiment, values: Mapping[str, str]) -> tuple[str, ...]:
+    """A line for each value that looks like one whose unit was forgotten."""
+    mine, theirs = _split(values)
+    return (*doubts(experiment.parameters, mine), *doubts(experiment.methods, theirs))
+
+
+def _split(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
+    """Those of the parameters, and those of the methods without that word."""
+    mine = {k: v for k, v in values.items() if not k.startswith("methods.")}
+    return mine, {k[8:]: v for k, v in values.items() if k.startswith("methods.")}
 
 
 def folder_of(experiment: Experiment) -> Path:

@@ -10,7 +10,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.reader import Options, Reader, require_known
-from validate.recording.types import Frames, Recording, Source
+from validate.recording.types import Frames, Recording, Source, odd_scale
+from validate.units import in_si, split
 
 MAX_STACK = 400 * 2**20  # bytes of all images of one stack
 MAX_FILE = 64 * 2**20  # bytes of one PNG
@@ -20,16 +21,17 @@ _OPTIONS = ("m_per_px", "rate", "topic")
 def read_png_stack(folder: Path, options: Options) -> Recording:
     """All *.png of a folder as one stream of frames, in the order of the numbers in their names.
 
-    Options are `m_per_px` (m), `rate` (Hz) and `topic` (default images). Frames are in the image's
-    own metres, x right, y down. Raises `UsageError` without size or rate and for what is no folder,
-    `RecordingError`: no files, equal numbers, damaged images, sizes that differ, over `MAX_STACK`.
+    Options are `m_per_px` (m, or with its unit), `rate` (Hz) and `topic` (default images). Frames
+    are in the image's own metres, x right, y down. Raises `UsageError` without size or rate, for a
+    pixel beyond reason and for what is no folder, `RecordingError`: no files, equal numbers,
+    damaged images, sizes that differ, over `MAX_STACK`.
     """
     require_known(options, _OPTIONS)
     if not {"m_per_px", "rate"} <= options.keys():
         raise UsageError("png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10")
-    side, rate = (_above_zero(options, key) for key in ("m_per_px", "rate"))
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder of PNG images")
+    side, rate = _pixel(options["m_per_px"]), _above_zero(options, "rate")
     images = _images(folder)
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
@@ -43,6 +45,17 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         clock={topic: clock_of(topic, None, ns, ns)},
         metadata={"provenance": made},
     )
+
+
+def _pixel(text: str) -> float:
+    """Side of a pixel, m; a bare number beyond reason is asked back, one with its unit is meant."""
+    number, unit = split(text) or (0.0, "")
+    side = in_si(number, unit or "m", "m")
+    if side is None or side <= 0:
+        raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
+    if not unit and (odd := odd_scale((side, side))):
+        raise UsageError(f"m_per_px={text}: {odd}; mm or um? with its unit it is taken")
+    return side
 
 
 def _above_zero(options: Options, key: str) -> float:
