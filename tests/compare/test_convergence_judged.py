@@ -140,3 +140,14 @@ def test_words_say_what_was_found() -> None:
     found = convergence(H, scalars(H, 2.0), 2, 2.0)
     assert found.words == "monotone over 4 sizes, order 2 of formal 2, safety 1.25"
     assert isinstance(found, GridConvergence)
+
+
+def test_answers_that_differ_by_rounding_need_no_factor() -> None:
+    """The largest difference is the uncertainty; just above the rounding an order is sought."""
+    answers = [np.array([[5.0 + x]]) for x in (3e-9, 0.0, -1e-9)]
+    found = convergence((2.0, 1.0, 0.5), answers, 1, 2.0, rounding=3.1e-9)
+    assert (found.conduct, found.safety, found.order) == ("at rounding", 1.0, None)
+    assert found.u == found.range == pytest.approx(3e-9, rel=1e-6)
+    assert found.deciding(1e-3) == 1.0
+    above = convergence((2.0, 1.0, 0.5), answers, 1, 2.0, rounding=2.9e-9)
+    assert above.conduct != "at rounding"

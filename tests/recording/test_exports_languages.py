@@ -179,3 +179,8 @@ def test_a_signal_that_does_not_move_takes_the_others_sign(still: str, tmp_path:
     names = "Time (s),Extension (mm),Load (N)\n"
     for sign in (1, -1):
         assert_test(read(tmp_path, names + rows(d=sign * d, f=sign * f)), d, f)
+
+
+def test_quotes_may_follow_a_blank(tmp_path: Path) -> None:
+    names = '"Time (s)", "Extension (mm)", "Load (N)"\n'
+    assert_test(read(tmp_path, names + rows(", ", lambda x: f'"{comma(x)}"')))

@@ -16,7 +16,7 @@ from engine_samples import Waited, Waiting, logged, waiting
 from validate.errors import UsageError
 from validate.study import engine
 from validate.study.engine import finish
-from validate.study.job import Where
+from validate.study.job import Where, file_sha256
 from validate.study.store import Record, key_of, read_records, write_record
 
 HERE = Where(workers=0)
@@ -169,3 +169,15 @@ def test_a_scheduler_that_is_not_there_is_one_line(
         )  # fmt: skip
     with pytest.raises(UsageError, match="--workers -1"):
         finish(waiting(tmp_path, (Waiting("a"),)), tmp_path / "cells", Where(workers=-1))
+
+
+def test_a_file_that_the_experiment_names_is_part_of_it_and_no_other(tmp_path: Path) -> None:
+    files = {name: tmp_path / f"{name}.py" for name in ("mine", "helper", "stranger")}
+    for path in files.values():
+        path.write_text("", encoding="utf-8")
+    files["mine"].write_text("import helper", encoding="utf-8")
+    first = file_sha256(files["mine"])
+    files["stranger"].write_text("x = 1", encoding="utf-8")
+    assert file_sha256(files["mine"]) == first
+    files["helper"].write_text("x = 1", encoding="utf-8")
+    assert file_sha256(files["mine"]) != first

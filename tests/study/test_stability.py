@@ -40,6 +40,8 @@ from validate.study.stability_cell import (
     run_cell,
 )
 from validate.study.stability_plan import (
+    _PAIR_NU,
+    NU,
     StabilityCell,
     drift_variant,
     stability_cells,
@@ -412,6 +414,7 @@ def test_regimes_by_radius_and_by_turn(needle: Stepped) -> None:
 
 
 def test_grids_span_what_was_asked_for() -> None:
+    assert all(0 <= nu < 0.5 for nu in (*NU, *_PAIR_NU))
     steps = step_grid(0.002)
     assert steps[-1] / steps[0] == pytest.approx(1e6)
     assert steps[len(steps) // 2] == pytest.approx(0.002)
