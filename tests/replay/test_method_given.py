@@ -18,6 +18,6 @@ def test_a_wider_specimen_is_as_much_stiffer_as_its_area_is_larger() -> None:
     methods = {"slip": pressed("slip")}
     made = compression("c", "", "", card, methods, ("slip",), (Accept("force", 1.0, ""),))
     assert made.uncertainty is not None
-    inputs = {i.name: i.change(card).material.E for i in made.uncertainty.inputs}
+    inputs = {i.name: i.by(1.0)(card).material.E for i in made.uncertainty.inputs}
     assert inputs["diameter"] == pytest.approx(10e3 * 1.1**2)
     assert inputs["modulus"] == pytest.approx(10e3 * 1.05)

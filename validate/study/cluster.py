@@ -20,7 +20,7 @@ TASK_S = 0.5  # s of work in one task: a kill loses so much, and Dask's 2 ms a t
 CONNECT_S = 10.0  # s until a scheduler counts as absent
 _AHEAD = 2  # tasks a worker: one that runs and one that waits
 # One thread each: two workers with two BLAS threads would only stand in each other's way.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _dask: Any = distributed  # its calls carry no annotations
 
@@ -64,7 +64,9 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
             yield client
         return
     settings = {
-        "distributed.nanny.pre-spawn-environ": dict.fromkeys(_THREADS, "1"),
+        "distributed.nanny.pre-spawn-environ": dict.fromkeys(_BLAS_THREADS, "1"),
+        # In the workers only: numba rereads its own settings, and a process keeps to its first.
+        "distributed.nanny.environ": {"NUMBA_NUM_THREADS": "1"},
         "distributed.admin.system-monitor.gil.enabled": False,
     }
     with dask.config.set(settings):
