@@ -185,11 +185,12 @@ def test_the_recordings_are_what_the_twin_records(cone: Experiment) -> None:
 @pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     """Locking at nu .4995 is ours; an earlier study has .855 and .460 at .49 and .499 on its mesh
-    with slipping plates, ours are bonded."""
+    with slipping plates, ours are bonded. Cones of these sizes do not converge in order (bonded
+    rims), so nothing is decided, and the mesh that would is named."""
     found = whole("ekf_cone")
-    assert found.passed
-    assert len(found.checks) == 3
-    assert all(c.u_num > 0 and c.u_input > 0 for c in found.checks)
+    assert (found.overall.word, found.passed) == ("undecided", False)
+    assert [c.verdict for c in found.checks] == 3 * ["cannot decide"]
+    assert all("not asymptotic; cells of " in c.why and c.u_input > 0 for c in found.checks)
     assert not [(p.name, p.fault) for p in found.published if p.fault]
     assert len([p for p in found.published if p.source == "Table 3"]) == 6
     shown = tables(found)
