@@ -141,7 +141,7 @@ def test_a_trade_is_told_in_numbers_that_are_finite(measured: Trade) -> None:
 @pytest.fixture
 def commanded(measured: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command line's trade is the one above."""
-    monkeypatch.setattr(studying, "find", lambda name, start: measured.experiment)
+    monkeypatch.setattr(studying, "find", lambda *_: measured.experiment)
     monkeypatch.setattr(studying, "trade", lambda experiment, **rest: measured)
 
 
@@ -218,3 +218,16 @@ def test_principal_strains_of_a_stretched_block() -> None:
 def test_steps_must_land_on_frames() -> None:
     with pytest.raises(SceneError, match="do not land on the frames"):
         replace(small(), steps=(0.03,))
+
+
+def test_elements_that_lock_are_named(measured: Trade) -> None:
+    def stiff(element: str, level: int, law: LawName) -> Scene:
+        scene = block(element, level, law)
+        return replace(scene, material=replace(scene.material, nu=0.499))
+
+    assert measured.locking == ()
+    found = replace(measured, trial=replace(measured.trial, build=stiff))
+    (warning,) = found.locking
+    assert warning.startswith("nu = 0.499: linear tetrahedra lock")
+    assert warning.endswith("(P1)")
+    assert warning in trade_exhibits(found)[0].words

@@ -1,6 +1,6 @@
 """`validate study filters|stability|tradeoff|choose`: runs, writes the folder, prints."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -242,11 +242,18 @@ def _show_trade(found: Trade) -> None:
     for by in ("error", "total"):
         if off := found.front(by).dominated:
             screen.print(f"dominated ({by}): {'; '.join(off)}", soft_wrap=True)
+    _warn(found.locking)
     screen.print(f"\n{trade_page.sentence(found)}", soft_wrap=True)
+
+
+def _warn(warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        console().print(f"warning: {warning}", style="yellow", markup=False, soft_wrap=True)
 
 
 def _show_choice(choice: Choice) -> None:
     screen = console()
+    _warn(choice.trade.locking)
     rows = [[f.name, f.value, f.means] for f in choice.facts]
     screen.print(table("The scene's own numbers", ("what", "value", "asks for"), rows))
     rows = []

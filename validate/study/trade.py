@@ -10,6 +10,7 @@ from pathlib import Path
 
 from validate.arrays import Floats, rms
 from validate.errors import ComparisonError
+from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.ladder import Rival, Trial
@@ -139,6 +140,15 @@ class Trade:
     def law_error(self) -> float | None:
         """Rms length m of what large strain changes."""
         return None if self.gap is None else rms(self.gap)
+
+    @property
+    def locking(self) -> tuple[str, ...]:
+        """Which elements lock on their coarsest mesh, and how to see it."""
+        trial = self.trial
+        return locking_notes(
+            (element, trial.build(element, levels[0], "linear"))
+            for element, levels in trial.meshes.items()
+        )
 
     def front(self, by: str = "error") -> ParetoFront:
         """The Pareto front of `by` ("error" or "total") against time per step."""

@@ -64,7 +64,7 @@ def _front_exhibit(trade: Trade) -> Exhibit:
         _TIMES,
     ]
     words += [s for by in _NAMES for s in _dominated(trade.front(by))]
-    words += list(scene.notes)
+    words += [*scene.notes, *trade.locking]
     fronts = [trade.front(by) for by in _NAMES]
     return Exhibit(
         "front", "Error against time per step", tuple(words),
