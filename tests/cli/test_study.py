@@ -3,6 +3,7 @@
 import csv
 import json
 import shlex
+from contextlib import chdir
 from pathlib import Path
 
 import jsonschema
@@ -24,7 +25,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the experiment and its finished study."""
     folder = tmp_path_factory.mktemp("study")
     arguments = ["study", "filters", str(experiment_file(folder)), *SWEEPS, "--seeds", "3"]
-    assert run([*arguments, "--workers", "1"]) == 0
+    with chdir(folder):
+        assert run([*arguments, "--workers", "1"]) == 0
     return folder
 
 
@@ -81,6 +83,7 @@ def test_the_best_line_decides_and_names_what_decides(
 def test_a_finished_study_is_not_run_again(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.chdir(made)
     monkeypatch.setattr("validate.study.cluster._client", None)  # no cluster is started
     file = str(made / "experiments" / "pulled.py")
     assert run(["study", "filters", file, *SWEEPS, "--seeds", "3", "--json"]) == 0
@@ -91,6 +94,7 @@ def test_a_finished_study_is_not_run_again(
 def test_bad_input_is_one_line(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.chdir(made)
     monkeypatch.setattr("validate.study.cluster.CONNECT_S", 0.5)
     file = str(made / "experiments" / "pulled.py")
     for arguments, said in (
