@@ -24,12 +24,15 @@ from validate.replay.road import compare
 
 ROOT = Path(__file__).resolve().parents[1]
 LONG_RUNS = ("phantom_result", "whole")
+LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         shared = next((name for name in LONG_RUNS if name in item.fixturenames), "")
+        if LONG & set(item.fixturenames):
+            item.add_marker(pytest.mark.slow)
         if item.get_closest_marker("xdist_group") is None:
             item.add_marker(pytest.mark.xdist_group(shared or item.path.name))
     items.sort(key=lambda item: not set(LONG_RUNS) & set(item.fixturenames))

@@ -102,6 +102,7 @@ def test_a_part_of_the_sizes_is_enough_where_the_recording_says_the_rest(tmp_pat
     assert result.passed
 
 
+@pytest.mark.slow
 def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) -> None:
     """What is identified follows the size, so that the checks agree all the same."""
     write_recording(log(**SIZES), tmp_path / "gel.mcap")

@@ -87,8 +87,8 @@ def error(name: LawName, order: int, dilatation: Dilatation, n: int) -> float:
 
 
 CASES = [
-    ("svk", 1, "pointwise", (3, 4, 6, 8)),
-    ("neo_hooke", 1, "pointwise", (3, 4, 6, 8)),
+    pytest.param("svk", 1, "pointwise", (3, 4, 6, 8), marks=pytest.mark.slow),
+    pytest.param("neo_hooke", 1, "pointwise", (3, 4, 6, 8), marks=pytest.mark.slow),
     ("neo_hooke", 1, "nodal_mean", (3, 4, 6, 8)),
     ("svk", 2, "pointwise", (2, 3, 4, 6)),
     ("neo_hooke", 2, "pointwise", (2, 3, 4, 6)),

@@ -137,7 +137,7 @@ def event(kind: str, t: np.ndarray) -> np.ndarray:
     return 5 * np.maximum(0, t - 3) if kind == "onset" else np.tanh((t - 5) / 0.08)
 
 
-@pytest.mark.parametrize("kind", ["onset", "step"])
+@pytest.mark.parametrize("kind", [pytest.param("onset", marks=pytest.mark.slow), "step"])
 def test_a_marked_event_to_a_tenth_of_a_sample_with_its_uncertainty(kind: str) -> None:
     errors, sds = [], []
     for seed, truth in enumerate(np.random.default_rng(5).uniform(-0.8, 0.8, SEEDS)):

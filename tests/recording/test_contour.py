@@ -61,6 +61,7 @@ def test_shapes_through_exact_points() -> None:
     assert np.linalg.norm(circle_points(c) - [0.01, 0.02], axis=1) == pytest.approx(3e-3, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [-12.0, -24.0])
 def test_eighteen_frames_meet_their_bounds(bench: ModuleType, level: float) -> None:
     """Nine frames each of low and high contrast with shadows of 0, 6 and 12 dB, no hint given."""

@@ -461,6 +461,7 @@ def test_clean_markers_raise_no_alarm():
     assert alarms <= 4
 
 
+@pytest.mark.slow
 def test_understated_noise_makes_few_outliers():
     """Judged at the noise of the markers left and the TRE; without the TRE they are 20."""
     named = 0

@@ -60,6 +60,7 @@ def test_circles_keep_an_ellipse_volume_but_not_its_surface() -> None:
     assert np.sqrt((off_surface(OVAL, exact(OVAL), "free") ** 2).mean()) < 0.05e-3
 
 
+@pytest.mark.slow
 def test_a_sweep_of_images_gives_volume_and_surface(stack: Stack) -> None:
     assert stack.empty[0] >= 1
     assert stack.empty[1] >= 1

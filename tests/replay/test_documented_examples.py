@@ -41,6 +41,7 @@ def test_readme_and_docstring_show_the_same(project_root: Path) -> None:
     assert shown[0] == shown[1]
 
 
+@pytest.mark.slow
 def test_the_example_prints_every_check(
     phantom: Experiment,
     monkeypatch: pytest.MonkeyPatch,

@@ -10,6 +10,9 @@ from validate.replay import compare, load
 COARSE = {"mesh.radial": "4", "mesh.axial": "6", "mesh.finer": "1.3"}
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def result(project_root: Path, shared_data: Path) -> Result:
     experiment = load(str(project_root / "experiments" / "ecoflex_cylinder.py"))

@@ -76,6 +76,7 @@ def words(result: Result, anchor: str) -> tuple[str, ...]:
     return next(e.words for e in result.exhibits if e.anchor == anchor)
 
 
+@pytest.mark.slow
 def test_0_15_N_is_below_the_noise_and_15_N_above(result: Result) -> None:
     recorded, small = words(result, "signal")
     assert recorded.startswith("recorded: the plate moves by 1.1")

@@ -22,7 +22,7 @@ from validate.report.loads import at_times, held, in_steps
 from validate.report.observed import driven, holds
 from validate.report.write import write_report
 
-pytestmark = pytest.mark.xdist_group("two methods of the phantom")
+pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
 BLACK = 60  # of 255; the measured points at a load are darker, between two they are not
 
 

@@ -99,6 +99,7 @@ for factor in (1.0, 2.0):
 """
 
 
+@pytest.mark.slow
 def test_renders(tmp_path: Path, project_root: Path) -> None:
     """In a process of its own: VTK keeps the window class of its first import."""
     paths = os.pathsep.join([str(project_root), str(Path(__file__).parent)])

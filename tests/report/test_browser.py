@@ -86,6 +86,7 @@ def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
     assert small_result().sentence in text
 
 
+@pytest.mark.slow
 def test_dom_of_a_result_over_time(
     browser: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

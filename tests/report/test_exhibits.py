@@ -78,11 +78,13 @@ def test_sections_that_need_loads_are_absent(made: dict[str, DrawnExhibit]) -> N
     assert not {"markers", "outlines", "curves"} & set(made)
 
 
-def test_results_without_exhibits_have_none() -> None:
+def test_results_without_exhibits_have_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
     assert list(sections(small_result()))[:2] == ["checks", "curves"]
 
 
-def test_a_failed_result_still_says_why() -> None:
+def test_a_failed_result_still_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
     failed = failed_result()
     text = unescape(page(failed, sections(failed).values(), CREATED, band(failed)))
     assert f"refused at step 0: {WHY}" in text
@@ -225,6 +227,7 @@ def test_captions_of_maps_have_units(made: dict[str, DrawnExhibit]) -> None:
     assert "Mean error along x, mm: −0.01 to 0.01" in other.caption
 
 
+@pytest.mark.slow
 def test_maps_are_rendered_where_gl_is(result: Result) -> None:
     if not gl.available():
         pytest.skip("no OpenGL")
@@ -266,7 +269,8 @@ def test_tables_and_charts_as_csv(folder: Path) -> None:
     np.testing.assert_array_equal(reference, 1e3 * swing(T))
 
 
-def test_names_must_differ(result: Result, tmp_path: Path) -> None:
+def test_names_must_differ(result: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
     twice = (*result.exhibits, replace(result.exhibits[0], anchor="again", tables=()))
     with pytest.raises(ComparisonError, match="2 charts 'displacement_node_A'; give each"):
         write_report(replace(result, exhibits=twice), tmp_path / "box", created=CREATED)

@@ -14,7 +14,7 @@ from validate.report.sections import SECTIONS, exhibits
 from validate.report.store import document, schema
 from validate.report.tables import shown as read
 
-pytestmark = pytest.mark.xdist_group("two methods of the phantom")
+pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

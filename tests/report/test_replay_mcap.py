@@ -30,7 +30,7 @@ from validate.report.foxglove_schemas import DEFINITIONS
 from validate.report.replay_mcap import tracks, views, write_replay
 from validate.scene.mesh import boundary_facets
 
-pytestmark = pytest.mark.xdist_group("two methods of the phantom")
+pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
 Messages = dict[str, list[tuple[int, Any]]]
 LOADS = ("0mm", "3mm", "6mm", "9mm")
 

@@ -65,6 +65,7 @@ def test_tables_are_si(tmp_path: Path) -> None:
     assert float(last["value"]) == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_old_report_is_replaced_whole(tmp_path: Path) -> None:
     folder = tmp_path / "cube"
     write_report(small_result(), folder, created=CREATED)

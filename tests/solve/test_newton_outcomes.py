@@ -131,6 +131,7 @@ def balloon() -> Scene:
     return Scene(mesh, Material(1e4, 0.3, "neo_hooke"), supports, (), (drive,), (cavity,))
 
 
+@pytest.mark.slow
 def test_fluid_holds_what_pressure_would_not() -> None:
     """Beyond a balloon's greatest pressure A is indefinite, yet the constrained body is stable."""
     system, found = build(balloon()), {}

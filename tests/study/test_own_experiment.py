@@ -58,6 +58,7 @@ def test_it_runs(here: Path) -> None:
     assert run(["run", "my_gel", "--methods", "slip"]) == 0
 
 
+@pytest.mark.slow
 def test_it_climbs_a_ladder_of_its_own_meshes_and_a_method_is_chosen(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
