@@ -259,7 +259,7 @@ def outcome(fault: Fault, copy: Path, uses: Mapping[str, set[str]], seconds: int
 def _failed(copy: Path) -> str:
     """The test, or the file that could not be collected, that found the fault."""
     told = (copy / "log.txt").read_text(encoding="utf-8")
-    named = re.search(r"^(?:FAILED|ERROR) (\S+)", told, re.MULTILINE)
+    named = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", told, re.MULTILINE)
     if not named:
         raise click.ClickException(f"pytest ended without a word: {told[-500:]}")
     return named[1]
