@@ -10,6 +10,7 @@ import click
 from validate import __version__
 from validate.cli.arguments import BAD_INPUT, BUG, INTERRUPTED, complain
 from validate.errors import UsageError, ValidateError
+from validate.places import of_the_place, why_not
 
 _OUT = click.Path(file_okay=False, path_type=Path)
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -46,12 +47,25 @@ def run(argv: list[str]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         return INTERRUPTED
-    except Exception:  # a bug: keep its traceback and say so by the exit code
-        import traceback
-
-        traceback.print_exc()
-        return BUG
+    except OSError as error:
+        if not of_the_place(error):
+            return _bug()
+        if error.filename is None:
+            complain(f"the output cannot be written: {error.strerror}")
+        else:
+            place = Path(error.filename)
+            complain(f"{place}: {why_not(error, place)}; make room there, or use another place")
+    except Exception:
+        return _bug()
     return BAD_INPUT
+
+
+def _bug() -> int:
+    """Keeps the traceback of what is being handled, and says so by the exit code."""
+    import traceback
+
+    traceback.print_exc()
+    return BUG
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})

@@ -8,6 +8,7 @@ from validate.cli.display import progress
 from validate.cli.recordings import written as say
 from validate.errors import UsageError
 from validate.parameters import with_values
+from validate.places import try_file, write_whole
 from validate.recording.digest import digest, to_text
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -24,6 +25,7 @@ def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...
     given = pairs(values, "--set")
     parameters = with_values(experiment.parameters, given)
     ask_about(experiment, given)
+    try_file(out)
     with progress(f"record {name}") as bar:
         done = iter(range(10))
         made = twin.record(parameters, lambda text: bar(next(done), 3, text))
@@ -31,5 +33,5 @@ def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...
         made = stamped(made, parameters)
     write_recording(made, out)
     written = read_recording(out)
-    out.with_suffix(".json").write_text(to_text(digest(written)), "utf-8")
+    write_whole(out.with_suffix(".json"), to_text(digest(written)))
     say(written, out)

@@ -14,12 +14,14 @@ import numpy as np
 
 from validate.cli.display import console
 from validate.errors import UsageError
+from validate.places import try_folder, write_whole
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
 from validate.replay.compression import stated_sizes
 
 TEMPLATES = {"force": "new_force.py.txt", "inclusion": "new_inclusion.py.txt"}
 _MOST_CHANNELS = 7  # lines of what the recording holds: the file stays short
+_LARGEST = 20_000  # bytes of such a file
 _LONGEST = 76  # characters of a text of the recording in a comment
 
 
@@ -32,13 +34,10 @@ def new(name: str, source: Path, out: Path | None) -> None:
         raise UsageError(f"-o {path}: an experiment's file is called as it is, {name}.py")
     if path.exists():
         raise UsageError(f"{path} exists and is left alone; give another NAME or -o")
+    try_folder(path, _LARGEST)
     text = written(name, read_recording(source), _beside(source, path))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written ({error.strerror})") from error
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, text)
     console().print(f"{path}: edit it, then `validate run {_called(name, path)}`", soft_wrap=True)
 
 

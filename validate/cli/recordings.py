@@ -7,6 +7,7 @@ from typing import Any
 from validate.cli.arguments import pairs
 from validate.cli.display import console
 from validate.errors import UsageError
+from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -19,6 +20,7 @@ def import_file(
     file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], given: Mapping[str, Any]
 ) -> None:
     """Reads a foreign file, of the `kind` that it shows where none is said, as a recording."""
+    try_file(out)
     reader = named(kind) if kind else recognised(file)
     said = {key: str(value) for key, value in given.items() if value is not None}
     recording = reader.read(file, pairs(mapping, "--map") | said)
@@ -28,6 +30,7 @@ def import_file(
 
 def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
     """Writes one recording with all streams, moved where the user says so."""
+    try_file(out)
     merged = merge([read_recording(f) for f in files], out.stem)
     for topic, text in pairs(shifts, "--shift").items():
         merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))

@@ -22,6 +22,7 @@ from validate.replay.find import root_of
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.report import gl
+from validate.report.folder import STUDIES, try_results
 from validate.report.write import write_report
 
 
@@ -44,13 +45,14 @@ def run(
 
 def _one(experiment: Experiment, options: Options, out: Path | None, as_json: bool) -> bool:
     start = perf_counter()
-    reports = out or root_of(experiment, Path.cwd()) / "reports"
+    folder = (out or root_of(experiment, Path.cwd()) / "reports") / experiment.name
+    try_results(folder, (STUDIES,))
     ask_about(experiment, options.values)
     with progress(experiment.name) as report:
         result = compare(experiment, options, report)
         report(1, 1, "report")
         created = datetime.now(UTC).isoformat(timespec="seconds")
-        page = write_report(result, reports / experiment.name, created=created)
+        page = write_report(result, folder, created=created)
     if as_json:
         print((page.parent / "results.json").read_text(encoding="utf-8"))
     else:

@@ -13,6 +13,7 @@ from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.options import Report
+from validate.report.folder import try_results
 from validate.report.numbers import MISSING, significant
 from validate.study import filter_page, stability_page, still_page, trade_page
 from validate.study.choose import Choice, choose, error_of, wanted
@@ -159,7 +160,8 @@ def _measured(name: str, common: StudyOptions) -> Trade:
 def _running(
     experiment: Experiment, kind: str, title: str, common: StudyOptions
 ) -> Iterator[Report]:
-    """A progress bar; an interruption says what is kept."""
+    """A progress bar, once the place was tried; an interruption says what is kept."""
+    try_results(study_folder(experiment, kind, common.out), (CELLS,))
     try:
         with progress(f"{experiment.name}: {title}") as report:
             yield report

@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Generic
 
 from validate.errors import UsageError
+from validate.places import try_folder
 from validate.replay.experiment import Experiment
 from validate.replay.find import root_of
 from validate.replay.options import Report
@@ -39,6 +40,7 @@ def finish(
     Raises `UsageError` when no scheduler answers, and what opening the experiment raises.
     """
     start, where = perf_counter(), where or Where()
+    try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     records = read_records(folder, (c.key for c in plan.cells), plan.kind)
     reused = len(records)

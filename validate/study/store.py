@@ -10,9 +10,10 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
-from uuid import uuid4
 
 import numpy as np
+
+from validate.places import write_whole
 
 R = TypeVar("R")
 _LIBRARIES = ("numpy", "scipy", "numba", "scikit-fem")
@@ -62,9 +63,7 @@ def write_record(folder: Path, cell: Any, record: Record[Any]) -> None:
     """Writes <key>.json whole or not at all; `cell` is for whoever reads the file."""
     content = {"cell": cell, "record": record}
     text = json.dumps(content, default=_plain, allow_nan=False, ensure_ascii=False)
-    fresh = folder / f".{record.key}.{uuid4().hex[:8]}"
-    fresh.write_text(text, encoding="utf-8")
-    fresh.replace(folder / f"{record.key}.json")
+    write_whole(folder / f"{record.key}.json", text)
 
 
 def read_records(folder: Path, keys: Iterable[str], kind: type[R]) -> dict[str, Record[R]]:

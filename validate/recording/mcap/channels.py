@@ -15,6 +15,7 @@ from typing import BinaryIO
 from mcap.writer import CompressionType, Writer
 
 from validate.errors import RecordingError
+from validate.places import size_of, why_not
 from validate.recording.mcap.schemas import MESSAGE_ENCODING, SCHEMA_ENCODING, Json, to_bytes
 
 LIBRARY = "validate"  # without a version: two versions write the same bytes
@@ -61,7 +62,8 @@ def write_channels(
             os.fsync(stream.fileno())
         part.replace(path)
     except OSError as error:
-        raise RecordingError(f"{path.name}: cannot be written ({error.strerror})") from error
+        why = why_not(error, path, size_of(part))
+        raise RecordingError(f"{path.name}: cannot be written ({why})") from error
     except UnicodeEncodeError as error:
         raise RecordingError(f"{path.name}: text that is no UTF-8 ({error.reason})") from error
     finally:
