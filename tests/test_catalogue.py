@@ -97,5 +97,5 @@ def test_a_file_named_as_a_module_leaves_that_module_alone(tmp_path: Path) -> No
 
 def test_reports_go_where_the_user_stands(phantom: Experiment, tmp_path: Path) -> None:
     project = shipped().parent
-    assert root_of(phantom, project / "docs") == project
-    assert root_of(phantom, tmp_path) == tmp_path
+    assert root_of(phantom.path, project / "docs") == project
+    assert root_of(phantom.path, tmp_path) == tmp_path

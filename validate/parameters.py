@@ -8,7 +8,7 @@ path is an error naming the nearest ones.
 import difflib
 import math
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -58,6 +58,26 @@ class Parameter:
     @property
     def missing(self) -> bool:
         return self.asked and self.default is None
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A parameter that is not as its experiment declares it, in SI."""
+
+    path: str
+    default: Any
+    value: Any
+    unit: str
+
+
+def changed(declared: Sequence[Parameter], used: Sequence[Parameter]) -> tuple[Changed, ...]:
+    """What differs of the parameters that both have."""
+    own = {p.path: p.default for p in declared}
+    return tuple(
+        Changed(p.path, own[p.path], p.default, p.unit)
+        for p in used
+        if p.path in own and own[p.path] != p.default
+    )
 
 
 def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Parameter, ...]:

@@ -20,7 +20,9 @@ _TRIED = 4096  # bytes that are written for trial
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # What the place forbids, as against a bug of ours: those are errors of a path that does not exist.
-_OF_THE_PLACE = (*_FULL, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENAMETOOLONG)
+_OF_THE_PLACE = (
+    *_FULL, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENAMETOOLONG, errno.ENOTDIR,
+)  # fmt: skip
 
 
 def try_folder(folder: Path, needed: int = REPORT_BYTES) -> None:

@@ -7,6 +7,12 @@ from validate.errors import UsageError
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 
+def command_line() -> tuple[str, ...]:
+    """The arguments of the running command; empty where there is none."""
+    context = click.get_current_context(silent=True)
+    return tuple(context.find_root().obj or ()) if context else ()
+
+
 def complain(message: str) -> None:
     """One line on standard error."""
     click.echo("validate: " + " ".join(message.split()), err=True)

@@ -15,7 +15,8 @@ from validate.report.store import check_members, figure_members
 
 def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int:
     """Runs the experiments and holds every figure; 0 when none failed and one was compared."""
-    found = []
+    found: list[tuple[Result, bool]] = []
+    failures: list[dict[str, Any]] = []
 
     def one(experiment: Experiment) -> bool:
         with progress(f"check {experiment.name}") as report:
@@ -23,9 +24,13 @@ def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int
         found.append((result, _holds(result, declared=bool(experiment.published))))
         return found[-1][1]
 
-    code = each(names, named, one)
+    def failed(name: str, why: str) -> None:
+        failures.append({"experiment": name, "holds": False, "error": why})
+
+    code = each(names, named, one, failed)
     if as_json:
-        print(json.dumps([_document(*pair) for pair in found], indent=1, allow_nan=False))
+        told = [*(_document(*pair) for pair in found), *failures]
+        print(json.dumps(told, indent=1, allow_nan=False))
     else:
         for result, _ in found:
             _print(result)

@@ -34,7 +34,8 @@ def main(argv: list[str] | None = None) -> None:
 def run(argv: list[str]) -> int:
     """The exit code of a command; known errors print one line, a bug its traceback."""
     try:
-        return int(cli.main(argv, prog_name="validate", standalone_mode=False) or 0)
+        given = tuple(argv)
+        return int(cli.main(argv, prog_name="validate", standalone_mode=False, obj=given) or 0)
     except ValidateError as error:
         complain(str(error))
     except click.exceptions.NoArgsIsHelpError as wanted:
@@ -99,7 +100,7 @@ def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
 )
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
-@click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="results.json of all on one list.")
 def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
     """Replay, simulate, compare and write a report."""
     from validate.cli import running

@@ -1,10 +1,11 @@
 """`validate run`."""
 
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from validate.cli.arguments import pairs
+from validate.cli.arguments import BAD_INPUT, command_line, pairs
 from validate.cli.chosen import ask_about, each
 from validate.cli.display import (
     console,
@@ -18,11 +19,13 @@ from validate.cli.display import (
 from validate.compare.result import KINDS, Result
 from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
-from validate.replay.find import root_of
-from validate.replay.options import Options
+from validate.replay.find import sources_of
+from validate.replay.named_run import run_folder
+from validate.replay.options import Options, configure, mesh_files
 from validate.replay.road import compare
 from validate.report import gl
 from validate.report.folder import STUDIES, try_results
+from validate.report.made import Made, made
 from validate.report.write import write_report
 
 
@@ -40,24 +43,46 @@ def run(
     gl.ask()
     wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
     options = Options(pairs(values, "--set"), wanted, quick)
-    return each(names, named, lambda e: _one(e, options, out, as_json))
+    found: list[str] = []  # results.json of each, or why there is none
+
+    def one(experiment: Experiment) -> bool:
+        start = perf_counter()
+        result, page = _reported(experiment, options, out)
+        if as_json:
+            found.append((page.parent / "results.json").read_text(encoding="utf-8").strip())
+        else:
+            _summary(result, page, perf_counter() - start)
+        return result.passed
+
+    def failed(name: str, why: str) -> None:
+        found.append(json.dumps({"experiment": name, "error": why}, ensure_ascii=False))
+
+    code = each(names, named, one, failed)
+    if as_json and len(names) != 1:
+        print("[" + ",\n".join(found) + "]")
+    elif as_json and code != BAD_INPUT:
+        print(found[0])
+    return code
 
 
-def _one(experiment: Experiment, options: Options, out: Path | None, as_json: bool) -> bool:
-    start = perf_counter()
-    folder = (out or root_of(experiment, Path.cwd()) / "reports") / experiment.name
+def _reported(experiment: Experiment, options: Options, out: Path | None) -> tuple[Result, Path]:
+    folder, by = run_folder(experiment, options, out), _made(experiment, options)
     try_results(folder, (STUDIES,))
     ask_about(experiment, options.values)
     with progress(experiment.name) as report:
         result = compare(experiment, options, report)
         report(1, 1, "report")
         created = datetime.now(UTC).isoformat(timespec="seconds")
-        page = write_report(result, folder, created=created)
-    if as_json:
-        print((page.parent / "results.json").read_text(encoding="utf-8"))
-    else:
-        _summary(result, page, perf_counter() - start)
-    return result.passed
+        page = write_report(result, folder, created=created, made=by)
+    return result, page
+
+
+def _made(experiment: Experiment, options: Options) -> Made:
+    """Taken before the run: files may be edited while it computes."""
+    path = experiment.path
+    parameters, _ = configure(experiment, options)
+    sources = sources_of(path) if path else ()
+    return made(command_line(), sources, mesh_files(parameters))
 
 
 def _summary(result: Result, page: Path, seconds: float) -> None:

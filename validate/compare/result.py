@@ -13,7 +13,7 @@ from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.compare.verdict import Check
-from validate.parameters import Parameter
+from validate.parameters import Changed, Parameter
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.scene.material_point import AnyScene
@@ -72,7 +72,7 @@ class Result:
     """An experiment compared: all that a report needs.
 
     `kind` is what the recording is: measured, a twin, or the judged model's own. `warnings` doubt
-    what was given.
+    what was given. `changed` parameters are not as the experiment declares them.
     """
 
     name: str
@@ -95,6 +95,7 @@ class Result:
     inputs: tuple[Declared, ...] = ()
     joint: tuple[Joint, ...] = ()
     exhibits: tuple[Exhibit, ...] = ()
+    changed: tuple[Changed, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:

@@ -73,9 +73,15 @@ def _place(error: BaseException, path: Path) -> str:
     return f", line {lines[-1]}" if lines else ""
 
 
-def root_of(experiment: Experiment, start: Path) -> Path:
-    """The project an experiment belongs to where `start` lies in it, else `start`: nothing is
-    written where nobody looks."""
-    path = experiment.path
+def sources_of(path: Path) -> tuple[Path, ...]:
+    """An experiment's file and those beside it that it names."""
+    text = path.read_text(encoding="utf-8")
+    beside = (f for f in sorted(path.parent.glob("*.py")) if f != path and f.stem in text)
+    return (path, *beside)
+
+
+def root_of(path: Path | None, start: Path) -> Path:
+    """The project an experiment's file belongs to where `start` lies in it, else `start`: nothing
+    is written where nobody looks."""
     own = path is not None and path.parent.name == "experiments"
     return path.parents[1] if path and own and start.is_relative_to(path.parents[1]) else start

@@ -1,16 +1,18 @@
 """What a user may change of an experiment, and where the experiment lies."""
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from validate.errors import ComparisonError, UsageError
-from validate.parameters import doubts, nearest_names, with_values
+from validate.parameters import describe, doubts, nearest_names, with_values
 from validate.replay.experiment import Experiment
 from validate.replay.method import Method
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
+_MESHES = ".npz"
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,13 @@ def _split(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
     """Those of the parameters, and those of the methods without that word."""
     mine = {k: v for k, v in values.items() if not k.startswith("methods.")}
     return mine, {k[8:]: v for k, v in values.items() if k.startswith("methods.")}
+
+
+def mesh_files(parameters: Any) -> tuple[Path, ...]:
+    """The files of meshes that parameters name, as far as they can be read."""
+    named = (p.default for p in describe(parameters) if isinstance(p.default, str))
+    paths = (Path(text) for text in named if text.endswith(_MESHES))
+    return tuple(p for p in paths if p.is_file() and os.access(p, os.R_OK))
 
 
 def folder_of(experiment: Experiment) -> Path:

@@ -15,7 +15,7 @@ from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.fem.locking import locking_notes
-from validate.parameters import Parameter, describe
+from validate.parameters import Changed, Parameter, changed, describe
 from validate.register.markers import MarkerObservation
 from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
 from validate.replay.consistency import consistency_scores
@@ -40,7 +40,9 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
     found = opened(experiment, parameters)
-    experiment = _following(experiment, found, parameters, methods)
+    declared = _settings(experiment.parameters, experiment.methods)
+    differing = changed(declared, _settings(parameters, methods))
+    experiment = _following(experiment, found, differing)
     shipped, parameters = found.recordings, found.parameters
     identified = None
     if experiment.identify:
@@ -86,24 +88,18 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
             captioned(exhibit, experiment.captions)
             for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
         ),
+        changed=differing,
     )
 
 
-def _following(
-    experiment: Experiment, found: Opened, parameters: Any, methods: Mapping[str, Method]
-) -> Experiment:
-    """The experiment as its recordings have it; no figure belongs to what the user changed in
-    `parameters`, before the recordings filled what stood open."""
+def _following(experiment: Experiment, found: Opened, differing: tuple[Changed, ...]) -> Experiment:
+    """The experiment as its recordings have it; no figure belongs to what the user changed, before
+    the recordings filled what stood open."""
     followed: Experiment = experiment.follows(experiment, found.recordings, found.parameters)
-    own = {p.path: p.default for p in _settings(experiment.parameters, experiment.methods)}
-    changed = [
-        f"{p.path} = {p.default}"
-        for p in _settings(parameters, methods)
-        if own.get(p.path) != p.default and p.path not in experiment.locates
-    ]
-    if not changed:
+    own = [f"{c.path} = {c.value}" for c in differing if c.path not in experiment.locates]
+    if not own:
         return followed
-    other = f"printed for this experiment's own settings; not compared with {', '.join(changed)}"
+    other = f"printed for this experiment's own settings; not compared with {', '.join(own)}"
     return replace(
         followed, published=tuple(replace(f, other=f.other or other) for f in followed.published)
     )

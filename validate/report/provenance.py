@@ -6,6 +6,7 @@ from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.result import Result
 from validate.recording.types import Recording
 from validate.report.environment import environment, file_name, without_folder
+from validate.report.made import Commit, Made
 from validate.report.numbers import text, with_unit
 
 _STREAMS = (
@@ -97,9 +98,37 @@ def parameters(result: Result) -> Exhibit:
     return Exhibit("parameters", "Parameters and environment", (), tables)
 
 
+def how(result: Result, made: Made) -> Exhibit:
+    """What differs from the declared parameters, the command, the commit, and the files' hashes."""
+    rows = tuple(
+        (c.path, _plain(c.default), _plain(c.value), "" if c.unit == "1" else c.unit)
+        for c in result.changed
+    )
+    none = "" if rows else "None differs."
+    differing = NumberTable(
+        "", "Parameters that differ from what the experiment declares, SI.",
+        ("path", "declared", "here", "unit"), rows, none,
+    )  # fmt: skip
+    said = [("command", made.command or "none: made from Python")]
+    said += [("commit", _commit(made.commit)), ("code and libraries, SHA-256", made.code_sha256)]
+    said += [("commit of the experiment's project", str(made.project))] if made.project else []
+    tables = [differing, NumberTable("", "Command and code.", ("", "value"), tuple(said))]
+    if made.files:
+        files = tuple((f.role, f.path, f.bytes, f.sha256) for f in made.files)
+        head = ("what", "file", "bytes", "SHA-256")
+        tables.append(NumberTable("", "Files read beside the recordings.", head, files))
+    return Exhibit("made", "How this was made", (), tuple(tables))
+
+
+def _commit(commit: Commit | None) -> str:
+    return str(commit) if commit else "unknown: the code lies in no clone, or git does not say"
+
+
 def _plain(value: object) -> str:
     if isinstance(value, (list, tuple)):
         return ", ".join(_plain(v) for v in value)
+    if value is None:
+        return "not set"
     if isinstance(value, float):
         return f"{value:g}".replace("-", "−")
     return str(without_folder(value))

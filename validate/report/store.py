@@ -23,6 +23,7 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.report.environment import environment, file_name
+from validate.report.made import Made
 from validate.report.observed import timed
 from validate.report.plain import Json, members, recorded
 from validate.report.store_exhibits import exhibits, rounded
@@ -50,7 +51,7 @@ def schema() -> Json:
     return loaded
 
 
-def document(result: Result, created: str) -> Json:
+def document(result: Result, created: str, made: Made | None = None) -> Json:
     """The content of results.json. Numbers that are not finite become null with a `why`."""
     share = _share(result)
     return {
@@ -74,6 +75,8 @@ def document(result: Result, created: str) -> Json:
             p.path: {"value": recorded(p.default), "unit": p.unit, "origin": p.origin}
             for p in result.parameters
         },
+        "changed": [members(c) for c in result.changed],
+        "made": _made(made or Made()),
         "environment": environment(),
         "methods": [_method(m, result, share) for m in result.methods],
         "effects": recorded(result.effects),
@@ -167,6 +170,19 @@ def _share(result: Result) -> _Share:
 def _score(score: Score) -> Json:
     why = {} if math.isfinite(score.value) else {"why": f"not finite ({score.value})"}
     return members(score) | why
+
+
+def _made(made: Made) -> Json:
+    ours, theirs = made.commit, made.project
+    return {
+        "command": made.command,
+        "commit": ours and ours.sha,
+        "dirty": ours and ours.dirty,
+        "project_commit": theirs and theirs.sha,
+        "project_dirty": theirs and theirs.dirty,
+        "code_sha256": made.code_sha256,
+        "files": [members(f) for f in made.files],
+    }
 
 
 def _overall(found: Overall) -> Json:

@@ -13,7 +13,7 @@ from typing import Generic
 from validate.errors import UsageError
 from validate.places import try_folder
 from validate.replay.experiment import Experiment
-from validate.replay.find import root_of
+from validate.replay.named_run import reports_of
 from validate.replay.options import Report
 from validate.study.job import C, Done, Plan, R, Where, run_batch
 from validate.study.store import Record, read_records, write_record
@@ -83,5 +83,4 @@ def _run_here(plan: Plan[C, R], cells: Sequence[C], done: Done) -> None:
 
 def study_folder(experiment: Experiment, kind: str, out: Path | None) -> Path:
     """`out`/<name>/study-<kind>, by default in the reports/ of the experiment's clone."""
-    reports = out or root_of(experiment, Path.cwd()) / "reports"
-    return reports / experiment.name / f"study-{kind}"
+    return reports_of(experiment.path, out) / experiment.name / f"study-{kind}"

@@ -10,7 +10,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from validate.errors import UsageError, ValidateError
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
+from validate.replay.find import load_file, sources_of
 from validate.replay.options import folder_of
 from validate.study.store import Record
 
@@ -71,9 +71,7 @@ def job_of(
 
 def file_sha256(path: Path) -> str:
     """Of an experiment's file and of those beside it that it names."""
-    text = path.read_text(encoding="utf-8")
-    beside = [f for f in sorted(path.parent.glob("*.py")) if f != path and f.stem in text]
-    return hashlib.sha256(b"".join(f.read_bytes() for f in (path, *beside))).hexdigest()
+    return hashlib.sha256(b"".join(f.read_bytes() for f in sources_of(path))).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -2,21 +2,18 @@
 
 import hashlib
 import json
-import platform
 import types
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from validate.places import write_whole
+from validate.report.made import code_sha256
 
 R = TypeVar("R")
-_LIBRARIES = ("numpy", "scipy", "numba", "scikit-fem")
 
 
 @dataclass(frozen=True)
@@ -44,19 +41,6 @@ def key_of(*content: Any) -> str:
     """Equal for equal content, code and libraries."""
     text = json.dumps([code_sha256(), *content], default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-@cache
-def code_sha256() -> str:
-    """Of this package's sources and the libraries' versions: what a stored cell rests on."""
-    found = hashlib.sha256()
-    root = Path(__file__).resolve().parents[1]
-    for path in sorted(root.rglob("*.py")):
-        found.update(path.relative_to(root).as_posix().encode())
-        found.update(path.read_bytes())
-    found.update(platform.python_version().encode())
-    found.update(" ".join(f"{name} {version(name)}" for name in _LIBRARIES).encode())
-    return found.hexdigest()
 
 
 def write_record(folder: Path, cell: Any, record: Record[Any]) -> None:

@@ -1,0 +1,65 @@
+"""Every run that computes something else has its own folder, and what made it is told."""
+
+import json
+from pathlib import Path
+
+import pytest
+from study_samples import experiment_file
+from test_cli import here
+
+
+@pytest.fixture(autouse=True)
+def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    folder = tmp_path / "mein Projekt ü"
+    experiment_file(folder)
+    return folder
+
+
+def test_a_changed_run_leaves_the_plain_one(project: Path) -> None:
+    assert here("run", "pulled", "--methods", "kf,plain", cwd=project)[0] == 0
+    reports = project / "reports"
+    plain = (reports / "pulled" / "results.json").read_bytes()
+    set_ = ["--set", "twin.noise=2mm2", "--json"]
+    code, out, err = here("run", "pulled", *set_, cwd=project)
+    assert code in (0, 1), err
+    found = json.loads(out)
+    assert found["changed"] == [
+        {"path": "twin.noise", "default": 1e-10, "value": 2e-6, "unit": "m2"}
+    ]
+    made = found["made"]
+    assert made["command"] == "validate run pulled --set twin.noise=2mm2 --json"
+    assert [f["path"] for f in made["files"]] == ["pulled.py"]
+    assert (reports / "pulled" / "results.json").read_bytes() == plain
+    other = next(p for p in reports.iterdir() if p.name.startswith("pulled+twin.noise-"))
+    assert 'id="changed"' in (other / "report.html").read_text("utf-8")
+    assert 'id="changed"' not in (reports / "pulled" / "report.html").read_text("utf-8")
+    assert len(list(reports.iterdir())) == 2
+
+
+def test_several_runs_are_one_document_and_a_failed_one_is_in_it(project: Path) -> None:
+    text = (project / "experiments" / "pulled.py").read_text("utf-8")
+    broken = text.replace('name="pulled"', 'name="torn"').replace(
+        "load=lambda p, folder: (record(p, lambda _: None),),", "load=_torn,"
+    )
+    broken = broken.replace(
+        "EXPERIMENT =",
+        "def _torn(p, folder):\n    from validate.errors import RecordingError\n"
+        '    raise RecordingError("nothing\\nthere")\n\n\nEXPERIMENT =',
+    )
+    (project / "experiments" / "torn.py").write_text(broken, "utf-8")
+    code, out, err = here("run", "torn", "pulled", "--json", cwd=project)
+    failed, done = json.loads(out)
+    assert (code, failed) == (2, {"experiment": "torn", "error": "nothing there"})
+    assert done["experiment"] == "pulled"
+    assert err == "validate: nothing there\n"
+    code, out, _ = here("check", "pulled", "torn", "--json", cwd=project)
+    assert code == 2
+    assert [(c["experiment"], c["holds"]) for c in json.loads(out)] == [
+        ("pulled", True), ("torn", False),
+    ]  # fmt: skip
+    assert here("run", "torn", "--json", cwd=project)[:2] == (2, "")

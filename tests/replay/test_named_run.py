@@ -1,0 +1,63 @@
+"""A run's folder is called by what it computes, not by how that was typed."""
+
+from pathlib import Path
+
+import pytest
+
+from validate.errors import UsageError
+from validate.replay.experiment import Experiment
+from validate.replay.named_run import run_folder, run_name, tag
+from validate.replay.options import Options
+
+
+def name(experiment: Experiment, *, quick: bool = False, methods: str = "", **values: str) -> str:
+    given = {path.replace("__", "."): text for path, text in values.items()}
+    return run_name(experiment, Options(given, tuple(methods.split(",")) if methods else (), quick))
+
+
+def test_the_plain_run_keeps_the_name(phantom: Experiment) -> None:
+    assert name(phantom) == "fluid_phantom"
+    assert name(phantom, material__E="15200") == "fluid_phantom"
+    assert name(phantom, material__E="15.2kPa") == "fluid_phantom"
+    assert name(phantom, methods=",".join(reversed(phantom.methods))) == "fluid_phantom"
+
+
+def test_what_differs_is_in_the_name_and_in_the_hash(phantom: Experiment) -> None:
+    soft = name(phantom, material__E="14000")
+    assert soft.startswith("fluid_phantom+material.E-")
+    assert len(soft.rpartition("-")[2]) == 6
+    assert soft == name(phantom, material__E="14kPa")
+    others = [
+        name(phantom, material__E="14001"),
+        name(phantom, methods__p1_loop__tolerance="0.1%"),
+        name(phantom, quick=True),
+        name(phantom, quick=True, material__E="14000"),
+        name(phantom, methods="p1_loop"),
+        name(phantom, methods="p1_loop,p1_dry"),
+        name(phantom, recording="elsewhere/fluid_phantom.mcap"),
+        "fluid_phantom",
+    ]
+    assert len({soft, *others}) == len(others) + 1
+    assert [o.rpartition("-")[0] for o in others[1:6]] == [
+        "fluid_phantom+methods.p1_loop.tolerance", "fluid_phantom+quick",
+        "fluid_phantom+quick+material.E", "fluid_phantom+methods", "fluid_phantom+methods",
+    ]  # fmt: skip
+
+
+def test_the_order_of_what_is_given_does_not_count(phantom: Experiment) -> None:
+    one = name(phantom, material__E="14000", material__nu="0.48", methods="p1_dry,p1_loop")
+    other = name(phantom, material__nu="0.48", material__E="14000", methods="p1_loop,p1_dry")
+    assert one == other
+
+
+def test_unknown_values_are_refused_before_a_folder_is_named(phantom: Experiment) -> None:
+    with pytest.raises(UsageError, match=r"nearest: material\.E"):
+        run_folder(phantom, Options({"material.EE": "1"}), Path("out"))
+
+
+def test_many_words_are_counted_and_odd_signs_replaced() -> None:
+    long = tag([f"material.number_{i}" for i in range(30)], "x")
+    assert long.startswith("+material.number_0+material.number_1+material.number_2+27_more-")
+    assert len(long) < 90
+    assert tag(["a b/ü"], 1).startswith("+a_b_ü-")
+    assert tag([], "x") == ""
