@@ -15,7 +15,7 @@ from validate.papers.fluid_inclusion.effects import EFFECTS, UNCERTAINTY
 from validate.papers.fluid_inclusion.figures import FIGURES
 from validate.papers.fluid_inclusion.friction import friction_from_rise
 from validate.papers.fluid_inclusion.ladder import LADDER
-from validate.papers.fluid_inclusion.phantom import Phantom, build, load, place, record
+from validate.papers.fluid_inclusion.phantom import Phantom, build, load, place, read, record
 from validate.papers.fluid_inclusion.phantom import PhantomModel as Model
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified, Twin
@@ -83,6 +83,7 @@ EXPERIMENT = Experiment(
     twin=Twin(
         record,
         seed=PARAMETERS.twin.seed,
+        read=read,
         notice=(
             "The recording is a twin: it and the accepted model share the law (linear "
             "elasticity), not the mesh. A real phantom's force would differ from every linear "

@@ -255,7 +255,7 @@ def _parse(hint: Any, path: str, text: str, unit: str) -> Any:
             raise UsageError(f"{path}={text}: one of {', '.join(choices)}")
         return choices[text]
     if get_origin(hint) is tuple:
-        parts = text.split(",")
+        parts = text.split(",") if text else []
         if len({bool(found[1]) for found in map(split, parts) if found}) > 1:
             raise UsageError(f"{path}={text}: all in {unit} without unit, or each with its own")
         return tuple(_parse(get_args(hint)[0], path, part, unit) for part in parts)

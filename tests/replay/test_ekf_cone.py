@@ -21,6 +21,7 @@ from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 from validate.replay import compare, load
 from validate.replay.experiment import Experiment
+from validate.replay.remade import stamped
 
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
 COARSE = {"twin.radial": "3", "twin.axial": "3", "mesh.radial": "3", "mesh.axial": "3"}
@@ -41,7 +42,7 @@ def coarse(cone: Experiment) -> Iterator[Experiment]:
     """Recordings made in memory by a coarse twin that is its models' equal; five methods."""
 
     def made(parameters: Any, folder: Path) -> tuple[Recording, ...]:
-        return (record_cone(parameters.twin, lambda step: None),)
+        return (stamped(record_cone(parameters.twin, lambda step: None), parameters),)
 
     assert cone.twin is not None
     with pytest.MonkeyPatch.context() as patch:

@@ -1,5 +1,6 @@
 """What is no evidence: same models, twins made again from one's own parameters, fitted data."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from tiny import TINY, Card, record, scene
 from validate.cli.running import run as run_command
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.recording.types import Recording
 from validate.replay.cards import changed
 from validate.replay.experiment import Experiment, Identified, MeshLadder, Twin, Uncertainty
@@ -19,6 +20,7 @@ from validate.replay.remade import stamped
 from validate.replay.road import compare
 from validate.scene.scene import Material, Scene
 
+RECORDINGS = Path(__file__).parents[2] / "recordings"
 FEM = {"fem": TINY.methods["fem"]}
 
 
@@ -67,6 +69,50 @@ def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
     assert result.notes[0].startswith("The twin was recorded anew")
     assert [c.verdict for c in result.checks] == ["repeats itself"]
     assert "made again from this run's own parameters" in result.checks[0].why
+
+
+def unsaid(card: Card, folder: Path) -> tuple[Recording, ...]:
+    """The twin's file without a word of what made it."""
+    return (record(Card(), print),)
+
+
+@pytest.mark.parametrize("files", [1, 2])
+def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(files: int) -> None:
+    silent = other_model(load=lambda card, folder: files * unsaid(card, folder))
+    assert [c.verdict for c in judged(silent).checks] == ["agrees"]
+    with pytest.raises(UsageError, match=r"--set sd=0\.0001 would be ignored: .*validate record"):
+        judged(silent, sd="1e-4")
+
+
+def test_a_setting_that_the_record_does_not_know_is_refused() -> None:
+    def older(card: Card, folder: Path) -> tuple[Recording, ...]:
+        made = stamped(record(Card(), print), Card())
+        known = {k: v for k, v in made.record("made_with").items() if k != "twin.stiffness"}
+        return (replace(made, metadata={**made.metadata, "made_with": known}),)
+
+    assert [c.verdict for c in judged(other_model(load=older)).checks] == ["agrees"]
+    with pytest.raises(UsageError, match=r"--set twin\.stiffness=1\.5 would be ignored"):
+        judged(other_model(load=older), **{"twin.stiffness": "1.5"})
+
+
+def test_a_twin_made_again_is_read_like_one_that_was_loaded() -> None:
+    seen: list[Recording] = []
+
+    def read(recording: Recording, card: Card) -> Recording:
+        seen.append(recording)
+        return recording
+
+    base = other_model()
+    assert base.twin is not None
+    judged(replace(base, twin=replace(base.twin, read=read)), sd="1e-4")
+    assert len(seen) == 1
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in RECORDINGS.glob("*.json")))
+def test_every_shipped_recording_says_what_made_it(name: str) -> None:
+    """Its digest is what must be read from the file, which another test compares."""
+    made = json.loads((RECORDINGS / f"{name}.json").read_text("utf-8"))["metadata"]["made_with"]
+    assert any(path.startswith("twin.") for path in made)
 
 
 def test_an_undeclared_uncertainty_is_no_excuse_for_a_measurement() -> None:

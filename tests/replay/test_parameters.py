@@ -59,6 +59,7 @@ def test_values_are_parsed_by_type_and_the_original_stays() -> None:
     )  # fmt: skip
     assert after == Outer(Inner(1e3, 7, "b", 0.5), (1.0, 2.5, 3.0), False)
     assert with_values(after, {"inner.maybe": "none"}).inner.maybe is None
+    assert with_values(after, {"loads": ""}).loads == ()
     assert before == Outer()
     assert with_values({"m": Inner()}, {"m.n": "9"})["m"] == Inner(n=9)
 

@@ -20,6 +20,7 @@ from validate.register.signals import driving, holds_at, validating
 from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
+from validate.replay.remade import stamped
 from validate.scene.box import box
 from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
@@ -154,7 +155,7 @@ TINY = Experiment(
     methods=METHODS,
     accepted=("fem",),
     accept=(Accept("node_B", 1e-4, "ours"),),
-    load=lambda card, folder: (record(card, print),),
+    load=lambda card, folder: (stamped(record(card, print), card),),
     build=lambda recording, card, model: scene(card.E, card.cells),
     place=lambda recording, card, its: follow_signal(recording, its.mesh, "pull", "N"),
     sets=sets,
@@ -220,7 +221,7 @@ AT_HOLDS = replace(
     TINY,
     methods={"fem": Method("FEM", NoFluid())},
     accept=(Accept("node_B", 1e-4, "ours"), Accept("force", 0.1, "ours")),
-    load=lambda card, folder: (record_moved(card, print),),
+    load=lambda card, folder: (stamped(record_moved(card, print), card),),
     build=lambda recording, card, model: moved_scene(card.E, card.cells),
     place=place_moved,
     sets=lambda card, seen: {},

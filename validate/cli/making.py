@@ -29,9 +29,7 @@ def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...
     with progress(f"record {name}") as bar:
         done = iter(range(10))
         made = twin.record(parameters, lambda text: bar(next(done), 3, text))
-    if twin.truth is not None:
-        made = stamped(made, parameters)
-    write_recording(made, out)
+    write_recording(stamped(made, parameters), out)
     written = read_recording(out)
     write_whole(out.with_suffix(".json"), to_text(digest(written)))
     say(written, out)

@@ -142,12 +142,17 @@ class Case:
     methods: tuple[str, ...] = ()
 
 
+def _as_read(recording: Recording, parameters: Any) -> Recording:
+    return recording
+
+
 @dataclass(frozen=True)
 class Twin:
     """How a synthetic recording is made, and what its truth was.
 
     `truth` repeats the twin: it scores the runs, and no method sees it. `remake` are prefixes of
-    parameters that the twin reads: changing one makes the recording anew. `same_model`: the twin
+    parameters that the twin reads: changing one makes the recording anew. `read` is what `load`
+    makes of a recording once read (outlines found in its images, say). `same_model`: the twin
     shares law and mesh with the models, so it can only repeat itself. `notice` is printed.
     """
 
@@ -157,6 +162,11 @@ class Twin:
     same_model: bool = False
     seed: int | None = None
     notice: str = ""
+    read: Callable[[Recording, Any], Recording] = _as_read
+
+    def made(self, parameters: Any, progress: Progress) -> Recording:
+        """A recording in memory, as one that was loaded."""
+        return self.read(self.record(parameters, progress), parameters)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from validate.compare.verdict import Accept
+from validate.errors import ComparisonError
 from validate.parameters import Ranges, known, quantity
 from validate.recording.types import Contours, Recording
 from validate.register.clock import clock_sd
@@ -219,6 +220,8 @@ def placed(
         measured, trace = _TRACES[unit]
         signals.append(validating(recording, topic, unit, quantity=measured, trace=trace))
         require_rising(stage, signals[-1])
+    if not loads:
+        raise ComparisonError("no loads: nothing would be compared; set stage positions in m")
     rest, *holds = holds_at(stage, contours.t, loads, within=_WITHIN)
     outline = observe_outlines(
         contours, wall, rest=instant(rest), corners=corners, name=streams.outline,

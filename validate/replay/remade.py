@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+from validate.errors import UsageError
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 
@@ -30,17 +31,20 @@ def synthetic(recording: Recording) -> bool:
 def made_by(
     recording: Recording,
     parameters: Any,
+    declared: Any,
     remake: tuple[str, ...],
     record: Callable[[Any], Recording],
 ) -> tuple[Recording, Any, tuple[str, ...]]:
     """The recording to use, the parameters that made it, and what is to be said of it.
 
     `remake` are prefixes of the twin's own parameters: where the user's differ from the recording's
-    it is made anew with them. A recording without the record counts as made with `parameters`.
+    it is made anew with them. Raises `UsageError` where they differ from the `declared` ones and
+    the recording does not say which it was made with: they would be ignored.
     """
     made = dict(recording.metadata.get(_RECORD, {}))
     mine = _texts(parameters)
     known = {path: text for path, text in made.items() if path in mine}
+    require_known(recording, parameters, declared, remake, tuple(known))
     true = with_values(parameters, known)
     changed = {
         path: mine[path]
@@ -53,6 +57,24 @@ def made_by(
     said = ", ".join(f"{path} = {text}" for path, text in changed.items())
     note = f"The twin was recorded anew in memory with {said}; the shipped recording was not used."
     return record(true), true, (note,)
+
+
+def require_known(
+    recording: Recording,
+    parameters: Any,
+    declared: Any,
+    remake: tuple[str, ...],
+    known: tuple[str, ...] = (),
+) -> None:
+    """Raises `UsageError` for a twin's parameter that differs from the `declared` one and is not
+    `known` of the recording."""
+    mine, own = _texts(parameters), _texts(declared)
+    lost = [p for p in mine if p.startswith(remake) and p not in known and mine[p] != own.get(p)]
+    if lost:
+        raise UsageError(
+            f"{recording.name}: --set {lost[0]}={mine[lost[0]]} would be ignored: the recording "
+            "does not say how it was made; leave it out, or make one with `validate record`"
+        )
 
 
 def _texts(parameters: Any) -> dict[str, str]:

@@ -7,11 +7,11 @@ from typing import Any
 from validate.compare.result import Kind
 from validate.errors import ComparisonError
 from validate.recording.types import Recording
-from validate.replay.experiment import Case, Experiment, Variant, unchanged
+from validate.replay.experiment import Case, Change, Experiment, Variant, unchanged
 from validate.replay.followed import MAIN, Followed, Truth
 from validate.replay.method import Method
 from validate.replay.options import Report, folder_of
-from validate.replay.remade import made_by, synthetic
+from validate.replay.remade import made_by, require_known, synthetic
 from validate.replay.solved import solve
 
 
@@ -52,7 +52,7 @@ class Road:
 
     def start(self, shipped: tuple[Recording, ...]) -> tuple[str, ...]:
         """Takes the recordings, made anew where the user changed their twin; what to say of it."""
-        self.recordings, self._true, said = self._made(shipped, self.parameters)
+        self.recordings, self._true, said = self._made(shipped, self.parameters, unchanged)
         self.remade = bool(said)
         return said
 
@@ -77,28 +77,33 @@ class Road:
         experiment = self.experiment
         if case.shipped:
             theirs = case.change(self.parameters)
-            recordings, true, _ = self._made(experiment.load(theirs, folder_of(experiment)), theirs)
+            found = experiment.load(theirs, folder_of(experiment))
+            recordings, true, _ = self._made(found, theirs, case.change)
         else:
             if experiment.twin is None:
                 raise ComparisonError(
                     f"case '{case.name}' is not shipped, and no twin is declared that records it"
                 )
             true = case.change(self._true)
-            recordings = (experiment.twin.record(true, self.tell),)
+            recordings = (experiment.twin.made(true, self.tell),)
         return {
             name: self._followed(case.name, recordings, Variant(name), self.parameters, true)
             for name in _of_case(self.methods, case)
         }
 
     def _made(
-        self, shipped: tuple[Recording, ...], parameters: Any
+        self, shipped: tuple[Recording, ...], parameters: Any, change: Change
     ) -> tuple[tuple[Recording, ...], Any, tuple[str, ...]]:
         """The recordings, the parameters of their truth, and what is to be said of them."""
-        twin = self.experiment.twin
-        if twin is None or len(shipped) != 1:
+        twin, declared = self.experiment.twin, change(self.experiment.parameters)
+        if twin is None:
+            return shipped, parameters, ()
+        if len(shipped) != 1:
+            for recording in shipped:
+                require_known(recording, parameters, declared, twin.remake)
             return shipped, parameters, ()
         recording, true, said = made_by(
-            shipped[0], parameters, twin.remake, lambda p: twin.record(p, self.tell)
+            shipped[0], parameters, declared, twin.remake, lambda p: twin.made(p, self.tell)
         )
         return (recording,), true, said
 

@@ -65,7 +65,7 @@ class Bench:
     def ready(self, cell: FilterCell, seed: int) -> Ready:
         parameters, method = set_up(self.experiment, self.job, cell, seed)
         key = _text(parameters)
-        recording = self._recordings.get(key, lambda: self.twin.record(parameters, lambda _: None))
+        recording = self._recordings.get(key, lambda: self.twin.made(parameters, lambda _: None))
         scene = meshed(self.experiment.build(recording, parameters, method.scene))
         mark = fingerprint(scene)
         system = self._systems.get(mark, lambda: build_system(scene))

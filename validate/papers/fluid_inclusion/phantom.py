@@ -121,11 +121,14 @@ def record(parameters: Phantom, progress: Progress) -> Recording:
 def load(parameters: Phantom, folder: Path) -> tuple[Recording, ...]:
     named = parameters.recording
     path = Path(named) if named else folder.parent / "recordings" / "fluid_phantom.mcap"
-    recording = read_recording(path)
-    if parameters.outlines == "images":
-        outlines = outlines_of(recording.frame("b_mode"))
-        recording = replace(recording, contours={"outline": outlines})
-    return (recording,)
+    return (read(read_recording(path), parameters),)
+
+
+def read(recording: Recording, parameters: Phantom) -> Recording:
+    """The recording with the outlines that are to be used."""
+    if parameters.outlines == "recorded":
+        return recording
+    return replace(recording, contours={"outline": outlines_of(recording.frame("b_mode"))})
 
 
 def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Scene:
