@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import ezc3d
 import numpy as np
 import pytest
 from exports import rows
@@ -37,8 +38,22 @@ def make_stack(path: Path) -> None:
         (path / f"f{i}.png").write_bytes(encode_png(image))
 
 
+def make_c3d(path: Path) -> None:
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [50.0]
+    file["parameters"]["POINT"]["LABELS"]["value"] = ("tip", "base")
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    points = np.ones((4, 2, 16))  # 512 bytes: data up to the file's end
+    points[:3] = np.arange(96.0).reshape(3, 2, 16)
+    file["data"]["points"] = points
+    file.write(f"{path}.c3d")  # it adds the ending where it is missing
+    path.write_bytes(Path(f"{path}.c3d").read_bytes().removesuffix(bytes(512)))
+    Path(f"{path}.c3d").unlink()
+
+
 MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "mcap": (make_mcap, {}),
+    "c3d": (make_c3d, {}),
     "instron": (make_export, {}),
     "png-stack": (make_stack, {"m_per_px": "1e-4", "rate": "10"}),
 }
@@ -131,7 +146,7 @@ def test_a_folder_without_images_is_no_stack(tmp_path: Path) -> None:
 
 def test_what_no_reader_recognises_names_them_all(tmp_path: Path) -> None:
     (tmp_path / "x").write_bytes(bytes(range(32)))
-    with pytest.raises(UsageError, match=r"not recognised .* mcap .* instron .* png-stack"):
+    with pytest.raises(UsageError, match=r"not recognised .* mcap .* c3d .* instron .* png-stack"):
         recognised(tmp_path / "x")
     with pytest.raises(UsageError, match="no such file"):
         recognised(tmp_path / "absent")

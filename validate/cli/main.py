@@ -224,14 +224,14 @@ def inspect(file: Path, as_json: bool) -> None:
 
 @cli.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--as", "kind", metavar="KIND", help="instron, png-stack or mcap; else as it shows.")
+@click.option("--as", "kind", metavar="KIND", help="c3d, instron, mcap, png-stack; else as it shows.")
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option(
     "--map",
     "mapping",
     multiple=True,
     metavar="ROLE=COLUMN[:UNIT][:-]",
-    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; encoding=cp1250.",
+    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; c3d: unit=mm.",
 )
 @click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
 @click.option("--rate", type=float, help="png-stack: images a second, Hz.")
@@ -239,7 +239,7 @@ def inspect(file: Path, as_json: bool) -> None:
 def import_(
     file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
 ) -> None:
-    """Turn a testing machine's export, or a folder of PNG images, into a recording."""
+    """Turn a testing machine's export, a C3D or a folder of PNG images into a recording."""
     from validate.cli import recordings
 
     recordings.import_file(file, kind, out, mapping, given)

@@ -4,12 +4,13 @@ A new format is one file with its `Reader`, and a line in `readers.READERS`.
 """
 
 import difflib
+import hashlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from validate.errors import UsageError
-from validate.recording.types import Recording
+from validate.recording.types import Recording, Source
 
 Options = Mapping[str, str]  # what a file does not say itself: `--map KEY=VALUE`
 
@@ -36,6 +37,13 @@ def head(path: Path, count: int = 4096) -> bytes:
             return stream.read(count)
     except OSError:
         return b""
+
+
+def source_of(path: Path, integrity: str) -> Source:
+    """A file's name, hash and size; `integrity` says what its bytes prove."""
+    with path.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    return Source(path.name, digest, path.stat().st_size, integrity)
 
 
 def require_known(options: Options, known: Collection[str]) -> None:

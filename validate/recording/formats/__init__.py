@@ -1,0 +1,1 @@
+"""Formats of other programs, each by its library behind one file."""

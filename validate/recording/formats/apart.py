@@ -1,0 +1,98 @@
+"""Files of others, decoded in a process of their own.
+
+A library in C that crashes on a damaged file, hangs, ends the interpreter or takes all memory then
+costs one line. What it found comes back as plain arrays, read without pickle.
+"""
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import RecordingError, UsageError, ValidateError
+
+Arrays = Mapping[str, NDArray[Any]]
+
+_HOME = "validate.recording.formats"
+_SAID, _MISSING = 3, 4  # exit codes of the process: a known error, a library that is not installed
+_MEMORY = 2**30  # bytes beyond 40 times the file's
+_SECONDS, _RATE = 20, 2**20  # s, and bytes a second of the file beside
+_RUN = (sys.executable, "-m", f"{_HOME}.apart")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def decoded(decoder: str, path: Path, extra: str) -> dict[str, NDArray[Any]]:
+    """What `arrays(path)` of the module `decoder` beside this file gives.
+
+    Raises `UsageError` with what to install where the library of the `extra` is absent, else
+    `RecordingError` naming the file: what the decoder said, or how its process ended.
+    """
+    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
+        out = Path(folder) / "arrays.npz"
+        done = _ended(decoder, path, out)
+        line = done.stdout.decode("utf-8", "replace").strip()[:300]
+        if done.returncode == _MISSING:
+            raise UsageError(f"{path.name}: {line}; pip install 'validate-tissue[{extra}]'")
+        if done.returncode == _SAID:
+            raise RecordingError(f"{path.name}: {line}")
+        if done.returncode or not out.is_file():
+            how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
+            raise RecordingError(
+                f"{path.name}: its reader ended with {how}: damaged, or not what its name says"
+            )
+        with np.load(out, allow_pickle=False) as found:
+            return {name: found[name] for name in found.files}
+
+
+def _ended(decoder: str, path: Path, out: Path) -> subprocess.CompletedProcess[bytes]:
+    size = path.stat().st_size
+    seconds = _SECONDS + size // _RATE
+    limit = _MEMORY + 40 * size
+    try:
+        return subprocess.run(
+            [*_RUN, decoder, str(path), str(out), str(limit)],
+            env={**os.environ, **dict.fromkeys(_THREADS, "1")},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise RecordingError(
+            f"{path.name}: its reader took over {seconds} s for {size} bytes and was ended"
+        ) from None
+
+
+def _decode(decoder: str, path: Path, out: Path, limit: int) -> int:
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        arrays: Arrays = import_module(f"{_HOME}.{decoder}").arrays(path)
+    except ImportError as missing:
+        print(f"the library '{missing.name}' that reads this format is not installed")
+        return _MISSING
+    except MemoryError:
+        print(f"its reader wants more than {limit / 2**20:.0f} MB: damaged, or too large")
+        return _SAID
+    except ValidateError as error:
+        print(error)
+        return _SAID
+    except Exception as error:  # whatever a library raises on damage is damage
+        print(f"damaged ({' '.join(str(error).split())[:200] or type(error).__name__})")
+        return _SAID
+    np.savez(out, allow_pickle=False, **arrays)
+    return 0
+
+
+if __name__ == "__main__":
+    decoder, path, out, limit = sys.argv[1:]
+    raise SystemExit(_decode(decoder, Path(path), Path(out), int(limit)))
