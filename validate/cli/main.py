@@ -224,7 +224,9 @@ def inspect(file: Path, as_json: bool) -> None:
 
 @cli.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--as", "kind", metavar="KIND", help="c3d, instron, mcap, png-stack; else as it shows.")
+@click.option(
+    "--as", "kind", metavar="KIND", help="c3d, instron, mcap or png-stack; else as it shows."
+)
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option(
     "--map",
