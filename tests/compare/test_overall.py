@@ -1,6 +1,7 @@
 """The verdict over many checks: Holm's correction, evidence, and what fails."""
 
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -9,11 +10,16 @@ from scipy.stats import norm
 from validate.compare.overall import ALPHA, judge_all
 from validate.compare.verdict import Check, Verdict
 
+_NAMES = count()
 
-def check(value: float, verdict: Verdict | None = None, count: int = 1) -> Check:
-    """An error of so many u_val."""
+
+def check(
+    value: float, verdict: Verdict | None = None, count: int = 1, name: str | None = None
+) -> Check:
+    """An error of so many u_val, of a comparison of its own."""
     own: Verdict = "differs" if abs(value) > 2 else "agrees"
-    return Check("x", value, 9.0, 1.0, 1.0, 0.0, 0.0, "m", count, verdict or own, "because")
+    name = name or f"q{next(_NAMES)}"
+    return Check(name, value, 9.0, 1.0, 1.0, 0.0, 0.0, "m", count, verdict or own, "because")
 
 
 def test_one_check_is_not_corrected() -> None:
@@ -50,13 +56,13 @@ def test_undecided_counts_as_a_test_and_fails() -> None:
 
 @pytest.mark.parametrize("verdict", ["fitted", "repeats itself"])
 def test_without_evidence_nothing_fails_and_nothing_agrees(verdict: Verdict) -> None:
-    found = judge_all(3 * [check(0.1, verdict)])
+    found = judge_all([check(0.1, verdict) for _ in range(3)])
     assert (found.passed, found.word) == (True, "no evidence")
     assert found.counted == "evidence: 0 of 3 checks"
 
 
 def test_fitted_checks_do_not_dilute_the_correction() -> None:
-    assert judge_all([check(2.1), *(3 * [check(9.0, "fitted")])]).differs
+    assert judge_all([check(2.1), *(check(9.0, "fitted") for _ in range(3))]).differs
 
 
 def test_nothing_checked_has_failed() -> None:
@@ -66,4 +72,21 @@ def test_nothing_checked_has_failed() -> None:
 
 def test_an_error_without_uncertainty_is_certain() -> None:
     sure = replace(check(1e-9, "differs"), u_val=0.0)
-    assert judge_all([sure, *(20 * [check(0.1)])]).differs == (sure,)
+    assert judge_all([sure, *(check(0.1) for _ in range(20))]).differs == (sure,)
+
+
+def test_methods_on_the_same_data_are_one_piece_of_evidence() -> None:
+    """Two models fitted to one slope show one error: the second adds and hides nothing."""
+    two = judge_all([check(-0.8, name="force@10pct"), check(-0.8, name="force@10pct")])
+    assert (two.evidence, two.total, two.word) == (1, 1, "agrees")
+    assert two.counted == "evidence: 1 of 1 checks (1 more on the same data)"
+    assert len(judge_all([check(2.01, name="f"), check(2.01, name="f")]).differs) == 2
+
+
+def test_a_method_that_agrees_does_not_hide_one_that_differs_on_the_same_data() -> None:
+    found = judge_all([check(0.1, name="f"), check(2.5, name="f"), check(0.1, name="g")])
+    assert [c.value for c in found.differs] == [2.5]
+    assert (found.evidence, found.total, found.again) == (2, 2, 1)
+    weak = judge_all([check(2.1, name="f"), check(9.0, name="f"), check(0.1, name="g")])
+    assert [c.value for c in weak.differs] == [9.0]
+    assert [c.value for c in weak.alone] == [2.1]

@@ -5,6 +5,9 @@ so twenty of them show a difference more often than not. Holm (1979), "A simple 
 rejective multiple test procedure", Scand. J. Stat. 6, 65-70: the i-th smallest of m p-values must
 stay below alpha/(m - i + 1); whatever the checks have in common, a perfect model is then called
 different in at most alpha of all experiments.
+
+Checks of one name are one comparison: several accepted methods on the same data. It is one piece of
+evidence, however many methods show it, and one of the m: its p-value is the smallest of theirs.
 """
 
 from collections.abc import Sequence
@@ -22,7 +25,8 @@ class Overall:
     """What all checks say together.
 
     `differs` after Holm's correction; `alone` differ by themselves only; `undecided` cannot be
-    decided; `evidence` agree or differ; the rest of `total` is fitted or repeats itself.
+    decided; `evidence` agree or differ; the rest of `total` is fitted or repeats itself. `evidence`
+    and `total` count comparisons; `again` are checks of further methods on the same ones.
     """
 
     differs: tuple[Check, ...]
@@ -30,6 +34,7 @@ class Overall:
     undecided: tuple[Check, ...]
     evidence: int
     total: int
+    again: int
 
     @property
     def passed(self) -> bool:
@@ -47,7 +52,8 @@ class Overall:
 
     @property
     def counted(self) -> str:
-        return f"evidence: {self.evidence} of {self.total} checks"
+        more = f" ({self.again} more on the same data)" if self.again else ""
+        return f"evidence: {self.evidence} of {self.total} checks{more}"
 
 
 def judge_all(checks: Sequence[Check]) -> Overall:
@@ -55,22 +61,28 @@ def judge_all(checks: Sequence[Check]) -> Overall:
     undecided = tuple(c for c in checks if c.verdict == "cannot decide")
     differing = [c for c in checks if c.verdict == "differs"]
     tested = [c for c in checks if c.evidence] + [c for c in undecided if c.count]
-    kept = _holm([c.p_value for c in tested])
-    rejected = [c for c, gone in zip(tested, kept, strict=True) if gone]
+    levels = _holm(tested)
+    rejected = [c.p_value < levels.get(c.name, 0.0) for c in differing]
+    total = len({c.name for c in checks})
     return Overall(
-        differs=tuple(c for c in differing if any(c is r for r in rejected)),
-        alone=tuple(c for c in differing if not any(c is r for r in rejected)),
+        differs=tuple(c for c, gone in zip(differing, rejected, strict=True) if gone),
+        alone=tuple(c for c, gone in zip(differing, rejected, strict=True) if not gone),
         undecided=undecided,
-        evidence=sum(c.evidence for c in checks),
-        total=len(checks),
+        evidence=len({c.name for c in checks if c.evidence}),
+        total=total,
+        again=len(checks) - total,
     )
 
 
-def _holm(p_values: Sequence[float]) -> list[bool]:
-    """Which hypotheses are rejected."""
-    m, rejected = len(p_values), [False] * len(p_values)
-    for rank, i in enumerate(sorted(range(m), key=lambda i: p_values[i])):
-        if not p_values[i] < ALPHA / (m - rank):
+def _holm(checks: Sequence[Check]) -> dict[str, float]:
+    """The level that rejects, by the name of every comparison that is rejected."""
+    smallest: dict[str, float] = {}
+    for c in checks:
+        smallest[c.name] = min(c.p_value, smallest.get(c.name, 1.0))
+    levels: dict[str, float] = {}
+    for rank, name in enumerate(sorted(smallest, key=lambda name: smallest[name])):
+        level = ALPHA / (len(smallest) - rank)
+        if not smallest[name] < level:
             break
-        rejected[i] = True
-    return rejected
+        levels[name] = level
+    return levels
