@@ -1,4 +1,5 @@
-"""Nodal forces of the scene's loads, per newton of their inputs, per m/s^2 of a weight."""
+"""Nodal forces of the scene's loads, per newton of their inputs, per m/s^2 of a weight; masses
+that hang at the body."""
 
 import numpy as np
 
@@ -6,6 +7,7 @@ from validate.arrays import Floats, Ints
 from validate.fem.assemble import mass
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene, Weight
+from validate.scene.select import Place, facets_of, kind_of, nodes_of
 from validate.scene.shape_functions import facet_rule
 
 
@@ -17,28 +19,54 @@ def load_columns(scene: Scene) -> Floats:
     columns = np.zeros((scene.mesh.nodes.size, len(scene.loads)))
     for j, load in enumerate(scene.loads):
         if isinstance(load, Weight):
-            columns[:, j] = mass(scene) @ np.tile(load.direction, len(scene.mesh.nodes))
+            pull = np.tile(load.direction, len(scene.mesh.nodes))
+            columns[:, j] = mass(scene) @ pull + hung_masses(scene) * pull
             continue
         columns[:, j] = np.outer(_nodal(scene.mesh, load), load.direction).ravel()
     return columns
 
 
+def hung_masses(scene: Scene) -> Floats:
+    """Masses (N,) kg of what hangs at the body, on every unknown of its nodes."""
+    nodal = np.zeros(len(scene.mesh.nodes))
+    for part in scene.masses:
+        nodal += part.mass * uniform_shares(scene.mesh, part.facets)
+    return np.repeat(nodal, scene.mesh.dimension)
+
+
 def _nodal(mesh: Mesh, load: Load) -> Floats:
     """The share (n,) of the input that every node takes."""
-    shares = np.zeros(len(mesh.nodes))
     if load.spread == "consistent":
-        facets = mesh.facets[load.facets]
-        parts = facet_integrals(mesh, facets)
-        np.add.at(shares, facets, parts / parts.sum())
-        return shares
-    nodes = mesh.facet_nodes(load.facets)
+        return uniform_shares(mesh, load.facets)
+    shares, nodes = np.zeros(len(mesh.nodes)), nodes_of(mesh, load.facets)
     shares[nodes] = 1.0 if load.spread == "per_node" else 1 / len(nodes)
     return shares
 
 
+def uniform_shares(mesh: Mesh, place: Place) -> Floats:
+    """Shares (n,) of 1 that is spread evenly over faces or edges, equally over points."""
+    shares, entities = np.zeros(len(mesh.nodes)), facets_of(mesh, place)
+    if kind_of(place) == "points":
+        shares[entities[:, 0]] = 1 / len(entities)
+        return shares
+    integrals = _edge_integrals if kind_of(place) == "edges" else facet_integrals
+    parts = integrals(mesh, entities)
+    np.add.at(shares, entities, parts / parts.sum())
+    return shares
+
+
+def _edge_integrals(mesh: Mesh, edges: Ints) -> Floats:
+    """Integral of every node's shape function (k, m) over its edge, m."""
+    rule = facet_rule(2, edges.shape[1])
+    lengths = np.linalg.norm(rule.jacobians(mesh.nodes[edges])[..., 0], axis=-1)
+    return np.asarray(rule.weights * lengths @ rule.N)
+
+
 def facet_integrals(mesh: Mesh, facets: Ints) -> Floats:
     """Integral of every node's shape function (f, m) over its facet, m^(d - 1)."""
-    rule = facet_rule(mesh.dimension, facets.shape[1])
+    if mesh.dimension == 2:
+        return _edge_integrals(mesh, facets)
+    rule = facet_rule(3, facets.shape[1])
     J = rule.jacobians(mesh.nodes[facets])
-    normal = np.cross(J[..., 0], J[..., 1]) if mesh.dimension == 3 else J[..., 0]
+    normal = np.cross(J[..., 0], J[..., 1])
     return np.asarray(rule.weights * np.linalg.norm(normal, axis=-1) @ rule.N)

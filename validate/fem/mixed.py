@@ -33,6 +33,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assemble import lame_constants, library_mesh
 from validate.scene.scene import Load, Scene, Weight
+from validate.scene.select import Place, facets_of, kind_of
 
 _PAIRS = {
     "tri3": (ElementTriP2, ElementTriP1),
@@ -94,6 +95,10 @@ def _require_plain(scene: Scene) -> None:
             f"mixed elements are for linear meshes in plane strain or 3-D, not {scene.mesh.kind} "
             f"in plane {scene.plane}"
         )
+    places = [p.facets for p in (*scene.supports, *scene.drives, *scene.loads)
+              if not isinstance(p, Weight)]  # fmt: skip
+    if scene.masses or {"faces"} != {"faces", *map(kind_of, places)}:
+        raise SceneError("mixed elements know faces alone, no edges, points or hanging masses")
     if scene.foundations or scene.membranes or scene.cavities:
         raise SceneError("mixed elements know supports, pins, drives and loads alone")
     spread = [x.name for x in scene.loads if isinstance(x, Load) and x.spread != "consistent"]
@@ -121,9 +126,9 @@ def _held(scene: Scene, domain: Any, basis: Basis) -> Ints:
     return np.unique(np.concatenate(held))
 
 
-def _facets(scene: Scene, domain: Any, name: str) -> Ints:
-    """The library's numbers of a facet set."""
-    wanted, known = np.sort(scene.mesh.facets[name], axis=1), np.sort(domain.facets.T, axis=1)
+def _facets(scene: Scene, domain: Any, place: Place) -> Ints:
+    """The library's numbers of facets."""
+    wanted, known = np.sort(facets_of(scene.mesh, place), axis=1), np.sort(domain.facets.T, axis=1)
     number = {tuple(f): i for i, f in enumerate(known.tolist())}
     return np.array([number[tuple(f)] for f in wanted.tolist()])
 

@@ -6,6 +6,7 @@ from scipy import sparse
 from validate.arrays import Floats, Ints
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Membrane, Scene
+from validate.scene.select import facets_of
 from validate.scene.shape_functions import facet_rule
 
 
@@ -19,7 +20,7 @@ def surface_stiffness(scene: Scene) -> tuple[sparse.csr_array, ...]:
 
 def foundation_stiffness(mesh: Mesh, foundation: Foundation) -> sparse.csr_array:
     """K (N, N) N/m of springs to the ground, k integral of N_a N_b dA per held component."""
-    facets = mesh.facets[foundation.facets]
+    facets = facets_of(mesh, foundation.facets)
     rule = facet_rule(3, facets.shape[1])
     J = rule.jacobians(mesh.nodes[facets])
     area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=2)
@@ -36,7 +37,7 @@ def membrane_stiffness(mesh: Mesh, membrane: Membrane) -> sparse.csr_array:
     K_ab = t integral of lambda' g_a g_b^T + mu (g_b g_a^T + (g_a . g_b) P) dA. The sheet is taut:
     it carries compression too, where a slack one would wrinkle.
     """
-    facets = mesh.facets[membrane.facets]
+    facets = facets_of(mesh, membrane.facets)
     rule = facet_rule(3, facets.shape[1])
     J = rule.jacobians(mesh.nodes[facets])
     e1, e2 = J[..., 0], J[..., 1]

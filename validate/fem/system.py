@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
@@ -17,8 +19,10 @@ from validate.fem.assemble import lumped, mass, stiffness, stiffness_damping
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
 from validate.fem.factor import Factor, factorise
 from validate.fem.frontal import Fronts
-from validate.fem.loads import load_columns
-from validate.scene.scene import Drive, Scene
+from validate.fem.loads import hung_masses, load_columns
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Drive, Load, Scene
+from validate.scene.select import Place, nodes_of
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,17 @@ class System:
 
     @cached_property
     def M(self) -> sparse.csr_array:
-        return mass(self.scene)
+        body = mass(self.scene)
+        if not self.scene.masses:
+            return body
+        return sparse.csr_array(body + sparse.diags_array(hung_masses(self.scene)))
 
     @cached_property
     def masses(self) -> Floats:
-        return lumped(self.scene, self.M)
+        if not self.scene.masses:
+            return lumped(self.scene, self.M)
+        hung = hung_masses(self.scene)
+        return lumped(self.scene, self.M - sparse.diags_array(hung)) + hung
 
     @cached_property
     def C(self) -> sparse.csr_array:
@@ -107,6 +117,7 @@ def build(scene: Scene) -> System:
         driven = _driven(scene, drive)
         held[driven] = True
         moves[driven, j] = sum(drive.direction)
+    _require_felt(scene, held)
     cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
     return System(scene, np.flatnonzero(~held), moves, cavities)
 
@@ -168,7 +179,39 @@ def _driven(scene: Scene, drive: Drive) -> Ints:
     return driven[[int(np.argmin(away))]]
 
 
-def _unknowns(scene: Scene, facets: str, components: tuple[int, ...]) -> Ints:
-    nodes = scene.mesh.facet_nodes(facets)
+def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:
+    """Raises `SceneError` for a load or mass all of whose unknowns are held: it would do nothing.
+
+    What hangs at a driven set is felt by the drive.
+    """
+    mesh = scene.mesh
+    free = ~held.reshape(mesh.nodes.shape)
+    loads = [load for load in scene.loads if isinstance(load, Load)]
+    parts = [("load", p.name, p.facets, np.array(p.direction) != 0) for p in loads]
+    every = np.ones(mesh.dimension, dtype=bool)
+    parts += [("mass", p.name, p.facets, every) for p in scene.masses if not scene.drives]
+    for what, name, place, along in parts:
+        nodes = nodes_of(mesh, place)
+        if free[nodes][:, along].any():
+            continue
+        open_ones = np.flatnonzero(free[:, along].any(axis=1))
+        hint = (
+            "the body has no free node" if not len(open_ones) else _nearest(mesh, nodes, open_ones)
+        )
+        raise SceneError(
+            f"{what} '{name}': supports, pins and drives hold all {len(nodes) * int(along.sum())} "
+            f"unknowns of its {len(nodes)} nodes, it would do nothing; {hint}"
+        )
+
+
+def _nearest(mesh: Mesh, nodes: Ints, others: Ints) -> str:
+    away, index = cKDTree(mesh.nodes[others]).query(mesh.nodes[nodes])
+    nearest = others[np.asarray(index)[int(np.argmin(away))]]
+    at = ", ".join(f"{1e3 * x:.3g}" for x in mesh.nodes[nearest])
+    return f"the nearest free node is at ({at}) mm, {1e3 * float(np.min(away)):.3g} mm away"
+
+
+def _unknowns(scene: Scene, facets: Place, components: tuple[int, ...]) -> Ints:
+    nodes = nodes_of(scene.mesh, facets)
     unknowns: Ints = (nodes[:, None] * scene.mesh.dimension + np.array(components)).ravel()
     return unknowns

@@ -11,6 +11,7 @@ from validate.report.observed import Held, holds, outline, shown_method
 from validate.scene.material_point import AnyScene
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Weight
+from validate.scene.select import nodes_of
 
 _MM = 1e3
 
@@ -131,7 +132,7 @@ def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:
     held = dict.fromkeys(s.facets for s in scene.supports if axis in s.components)
     found = []
     for name in {**moved, **held}:
-        nodes = _MM * scene.mesh.nodes[scene.mesh.facet_nodes(name)]
+        nodes = _MM * scene.mesh.nodes[nodes_of(scene.mesh, name)]
         low, high = nodes.min(axis=0), nodes.max(axis=0)
         if high[axis] - low[axis] < 1e-6:
             shift = moved.get(name, np.zeros(3))

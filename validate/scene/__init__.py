@@ -10,6 +10,7 @@ _HOMES = {
         "Drive",
         "Foundation",
         "Load",
+        "Mass",
         "Material",
         "Membrane",
         "Pin",
@@ -25,6 +26,7 @@ _HOMES = {
     "inclusion": ("Block", "Capsule", "block_with_inclusion"),
     "plates": ("Plates", "between_plates"),
     "refine": ("refined",),
+    "select": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),
 }
 
 __all__ = names(_HOMES)

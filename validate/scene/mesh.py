@@ -7,6 +7,7 @@ local order of `EDGES`. Corners of quad4 and hex8 run as in `scene.shape_functio
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import permutations
 from types import MappingProxyType
 from typing import Literal
@@ -95,6 +96,20 @@ class Mesh:
         if not self.bricks:
             return self.corners
         return self.cells[:, np.array(_SIMPLICES[self.kind])].reshape(-1, self.dimension + 1)
+
+    @cached_property
+    def surface(self) -> Ints:
+        """Facets (f, m) that belong to one cell only, oriented outward, middles included."""
+        outside = boundary_facets(self.corners, self.dimension)
+        if self.order == 1:
+            return outside
+        d, n = self.dimension, len(self.nodes)
+        ends = np.sort(self.cells[:, list(EDGES[d])], axis=2)
+        key, first = np.unique(ends[..., 0] * n + ends[..., 1], return_index=True)
+        middle = self.cells[:, d + 1 :].ravel()[first]
+        around = np.sort(outside[:, list(EDGES[d - 1])], axis=2)
+        found = np.searchsorted(key, around[..., 0] * n + around[..., 1])
+        return np.hstack([outside, middle[found]])
 
     def facet_nodes(self, name: str) -> Ints:
         """Sorted node numbers of a facet set; raises `SceneError` when it is absent or empty."""

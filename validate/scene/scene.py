@@ -9,6 +9,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh
+from validate.scene.select import Place, kind_of, nodes_of
 
 Dilatation = Literal["pointwise", "nodal_mean"]
 LawName = Literal["linear", "svk", "neo_hooke"]
@@ -67,9 +68,9 @@ class Region:
 
 @dataclass(frozen=True)
 class Support:
-    """Displacement components held at zero on a facet set."""
+    """Displacement components held at zero on a facet set, or on faces, edges or points."""
 
-    facets: str
+    facets: Place
     components: tuple[int, ...]
 
 
@@ -92,7 +93,7 @@ class Drive:
     """
 
     name: str
-    facets: str
+    facets: Place
     direction: tuple[float, ...]
     point: tuple[float, ...] | None = None
     speeds: tuple[tuple[float, float], ...] = ()
@@ -109,11 +110,12 @@ class Load:
 
     `spread`: "consistent" takes the input as the total force of a uniform traction, "nodal" as a
     total split equally over the set's nodes, "per_node" as the force on each of its nodes. The
-    direction is dead: it does not turn with the body. In 2-D N per metre of thickness.
+    direction is dead: it does not turn with the body. In 2-D N per metre of thickness. On edges a
+    consistent load is uniform along them, on points it is split equally.
     """
 
     name: str
-    facets: str
+    facets: Place
     direction: tuple[float, ...]
     spread: Literal["consistent", "nodal", "per_node"] = "consistent"
 
@@ -141,6 +143,25 @@ class Weight:
 
 
 @dataclass(frozen=True)
+class Mass:
+    """A mass kg that hangs at faces, edges or points, spread over them as a uniform load is.
+
+    It moves with its nodes, is weighed by every `Weight`, and is not damped: Rayleigh's damping is
+    the body's own. Of the mesh, as the body's own mass is: with `copies` each has one.
+    """
+
+    name: str
+    facets: Place
+    mass: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.mass) and self.mass > 0):
+            raise SceneError(
+                f"mass '{self.name}': {self.mass:g} kg; give one above 0, or drop the part"
+            )
+
+
+@dataclass(frozen=True)
 class Probe:
     """A point m whose displacement is traced at every step as `<name>.x`, `.y`, `.z`."""
 
@@ -155,7 +176,7 @@ class Foundation:
     Zero lets the facets slip, infinity would bond them; what lies between is partial friction.
     """
 
-    facets: str
+    facets: Place
     components: tuple[int, ...]
     stiffness: float
 
@@ -168,7 +189,7 @@ class Foundation:
 class Membrane:
     """A taut elastic sheet glued to a facet set: thickness m."""
 
-    facets: str
+    facets: Place
     thickness: float
     material: Material
 
@@ -209,6 +230,7 @@ class Scene:
     probes: tuple[Probe, ...] = ()
     plane: PlaneState = "strain"
     thickness: float = 1.0
+    masses: tuple[Mass, ...] = ()
 
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
@@ -228,12 +250,22 @@ class Scene:
                 )
         if self.copies < 1:
             raise SceneError(f"{self.copies} copies of the mesh: at least 1")
-        named = [s.facets for s in self.supports]
-        named += [f.facets for f in self.foundations] + [m.facets for m in self.membranes]
-        named += [d.facets for d in self.drives] + [c.facets for c in self.cavities]
-        named += [load.facets for load in self.loads if isinstance(load, Load)]
-        for facets in named:
-            self.mesh.facet_nodes(facets)
+        self._check_places()
+
+    def _check_places(self) -> None:
+        """Every part must sit somewhere, and what covers an area on faces."""
+        places = [s.facets for s in self.supports] + [d.facets for d in self.drives]
+        places += [load.facets for load in self.loads if isinstance(load, Load)]
+        sheets = [f.facets for f in self.foundations] + [m.facets for m in self.membranes]
+        for place in (*places, *(m.facets for m in self.masses), *sheets):
+            nodes_of(self.mesh, place)
+        for place in sheets:
+            if kind_of(place) != "faces":
+                raise SceneError(
+                    f"a foundation or membrane on {kind_of(place)}: it covers an area; choose faces"
+                )
+        for cavity in self.cavities:
+            self.mesh.facet_nodes(cavity.facets)
 
     def _check_cells(self) -> None:
         """What bricks cannot have, and plane state and thickness, which are for 2-D meshes."""

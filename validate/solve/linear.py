@@ -10,6 +10,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import Responses
 from validate.scene.scene import Scene
+from validate.scene.select import nodes_of
 from validate.solve.types import Ending, State
 
 
@@ -76,10 +77,10 @@ class LinearStepper:
 def condensed(responses: Responses) -> Floats:
     """Rows at the nodes of the cavities and driven plates, then the plates' forces."""
     scene = responses.scene
-    sets = [c.facets for c in scene.cavities] + [d.facets for d in scene.drives]
+    sets = [*(c.facets for c in scene.cavities), *(d.facets for d in scene.drives)]
     if not sets:
         raise SceneError("scene without drive and cavity: nothing moves")
-    nodes = np.unique(np.concatenate([scene.mesh.facet_nodes(name) for name in sets]))
+    nodes = np.unique(np.concatenate([nodes_of(scene.mesh, place) for place in sets]))
     kept = responses.fields[:, nodes].reshape(len(responses.fields), -1).T
     forces = responses.reactions.reshape(-1, kept.shape[1])
     return np.ascontiguousarray(np.vstack([kept, forces]))
