@@ -292,6 +292,8 @@ def _number(path: str, text: str, unit: str) -> float:
 def _type_name(hint: Any) -> str:
     if get_origin(hint) is Literal:
         return "|".join(map(str, get_args(hint)))
+    if get_origin(hint) in (Union, types.UnionType):
+        return " | ".join("None" if a is type(None) else _type_name(a) for a in get_args(hint))
     return hint.__name__ if isinstance(hint, type) else str(hint).replace("typing.", "")
 
 

@@ -6,9 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
-from validate.cli import comparing
 from validate.cli.arguments import BAD_INPUT
 from validate.cli.main import run
 from validate.errors import ComparisonError, UsageError
@@ -137,8 +135,7 @@ def printed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *runs: Path
 ) -> list[str]:
     """Lines of the command on a terminal of 100 columns."""
-    narrow = lambda error=False: Console(stderr=error, width=100, highlight=False)  # noqa: E731
-    monkeypatch.setattr(comparing, "console", narrow)
+    monkeypatch.setenv("COLUMNS", "100")
     assert run(["compare", *map(str, runs)]) == 0
     return capsys.readouterr().out.splitlines()
 

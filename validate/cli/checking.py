@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.chosen import each
-from validate.cli.display import console, error_shown, figures_table, progress, shown, table
+from validate.cli.display import error_shown, figures_table, progress, say, shown, table
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options
@@ -54,17 +54,16 @@ def _document(result: Result, holds: bool) -> dict[str, Any]:
 
 
 def _print(result: Result) -> None:
-    screen = console()
-    screen.print(f"{result.name}: {KINDS[result.kind]}", soft_wrap=True)
-    screen.print(f"{result.source}\n", soft_wrap=True)
-    screen.print(figures_table(result.published))
+    say(f"{result.name}: {KINDS[result.kind]}")
+    say(result.source)
+    figures_table(result.published)
     checks = [
         [c.name, error_shown(c), shown(c.limit, c.unit), str(c.count), c.verdict]
         for c in result.checks
     ]
-    screen.print(table("\nAccepted limits", ["check", "error", "limit", "n", "verdict"], checks))
+    table("Accepted limits", ["check", "error", "limit", "n", "verdict"], checks)
     overall = result.overall
-    screen.print(
+    say(
         f"\n{len(result.published)} published figures, {len(result.fallen)} no longer stand; "
         f"checks: {overall.word}, {overall.counted}\n"
     )

@@ -4,9 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
-from validate.cli.display import console, table
+from validate.cli.display import say, table, warn
 from validate.report.numbers import shown_unit, significant, text
 from validate.study.stored import Pair, Row, SideBySide, pairs, read_run, side_by_side
 
@@ -21,22 +19,21 @@ def compare(paths: tuple[Path, ...], as_json: bool) -> None:
 
 
 def _show(found: SideBySide) -> None:
-    screen, error = console(), console(error=True)
     for warning in found.warnings:
-        error.print(f"warning: {warning}", soft_wrap=True)
+        warn(warning, error=True)
     shown, more, unseen = pairs(found)
     for pair in shown:
-        screen.print(_scores(pair), "")
+        _scores(pair)
     if more or unseen:
         left = f"left out: {more} pairs of methods, {unseen} scores; --json has all"
-        screen.print(left, soft_wrap=True)
+        say(f"\n{left}")
     if found.parameters:
         rows = [[path, *values] for path, values in found.parameters.items()]
-        names = [f"{r.name} ({r.created})" for r in found.runs]
-        screen.print(table("Parameters that differ", ["path", *names], rows))
+        names = [f"{r.name} {r.created}" for r in found.runs]
+        table("Parameters that differ", ["path", *names], rows)
     else:
-        screen.print("No parameter differs.")
-    screen.print(f"\n{len(found.rows)} scores of {len(found.runs)} runs compared")
+        say("\nNo parameter differs.")
+    say(f"\n{len(found.rows)} scores of {len(found.runs)} runs compared")
 
 
 def document(found: SideBySide) -> dict[str, Any]:
@@ -59,7 +56,7 @@ def document(found: SideBySide) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _scores(pair: Pair) -> Table:
+def _scores(pair: Pair) -> None:
     """One table of two columns, which fits where a table of all would not."""
     by_method = any(r.method for r in pair.rows)
     head = ["score", "one", "other", "difference", "unit"]
@@ -67,7 +64,7 @@ def _scores(pair: Pair) -> Table:
     if by_method:
         head = ["method", *head]
         rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
-    return table(f"One: {pair.one}; other: {pair.other}", head, rows)
+    table(f"One: {pair.one}; other: {pair.other}", head, rows)
 
 
 def _row(row: Row) -> list[str]:

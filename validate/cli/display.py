@@ -1,15 +1,16 @@
-"""Tables and progress bars on the terminal; plain lines when it is not one."""
+"""Tables and sentences on the terminal; plain lines when it is not one."""
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
+from validate.cli.layout import laid, wrapped
 from validate.report.numbers import duration, significant, with_unit
 
 if TYPE_CHECKING:  # what only names a type costs `validate list` nothing
@@ -17,26 +18,54 @@ if TYPE_CHECKING:  # what only names a type costs `validate list` nothing
     from validate.compare.verdict import Check
 
 
+_WIDTH = 80  # columns where neither COLUMNS nor a terminal says how many there are
+
+
+def width(stream: TextIO) -> int:
+    """COLUMNS, else those of the terminal that the stream is, else 80."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isdigit() and int(given) > 0:
+        return int(given)
+    try:
+        return os.get_terminal_size(stream.fileno()).columns or _WIDTH
+    except (OSError, ValueError):  # a pipe, a file, no stream of the system
+        return _WIDTH
+
+
 def console(*, error: bool = False) -> Console:
-    """Standard output or error; a pipe gets wide lines without colour."""
-    found = Console(stderr=error, highlight=False)
-    return found if found.is_terminal else Console(stderr=error, highlight=False, width=160)
+    """Standard output or error, as wide as `width` says; colours on a terminal only."""
+    stream = sys.stderr if error else sys.stdout
+    return Console(stderr=error, highlight=False, width=width(stream))
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """A table of texts; every column with a unit carries it in its name."""
-    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
-    for column in columns:
-        made.add_column(column, overflow="fold")
-    for row in rows:
-        made.add_row(*row)
-    return made
+def say(text: str, style: str = "", indent: str = "", *, error: bool = False) -> None:
+    """Sentences, broken between words; `indent` from the second line on."""
+    screen = console(error=error)
+    for line in wrapped(text, screen.width, indent):
+        screen.print(line, style=style, markup=False, soft_wrap=True)
 
 
-def figures_table(published: "Sequence[Published]") -> Table:
+def warn(text: str, *, error: bool = False) -> None:
+    """A warning, which nobody overlooks on a terminal."""
+    say(f"warning: {text}", "yellow", "  ", error=error)
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table of texts below its title; a column with a unit carries it in its name."""
+    if not rows:
+        say(f"\n{title}: none")
+        return
+    screen = console()
+    if title:
+        say(f"\n{title}", "bold")
+    for line in laid(columns, rows, screen.width):
+        screen.print(line, markup=False, soft_wrap=True)
+
+
+def figures_table(published: "Sequence[Published]") -> None:
     """Printed figures beside ours, with today's verdict."""
     rows = [[p.name, _value(p.ours, p), _value(p.theirs, p), p.line, p.why] for p in published]
-    return table("Published figures", ["figure", "ours", "theirs", "verdict", "why"], rows)
+    table("Published figures", ["figure", "ours", "theirs", "verdict", "why"], rows)
 
 
 def _value(value: float | None, figure: "Published") -> str:

@@ -4,7 +4,7 @@ import json
 from datetime import UTC, datetime
 from pathlib import Path
 
-from validate.cli.display import console, table
+from validate.cli.display import say, table
 from validate.recording.preflight import Inspection, Topic, inspect_recording
 
 
@@ -18,16 +18,16 @@ def inspect(file: Path, as_json: bool) -> None:
 
 
 def _print(found: Inspection) -> None:
-    screen = console()
-    head = ["topic", "kind", "schema (encoding)", "n", "duration s", "rate Hz", "gaps", "unit"]
+    head = ["topic", "kind", "n", "duration s", "rate Hz", "gaps", "unit", "frame"]
     rows = [_row(topic) for topic in found.topics]
-    screen.print(table(found.source.path, [*head, "frame"], rows))
-    screen.print(_head(found), soft_wrap=True)
+    say(found.source.path, "bold")
+    table("", [*head, "schema (encoding)"], rows)
+    say(_head(found), indent="  ")
     for line in found.clock_offsets:
-        screen.print(line, soft_wrap=True)
-    screen.print(f"defects: {len(found.defects)}")
+        say(line, indent="  ")
+    say(f"defects: {len(found.defects)}")
     for defect in found.defects:
-        screen.print(f"  {defect}", soft_wrap=True)
+        say(f"  {defect}", indent="    ")
 
 
 def _row(topic: Topic) -> list[str]:
@@ -37,8 +37,8 @@ def _row(topic: Topic) -> list[str]:
     gaps = "-" if clock is None else str(clock.gaps)
     schema = f"{topic.schema or '-'} ({topic.schema_encoding or '-'}/{topic.message_encoding})"
     return [
-        topic.name, topic.kind, schema, str(topic.count), duration, rate, gaps,
-        topic.unit or "-", topic.frame or "-",
+        topic.name, topic.kind, str(topic.count), duration, rate, gaps, topic.unit or "-",
+        topic.frame or "-", schema,
     ]  # fmt: skip
 
 

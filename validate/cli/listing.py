@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from validate.cli.display import console, table
+from validate.cli.display import say, table
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
@@ -47,17 +47,28 @@ def _details(experiment: Experiment) -> dict[str, Any]:
 
 
 def _print(experiment: Experiment) -> None:
-    out = console()
-    out.print(f"[bold]{experiment.name}[/]: {experiment.title}\n{experiment.source}\n")
-    rows = [
-        [p.path, p.type, "none" if p.default is None else str(p.default), p.unit, p.doc]
-        for p in parameters_of(experiment)
-    ]
-    out.print(table("Parameters", ["path", "type", "default", "unit", "what it is"], rows))
+    say(f"{experiment.name}: {experiment.title}", "bold")
+    say(experiment.source)
+    rows = [[p.path, _default(p), f"{p.doc} ({p.type})"] for p in parameters_of(experiment)]
+    table("Parameters", ["path", "default", "what it is (type)"], rows)
     methods = [
         [k, m.label, "accepted" if k in experiment.accepted else ""]
         for k, m in experiment.methods.items()
     ]
-    out.print(table("\nMethods", ["name", "what", ""], methods))
+    table("Methods", ["name", "what", ""], methods)
     accepted = [[a.quantity, f"{a.limit:g}", a.source] for a in experiment.accept]
-    out.print(table("\nAccepted when", ["quantity", "limit (SI)", "source"], accepted))
+    table("Accepted when", ["quantity", "limit (SI)", "source"], accepted)
+
+
+def _default(parameter: Parameter) -> str:
+    """As `--set` takes it."""
+    value, unit = parameter.default, parameter.unit
+    if value is None or value in ("", []):
+        return "none"
+    text = ",".join(map(_plain, value)) if isinstance(value, list) else _plain(value)
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def _plain(value: Any) -> str:
+    """15200, not 15200.0."""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from validate.catalogue import card, experiment_files, shipped
-from validate.cli.display import console, relative, table
+from validate.cli.display import relative, say, table
 
 
 def show(named: tuple[Path, ...], as_json: bool) -> None:
@@ -16,12 +16,11 @@ def show(named: tuple[Path, ...], as_json: bool) -> None:
         print(json.dumps([asdict(c) for c in cards], indent=2))
         return
     rows = [[c.name, c.title, c.source] for c in cards if not c.note]
-    screen = console()
-    screen.print(table("Experiments", ["name", "what", "source"], rows))
+    table("", ["name", "what", "source"], rows)
     for c in cards:
         for line in (c.note, _hides(files[c.name])):
             if line:
-                screen.print(f"{relative(files[c.name])}: {line}", soft_wrap=True, markup=False)
+                say(f"{relative(files[c.name])}: {line}", indent="  ")
 
 
 def _hides(file: Path) -> str:

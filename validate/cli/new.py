@@ -12,7 +12,7 @@ from string import Template
 
 import numpy as np
 
-from validate.cli.display import console
+from validate.cli.display import say
 from validate.errors import UsageError
 from validate.places import try_folder, write_whole
 from validate.recording.mcap.read import read_recording
@@ -38,7 +38,7 @@ def new(name: str, source: Path, out: Path | None) -> None:
     text = written(name, read_recording(source), _beside(source, path))
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, text)
-    console().print(f"{path}: edit it, then `validate run {_called(name, path)}`", soft_wrap=True)
+    say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
 
 
 def written(name: str, recording: Recording, source: str) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.arguments import pairs
-from validate.cli.display import console
+from validate.cli.display import say
 from validate.errors import UsageError
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
@@ -49,4 +49,4 @@ def _seconds(topic: str, text: str) -> tuple[float, float]:
 def written(recording: Recording, out: Path) -> None:
     """Says which streams a file got and how large it is."""
     size = out.stat().st_size / 1e3
-    console().print(f"{out}: {', '.join(recording.streams)}; {size:.0f} kB", soft_wrap=True)
+    say(f"{out}: {', '.join(recording.streams)}; {size:.0f} kB", indent="  ")

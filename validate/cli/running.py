@@ -8,15 +8,16 @@ from time import perf_counter
 from validate.cli.arguments import BAD_INPUT, command_line, pairs
 from validate.cli.chosen import ask_about, each
 from validate.cli.display import (
-    console,
     error_shown,
     figures_table,
     progress,
     relative,
+    say,
     shown,
     table,
+    warn,
 )
-from validate.compare.result import KINDS, Result
+from validate.compare.result import KINDS, MethodResult, Result
 from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
 from validate.replay.find import sources_of
@@ -86,24 +87,27 @@ def _made(experiment: Experiment, options: Options) -> Made:
 
 
 def _summary(result: Result, page: Path, seconds: float) -> None:
-    screen = console()
-    rows = [
-        [m.name, c.name, error_shown(c), shown(2 * c.u_val, c.unit),
-         shown(c.limit, c.unit), str(c.count), c.verdict, m.why(c)]
-        for m in result.methods for c in m.checks
-    ]  # fmt: skip
-    head = ["method", "check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
     found = result.overall
-    screen.print(
-        f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", soft_wrap=True
-    )
+    say(f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", indent="  ")
     locked = locking_notes((m.label, m.scene) for m in result.methods)
     for warning in (*result.warnings, *locked):
-        screen.print(f"warning: {warning}", style="yellow", markup=False, soft_wrap=True)
-    screen.print(f"{result.title}\n", soft_wrap=True)
-    if rows:
-        screen.print(table("Checks", head, rows))
+        warn(warning)
+    say(result.title)
+    for method in result.methods:
+        if method.checks:
+            _checks(method)
     if result.published:
-        screen.print(figures_table(result.published))
-    screen.print(f"\n{result.sentence}", soft_wrap=True)
-    screen.print(f"{seconds:.1f} s wall time; report: {relative(page)}", soft_wrap=True)
+        figures_table(result.published)
+    say(f"\n{result.sentence}")
+    say(f"{seconds:.1f} s wall time; report: {relative(page)}")
+
+
+def _checks(method: MethodResult) -> None:
+    """A line a check; why it ended so stands below where there is no room beside."""
+    rows = [
+        [c.name, error_shown(c), shown(2 * c.u_val, c.unit), shown(c.limit, c.unit), str(c.count),
+         c.verdict, method.why(c)]
+        for c in method.checks
+    ]  # fmt: skip
+    head = ["check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
+    table(f"Checks of {method.name}", head, rows)

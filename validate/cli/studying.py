@@ -1,6 +1,6 @@
 """`validate study filters|stability|tradeoff|choose`: runs, writes the folder, prints."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import Any
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import console, progress, relative, table
+from validate.cli.display import progress, relative, say, table, warn
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
@@ -108,7 +108,7 @@ def _still(experiment: Experiment, still: GainMap | None, common: StudyOptions) 
     )
     page = _written(experiment, told, "stability", common)
     if not common.as_json:
-        console().print(f"{told.sentence}\nreport: {relative(page)}", soft_wrap=True)
+        say(f"{told.sentence}\nreport: {relative(page)}")
     return FAILED if told.passed is False else OK
 
 
@@ -168,8 +168,7 @@ def _running(
     except KeyboardInterrupt:
         cells = study_folder(experiment, kind, common.out) / CELLS
         kept = sum(1 for _ in cells.glob("*.json"))
-        screen = console(error=True)
-        screen.print(f"{kept} finished cells are kept; the same command goes on from there")
+        say(f"{kept} finished cells are kept; the same command goes on from there", error=True)
         raise
 
 
@@ -183,10 +182,9 @@ def _written(experiment: Experiment, told: Findings, kind: str, common: StudyOpt
 
 def _end(done: Finished[Any], page: Path) -> None:
     where = f" on {done.workers}" if done.workers else ""
-    console().print(
+    say(
         f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
-        f"{where}; report: {relative(page)}",
-        soft_wrap=True,
+        f"{where}; report: {relative(page)}"
     )
 
 
@@ -194,16 +192,15 @@ def _end(done: Finished[Any], page: Path) -> None:
 
 
 def _show_filters(found: FilterStudy) -> None:
-    screen = console()
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        screen.print(table(f"Ranking by {found.by}{under}", _COLUMNS, _places(ranking)))
+        table(f"Ranking by {found.by}{under}", _COLUMNS, _places(ranking))
     failed = [pair for r in found.rankings for pair in r.failed]
     for cell, why in failed[:_PLACES]:
-        screen.print(f"failed: {cell.method} ({named(cell.values)}): {why}", soft_wrap=True)
-    screen.print(f"\n{filter_page.sentence(found)}", soft_wrap=True)
+        say(f"failed: {cell.method} ({named(cell.values)}): {why}", indent="  ")
+    say(f"\n{filter_page.sentence(found)}")
     for best in found.best:
-        screen.print(best.line, soft_wrap=True)
+        say(best.line, indent="  ")
 
 
 def _places(ranking: Ranking) -> list[list[str]]:
@@ -225,14 +222,12 @@ def _show_stability(found: Stability) -> None:
         for p in found.predictions
     ]  # fmt: skip
     head = ("prediction", "worst / 1", "limit / 1", "count", "verdict")
-    screen = console()
-    screen.print(table("Predictions against measured radii", head, rows))
+    table("Predictions against measured radii", head, rows)
     quick = "QUICK: fewer points; " if found.quick else ""
-    screen.print(f"\n{quick}{stability_page.sentence(found)}", soft_wrap=True)
+    say(f"\n{quick}{stability_page.sentence(found)}")
 
 
 def _show_trade(found: Trade) -> None:
-    screen = console()
     head = ("solver", "element", "mesh", "error / mm", "time / us")
     for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
         rows = [
@@ -240,28 +235,25 @@ def _show_trade(found: Trade) -> None:
              significant(1e6 * (r.time_s or 0.0))]
             for r in found.front(by).rows
         ]  # fmt: skip
-        screen.print(table(title, head, rows))
+        table(title, head, rows)
     for by in ("error", "total"):
         if off := found.front(by).dominated:
-            screen.print(f"dominated ({by}): {'; '.join(off)}", soft_wrap=True)
-    _warn(found.locking)
-    screen.print(f"\n{trade_page.sentence(found)}", soft_wrap=True)
-
-
-def _warn(warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        console().print(f"warning: {warning}", style="yellow", markup=False, soft_wrap=True)
+            say(f"dominated ({by}): {'; '.join(off)}", indent="  ")
+    for warning in found.locking:
+        warn(warning)
+    say(f"\n{trade_page.sentence(found)}")
 
 
 def _show_choice(choice: Choice) -> None:
-    screen = console()
-    _warn(choice.trade.locking)
+    for warning in choice.trade.locking:
+        warn(warning)
     rows = [[f.name, f.value, f.means] for f in choice.facts]
-    screen.print(table("The scene's own numbers", ("what", "value", "asks for"), rows))
+    table("The scene's own numbers", ("what", "value", "asks for"), rows)
     rows = []
     for c in choice.ladder:
         error = None if c.best is None else error_of(c.best, choice.by)
         rows.append([c.rung, c.verdict, _text(None if error is None else 1e3 * error), c.evidence])
-    screen.print(table("The ladder", ("rung", "verdict", "error / mm", "evidence"), rows))
+    table("The ladder", ("rung", "verdict", "error / mm", "evidence"), rows)
+    say("")
     for line in (*choice.rejected, *words(choice)):
-        screen.print(line, soft_wrap=True)
+        say(line, indent="  ")
