@@ -9,9 +9,12 @@ from validate.fem.locate import (
     barycentric_rows,
     facet_samples,
     nearest_node_rows,
+    probe_rows,
     require_inside,
 )
-from validate.scene.mesh import Mesh
+from validate.scene.box import box
+from validate.scene.mesh import Mesh, quadratic
+from validate.scene.scene import Probe
 
 orders = pytest.mark.parametrize("order", [1, 2])
 
@@ -91,3 +94,21 @@ def test_facet_samples_cover_the_facets(order: int, parts: int) -> None:
     small = area_vectors(x, triangles).reshape(len(facets), -1, 3).sum(axis=1)
     assert small == pytest.approx(area_vectors(mesh.nodes, facets[:, :3]), abs=1e-18)
     assert CAPSULE.distance(x).max() < 1e-15
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_marker_on_a_stalk_is_turned_with_the_surface(order: int) -> None:
+    """A rigid motion by 20 degrees moves a point 6 mm off the face exactly, as if it were the
+    body's; a point inside is read as ever."""
+    mesh = box((0.1, 0.03, 0.03), (4, 2, 2))
+    mesh = quadratic(mesh) if order == 2 else mesh
+    points = np.array([[0.1, 0.015, 0.036], [0.04, -0.006, 0.01], [0.05, 0.01, 0.02]])
+    probes = [Probe(str(i), tuple(p.tolist()), stands=i < 2) for i, p in enumerate(points)]
+    rows = probe_rows(mesh, probes)
+    c, s = np.cos(0.35), np.sin(0.35)
+    H = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) - np.eye(3)
+    assert np.allclose(rows.apply(mesh.nodes @ H.T + 0.002), points @ H.T + 0.002, atol=1e-15)
+    assert rows.outside[2] == 0
+    assert ((rows.outside[:2] >= 0.006 - 1e-12) & (rows.outside[:2] < 0.009)).all()
+    u = np.random.default_rng(1).normal(size=mesh.nodes.shape)
+    assert np.allclose(rows.apply(u)[2], barycentric_rows(mesh, points).apply(u)[2])

@@ -1,5 +1,6 @@
 """Interpolation rows: the displacement at any point as a weighted sum of nodal displacements."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.spatial import cKDTree
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
 from validate.scene.mesh import Mesh
+from validate.scene.scene import Probe
 from validate.scene.shape_functions import (
     barycentric,
     brick_slopes,
@@ -16,6 +18,7 @@ from validate.scene.shape_functions import (
     simplex_values,
 )
 
+_ON = 1e-6  # m: a point this near is on the surface
 _CANDIDATES = 24  # nearest cell centres tried per point
 _INVERSIONS = 12  # Newton steps to a brick's local coordinates; a parallelepiped takes one
 _STRAY = 4.0  # how far outside its unit cell such a step may go: a brick's map folds further out
@@ -44,6 +47,27 @@ def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
     feet = np.einsum("ka,kad->kd", clipped, corners)
     weights = simplex_values(mesh.order, clipped)
     return Rows(_csr(mesh.cells[cell], weights, mesh), np.linalg.norm(points - feet, axis=1))
+
+
+def standing_rows(mesh: Mesh, points: Floats) -> Rows:
+    """Rows of points off the surface, as markers on stalks: each moves and turns with the cell
+    below it, by the affine field (least squares) of the cell's nodes, so that in a stretch-free
+    cell its offset is turned exactly. Points within the mesh are read as `barycentric_rows` does.
+    """
+    rows = barycentric_rows(mesh, points)
+    weights = rows.weights.copy()
+    for i in np.flatnonzero(rows.outside > _ON):
+        own = slice(weights.indptr[i], weights.indptr[i + 1])  # all nodes of the cell
+        x = mesh.nodes[weights.indices[own]]
+        affine = np.linalg.pinv(np.column_stack([np.ones(len(x)), x - x.mean(axis=0)]))
+        weights.data[own] = np.append(1.0, points[i] - x.mean(axis=0)) @ affine
+    return Rows(weights, rows.outside)
+
+
+def probe_rows(mesh: Mesh, probes: Sequence[Probe]) -> Rows:
+    """Rows of probes, in their order."""
+    points = np.array([p.point for p in probes])
+    return (standing_rows if any(p.stands for p in probes) else barycentric_rows)(mesh, points)
 
 
 def nearest_node_rows(mesh: Mesh, points: Floats, among: Ints | None = None) -> Rows:

@@ -8,7 +8,13 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
-from validate.fem.locate import Rows, barycentric_rows, nearest_node_rows, require_inside
+from validate.fem.locate import (
+    Rows,
+    barycentric_rows,
+    nearest_node_rows,
+    require_inside,
+    standing_rows,
+)
 from validate.recording.types import Markers, Recording
 from validate.register.clock import clock_sd, slopes, with_clock
 from validate.register.fitting import MarkerFit
@@ -154,12 +160,14 @@ def observe_markers(
     role: Role = "validates",
     together: tuple[Together, ...] = (),
     sd_t: float = 0.0,
+    stands: float = 0.0,
 ) -> MarkerObservation:
     """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
 
     `up` is one direction in the markers' frame and in the scene's: without it a planar set that
     was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the plane
-    z = 0 of the layout: what markers do across it is dropped.
+    z = 0 of the layout: what markers do across it is dropped. Markers on stalks may stand
+    `stands` m off the surface and turn with it.
     Raises `RegistrationError` for names that the layout lacks, for markers outside the mesh, and
     for whatever `register_points` finds.
     """
@@ -177,9 +185,9 @@ def observe_markers(
     d = mesh.dimension
     sds = _along_axes(registration, d)
     places = rest[:, :d]
-    rows = (barycentric_rows if sampling == "barycentric" else nearest_node_rows)(mesh, places)
+    rows = _rows(mesh, places, sampling, stands)
     if sampling == "barycentric":
-        require_inside(rows, markers.names, _INSIDE)
+        require_inside(rows, markers.names, max(stands, _INSIDE))
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
     require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
     return MarkerObservation(
@@ -187,6 +195,12 @@ def observe_markers(
         rms(sds) if sds else registration.expected_sd,
         registration.tre_at(rest), registration, together, sd_t, sds,
     )  # fmt: skip
+
+
+def _rows(mesh: Mesh, places: Floats, sampling: Sampling, stands: float) -> Rows:
+    if sampling == "nearest_node":
+        return nearest_node_rows(mesh, places)
+    return (standing_rows if stands else barycentric_rows)(mesh, places)
 
 
 def _along_axes(found: Registration, d: int) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ from validate.compare.verdict import (
     judge,
 )
 from validate.errors import ComparisonError
-from validate.fem.locate import barycentric_rows
+from validate.fem.locate import probe_rows
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
 from validate.replay.followed import Followed
 from validate.replay.refined import Refined, mesh_errors, variants
@@ -164,7 +164,7 @@ def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
     for probe in mine.scene.probes:
         key = f"{probe.name}@all"
         if key in mine.residuals:
-            rows = barycentric_rows(mine.scene.mesh, np.array([probe.point]))
+            rows = probe_rows(mine.body.mesh, (probe,))
             sd = np.array([rows.apply(s)[0] for s in mine.run.sd])
             claimed = replace(mine.residuals[key], values=sd, sd=0.0)
             found[key] = [Sensitivity(OWN_COVARIANCE, claimed, 1.0)]

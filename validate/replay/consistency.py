@@ -15,7 +15,7 @@ from validate.estimate.consistency import (
     nis_consistency,
     whiteness,
 )
-from validate.fem.locate import barycentric_rows
+from validate.fem.locate import probe_rows
 from validate.replay.followed import Cases, Followed
 
 _LAGS = 10
@@ -86,7 +86,7 @@ def nees_of(followed: Followed) -> dict[str, Consistency]:
         if probe.name not in followed.truth.probes:
             continue
         reference = followed.reference(probe.name)
-        rows = barycentric_rows(mesh, np.array([probe.point]))
+        rows = probe_rows(mesh, (probe,))
         error = np.array([rows.apply(u)[0] for u in run.u]) - reference[run.at]
         sd = np.array([rows.apply(s)[0] for s in run.sd])
         free = (sd > 0).any(axis=0) | (np.abs(error).max(axis=0) > _HELD)

@@ -163,10 +163,14 @@ class Mass:
 
 @dataclass(frozen=True)
 class Probe:
-    """A point m whose displacement is traced at every step as `<name>.x`, `.y`, `.z`."""
+    """A point m whose displacement is traced at every step as `<name>.x`, `.y`, `.z`.
+
+    `stands`: it stands off the surface, as a marker on a stalk, and turns with the cell below it.
+    """
 
     name: str
     point: tuple[float, ...]
+    stands: bool = False
 
 
 @dataclass(frozen=True)

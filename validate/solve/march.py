@@ -8,7 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
-from validate.fem.locate import Rows, barycentric_rows
+from validate.fem.locate import Rows, probe_rows
 from validate.fem.system import build
 from validate.scene.material_point import MaterialPoint
 from validate.scene.scene import Scene, Weight
@@ -125,7 +125,7 @@ def _probe_rows(stepper: Stepper) -> Rows | None:
     scene = stepper.scene
     if not scene.probes:
         return None
-    return barycentric_rows(scene.mesh, np.array([p.point for p in scene.probes]))
+    return probe_rows(scene.mesh, scene.probes)
 
 
 def _probed(stepper: Stepper, values: list[Floats]) -> dict[str, Trace]:

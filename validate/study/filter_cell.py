@@ -17,7 +17,7 @@ from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.gains import schedule
 from validate.estimate.measurements import Timetable, measurements, timetable
-from validate.fem.locate import barycentric_rows
+from validate.fem.locate import probe_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import describe
@@ -120,7 +120,7 @@ def _all_seeds(
     if z is None or shared is None or shared.gains is None:
         return None
     scene, inputs = first.system.scene, first.seen.inputs
-    points = barycentric_rows(scene.mesh, np.array([p.point for p in scene.probes]))
+    points = probe_rows(scene.mesh, scene.probes)
     rows = np.kron(points.weights.toarray(), np.eye(scene.mesh.dimension))
     found = shared_gain_run(
         shared, inputs, z, rows["xyz".index(bench.experiment.axis) :: scene.mesh.dimension]
