@@ -7,12 +7,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
-import faults
+import faults_drawn as drawing
+import faults_tests
 
 
 @pytest.fixture
-def one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(faults, "ROOT", tmp_path)
+def one_file(tmp_path: Path) -> Path:
     (tmp_path / "validate").mkdir()
     return tmp_path / "validate" / "one.py"
 
@@ -34,31 +34,67 @@ def one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 )
 def test_faults_of_a_line(one_file: Path, line: str, expected: set[str]) -> None:
     one_file.write_text(line + "\n", encoding="utf-8")
-    assert {f.after.rstrip() for f in faults.faults_of(one_file)} == expected
+    found = drawing.faults_of(one_file.parents[1], one_file)
+    assert {f.after.rstrip() for f in found} == expected
 
 
 def test_draw_is_by_seed_and_still_python(one_file: Path) -> None:
     one_file.write_text("".join(f"x{i} = a{i} + {i}\n" for i in range(30)), encoding="utf-8")
-    first, again, other = (faults.drawn(10, seed, "") for seed in (1, 1, 2))
+    root = one_file.parents[1]
+    first, again, other = (drawing.drawn(root, 10, seed, "") for seed in (1, 1, 2))
     assert first == again != other
     assert len({f.line for f in first}) == 10
     for fault in first:
-        compile(faults.broken(fault), "one", "exec")
+        compile(drawing.broken(fault, one_file.read_text("utf-8")), "one", "exec")
 
 
-def test_nearest_tests_come_first() -> None:
-    fault = faults.Fault("validate/a/b.py", 1, 0, 1, "", "x", "sign", "broken_one")
-    uses = {
-        "validate.c": {"validate.a.b"},
-        "tests/test_far.py": {"validate.c"},
-        "tests/test_uses.py": {"validate.a.b"},
-        "tests/a/test_b.py": {"validate.a.b"},
-        "tests/test_other.py": {"validate.d"},
-        "tests/test_reads.py": set(),
-    }
-    texts = dict.fromkeys(uses, "")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Path, "read_text", lambda self, encoding: texts.get(str(self), ""))
-        found = list(faults.nearest(fault, uses))
-    told = ["tests/a/test_b.py", "tests/test_uses.py", "tests/test_reads.py", "tests/test_far.py"]
-    assert found == told
+TEXT = """\
+LIMIT = 3
+
+
+class Box:
+    side: float = 2.0
+
+    def area(
+        self, scale: float = 1.0
+    ) -> float:
+        if (
+            scale > LIMIT
+        ):
+            return 0.0
+        return scale * self.side
+
+
+@compiled(cache=True)
+def kernel(x):
+    return x + 1
+"""
+
+
+def test_lines_of_a_statement_are_executed_together() -> None:
+    source = drawing.Source(TEXT)
+    assert source.statement(1) == range(1, 2)
+    assert source.statement(11) == range(10, 13)  # the condition, not what follows it
+    assert source.statement(13) == range(13, 14)
+    assert source.statement(8) == range(7, 10)
+
+
+def test_what_runs_at_import_or_compiled_is_reached_by_name() -> None:
+    source = drawing.Source(TEXT)
+    assert source.reached_by(1) == (["LIMIT"], range(0))
+    assert source.reached_by(5) == (["Box", "side"], range(4, 15))
+    assert source.reached_by(8) == (["Box", "area"], range(10, 15))
+    assert source.reached_by(13) == ([], range(0))  # traced
+    assert source.reached_by(19) == (["kernel"], range(19, 20))
+
+
+def test_batches_begin_with_what_executes_the_line_and_end_with_the_time() -> None:
+    def tests(name: str, *seconds: float) -> faults_tests.Tests:
+        return faults_tests.Tests(name, {f"{name}{i}": s for i, s in enumerate(seconds)})
+
+    a, b, c = tests("a", 1.0, 2.0), tests("b", 4.0), tests("c", 50.0)
+    nearest = [(a, {"a0"}), (b, {"b0"}), (c, {"c0"})]
+    told = [[(t.name, sorted(ids)) for t, ids in x] for x in faults_tests._batches(nearest, 20.0)]
+    assert told == [[("a", ["a0"]), ("b", ["b0"])], [("a", ["a1"])]]
+    alone = list(faults_tests._batches([(c, {"c0"})], 20.0))
+    assert [t.name for t, _ in alone[0]] == ["c"]  # never none

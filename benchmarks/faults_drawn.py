@@ -1,0 +1,209 @@
+"""What can be broken in a line of `validate/`, and which lines a seed draws."""
+
+import ast
+import random
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+_COMPARED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is not": "is",
+             "is": "is not", "not in": "in", "in": "not in"}  # fmt: skip
+_COMBINED = {"+": "-", "-": "+", "*": "/", "/": "*", "@": "+", "//": "*", "**": "*", "%": "*",
+             "&": "|", "|": "&"}  # fmt: skip
+_NAMES = {"min": "max", "max": "min", "sin": "cos", "cos": "sin", "all": "any", "any": "all",
+          "minimum": "maximum", "maximum": "minimum", "argmin": "argmax", "argmax": "argmin",
+          "floor": "ceil", "ceil": "floor", "rms": "mean"}  # fmt: skip
+_WORDS = (ast.JoinedStr, ast.Raise, ast.Import, ast.ImportFrom)  # what only speaks
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Characters [start, end) of a line of a file replaced by `text`."""
+
+    path: str
+    line: int
+    start: int
+    end: int
+    text: str
+    before: str
+    kind: str
+
+    @property
+    def after(self) -> str:
+        return self.before[: self.start] + self.text + self.before[self.end :]
+
+    @property
+    def name(self) -> str:
+        return f"{self.path}: {self.before.strip()} -> {self.after.strip()}"
+
+
+def faults_of(root: Path, path: Path) -> list[Fault]:
+    """Every fault of a file; words, annotations and imports are left alone."""
+    source = path.read_text(encoding="utf-8")
+    lines, told = source.splitlines(), str(path.relative_to(root))
+    found = []
+    for start, end, text, kind in _edits(ast.parse(source), lines):
+        (line, a), (last, b) = start, end
+        if line == last and lines[line - 1].isascii():
+            found.append(Fault(told, line, a, b, text, lines[line - 1], kind))
+    return found
+
+
+Place = tuple[int, int]
+Edit = tuple[Place, Place, str, str]
+
+
+def _edits(tree: ast.AST, lines: list[str]) -> Iterator[Edit]:
+    for node in _code(tree):
+        if isinstance(node, ast.BinOp):
+            yield from _between(node.left, node.right, _COMBINED, "operator", lines)
+            if isinstance(node.op, ast.Add | ast.Sub):
+                yield _end(node.left), _end(node.right), "", "dropped term"
+        elif isinstance(node, ast.Compare):
+            yield from _between(node.left, node.comparators[0], _COMPARED, "comparison", lines)
+        elif isinstance(node, ast.BoolOp):
+            swap = {"and": "or", "or": "and"}
+            yield from _between(node.values[0], node.values[1], swap, "condition", lines)
+            yield _end(node.values[0]), _end(node.values[-1]), "", "dropped condition"
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
+            yield _start(node), _start(node.operand), "", "sign"
+        elif isinstance(node, ast.Constant) and type(node.value) in (int, float, bool):
+            yield _start(node), _end(node), _other(node.value), "constant"
+        elif isinstance(node, ast.Attribute) and node.attr in _NAMES:
+            line, column = _end(node)
+            yield (line, column - len(node.attr)), (line, column), _NAMES[node.attr], "function"
+        elif isinstance(node, ast.Name) and node.id in _NAMES and isinstance(node.ctx, ast.Load):
+            yield _start(node), _end(node), _NAMES[node.id], "function"
+        elif isinstance(node, ast.AugAssign):
+            yield from _between(node.target, node.value, {"+=": "-=", "-=": "+=", "*=": "/=",
+                                "/=": "*=", "|=": "="}, "operator", lines)  # fmt: skip
+
+
+def _code(tree: ast.AST) -> Iterator[ast.AST]:
+    """The nodes that compute."""
+    for name, value in ast.iter_fields(tree):
+        if name in ("annotation", "returns", "decorator_list"):
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.AST) and not isinstance(child, _WORDS):
+                yield child
+                yield from _code(child)
+
+
+def _other(value: float) -> str:
+    if isinstance(value, bool):
+        return str(not value)
+    if isinstance(value, int):
+        return str(value + 1)
+    return repr(1.5 * value) if value else "1.0"
+
+
+def _between(
+    left: ast.expr, right: ast.expr, swap: Mapping[str, str], kind: str, lines: list[str]
+) -> Iterator[Edit]:
+    """The operator between two expressions of one line, swapped."""
+    (line, a), (last, b) = _end(left), _start(right)
+    if line != last:
+        return
+    gap = lines[line - 1][a:b]
+    token = gap.strip(" ()")
+    if token in swap:
+        at = a + gap.index(token)
+        yield (line, at), (line, at + len(token)), swap[token], kind
+
+
+def _start(node: ast.expr) -> Place:
+    return node.lineno, node.col_offset
+
+
+def _end(node: ast.expr) -> Place:
+    return node.end_lineno or node.lineno, node.end_col_offset or node.col_offset
+
+
+def drawn(root: Path, count: int, seed: int, only: str) -> list[Fault]:
+    """Lines drawn by seed, one fault on each."""
+    by_line: dict[tuple[str, int], list[Fault]] = {}
+    for path in sorted((root / "validate").rglob("*.py")):
+        if only in str(path.relative_to(root)):
+            for fault in faults_of(root, path):
+                by_line.setdefault((fault.path, fault.line), []).append(fault)
+    chance = random.Random(seed)
+    lines = chance.sample(sorted(by_line), min(count, len(by_line)))
+    return [f for line in lines if (f := _one(root, by_line[line], chance))]
+
+
+def _one(root: Path, faults: list[Fault], chance: random.Random) -> Fault | None:
+    """A fault of one line by chance, whose file is still Python."""
+    for fault in chance.sample(faults, len(faults)):
+        try:
+            ast.parse(broken(fault, (root / fault.path).read_text(encoding="utf-8")))
+        except SyntaxError:
+            continue
+        return fault
+    return None
+
+
+def broken(fault: Fault, whole: str) -> str:
+    """The file's text with the fault."""
+    lines = whole.splitlines(keepends=True)
+    lines[fault.line - 1] = fault.after + "\n"
+    return "".join(lines)
+
+
+# --- what a line belongs to -----------------------------------------------------------------------
+
+
+class Source:
+    """A file's statements: which lines are executed together, and by what name they are reached."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text.splitlines()
+        self._statements = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.stmt)]
+
+    def _around(self, line: int) -> list[ast.stmt]:
+        """The statements that hold a line, outermost first; a decorator is of what it decorates."""
+        held = [n for n in self._statements if _first(n) <= line <= (n.end_lineno or 0)]
+        return sorted(held, key=lambda n: (_first(n), -(n.end_lineno or 0)))
+
+    def statement(self, line: int) -> range:
+        """The lines of the innermost statement, of a compound one those before its body."""
+        around = self._around(line)
+        if not around:
+            return range(line, line + 1)
+        body = getattr(around[-1], "body", None)
+        end = _first(body[0]) if body and line < _first(body[0]) else around[-1].end_lineno + 1
+        return range(_first(around[-1]), end)
+
+    def reached_by(self, line: int) -> tuple[list[str], range]:
+        """Names and lines by which a line is reached that is evaluated at import or compiled; none
+        for a line of a function, which is traced."""
+        none: tuple[list[str], range] = [], range(0)
+        around = self._around(line)
+        if not around or isinstance(around[-1], ast.Import | ast.ImportFrom):
+            return none
+        for n, statement in enumerate(around):
+            if isinstance(statement, ast.FunctionDef):
+                if line >= _first(statement.body[0]) and not _compiled(statement):
+                    return none
+                inner = range(_first(statement.body[0]), (statement.end_lineno or 0) + 1)
+                owners = [s.name for s in around[:n] if isinstance(s, ast.ClassDef)]
+                return [*owners, statement.name], inner
+        owners = [s for s in around if isinstance(s, ast.ClassDef)]
+        inner = range(owners[-1].lineno, (owners[-1].end_lineno or 0) + 1) if owners else range(0)
+        return [*(s.name for s in owners), *_assigned(around[-1])], inner
+
+
+def _first(statement: ast.stmt) -> int:
+    return min([statement.lineno, *(d.lineno for d in getattr(statement, "decorator_list", ()))])
+
+
+def _compiled(function: ast.FunctionDef) -> bool:
+    return any(re.search("compiled|inlined", ast.unparse(d)) for d in function.decorator_list)
+
+
+def _assigned(statement: ast.stmt) -> list[str]:
+    targets = getattr(statement, "targets", [getattr(statement, "target", None)])
+    named = [n.id for t in targets if t for n in ast.walk(t) if isinstance(n, ast.Name)]
+    return [n for n in named if not n.startswith("__")]

@@ -1,0 +1,43 @@
+"""Numbers that modules name: one that moves, moves figures or limits, and is changed here too."""
+
+import ast
+import tomllib
+from pathlib import Path
+
+_LONGEST = 120  # characters: what is longer is a declaration, with tests of its own
+
+
+def _named(root: Path) -> dict[str, dict[str, str]]:
+    """What the top of each module names that is written with numbers."""
+    found: dict[str, dict[str, str]] = {}
+    for path in sorted((root / "validate").rglob("*.py")):
+        module = ".".join(path.relative_to(root / "validate").with_suffix("").parts)
+        for statement in ast.parse(path.read_text("utf-8")).body:
+            match statement:
+                case ast.Assign(targets=[target], value=value):
+                    pass
+                case ast.AnnAssign(target=target, value=ast.expr() as value):
+                    pass
+                case _:
+                    continue
+            text = ast.unparse(value)
+            if len(text) <= _LONGEST and any(_number(part) for part in ast.walk(value)):
+                found.setdefault(module, {})[ast.unparse(target)] = text
+    return found
+
+
+def _number(part: ast.AST) -> bool:
+    return isinstance(part, ast.Constant) and type(part.value) in (int, float)
+
+
+def test_named_numbers_are_as_listed(project_root: Path) -> None:
+    listed = tomllib.loads((project_root / "tests" / "constants.toml").read_text("utf-8"))
+    named = _named(project_root)
+    moved = {
+        f"{module}.{name}": (value, named[module][name])
+        for module, names in listed.items()
+        for name, value in names.items()
+        if named.get(module, {}).get(name, value) != value
+    }
+    assert not moved, "a number moved (listed, named): list it, and say so in the changelog"
+    assert sum(map(len, listed.values())) > 250
