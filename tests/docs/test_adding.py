@@ -27,3 +27,9 @@ def test_every_example_runs(
     import adding_page  # type: ignore[import-not-found]
 
     assert adding_page.check.count == 20
+
+
+def test_the_page_of_laws_runs(project_root: Path) -> None:
+    text = (project_root / "docs" / "laws.md").read_text("utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    exec(compile(block, "laws.md", "exec"), {})

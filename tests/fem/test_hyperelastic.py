@@ -5,8 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from law_samples import NAMES, SPLIT, sample
 from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_scene
 
 from validate.arrays import Floats
@@ -15,27 +14,27 @@ from validate.fem.assemble import stiffness
 from validate.fem.cavity import cavity_surface, pressure_load, volume_of
 from validate.fem.follower import volume_hessian
 from validate.fem.hyperelastic import Body
-from validate.fem.laws import LAWS, NeoHooke, SaintVenantKirchhoff, law_of
+from validate.fem.laws import SaintVenantKirchhoff, law_of
+from validate.fem.neo_hooke import NeoHooke
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Dilatation, Foundation, LawName, Material, Membrane, Scene
+from validate.scene.scene import Dilatation, Foundation, Material, Membrane, Scene
 
 MATERIAL = Material(15_200.0, 0.485)
 ELEMENTS: list[tuple[int, Dilatation]] = [(1, "pointwise"), (1, "nodal_mean"), (2, "pointwise")]
-NAMES: list[LawName] = ["svk", "neo_hooke"]
 every = pytest.mark.parametrize(
     ("order", "dilatation", "name"),
-    [(*e, name) for e in ELEMENTS for name in NAMES],
+    [(*e, n) for e in ELEMENTS for n in NAMES if e[1] == "pointwise" or n in SPLIT],
     ids=lambda v: str(v),
 )
 
 
-def phantom(order: int, dilatation: Dilatation, name: LawName) -> Scene:
+def phantom(order: int, dilatation: Dilatation, name: str) -> Scene:
     scene = phantom_scene(phantom_mesh(COARSE_GRID, order), dilatation=dilatation)
-    return replace(scene, material=replace(MATERIAL, law=name))
+    return replace(scene, material=sample(name, MATERIAL.E, MATERIAL.nu))
 
 
 @cache
-def body(order: int, dilatation: Dilatation, name: LawName) -> Body:
+def body(order: int, dilatation: Dilatation, name: str) -> Body:
     return Body(phantom(order, dilatation, name))
 
 
@@ -58,7 +57,7 @@ def turn(axis: int, angle: float) -> Floats:
 
 @every
 def test_tangent_at_rest_is_the_linear_stiffness(
-    order: int, dilatation: Dilatation, name: LawName
+    order: int, dilatation: Dilatation, name: str
 ) -> None:
     scene = phantom(order, dilatation, name)
     K, T = stiffness(scene), body(order, dilatation, name).tangent(np.zeros(scene.mesh.nodes.size))
@@ -66,9 +65,7 @@ def test_tangent_at_rest_is_the_linear_stiffness(
 
 
 @every
-def test_force_and_tangent_are_derivatives(
-    order: int, dilatation: Dilatation, name: LawName
-) -> None:
+def test_force_and_tangent_are_derivatives(order: int, dilatation: Dilatation, name: str) -> None:
     b = body(order, dilatation, name)
     u = deformed(b.mesh)
     assert 0.2 < b.jacobians(u).min() < 0.95
@@ -98,43 +95,12 @@ def test_volume_hessian_is_the_derivative_of_the_load(order: int) -> None:
     assert y @ H @ y == pytest.approx(6 * volume_of(cavity, x), rel=1e-12)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(st.integers(0, 2**31), st.floats(-8, -0.5), st.sampled_from(sorted(LAWS)))
-def test_laws_at_a_point(seed: int, size: float, name: str) -> None:
-    """W is objective, P and A its derivatives, at every strain from 1e-8 up."""
-    rng = np.random.default_rng(seed)
-    law = LAWS[name](3e3, 5e4)
-    H = 10**size * rng.uniform(-1, 1, (3, 3))
-    dH = rng.normal(size=(3, 3))
-    R = turn(int(rng.integers(3)), float(rng.uniform(-np.pi, np.pi)))
-    F = np.eye(3) + H
-    turned = law.stress(R @ F - np.eye(3))
-    assert turned == pytest.approx(R @ law.stress(H), abs=1e-9 * 5e4)
-    change = np.einsum("JijK,jK->iJ", law.tangent(H), dH)
-    h = 1e-6
-    slope = (law.stress(H + h * dH) - law.stress(H - h * dH)) / (2 * h)
-    assert slope == pytest.approx(change, abs=1e-6 * np.abs(change).max())
-    work = (law.energy(H + h * dH) - law.energy(H - h * dH)) / (2 * h)
-    assert work == pytest.approx((law.stress(H) * dH).sum(), abs=1e-4 + 1e-6 * abs(work))
-
-
-@pytest.mark.parametrize("name", sorted(LAWS))
-def test_small_strains_keep_their_digits(name: str) -> None:
-    law = law_of(replace(MATERIAL, nu=0.4999, law=name))  # type: ignore[arg-type]
-    rng = np.random.default_rng(4)
-    H = 1e-11 * rng.normal(size=(3, 3))
-    E = (H + H.T) / 2
-    mu, kappa = law.mu, law.kappa
-    linear = 2 * mu * E + (kappa - 2 * mu / 3) * np.trace(E) * np.eye(3)
-    assert law.stress(H) == pytest.approx(linear, abs=1e-7 * np.abs(linear).max())
-
-
 # Exact truths
 
 
 @every
 def test_rigid_turn_by_a_right_angle_costs_nothing(
-    order: int, dilatation: Dilatation, name: LawName
+    order: int, dilatation: Dilatation, name: str
 ) -> None:
     b = body(order, dilatation, name)
     for axis in range(3):
@@ -146,18 +112,17 @@ def test_rigid_turn_by_a_right_angle_costs_nothing(
 
 
 @every
-def test_homogeneous_deformation_is_exact(
-    order: int, dilatation: Dilatation, name: LawName
-) -> None:
+def test_homogeneous_deformation_is_exact(order: int, dilatation: Dilatation, name: str) -> None:
     """The patch test at finite strain: inner nodes in balance, energy and face force exact."""
     mesh = grid_mesh((4, 4, 4), kind="tet10" if order == 2 else "tet4")
     rng = np.random.default_rng(5)
     inner = ((mesh.nodes > 0) & (mesh.nodes < 1)).all(axis=1)
     corners = np.unique(mesh.corners)
-    b = Body(Scene(_disordered(mesh, rng), replace(MATERIAL, law=name), dilatation=dilatation))
+    material = sample(name, MATERIAL.E, MATERIAL.nu)
+    b = Body(Scene(_disordered(mesh, rng), material, dilatation=dilatation))
     H = np.array([[-0.3, 0.2, 0.1], [0.05, 0.25, -0.1], [0.1, 0.0, 0.15]])
     u = (b.mesh.nodes @ H.T).ravel()
-    law = law_of(replace(MATERIAL, law=name))
+    law = law_of(material)
     force = b.force(u).reshape(-1, 3)
     P = law.stress(H)
     assert len(corners) == 64
@@ -226,7 +191,8 @@ def test_principal_stretch_of_a_known_deformation() -> None:
     b = body(2, "pointwise", "svk")
     F = turn(0, 0.7) @ np.diag([0.6, 1.1, 1.3]) @ turn(2, -0.4)
     u = (b.mesh.nodes @ (F - np.eye(3)).T).ravel()
-    assert b.principal_stretches(u) == pytest.approx(0.6, rel=1e-10)
+    assert b.principal_stretches(u)[..., 0] == pytest.approx(0.6, rel=1e-10)
+    assert b.principal_stretches(u)[..., 2] == pytest.approx(1.3, rel=1e-10)
     assert b.jacobians(u) == pytest.approx(0.6 * 1.1 * 1.3, rel=1e-10)
 
 
@@ -244,7 +210,7 @@ def test_foundation_acts_as_a_linear_spring() -> None:
 
 def test_what_has_no_large_strain_form_is_refused() -> None:
     scene = phantom(1, "pointwise", "neo_hooke")
-    with pytest.raises(SceneError, match=r"law 'linear' has no form .*'neo_hooke', 'svk'"):
+    with pytest.raises(SceneError, match=r"law 'linear' has no form .*'neo_hooke', .*'svk'"):
         Body(replace(scene, material=MATERIAL))
     membrane = Membrane("cavity", 1e-4, Material(1e6, 0.45))
     with pytest.raises(SceneError, match="membranes are linear only"):

@@ -4,13 +4,15 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from law_samples import NAMES, sample
 from newton_scenes import SIDE, cube, phantom, phantom_system, prepared, pressed
 from scipy.optimize import brentq
 
 from validate.errors import SceneError
 from validate.fem.laws import law_of
 from validate.fem.system import build
-from validate.scene.scene import Dilatation, LawName, Material
+from validate.scene.rubber import mooney_rivlin
+from validate.scene.scene import Dilatation, Material
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.march import march
 from validate.solve.newton import NewtonStepper, StaticNewton
@@ -47,9 +49,9 @@ def test_saint_venant_kirchhoff_between_slipping_plates(
     assert np.ptp(x, axis=0) == pytest.approx([side, side, 0.09], rel=1e-8)
 
 
-def uniaxial(law: LawName, nu: float, stretch: float) -> float:
+def uniaxial(material: Material, stretch: float) -> float:
     """Plate force N of the cube with free sides: the lateral stretch from its own equilibrium."""
-    point = law_of(Material(30e3, nu, law))
+    point = law_of(material)
 
     def stress(side: float) -> np.ndarray:
         return point.stress(np.diag([side, side, stretch]) - np.eye(3))
@@ -65,7 +67,29 @@ def test_neo_hooke_between_slipping_plates(nu: float, order: int, dilatation: Di
     state = stepper.rest()
     for stretch in (0.9, 0.7, 0.5, 1.3):
         state = at(stepper, state, (1 - stretch) * SIDE)
-        assert force(state) == pytest.approx(uniaxial("neo_hooke", nu, stretch), rel=1e-7)
+        assert force(state) == pytest.approx(uniaxial(stepper.scene.material, stretch), rel=1e-7)
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n not in ("svk", "neo_hooke")])
+def test_every_law_between_slipping_plates(name: str) -> None:
+    """The uniaxial curve of the material point, at nu .49 and on quadratic elements."""
+    scene = replace(cube("svk", n=3, order=2), material=sample(name, 30e3, 0.49))
+    stepper = prepared(scene)
+    state = stepper.rest()
+    for stretch in (0.8, 0.6, 1.3):
+        state = at(stepper, state, (1 - stretch) * SIDE)
+        assert force(state) == pytest.approx(uniaxial(scene.material, stretch), rel=1e-7)
+
+
+def test_a_stretch_beyond_the_stated_ones_is_an_outcome() -> None:
+    card = mooney_rivlin(4e3, 1e3, 0.4, stretches=(0.7, 1.2))
+    stepper = prepared(replace(cube("svk", n=3), material=card))
+    assert at(stepper, stepper.rest(), 0.25 * SIDE).failure is None
+    for d, words in ((0.35, "is below 0.700; last good"), (-0.25, "is above 1.200")):
+        failed = at(stepper, stepper.rest(), d * SIDE)
+        assert failed.failure is not None
+        assert failed.failure[0] == "invalid"
+        assert words in failed.failure[1]
 
 
 @elements

@@ -12,7 +12,7 @@ from validate.fem.system import System, build
 from validate.parameters import with_values
 from validate.scene.box import box
 from validate.scene.scene import Drive, LawName, Load, Material, Scene, Support
-from validate.solve.handles import INSTEAD
+from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton
 from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, LINEAR, SCHEMES, SOLVERS
@@ -112,8 +112,11 @@ def test_a_linear_scheme_refuses_a_law_at_large_strain(scheme: type[Scheme], lar
         scheme().prepare(large)
 
 
-@pytest.mark.parametrize("scheme", LARGE_INERTIAL, ids=lambda s: s.__name__)
-@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+@pytest.mark.parametrize(
+    ("scheme", "law"),
+    [(s, law) for s in LARGE_INERTIAL for law in s.handles.law],
+    ids=lambda v: v if isinstance(v, str) else v.__name__,
+)
 def test_dynamics_at_large_strain_step_drives_and_loads(
     scheme: type[Scheme], law: LawName, pressed: System
 ) -> None:
@@ -169,7 +172,7 @@ def test_what_a_refusal_names_instead_handles_it() -> None:
                 "mesh": h.mesh,
                 "point": not h.mesh,
                 "membranes": "membranes" in h.contact,
-                **{law: law in h.law for law in ("linear", "svk", "neo_hooke")},
+                **{law: law in h.law for law in ("linear", *LARGE)},
             }
             assert has.get(part) or getattr(h, part, False), (part, name)
 

@@ -170,6 +170,8 @@ def _require(scene: Scene) -> None:
         raise SceneError(
             f"law '{scene.material.law}' has no form at large strain; choose one of {sorted(_LAWS)}"
         )
+    if scene.material.coefficients.volumetric == "coupled":
+        raise SceneError("the coupled volumetric form is not compiled; take 'split'")
     if scene.membranes:
         raise SceneError("membranes are linear only: drop them, or take the linear law")
     if scene.dilatation != "pointwise":

@@ -18,10 +18,11 @@ from scipy import sparse
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assemble import point_slopes
-from validate.fem.laws import green_strain, law_of, volume_change
+from validate.fem.laws import law_of
 from validate.fem.nodal_mean import NodalMean
 from validate.fem.pattern import NodePattern
 from validate.fem.surface import foundation_stiffness
+from validate.fem.tensors import green_strain, volume_change
 from validate.scene.mesh import cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
 
@@ -113,11 +114,25 @@ class Body:
         return Inverted(int(bad.sum()), bad.size, int(np.argmax(bad.any(axis=1))))
 
     def principal_stretches(self, u: Floats) -> Floats:
-        """The least principal stretch (e, q) at every quadrature point."""
-        squares = [
-            np.linalg.eigvalsh(2 * green_strain(H) + np.eye(3))[..., 0] for _, H in self._blocks(u)
-        ]
+        """The principal stretches (e, q, 3), rising, at every quadrature point."""
+        squares = [np.linalg.eigvalsh(2 * green_strain(H) + np.eye(3)) for _, H in self._blocks(u)]
         return np.sqrt(np.maximum(np.concatenate(squares), 0.0))
+
+    def beyond_the_law(self, u: Floats) -> str:
+        """Where a principal stretch is one at which the law has no sense, in words, or nothing."""
+        least, most = self.law.least_stretch, self.law.most_stretch
+        if least == 0 and most == np.inf:
+            return ""
+        stretches = self.principal_stretches(u)
+        low, high = stretches[..., 0].min(axis=1), stretches[..., 2].max(axis=1)
+        if low.min() < least:
+            found, cell, ends = low.min(), low.argmin(), f"below {least:.3f}"
+        elif high.max() > most:
+            found, cell, ends = high.max(), high.argmax(), f"above {most:.3f}"
+        else:
+            return ""
+        words = f"principal stretch {found:.3f} in element {cell}"
+        return f"beyond the law's validity: {words} is {ends}"
 
     def _cell_tangents(self, part: slice, A: Floats) -> Floats:
         """K (e, a, i, j, b) of the cells of a block: dN_aJ A_iJjK dN_bK, summed over points."""

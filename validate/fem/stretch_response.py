@@ -10,7 +10,8 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import SceneError
-from validate.fem.laws import Law, law_of, volume_change
+from validate.fem.laws import Law, law_of
+from validate.fem.tensors import volume_change
 from validate.scene.material_point import MaterialPoint, StretchMode
 
 _ITERATIONS = 50
@@ -35,11 +36,13 @@ def response(point: MaterialPoint, stretches: Floats) -> dict[str, Floats]:
     """
     law = law_of(point.material)
     stretch = checked(stretches, "stretches", (None,), error=SceneError)
-    if len(stretch) and stretch.min() <= law.least_stretch:
-        raise SceneError(
-            f"stretch {stretch.min():.4g}: the law '{point.material.law}' has sense above "
-            f"{law.least_stretch:.4g}"
-        )
+    for value in (stretch.min(), stretch.max()) if len(stretch) else ():
+        if not law.least_stretch < value <= law.most_stretch:
+            ends = f"above {law.least_stretch:.4g}"
+            ends += f" up to {law.most_stretch:.4g}" if law.most_stretch < np.inf else ""
+            raise SceneError(
+                f"stretch {value:.4g}: the law '{point.material.law}' has sense {ends}"
+            )
     drive, free = _MOVES[point.mode]
     driven = (stretch - 1)[:, None, None] * drive
     h = _free_strain(law, driven, free, _first_guess(point, stretch))

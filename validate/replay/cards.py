@@ -1,17 +1,19 @@
 """What the parameters of several experiments have in common: cards, and changes of them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
+from validate.errors import UsageError
 from validate.parameters import quantity
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.replay.experiment import Change, MeshLadder
+from validate.scene.laws import Coefficients
 from validate.scene.plates import plates_of_share, rubbing_share
-from validate.scene.scene import Material
+from validate.scene.scene import LawName, Material
 from validate.twin.tracked import Camera, require_noise
 
 
@@ -140,3 +142,14 @@ def quarter_meshes(size: Callable[[Any], float]) -> MeshLadder:
         return float(size(p) / cells ** (1 / 3))
 
     return MeshLadder(tuple(levels), cell)
+
+
+def require_used(given: Coefficients, laws: set[LawName]) -> None:
+    """Raises `UsageError` for coefficients of the material that the law of no method knows."""
+    for f in fields(given):
+        value = getattr(given, f.name)
+        if value != f.default and all(getattr(given.known_to(w), f.name) != value for w in laws):
+            raise UsageError(
+                f"material.{f.name} = {value}: no method has a law that knows it, only "
+                f"{', '.join(sorted(laws))}; set methods.NAME.law"
+            )

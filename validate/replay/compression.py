@@ -18,11 +18,11 @@ from validate.compare.verdict import Accept
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
 from validate.identify.modulus import Cylinder, ModulusFit, fit_modulus, identify_modulus
-from validate.parameters import Ranges, known, quantity
+from validate.parameters import Ranges, known, part, quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
-from validate.replay.cards import beside, moved, scaled
+from validate.replay.cards import beside, moved, require_used, scaled
 from validate.replay.experiment import (
     Change,
     Experiment,
@@ -33,6 +33,7 @@ from validate.replay.experiment import (
 )
 from validate.replay.method import Method
 from validate.scene.cylinder import quarter_cylinder
+from validate.scene.laws import Coefficients
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
@@ -103,6 +104,7 @@ class Gel:
         None, "Pa", "of models with bonded plates; none: E, or identified with bonded plates"
     )
     nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
+    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class Pressed:
     """What a method's scene is built with."""
 
     plates: Contact = quantity("slip", "1", "contact of both plates")
-    law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
+    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
     order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
 
 
@@ -180,6 +182,7 @@ def compression(
 def _identify(
     recordings: Sequence[Recording], p: Compression, methods: Mapping[str, Method]
 ) -> Identified:
+    require_used(p.material.coefficients, {m.scene.law for m in methods.values()})
     if p.material.E is not None:
         return Identified(p, (), ())
     found = identify_modulus(recordings, p.specimen.size, (p.fit_from, p.fit_to))
@@ -215,7 +218,12 @@ def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
     own = p.material.E_bonded if model.plates == "bonded" else None
     scene = Scene(
         mesh,
-        Material(own or p.material.E or 1.0, p.material.nu, model.law),
+        Material(
+            own or p.material.E or 1.0,
+            p.material.nu,
+            model.law,
+            coefficients=p.material.coefficients.known_to(model.law),
+        ),
         (*between(model.plates), *(() if whole else SYMMETRY)),
         pins=_pins(mesh) if whole and model.plates == "slip" else (),
         drives=(STAGE,),

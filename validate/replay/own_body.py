@@ -117,8 +117,8 @@ def meshed(scene: AnyScene) -> Scene:
 
 def with_law(scene: Scene, law: LawName) -> Scene:
     """The scene with that law everywhere."""
-    regions = tuple(replace(r, material=replace(r.material, law=law)) for r in scene.regions)
-    return replace(scene, material=replace(scene.material, law=law), regions=regions)
+    regions = tuple(replace(r, material=r.material.of_law(law)) for r in scene.regions)
+    return replace(scene, material=scene.material.of_law(law), regions=regions)
 
 
 def _may_refine(p: Parameter) -> bool:

@@ -20,6 +20,8 @@ _HOMES = {
         "Support",
         "Weight",
     ),
+    "laws": ("Coefficients",),
+    "rubber": ("mooney_rivlin", "ogden", "yeoh"),
     "material_point": ("MaterialPoint",),
     "box": ("grid",),
     "cylinder": ("quarter_cylinder",),

@@ -1,36 +1,42 @@
 """The scene: a mesh, what it is made of, how it is held and driven, and the fluid in it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.parameters import part, quantity
+from validate.scene.laws import Coefficients, law_kind
 from validate.scene.mesh import Mesh
 from validate.scene.select import Place, kind_of, nodes_of
+from validate.scene.stability import require_stable
 
 Dilatation = Literal["pointwise", "nodal_mean"]
-LawName = Literal["linear", "svk", "neo_hooke"]
+LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"]
 PlaneState = Literal["strain", "stress"]
 
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic elasticity: E Pa, nu -, and the law at large strain (`fem.laws`).
+    """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws`).
 
-    Every law has this E and nu at small strain, which is all that the linear schemes use. Dynamic
-    schemes need rho kg/m^3; Rayleigh damping is C = mass_damping M + stiffness_damping K, in 1/s
-    and s (the alpha_0 and alpha_1 of paper 001, eq 7).
+    Every law has this E and nu at small strain, which is all that the linear schemes use;
+    `coefficients` are what the law has beyond them. Dynamic schemes need rho kg/m^3; Rayleigh
+    damping is C = mass_damping M + stiffness_damping K, in 1/s and s (the alpha_0 and alpha_1 of
+    paper 001, eq 7). Raises `SceneError` for values out of range, coefficients that the law does
+    not know, and those that lose positive energy, with the stretch.
     """
 
-    E: float
-    nu: float
-    law: LawName = "linear"
-    rho: float | None = None
-    mass_damping: float = 0.0
-    stiffness_damping: float = 0.0
+    E: float = quantity(MISSING, "Pa", "Young's modulus at small strain")
+    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain")
+    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
+    rho: float | None = quantity(None, "kg/m^3", "density")
+    mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
+    stiffness_damping: float = quantity(0.0, "s", "Rayleigh's beta")
+    coefficients: Coefficients = part(Coefficients(), "what the law has beyond E and nu")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.E) and self.E > 0):
@@ -45,6 +51,13 @@ class Material:
         for name, value in (("mass", self.mass_damping), ("stiffness", self.stiffness_damping)):
             if not (np.isfinite(value) and value >= 0):
                 raise SceneError(f"{name} damping {value:g}: a number >= 0")
+        self.coefficients.require_known(self.law)
+        if law_kind(self.law).ranged:
+            require_stable(self.law, self.coefficients, self.shear_modulus, self.bulk_modulus)
+
+    def of_law(self, law: LawName) -> "Material":
+        """The same at small strain, with another law and what it knows of the coefficients."""
+        return replace(self, law=law, coefficients=self.coefficients.known_to(law))
 
     @property
     def shear_modulus(self) -> float:

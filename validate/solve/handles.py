@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol, cast
 
 from validate.errors import SceneError
+from validate.scene.laws import LAWS
 from validate.scene.material_point import MaterialPoint
 from validate.scene.scene import LawName, Scene
 
 ContactName = Literal["foundations", "membranes"]
-LARGE: tuple[LawName, ...] = ("svk", "neo_hooke")
+LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS))
+COMPILED: tuple[LawName, ...] = ("svk", "neo_hooke")
 GLUED: tuple[ContactName, ...] = ("foundations", "membranes")
 
 
@@ -35,6 +37,7 @@ class Handles:
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
 LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False)
+COMPILED_DYNAMICS = Handles(COMPILED, inertia=True, cavities=False)
 LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
 
@@ -49,8 +52,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "mesh": ("QuasiStatic", "StaticNewton"),
     "point": ("StretchTest",),
     "linear": ("ExactPressure", "Newmark"),
-    "svk": ("StaticNewton", "NewtonDynamics"),
-    "neo_hooke": ("StaticNewton", "NewtonDynamics"),
+    **dict.fromkeys(LARGE, ("StaticNewton", "NewtonDynamics")),
     "cavities": ("ExactPressure", "StaticNewton"),
     "loads": ("QuasiStatic", "NewtonDynamics"),
     "drives": ("KfFem", "ModalKf"),

@@ -215,6 +215,9 @@ class ImplicitStepper:
         if bad:
             words = f"{bad.count} of {bad.points} elements inverted (det F <= 0)"
             return replace(state, failure=("invalid", words))
+        beyond = self.body.beyond_the_law(u) if self.body.law.most_stretch < np.inf else ""
+        if beyond:
+            return replace(state, failure=("invalid", beyond))
         numbers = self._numbers(u, v, a, inputs)
         return State(state.k, Settled(u, v, a, inputs), None, iterations, numbers)
 

@@ -241,12 +241,9 @@ class NewtonStepper:
 
     def _checked(self, found: Found) -> Found | Failed:
         """The law must hold there; the tangent is renewed where the body has moved on."""
-        body, least = self.problem.body, self.problem.body.law.least_stretch
-        if least:
-            stretches = body.principal_stretches(found.balance.u).min(axis=1)
-            if stretches.min() < least:
-                words = f"principal stretch {stretches.min():.3f} in element {stretches.argmin()}"
-                return Failed("invalid", f"beyond the law's validity: {words} is below {least:.3f}")
+        beyond = self.problem.body.beyond_the_law(found.balance.u)
+        if beyond:
+            return Failed("invalid", beyond)
         size = float(np.ptp(self.scene.mesh.nodes, axis=0).max())
         moved = np.abs(found.drives - found.tangent.inputs).max(initial=0.0)
         if moved <= self.settings.watch * size:
