@@ -18,6 +18,10 @@ class Waiting:
     timed: bool = False
     ends: str = ""
 
+    @property
+    def label(self) -> str:
+        return f"cell {self.key}"
+
 
 @dataclass(frozen=True)
 class Waited:

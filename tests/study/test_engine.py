@@ -47,14 +47,16 @@ def test_failures_are_records_with_one_line(tmp_path: Path) -> None:
 def test_progress_counts_what_was_there(tmp_path: Path) -> None:
     cells = tuple(Waiting(f"c{i}") for i in range(3))
     finish(waiting(tmp_path, cells[:1]), tmp_path / "cells", HERE)
-    seen: list[tuple[int, int]] = []
+    seen: list[tuple[int, int, str]] = []
     finish(
         waiting(tmp_path, cells),
         tmp_path / "cells",
         HERE,
-        lambda done, n, _: seen.append((done, n)),
+        lambda *told: seen.append(told),
     )
-    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert [told[:2] for told in seen] == [(1, 3), (1, 3), (2, 3), (2, 3), (3, 3)]
+    assert seen[1][2] == "1 of 3 cells; cell c1"
+    assert seen[2][2] == "2 of 3 cells; cell c1 is done"
 
 
 def test_a_key_knows_all_that_is_put_in() -> None:

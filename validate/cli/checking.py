@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.chosen import each
-from validate.cli.display import error_shown, figures_table, progress, say, shown, table
+from validate.cli.display import error_shown, figures_table, say, shown, table
+from validate.cli.progress import progress
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
 from validate.replay.options import Options

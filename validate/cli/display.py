@@ -2,13 +2,11 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from validate.cli.layout import laid, wrapped
 from validate.report.numbers import duration, significant, with_unit
@@ -62,6 +60,11 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
         screen.print(line, markup=False, soft_wrap=True)
 
 
+def fits(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Whether each row of such a table is one line."""
+    return len(laid(columns, rows, console().width)) == 1 + len(rows)
+
+
 def figures_table(published: "Sequence[Published]") -> None:
     """Printed figures beside ours, with today's verdict."""
     rows = [[p.name, _value(p.ours, p), _value(p.theirs, p), p.line, p.why] for p in published]
@@ -70,31 +73,6 @@ def figures_table(published: "Sequence[Published]") -> None:
 
 def _value(value: float | None, figure: "Published") -> str:
     return "-" if value is None else shown(value, figure.unit)
-
-
-@contextmanager
-def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar with the time left on standard error; silent when that is no terminal.
-
-    Yields what a road reports to: done, total, what comes next.
-    """
-    screen = Console(stderr=True)
-    with Progress(
-        TextColumn(title),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.description}"),
-        console=screen,
-        disable=not screen.is_terminal,
-        transient=True,
-    ) as bar:
-        task = bar.add_task("", total=None)
-
-        def report(done: int, total: int, text: str) -> None:
-            bar.update(task, completed=done, total=total, description=text)
-
-        yield report
 
 
 def shown(value: float, unit: str) -> str:

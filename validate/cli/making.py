@@ -4,7 +4,7 @@ from pathlib import Path
 
 from validate.cli.arguments import pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import progress
+from validate.cli.progress import progress
 from validate.cli.recordings import written as say
 from validate.errors import UsageError
 from validate.parameters import with_values

@@ -10,14 +10,16 @@ from validate.cli.chosen import ask_about, each
 from validate.cli.display import (
     error_shown,
     figures_table,
-    progress,
+    fits,
     relative,
     say,
     shown,
     table,
     warn,
 )
+from validate.cli.progress import progress
 from validate.compare.result import KINDS, MethodResult, Result
+from validate.compare.verdict import Check
 from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
 from validate.replay.find import sources_of
@@ -72,9 +74,11 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
     ask_about(experiment, options.values)
     with progress(experiment.name) as report:
         result = compare(experiment, options, report)
-        report(1, 1, "report")
         created = datetime.now(UTC).isoformat(timespec="seconds")
-        page = write_report(result, folder, created=created, made=by)
+        page = write_report(
+            result, folder, created=created, made=by,
+            progress=lambda part: report(1, 1, f"writes the report: {part}"),
+        )  # fmt: skip
     return result, page
 
 
@@ -103,11 +107,17 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
 
 
 def _checks(method: MethodResult) -> None:
-    """A line a check; why it ended so stands below where there is no room beside."""
-    rows = [
-        [c.name, error_shown(c), shown(2 * c.u_val, c.unit), shown(c.limit, c.unit), str(c.count),
-         c.verdict, method.why(c)]
-        for c in method.checks
-    ]  # fmt: skip
+    """A line a check; where there is no room beside, why stands below those that do not agree."""
     head = ["check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
+    rows = [_row(c, method.why(c)) for c in method.checks]
+    if not fits(head, rows):
+        rows = [_row(c, "" if c.verdict == "agrees" else method.why(c)) for c in method.checks]
     table(f"Checks of {method.name}", head, rows)
+
+
+def _row(check: Check, why: str) -> list[str]:
+    unit = check.unit
+    return [
+        check.name, error_shown(check), shown(2 * check.u_val, unit), shown(check.limit, unit),
+        str(check.count), check.verdict, why,
+    ]  # fmt: skip

@@ -8,7 +8,8 @@ from typing import Any
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import progress, relative, say, table, warn
+from validate.cli.display import relative, say, table, warn
+from validate.cli.progress import progress
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find

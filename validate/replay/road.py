@@ -5,6 +5,7 @@ One for every experiment, at holds or over time, with a twin's truth beside or w
 
 from collections.abc import Mapping
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 from validate.compare.exhibit import captioned
@@ -38,6 +39,7 @@ _AGAINST: Mapping[Kind, str] = {
 
 def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
+    start = perf_counter()
     parameters, methods = configure(experiment, options)
     found = opened(experiment, parameters)
     declared = _settings(experiment.parameters, experiment.methods)
@@ -46,10 +48,15 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     shipped, parameters = found.recordings, found.parameters
     identified = None
     if experiment.identify:
+        if report:
+            report(0, 1, "identifies parameters")
         identified = experiment.identify(shipped, parameters, all_methods(experiment, options))
     used = identified.parameters if identified else parameters
     calibrated = identified.calibrated if identified else ()
-    road = Road(experiment, methods, used, report, quick=options.quick, calibrated=calibrated)
+    road = Road(
+        experiment, methods, used, report,
+        quick=options.quick, calibrated=calibrated, since=start,
+    )  # fmt: skip
     road.expect(variants_of(road))
     remade = road.start(shipped)
     main = {name: road.main(Variant(name)) for name in methods}

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 from validate.compare.result import Kind
@@ -11,6 +12,7 @@ from validate.replay.experiment import Case, Change, Experiment, Variant, unchan
 from validate.replay.followed import MAIN, Followed, Truth
 from validate.replay.method import Method
 from validate.replay.options import Report, folder_of
+from validate.replay.pace import Pace
 from validate.replay.remade import made_by, require_known, synthetic
 from validate.replay.solved import solve
 
@@ -31,6 +33,7 @@ class Road:
         *,
         quick: bool,
         calibrated: tuple[str, ...] = (),
+        since: float | None = None,
     ) -> None:
         self.experiment, self.methods, self.parameters = experiment, methods, parameters
         self.calibrated = calibrated
@@ -43,12 +46,24 @@ class Road:
         self._report = report
         self._done: dict[tuple[Any, ...], Followed] = {}
         self._truths: dict[str, Truth] = {}
-        self._total = sum(len(_of_case(methods, case)) for case in self.cases)
+        self._pace = Pace(perf_counter() if since is None else since)
+        for case in self.cases:
+            for name in _of_case(methods, case):
+                self._pace.expect(self._key(case.name, Variant(name), parameters), name)
 
     def expect(self, variants: list[Variant]) -> None:
-        """Says what will be asked for on the experiment's own recordings: the progress bar's
-        end."""
-        self._total += len({self._key(MAIN, v, self.parameters) for v in variants})
+        """Says what will be asked for on the experiment's own recordings, for the time left."""
+        for v in variants:
+            key = self._key(MAIN, v, self.parameters)
+            self._pace.expect(key, v.method, self._cells(v), v.split)
+
+    def _cells(self, variant: Variant) -> float:
+        """How many times the cells of the experiment's own mesh, as its ladder of meshes has it."""
+        uncertainty = self.experiment.uncertainty
+        if uncertainty is None or uncertainty.mesh is None:
+            return 1.0
+        size = uncertainty.mesh.size
+        return (size(self.parameters) / size(variant.change(self.parameters))) ** 3
 
     def start(self, shipped: tuple[Recording, ...]) -> tuple[str, ...]:
         """Takes the recordings, made anew where the user changed their twin; what to say of it."""
@@ -65,7 +80,7 @@ class Road:
 
     def tell(self, what: str) -> None:
         if self._report:
-            self._report(min(len(self._done), self._total), max(self._total, 1), what)
+            self._report(*self._pace.progress, what)
 
     def main(self, variant: Variant) -> Followed:
         """A variant on the experiment's own recordings."""
@@ -112,11 +127,16 @@ class Road:
     ) -> Followed:
         key = self._key(case, replace(as_, change=unchanged), parameters)
         if key not in self._done:
-            self.tell(f"{as_.method} {case}".strip())
+            start = perf_counter()
             settings = self.settings[as_.method]
             method = replace(settings, split=as_.split * settings.split)
-            found = solve(self.experiment, recordings, as_.method, method, parameters, case)
+            what = f"{as_.method} on {case}" if case else as_.method
+            found = solve(
+                self.experiment, recordings, as_.method, method, parameters, case,
+                lambda doing: self.tell(f"{what}: {doing}"),
+            )  # fmt: skip
             self._done[key] = self._with_truth(found, true)
+            self._pace.took(key, perf_counter() - start)
         return self._done[key]
 
     def _with_truth(self, followed: Followed, true: Any) -> Followed:

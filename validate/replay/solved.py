@@ -17,7 +17,7 @@ from validate.replay.followed import MAIN, Followed
 from validate.replay.method import Method
 from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.scene import Scene
-from validate.solve.march import march, run_scheme
+from validate.solve.march import Tell, march, run_scheme
 from validate.solve.types import Run, SceneSolver, Stepper
 
 
@@ -28,13 +28,18 @@ def solve(
     method: Method,
     parameters: Any,
     case: str = MAIN,
+    tell: Tell = lambda _: None,
 ) -> Followed:
-    """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input."""
+    """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input.
+
+    `tell` is given what is being done, in words.
+    """
     start = perf_counter()
+    tell("mesh")
     scene = experiment.build(recordings[0], parameters, method.scene)
     built = perf_counter() - start
     seen = tuple(experiment.place(r, parameters, scene) for r in recordings)
-    runs = _Runs(experiment, name, method, parameters, scene, built)
+    runs = _Runs(experiment, name, method, parameters, scene, built, tell)
     done = tuple(runs.on(r) for r in seen)
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
     return Followed(name, _label(method, scene), case, scene, seen, done, stacked(found))
@@ -54,7 +59,10 @@ class _Runs:
         parameters: Any,
         scene: AnyScene,
         built: float,
+        tell: Tell,
     ) -> None:
+        unknowns = f"{scene.mesh.nodes.size} unknowns"
+        self._tell: Tell = lambda what: tell(f"{unknowns}, {what}")
         self._experiment, self._name, self._method = experiment, name, method
         self._parameters, self._scene, self._built = parameters, scene, built
         self._system: System | None = None
@@ -66,13 +74,15 @@ class _Runs:
         every = slice(method.stride - 1, None, method.stride)
         t, inputs = between(seen.t[every], seen.inputs[every], method.split)
         steps = method.steps or len(t)
+        self._tell("set-up")
         at = seen.frames(t, self._experiment.frames)
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
         if isinstance(method.settings, SceneSolver) or isinstance(self._scene, MaterialPoint):
-            return run_scheme(self._name, method.given(given), self._scene, t, inputs, at)
+            settings = method.given(given)
+            return run_scheme(self._name, settings, self._scene, t, inputs, at, self._tell)
         stepper, setup = self._stepper(self._scene, seen, given)
-        return march(self._name, stepper, t, inputs, at, setup)
+        return march(self._name, stepper, t, inputs, at, setup, self._tell)
 
     def _stepper(
         self, scene: Scene, seen: Registered, given: Mapping[str, Any]

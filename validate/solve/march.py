@@ -1,6 +1,6 @@
 """The loop over steps, written once: it steps, times, traces and stops where a step fails."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
@@ -25,7 +25,14 @@ from validate.solve.types import (
 )
 
 _UNTIMED = 20  # first steps left out of the step times: caches and allocators settle
+_TOLD = 100  # times in a run that a step is told of: what is told costs time between the steps
 _AXES = "xyz"
+
+Tell = Callable[[str], None]  # what is being done, in words
+
+
+def _untold(_: str) -> None:
+    pass
 
 
 def run_scheme(
@@ -35,6 +42,7 @@ def run_scheme(
     t: Floats,
     inputs: Floats,
     at: Ints,
+    tell: Tell = _untold,
 ) -> Run:
     """A run by what steps through a scene, or by what solves it as a whole.
 
@@ -49,20 +57,28 @@ def run_scheme(
     assert isinstance(scene, Scene)
     start = perf_counter()
     stepper = settings.prepare(build(scene))
-    return march(name, stepper, t, inputs, at, perf_counter() - start)
+    return march(name, stepper, t, inputs, at, perf_counter() - start, tell)
 
 
 def march(
-    method: str, stepper: Stepper, t: Floats, inputs: Floats, at: Ints, setup_s: float
+    method: str,
+    stepper: Stepper,
+    t: Floats,
+    inputs: Floats,
+    at: Ints,
+    setup_s: float,
+    tell: Tell = _untold,
 ) -> Run:
     """Steps through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`.
+
+    `tell` is given the step, now and then.
 
     Inputs are drives in m, then loads in N. Inputs, the numbers of the states and the scene's
     probes are traced at every step.
     """
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
-    walk, outcome = _walk(stepper, inputs, frozenset(at.tolist()))
+    walk, outcome = _walk(stepper, inputs, frozenset(at.tolist()), tell)
     done = len(walk.updates)
     traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
     traces |= _given(stepper.scene, inputs[:done])
@@ -89,9 +105,14 @@ class _Kept:
     sd: list[Floats] = field(default_factory=list)
 
 
-def _walk(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> tuple[_Kept, Outcome]:
+def _walk(
+    stepper: Stepper, inputs: Floats, at: frozenset[int], tell: Tell
+) -> tuple[_Kept, Outcome]:
     walk, state, rows = _Kept(), stepper.rest(), _probe_rows(stepper)
+    often = -(-len(inputs) // _TOLD)
     for i, value in enumerate(inputs):
+        if i % often == 0:
+            tell(f"step {i + 1} of {len(inputs)}")
         start = perf_counter()
         state = stepper.step(state, value)
         walk.seconds.append(perf_counter() - start)

@@ -15,6 +15,7 @@ from validate.places import try_folder
 from validate.replay.experiment import Experiment
 from validate.replay.named_run import reports_of
 from validate.replay.options import Report
+from validate.solve.march import Tell
 from validate.study.job import C, Done, Plan, R, Where, run_batch
 from validate.study.store import Record, read_records, write_record
 
@@ -49,17 +50,20 @@ def finish(
         records[cell.key] = record
         if record.lasting:
             write_record(folder, cell, record)
+        tell(f"{cell.label} is done")
+
+    def tell(what: str) -> None:
+        done, total = len(records), len(plan.cells)
         if report:
-            report(len(records), len(plan.cells), "cells")
+            report(done, total, f"{done} of {total} cells; {what}")
 
     left = [c for c in plan.cells if c.key not in records]
-    if report:
-        report(reused, len(plan.cells), "workers")
-    said = _run(plan, left, where, done)
+    tell("starts the workers" if left else "all were finished before")
+    said = _run(plan, left, where, done, tell)
     return Finished(records, reused, perf_counter() - start, said)
 
 
-def _run(plan: Plan[C, R], left: Sequence[C], where: Where, done: Done) -> str:
+def _run(plan: Plan[C, R], left: Sequence[C], where: Where, done: Done, tell: Tell) -> str:
     """Side by side, then those that are timed one by one; on this machine, in this process."""
     beside, timed = [c for c in left if not c.timed], [c for c in left if c.timed]
     if where.workers is not None and where.workers < 0:
@@ -70,14 +74,15 @@ def _run(plan: Plan[C, R], left: Sequence[C], where: Where, done: Done) -> str:
         said = run_beside(plan, beside, where, done) if beside else ""
         if where.scheduler:
             return run_in_turn(plan, timed, where, done) if timed else said
-        _run_here(plan, timed, done)
+        _run_here(plan, timed, done, tell)
         return said
-    _run_here(plan, left, done)
+    _run_here(plan, left, done, tell)
     return "this process"
 
 
-def _run_here(plan: Plan[C, R], cells: Sequence[C], done: Done) -> None:
+def _run_here(plan: Plan[C, R], cells: Sequence[C], done: Done, tell: Tell) -> None:
     for cell in cells:
+        tell(cell.label)
         done(cell, *run_batch(plan.open, plan.run, plan.job, (cell,)))
 
 

@@ -10,7 +10,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.options import Options, configure
 from validate.study.job import Job, job_of
 from validate.study.store import key_of
-from validate.study.sweep import Axis, grid
+from validate.study.sweep import Axis, grid, named
 
 METHODS = "methods."
 
@@ -30,6 +30,11 @@ class FilterCell:
     seeds: tuple[int, ...] = (0,)
     key: str = ""
     timed: bool = False
+
+    @property
+    def label(self) -> str:
+        given = f" ({named(self.values)})" if self.values else ""
+        return f"{self.method}{given}, {len(self.seeds)} seeds"
 
     @property
     def values(self) -> dict[str, str]:

@@ -38,6 +38,10 @@ class GainCell:
     key: str
     timed: bool = False
 
+    @property
+    def label(self) -> str:
+        return f"pressure loop at {self.load:g} of the load"
+
 
 @dataclass(frozen=True)
 class GainLimit:

@@ -16,10 +16,13 @@ from validate.study.store import Record
 
 
 class Keyed(Protocol):
-    """A cell, small enough to be sent; `timed`: its times are what it is run for."""
+    """A cell, small enough to be sent; `timed`: its times are what it is run for, `label` what it
+    runs, in a few words."""
 
     @property
     def key(self) -> str: ...
+    @property
+    def label(self) -> str: ...
     @property
     def timed(self) -> bool: ...
 

@@ -44,6 +44,11 @@ class StabilityCell:
     key: str = ""
     timed: bool = False
 
+    @property
+    def label(self) -> str:
+        v = self.variant
+        return f"mesh {v.mesh}, E {v.E:.3g} Pa, nu {v.nu:g}, all schemes at {len(self.steps)} steps"
+
 
 def step_grid(dt: float, quick: bool = False) -> Floats:
     """Steps (k,) s over six decades, `dt` in the middle."""

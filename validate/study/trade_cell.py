@@ -48,6 +48,11 @@ class TradeCell:
     key: str = ""
 
     @property
+    def label(self) -> str:
+        what = self.solver or ("reference" if self.part == "best" else f"{self.part} law")
+        return f"{what}, {self.element} mesh {self.level}"
+
+    @property
     def timed(self) -> bool:
         return self.part == "solver"
 
