@@ -23,7 +23,7 @@ def test_draws_fill_every_range_once_and_are_hardly_correlated() -> None:
 
 def test_a_linear_model_shows_the_same_both_ways() -> None:
     base, table = scalar(2.0), joint_draws(12, 2)
-    parts = [Sensitivity("a", scalar(3.0), 1.0), Sensitivity("b", scalar(-4.0), 1.0)]
+    parts = [Sensitivity("a", scalar(3.0)), Sensitivity("b", scalar(-4.0))]
     drawn = [scalar(2 + 3 * a - 4 * b) for a, b in table]
     found = joint(base, parts, drawn)
     assert found.first_order == 5.0
@@ -35,7 +35,7 @@ def test_a_linear_model_shows_the_same_both_ways() -> None:
 def test_inputs_that_act_together_are_seen_only_by_the_sample() -> None:
     """By hand: y = a b has no first order at a = b = 0; the rms of a b over the draws remains."""
     table = joint_draws(16, 2)
-    parts = [Sensitivity("a", scalar(0.0), 1.0), Sensitivity("b", scalar(0.0), 1.0)]
+    parts = [Sensitivity("a", scalar(0.0)), Sensitivity("b", scalar(0.0))]
     found = joint(scalar(0.0), parts, [scalar(a * b) for a, b in table])
     assert (found.first_order, found.percent) == (0.0, None)
     assert found.sampled == pytest.approx(np.sqrt(np.mean(table[:, 0] ** 2 * table[:, 1] ** 2)))

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats, Ints, rms
+from validate.compare.residual import _of
+from validate.compare.verdict import error_of
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import nearest_node_rows
 from validate.recording.types import Contours, Markers
@@ -217,13 +219,56 @@ def test_the_sd_of_an_outline_is_the_scatter_of_noisy_ones() -> None:
             found.setdefault(d.quantity, []).append(d.values / d.sd)
     for quantity in ("contour.area", "contour.centroid", "corner"):
         assert np.std(found[quantity], axis=0) == pytest.approx(1.0, rel=0.15), quantity
-    assert np.mean(found["corner"]) * np.sqrt(2) * sd == pytest.approx(-3e-3, rel=0.01)
+    stated = np.sqrt(2) * sd  # both outlines have a point near the corner's ray
+    assert np.mean(found["corner"]) * stated == pytest.approx(-3e-3, rel=0.03)
     contours = Contours(T[:1], (ROUND,), sd, np.eye(4), "scene")
     assert observe_outlines(contours, none, 0.0).sd_t == 0.0  # type: ignore[arg-type]
     (still_one,) = Round("o", "validates", T[:1], (ROUND,), np.eye(4), sd, none, 0.0).deviations(  # type: ignore[arg-type]
         ramp(()), Selection("rest", T[:1])
     )
     assert (still_one.quantity, still_one.sd) == ("contour", sd)
+
+
+def noisy(k: int, first: float, sd: float, rng: np.random.Generator) -> Floats:
+    """A circle of k points, the first at an angle in degrees, with noise along its normal."""
+    angle = np.deg2rad(first + 360 * np.arange(k) / k)
+    radius = 8e-3 + rng.normal(0, sd, k)
+    return radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("k", "first", "freedom"), [(36, 0.0, 36), (36, 5.0, 24), (72, 2.5, 36), (24, 3.0, 20)]
+)
+def test_the_distance_an_outline_moved_has_the_noise_of_its_normal(
+    k: int, first: float, freedom: int
+) -> None:
+    """Noise lies along the normal: a distance has that of one component, not of two. A perfect
+    model is then within 2 u_D in 95 of 100 draws."""
+    rng, sd, draws = np.random.default_rng(11), 0.1e-3, 300
+    found = []
+    for _ in range(draws):
+        outlines = (noisy(k, first, sd, rng), noisy(k, first, sd, rng))
+        seen = Round("o", "validates", T[:2], outlines, np.eye(4), sd, None, 0.0)  # type: ignore[arg-type]
+        found.append(seen.deviations(ramp(()), Selection("1s", T[1:2]))[1])
+    stated = [np.sqrt(2) * d.sd for d in found]
+    assert found[0].quantity == "contour.material"
+    assert rms(np.vstack([d.values for d in found])) == pytest.approx(rms(stated), rel=0.03)
+    assert np.mean([d.freedom or 0 for d in found]) == pytest.approx(freedom, abs=1)
+    one = Selection("1s", T[1:2])
+    errors = [error_of(_of(d, one, "validates")) for d in found]
+    assert np.mean([2 * e.u_D >= e.E for e in errors]) == pytest.approx(0.95, abs=0.045)
+
+
+def test_a_corner_that_moves_along_the_wall_has_little_of_its_noise() -> None:
+    rng, sd, across = np.random.default_rng(12), 0.1e-3, np.array([np.sin(0.0), np.cos(0.0)])
+    corner = Corner("corner", 0.0, "")
+    found = []
+    for _ in range(300):
+        outlines = (noisy(36, 0.0, sd, rng), noisy(36, 0.0, sd, rng) + 3e-3 * across)
+        seen = Round("o", "validates", T[:2], outlines, np.eye(4), sd, None, 0.0, (corner,))  # type: ignore[arg-type]
+        found.append(seen.deviations(ramp(()), Selection("1s", T[1:2]))[2])
+    assert np.std([d.values for d in found]) == pytest.approx(rms([d.sd for d in found]), rel=0.1)
+    assert rms([d.sd for d in found]) == pytest.approx(sd * np.sqrt(2) * np.sqrt(2 / 36), rel=0.05)
 
 
 def test_an_outline_of_three_points_is_seen_from_its_centroid() -> None:
@@ -236,8 +281,10 @@ def test_an_outline_of_three_points_is_seen_from_its_centroid() -> None:
 
 def test_deviations_of_several_instants_share_the_rms_of_what_is_systematic() -> None:
     one = Deviation("q", np.ones((2, 1)), "m", 0.1, 3.0, "words")
-    found = merged([one, replace(one, systematic=4.0)])
+    found = merged([one, replace(one, systematic=4.0, sd=0.7)])
     assert (found.systematic, len(found.values)) == (pytest.approx(np.sqrt(12.5)), 4)
+    assert (found.sd, found.freedom) == (pytest.approx(0.5), None)
+    assert merged([replace(one, freedom=3), replace(one, freedom=4)]).freedom == 7
 
 
 # --- a recording ----------------------------------------------------------------------------------

@@ -66,7 +66,7 @@ def joint(base: Residual, parts: Sequence[Sensitivity], drawn: Sequence[Residual
 
     What a range does on one side only (plates cannot rub less than not at all) is an error too.
     """
-    first = float(np.sqrt(sum((p.scale * rms(p.change.values)) ** 2 for p in parts)))
+    first = float(np.sqrt(sum(rms(p.change.values) ** 2 for p in parts)))
     sampled = rms(np.array([[rms(one.values - base.values)] for one in drawn]))
     least = _ROUNDING * rms(base.values)  # an input that moves nothing leaves rounding
     first, sampled = (u if u > least else 0.0 for u in (first, sampled))

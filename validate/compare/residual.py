@@ -24,6 +24,7 @@ class Residual:
     `sd` is the measurement's standard deviation per component, independent between points;
     `systematic` the part that all points share (registration), per component. `simulated` and
     `measured` are kept for scalar quantities. `role` says whether the observation validates.
+    `freedom` counts the numbers in which noise is independent; None: all of them.
     """
 
     quantity: str
@@ -36,6 +37,7 @@ class Residual:
     simulated: float | None = None
     measured: float | None = None
     role: Role = "validates"
+    freedom: int | None = None
 
     def __post_init__(self) -> None:
         values = checked(self.values, f"residual {self.name}", (None, None), error=ComparisonError)
@@ -106,7 +108,10 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
         other = merged.get(residual.name)
         if other is not None:
             values = np.vstack([other.values, residual.values])
-            residual = replace(residual, values=values, simulated=None, measured=None)
+            freedom = None if residual.freedom is None else residual.freedom + (other.freedom or 0)
+            residual = replace(
+                residual, values=values, simulated=None, measured=None, freedom=freedom
+            )
         merged[residual.name] = residual
     return merged
 
@@ -114,7 +119,7 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
 def _of(d: Deviation, selection: Selection, role: Role) -> Residual:
     return Residual(
         d.quantity, selection.label, d.values, d.sd, d.systematic, d.unit, d.definition,
-        d.simulated, d.measured, role,
+        d.simulated, d.measured, role, d.freedom,
     )  # fmt: skip
 
 

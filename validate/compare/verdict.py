@@ -5,7 +5,7 @@ E = simulation - measurement, u_val^2 = u_D^2 + u_num^2 + u_input^2 (standard un
 
 An rms over many noisy points is not zero for a perfect model. E is then the part that noise does
 not explain, sqrt(rms^2 - noise^2), and u_D half of the smallest such part that noise alone reaches
-in 5 % of repetitions (chi-square with one degree of freedom per number compared). It has the sign
+in 5 % of repetitions (chi-square with a degree of freedom per independent number). It has the sign
 of the mean where points have one component, and none where they have more.
 
 Only what validates is evidence: data that calibrated the model are "fitted" and a model judged by
@@ -108,11 +108,10 @@ def as_repeated(check: Check, why: str) -> Check:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one input does to a residual: `change`, times `scale` one standard uncertainty."""
+    """What one standard uncertainty of an input does to a residual."""
 
     name: str
     change: Residual
-    scale: float
 
 
 def judge(
@@ -125,7 +124,7 @@ def judge(
     seen = error_of(residual)
     E, u_D = seen.E, seen.u_D
     u_num = numerical.u
-    parts = {s.name: abs(s.scale) * rms(s.change.values) for s in inputs}
+    parts = {s.name: rms(s.change.values) for s in inputs}
     u_input = float(np.sqrt(sum(p**2 for p in parts.values())))
     u_val = float(np.sqrt(u_D**2 + u_num**2 + u_input**2))
     named = {"measurement": u_D} | dict(numerical.parts) | parts
@@ -156,7 +155,8 @@ def error_of(residual: Residual) -> Error:
         return Error(float(residual.values[0, 0]), u_D, raw, noise)
     sign = np.copysign(1.0, residual.values.mean()) if c == 1 else 1.0
     E = sign * np.sqrt(max(raw**2 - noise**2, 0.0))
-    reach = noise * np.sqrt(max(float(chi_square_quantile(0.95, k * c)) / (k * c) - 1, 0.0))
+    m = residual.freedom or k * c
+    reach = noise * np.sqrt(max(float(chi_square_quantile(0.95, m)) / m - 1, 0.0))
     u_D = float(np.hypot(reach / 2, np.sqrt(c) * residual.systematic))
     return Error(float(E) + 0.0, u_D, raw, noise)  # no -0
 

@@ -92,8 +92,8 @@ class Deviation:
     """Simulated less measured of one quantity: values (k, c) in `unit`.
 
     `sd` is the measurement's standard deviation per component, independent between points;
-    `systematic` what all points share (registration), per component. `simulated` and `measured`
-    are kept of scalars.
+    `systematic` what all points share (registration), per component. `freedom` counts the numbers
+    in which noise is independent (None: all). `simulated` and `measured` are kept of scalars.
     """
 
     quantity: str
@@ -104,6 +104,7 @@ class Deviation:
     definition: str
     simulated: float | None = None
     measured: float | None = None
+    freedom: int | None = None
 
 
 class Observation(Protocol):

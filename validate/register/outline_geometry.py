@@ -6,6 +6,8 @@ import shapely
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 
+_TURN = 2 * np.pi
+
 
 def normal_distances(outline: Floats, points: Floats) -> Floats:
     """How far the closed `outline` (k, 2) m lies outside each point (m, 2) m: negative inside.
@@ -30,6 +32,26 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
     The radius is interpolated linearly in angle; the outline must be star-shaped about its
     centroid, else `ComparisonError`.
     """
+    centre, at, radius = _rays(outline)
+    found = np.interp(np.mod(angles, _TURN), at, radius, period=_TURN)
+    return np.asarray(centre + found[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+
+
+def angular_weights(outline: Floats, angles: Floats) -> Floats:
+    """Weights (a, k) by which `angular_points` takes the radii of the outline's points, in the
+    order of their polar angles."""
+    _, at, _ = _rays(outline)
+    ahead = np.mod(angles[:, None] - at, _TURN)
+    rows, before = np.arange(len(angles)), ahead.argmin(axis=1)
+    after = (before + 1) % len(at)
+    share = ahead[rows, before] / np.mod(at[after] - at[before], _TURN)
+    weights = np.zeros(ahead.shape)
+    weights[rows, before], weights[rows, after] = 1 - share, share
+    return weights
+
+
+def _rays(outline: Floats) -> tuple[Floats, Floats, Floats]:
+    """The centroid (2,) m, and polar angles (k,) in 0..2 pi, rising, with radii (k,) m about it."""
     _, centre = enclosed(outline)
     away = outline - centre
     polar = np.arctan2(away[:, 1], away[:, 0])
@@ -38,15 +60,9 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
     back = (np.maximum.accumulate(ahead) - ahead).max()
     if back > np.deg2rad(20) or not 1.5 * np.pi < ahead[-1] < 2.5 * np.pi:
         raise ComparisonError("an outline folds back on itself; its polar angles are not ordered")
-    at = np.mod(polar, 2 * np.pi)
+    at = np.mod(polar, _TURN)
     order = np.argsort(at, kind="stable")
-    radius = np.interp(
-        np.mod(angles, 2 * np.pi),
-        at[order],
-        np.linalg.norm(away[order], axis=1),
-        period=2 * np.pi,
-    )
-    return np.asarray(centre + radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    return centre, at[order], np.linalg.norm(away[order], axis=1)
 
 
 def _polygon(outline: Floats) -> shapely.Polygon:

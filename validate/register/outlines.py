@@ -1,6 +1,6 @@
 """Outlines seen in an image plane, against the section of the deformed wall with that plane."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,15 @@ from validate.register.observation import (
     frame_at,
     nearest_sample,
 )
-from validate.register.outline_geometry import angular_points, enclosed, normal_distances
+from validate.register.outline_geometry import (
+    angular_points,
+    angular_weights,
+    enclosed,
+    normal_distances,
+)
 from validate.register.plane import SurfaceSampler, require_rigid, section
 
+_TINY = np.finfo(float).tiny
 _ANGLES = np.deg2rad(np.arange(0.0, 360.0, 10.0))
 
 
@@ -109,13 +115,15 @@ class OutlineObservation:
         """What changed of the simulated and of the measured outline since rest."""
         moved = [_moved(a, b, _ANGLES) for a, b in zip(start, end, strict=True)]
         (area, centre), (true_area, true_centre) = enclosed(end[0]), enclosed(end[1])
+        along, across = _noise((start[1], end[1]), _ANGLES)
         k, radius = len(end[1]), np.sqrt(true_area / np.pi)
         spread = self.sd * np.sqrt(2 / k)
         return [
             Deviation(
-                "contour.material", moved[0] - moved[1], "m", np.sqrt(2.0) * self.sd, 0.0,
+                "contour.material", moved[0] - moved[1], "m",
+                self.sd * float(np.sqrt((np.diag(along).mean() + across) / 2)), 0.0,
                 "displacement of the outline at equal polar angle about its own centroid, every "
-                "10 deg",
+                "10 deg", freedom=_freedom(along),
             ),
             *(self._corner(c, start, end) for c in self.corners),
             Deviation(
@@ -133,16 +141,32 @@ class OutlineObservation:
         self, corner: Corner, start: tuple[Floats, Floats], end: tuple[Floats, Floats]
     ) -> Deviation:
         angle = np.array([corner.angle])
-        simulated, measured = (
-            float(np.linalg.norm(_moved(a, b, angle))) for a, b in zip(start, end, strict=True)
-        )
+        ways = [_moved(a, b, angle) for a, b in zip(start, end, strict=True)]
+        simulated, measured = (float(np.linalg.norm(way)) for way in ways)
         off = np.array([[simulated - measured]])
-        sd = np.sqrt(2.0) * self.sd
+        along, across = _noise((start[1], end[1]), angle)
+        ray = np.array([np.cos(corner.angle), np.sin(corner.angle)])
+        share = min((float(ways[1][0] @ ray) / max(measured, _TINY)) ** 2, 1.0)
+        sd = self.sd * float(np.sqrt(share * along[0, 0] + (1 - share) * across))
         return Deviation(corner.quantity, off, "m", sd, 0.0, corner.words, simulated, measured)
 
 
 def _moved(start: Floats, end: Floats, angles: Floats) -> Floats:
     return angular_points(end, angles) - angular_points(start, angles)
+
+
+def _noise(outlines: Iterable[Floats], angles: Floats) -> tuple[Floats, float]:
+    """Variances of a displacement over that of the outlines' points, whose noise lies along the
+    normal, taken to be the ray's: covariance (a, a) along the rays, and variance across, which the
+    centroids have."""
+    found = [angular_weights(outline, angles) for outline in outlines]
+    along = np.sum([w @ w.T for w in found], axis=0)
+    return np.asarray(along), sum(2 / w.shape[1] for w in found)
+
+
+def _freedom(along: Floats) -> int:
+    """Independent numbers of the same spread of their mean square (Satterthwaite 1946)."""
+    return max(1, int(np.trace(along) ** 2 / (along**2).sum()))
 
 
 def _stacked(found: list[Deviation]) -> tuple[Deviation, ...]:
@@ -157,7 +181,11 @@ def merged(group: list[Deviation]) -> Deviation:
     values = np.vstack([d.values for d in group])
     first = group[0]
     systematic = rms([d.systematic for d in group])
-    return Deviation(first.quantity, values, first.unit, first.sd, systematic, first.definition)
+    freedom = None if first.freedom is None else sum(d.freedom or 0 for d in group)
+    return Deviation(
+        first.quantity, values, first.unit, rms([d.sd for d in group]), systematic,
+        first.definition, freedom=freedom,
+    )  # fmt: skip
 
 
 def observe_outlines(

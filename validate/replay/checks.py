@@ -119,7 +119,7 @@ def _sensitivities(road: Road) -> dict[str, list[Sensitivity]]:
         moved = road.main(Variant(uncertainty.surrogate, source.by(1.0))).residuals
         for key in base.keys() & moved.keys():
             step = replace(base[key], values=moved[key].values - base[key].values, sd=0.0)
-            found.setdefault(key, []).append(Sensitivity(source.name, step, 1.0))
+            found.setdefault(key, []).append(Sensitivity(source.name, step))
     return found
 
 
@@ -167,7 +167,7 @@ def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
             rows = probe_rows(mine.body.mesh, (probe,))
             sd = np.array([rows.apply(s)[0] for s in mine.run.sd])
             claimed = replace(mine.residuals[key], values=sd, sd=0.0)
-            found[key] = [Sensitivity(OWN_COVARIANCE, claimed, 1.0)]
+            found[key] = [Sensitivity(OWN_COVARIANCE, claimed)]
     return found
 
 
@@ -224,7 +224,7 @@ def _shared(
     """u_num and u_input of every residual, SI: what no averaging over points removes."""
     squares: dict[str, float] = {}
     for key, parts in inputs.items():
-        squares[key] = sum((p.scale * rms(p.change.values)) ** 2 for p in parts if p.name != itself)
+        squares[key] = sum(rms(p.change.values) ** 2 for p in parts if p.name != itself)
     for errors in meshes:
         for key, u_num in errors.items():
             squares[key] = squares.get(key, 0.0) + u_num**2

@@ -24,7 +24,7 @@ from validate.errors import RecordingError
 from validate.recording.images.discs import candidates
 from validate.recording.images.polar import Grey, Wall, speckle_area, trace
 from validate.recording.images.quality import Quality, quality, wall_sd
-from validate.recording.images.shapes import circle_points, ellipse_points
+from validate.recording.images.shapes import circle_points, ellipse_points, off_curve
 from validate.recording.images.wall import placed
 from validate.recording.types import Contours, Frames
 
@@ -215,8 +215,7 @@ def _fitted(free: Outline, shape: Shape, grey: Grey) -> Outline:
     fit, freedom = (ellipse_points, 5) if shape == "ellipse" else (circle_points, 3)
     points = fit(free.points)
     centre, radius = _enclosed(points)
-    nearest = np.linalg.norm(free.points[:, None] - points[None], axis=-1).min(axis=1)
-    misfit = max(float((nearest**2).mean()) - free.sd**2, 0.0)
+    misfit = max(rms(off_curve(free.points, points)) ** 2 - free.sd**2, 0.0)
     independent = max(2 * np.pi * free.radius / (4 * np.sqrt(grey.speckle)), freedom)
     sd = float(np.sqrt(free.sd**2 * freedom / independent + misfit))
     return replace(free, points=points, sd=sd, centre=centre, radius=radius, shape=shape)

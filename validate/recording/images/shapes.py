@@ -1,4 +1,4 @@
-"""Ellipses and circles through an outline's points."""
+"""Ellipses and circles through an outline's points, and how far points lie off a curve."""
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -26,3 +26,14 @@ def circle_points(points: Floats) -> Floats:
 
     found = least_squares(off, [0.0, 0.0, 1.0]).x
     return np.asarray(middle + scale * found[:2] + scale * found[2] * DIRECTIONS)
+
+
+def off_curve(points: Floats, curve: Floats) -> Floats:
+    """Distances (k,) of points (k, 2) from the closed curve through (m, 2), along its chords.
+
+    Of 120 points of a circle the chords lie within 0.04 % of the radius.
+    """
+    chord = np.roll(curve, -1, axis=0) - curve
+    away = points[:, None] - curve
+    share = np.clip((away * chord).sum(axis=-1) / (chord**2).sum(axis=-1), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - share[..., None] * chord, axis=-1).min(axis=1))
