@@ -24,18 +24,18 @@ def test_a_changed_run_leaves_the_plain_one(project: Path) -> None:
     assert here("run", "pulled", "--methods", "kf,plain", cwd=project)[0] == 0
     reports = project / "reports"
     plain = (reports / "pulled" / "results.json").read_bytes()
-    set_ = ["--set", "twin.noise=2mm2", "--json"]
+    set_ = ["--set", "methods.kf.Q=2e-11", "--json"]
     code, out, err = here("run", "pulled", *set_, cwd=project)
     assert code in (0, 1), err
     found = json.loads(out)
     assert found["changed"] == [
-        {"path": "twin.noise", "default": 1e-10, "value": 2e-6, "unit": "m2"}
+        {"path": "methods.kf.Q", "default": 1e-11, "value": 2e-11, "unit": "m2"}
     ]
     made = found["made"]
-    assert made["command"] == "validate run pulled --set twin.noise=2mm2 --json"
+    assert made["command"] == "validate run pulled --set methods.kf.Q=2e-11 --json"
     assert [f["path"] for f in made["files"]] == ["pulled.py"]
     assert (reports / "pulled" / "results.json").read_bytes() == plain
-    other = next(p for p in reports.iterdir() if p.name.startswith("pulled+twin.noise-"))
+    other = next(p for p in reports.iterdir() if p.name.startswith("pulled+methods.kf.Q-"))
     assert 'id="changed"' in (other / "report.html").read_text("utf-8")
     assert 'id="changed"' not in (reports / "pulled" / "report.html").read_text("utf-8")
     assert len(list(reports.iterdir())) == 2

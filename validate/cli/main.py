@@ -121,6 +121,18 @@ def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int
     return checking.check(names, named, as_json)
 
 
+@cli.command("history")
+@click.argument("name", metavar="NAME|FILE.py")
+@_EXPERIMENTS
+@click.option("--out", type=_OUT, help="Where its reports are (default: as of run).")
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
+    """The runs of an experiment, and what changed from one to the next."""
+    from validate.cli import past
+
+    past.show(name, named, out, as_json)
+
+
 @cli.command()
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")

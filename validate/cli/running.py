@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from validate.cli.arguments import BAD_INPUT, command_line, pairs
+from validate.cli.arguments import BAD_INPUT, command_line, complain, pairs
 from validate.cli.chosen import ask_about, each
 from validate.cli.display import (
     error_shown,
@@ -28,6 +28,7 @@ from validate.replay.options import Options, configure, mesh_files
 from validate.replay.road import compare
 from validate.report import gl
 from validate.report.folder import STUDIES, try_results
+from validate.report.history import replaced
 from validate.report.made import Made, made
 from validate.report.write import write_report
 
@@ -79,6 +80,11 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
             result, folder, created=created, made=by,
             progress=lambda part: report(1, 1, f"writes the report: {part}"),
         )  # fmt: skip
+    if old := replaced(page.parent, created):
+        complain(
+            f"{relative(page.parent)} held a run of {old['created']}, made otherwise; its line is "
+            f"kept, see `validate history {experiment.name}`"
+        )
     return result, page
 
 

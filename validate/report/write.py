@@ -5,7 +5,9 @@ from pathlib import Path
 
 from validate.compare.result import Result
 from validate.report.folder import MARK, STUDIES, replace_folder
+from validate.report.history import carried, write_lines
 from validate.report.made import Made
+from validate.report.plain import Json
 from validate.report.store import document, write_json, write_runs
 from validate.report.verdicts import band
 
@@ -24,11 +26,19 @@ def write_report(
 
     `created` is a UTC time, ISO-8601; `made` says what made the result. The old folder stays until
     the new one is complete; after any failure nothing of the new one is left; folders of studies in
-    it are kept. Raises `UsageError` when `folder` holds something other than a report, or cannot be
-    written; `ComparisonError` when two parts of the exhibits share a name.
+    it are kept, and a line of the run that was there, unless all that made it is equal. Raises
+    `UsageError` when `folder` holds something other than a report, or cannot be written;
+    `ComparisonError` when two parts of the exhibits share a name.
     """
     told, by = progress or _silent, made or Made()
-    folder = replace_folder(folder, lambda f: _fill(result, f, created, by, told), (STUDIES,))
+    content = document(result, created, by)
+    lines = carried(folder, content)
+
+    def fill(fresh: Path) -> None:
+        write_lines(lines, fresh)
+        _fill(result, fresh, content, by, told)
+
+    folder = replace_folder(folder, fill, (STUDIES,))
     return folder / "report.html"
 
 
@@ -36,7 +46,7 @@ def _silent(_: str) -> None:
     pass
 
 
-def _fill(result: Result, folder: Path, created: str, made: Made, progress: Progress) -> None:
+def _fill(result: Result, folder: Path, content: Json, made: Made, progress: Progress) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
     from validate.report.exhibits import draw_all, write_files
     from validate.report.html import page
@@ -47,7 +57,7 @@ def _fill(result: Result, folder: Path, created: str, made: Made, progress: Prog
     for name in ("tables", "figures", "runs"):
         (folder / name).mkdir()
     progress("runs")
-    write_json(document(result, created, made), folder / MARK)
+    write_json(content, folder / MARK)
     write_runs(result, folder / "runs")
     progress("replay")
     write_replay(result, folder / "replay.mcap")
@@ -55,4 +65,5 @@ def _fill(result: Result, folder: Path, created: str, made: Made, progress: Prog
     for exhibit in shown:
         write_files(exhibit, folder)
     progress("page")
-    (folder / "report.html").write_text(page(result, shown, created, band(result)), "utf-8")
+    text = page(result, shown, content["created"], band(result))
+    (folder / "report.html").write_text(text, "utf-8")

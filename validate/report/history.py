@@ -1,0 +1,101 @@
+"""What a report folder held before: a line of JSON for every run that a newer one replaced.
+
+The line is what the run's results.json says in short, so that a folder of any age has a history. A
+run is carried over unless all that made it (code, files, parameters) is equal.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from validate.report.folder import MARK
+from validate.report.plain import Json
+
+LINES = "history.jsonl"
+_WHOLE = (
+    "experiment", "created", "sentence", "passed", "quick", "kind", "overall", "parameters",
+    "changed", "made",
+)  # fmt: skip
+_CHECK = ("name", "value", "raw", "limit", "u_val", "u_num", "unit", "count", "verdict")
+
+
+def line_of(content: Json) -> Json:
+    """A run in short; raises `KeyError` or `TypeError` for what is no results.json."""
+    methods = content["methods"]
+    return {
+        **{key: content[key] for key in _WHOLE if key in content},
+        "inputs": [{"path": i["path"], "sha256": i["sha256"]} for i in content["inputs"]],
+        "methods": [m["name"] for m in methods],
+        "checks": [
+            {"method": m["name"], **{key: c.get(key) for key in _CHECK}}
+            for m in methods
+            for c in m["checks"]
+        ],
+        "identified": [
+            {key: s[key] for key in ("name", "value", "unit")}
+            for s in content.get("identified", [])
+        ],
+    }
+
+
+def carried(folder: Path, content: Json) -> list[str]:
+    """The lines of the folder that the run `content` is about to replace, that of its run last."""
+    lines = _texts(folder)
+    old = current(folder)
+    if old is not None and not _alike(old, line_of(content)):
+        lines.append(_text({**old, "replaced": content["created"]}))
+    return lines
+
+
+def write_lines(lines: list[str], folder: Path) -> None:
+    """Nothing where there are none."""
+    if lines:
+        (folder / LINES).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def replaced(folder: Path, created: str) -> Json | None:
+    """The run that gave way to the one created then; None where that replaced none, or its like."""
+    lines = _texts(folder)
+    last: Json = json.loads(lines[-1]) if lines else {}
+    return last if last.get("replaced") == created else None
+
+
+def lines_of(folder: Path) -> list[Json]:
+    """Every run that a report folder knows of, the current one last.
+
+    Raises `ValueError` for a line that is no JSON.
+    """
+    now = current(folder)
+    return [*map(json.loads, _texts(folder)), *([] if now is None else [now])]
+
+
+def current(folder: Path) -> Json | None:
+    """The line of the run that lies there; None for a folder without one, or a damaged one."""
+    try:
+        return line_of(json.loads((folder / MARK).read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def _texts(folder: Path) -> list[str]:
+    try:
+        text = (folder / LINES).read_text(encoding="utf-8")
+    except OSError:
+        return []
+    return [line for line in text.splitlines() if line.strip()]
+
+
+def _text(line: Json) -> str:
+    return json.dumps(line, ensure_ascii=False, allow_nan=False)
+
+
+def _alike(one: Json, other: Json) -> bool:
+    """Whether all that made two runs is equal."""
+    return bool(_maker(one)[0]) and _maker(one) == _maker(other)
+
+
+def _maker(line: Json) -> tuple[Any, ...]:
+    made = line.get("made") or {}
+    rest = (line.get(key) for key in ("inputs", "parameters", "quick", "methods"))
+    # Through JSON: a file that was read again has lists where this run has tuples.
+    return made.get("code_sha256"), json.dumps([made.get("files"), *rest], sort_keys=True)
