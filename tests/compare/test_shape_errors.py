@@ -32,6 +32,7 @@ MESHES = {
     "tet4": box(*SOLID),
     "tet10": quadratic(box(*SOLID)),
     "hex8": grid(*SOLID),
+    "hex27": quadratic(grid(*SOLID)),
     "hole": square_with_hole(1.0, 0.2, 5),
 }
 

@@ -26,6 +26,7 @@ MESHES = {
     "tet4": box(*SOLID),
     "tet10": quadratic(box(*SOLID)),
     "hex8": grid(*SOLID),
+    "hex27": quadratic(grid(*SOLID)),
 }
 # Exponent of a length in each unit; the energy norm's by dimension at unit thickness.
 POWERS = {"1": 0.0, "m": 1.0, "m^2": 2.0, "m^3": 3.0}

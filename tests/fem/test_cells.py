@@ -24,6 +24,7 @@ MESHES = {
     "tet4": box(*SOLID),
     "tet10": quadratic(box(*SOLID)),
     "hex8": grid(*SOLID),
+    "hex27": quadratic(grid(*SOLID)),
 }
 
 

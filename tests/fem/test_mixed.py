@@ -90,7 +90,7 @@ def test_the_warning_names_the_cells_and_leaves_plane_stress_alone() -> None:
     warning = locking_warning(block)
     assert warning is not None
     assert "nu = 0.495: linear quadrilaterals lock" in warning
-    assert "compare with a mixed reference" in warning
+    assert "compare with mixed dilatation" in warning
     assert locking_warning(replace(block, plane="stress")) is None
 
 

@@ -16,6 +16,7 @@ from validate.scene.mesh import (
     quadratic,
     require_positive_cells,
 )
+from validate.scene.refine import linear, refined
 from validate.scene.scene import Cavity, Drive, Foundation, Material, Scene, Weight
 from validate.scene.shape_functions import CORNERS
 
@@ -77,8 +78,10 @@ def test_a_folded_quadrilateral_is_refused_though_its_area_is_positive() -> None
 
 def test_what_bricks_do_not_have_is_refused() -> None:
     rod = bending_rod(1)
-    with pytest.raises(SceneError, match="hex8 have no quadratic form"):
-        quadratic(rod.mesh)
+    with pytest.raises(SceneError, match="quad4 have no quadratic form"):
+        quadratic(needle_block(4).mesh)
+    with pytest.raises(SceneError, match="refined by a finer grid"):
+        refined(rod)
     with pytest.raises(SceneError, match="nodal mean dilatation is for simplices, not hex8"):
         replace(rod, dilatation="nodal_mean")
     with pytest.raises(SceneError, match="need triangular facets"):
@@ -108,3 +111,23 @@ def test_drives_and_weights_are_checked() -> None:
         bending_rod(0)
     scene = Scene(grid((1.0, 1.0), (1, 1)), Material(1.0, 0.3), loads=(Weight("w", (0.0, -1.0)),))
     assert scene.inputs == ("w",)
+
+
+def test_quadratic_hexahedra_have_a_node_at_every_place_once() -> None:
+    mesh = grid((3.0, 2.0, 1.0), (2, 3, 1))
+    fine = quadratic(mesh)
+    assert (fine.kind, fine.order, len(fine.nodes)) == ("hex27", 2, 5 * 7 * 3)
+    assert np.array_equal(fine.nodes[: len(mesh.nodes)], mesh.nodes)
+    assert np.unique(fine.nodes.round(9), axis=0).shape == fine.nodes.shape
+    assert np.array_equal(fine.corners, mesh.cells)
+    assert (
+        np.ptp(fine.nodes[fine.cells[:, 8:]].mean(axis=1) - fine.nodes[fine.cells[:, 26]]) < 1e-15
+    )
+    for name, facets in fine.facets.items():
+        assert np.array_equal(facets[:, :4], mesh.facets[name])
+        assert fine.nodes[facets[:, 8]] == pytest.approx(fine.nodes[facets[:, :4]].mean(axis=1))
+    sides = np.sort(np.vstack(list(fine.facets.values())), axis=1)
+    found = np.sort(boundary_facets(fine.cells, 3), axis=1)
+    assert {tuple(f) for f in found.tolist()} == {tuple(f) for f in sides.tolist()}
+    assert linear(fine).kind == "hex8"
+    assert np.array_equal(linear(fine).facets["x1"], mesh.facets["x1"])

@@ -9,6 +9,7 @@ import pytest
 from validate.arrays import Floats
 from validate.scene.shape_functions import (
     CORNERS,
+    LATTICE,
     Quadrature,
     barycentric,
     brick_rule,
@@ -21,26 +22,30 @@ from validate.scene.shape_functions import (
 )
 
 
-def at(order: int | None) -> Callable[[Floats], Quadrature]:
-    """The rule of simplices of an order, or of bricks, at points without weights."""
-    if order is None:
-        return lambda xi: brick_rule(xi, np.zeros(len(xi)))
+def at(order: int, brick: bool) -> Callable[[Floats], Quadrature]:
+    """The rule of simplices or bricks of an order, at points without weights."""
+    if brick:
+        return lambda xi: brick_rule(xi, np.zeros(len(xi)), order)
     return lambda xi: simplex_rule(order, barycentric(xi), np.zeros(len(xi)))
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("order", [1, 2, None])
-def test_shapes_sum_to_one_and_their_slopes_are_differences(order: int | None, d: int) -> None:
-    xi = np.random.default_rng(0).random((5, d)) / d
-    assert at(order)(xi).N.sum(axis=1) == pytest.approx(np.ones(5))
+@pytest.mark.parametrize("brick", [False, True])
+@pytest.mark.parametrize("order", [1, 2])
+def test_shapes_sum_to_one_and_their_slopes_are_differences(
+    order: int, brick: bool, d: int
+) -> None:
+    xi, made = np.random.default_rng(0).random((5, d)) / d, at(order, brick)
+    assert made(xi).N.sum(axis=1) == pytest.approx(np.ones(5))
     for axis, step in enumerate(1e-6 * np.eye(d)):
-        difference = (at(order)(xi + step).N - at(order)(xi - step).N) / 2e-6
-        assert at(order)(xi).dN[..., axis] == pytest.approx(difference, abs=1e-9)
+        difference = (made(xi + step).N - made(xi - step).N) / 2e-6
+        assert made(xi).dN[..., axis] == pytest.approx(difference, abs=1e-9)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-def test_bricks_are_one_at_their_own_corner(d: int) -> None:
+def test_bricks_are_one_at_their_own_node(d: int) -> None:
     assert np.array_equal(brick_values(CORNERS[d]), np.eye(2**d))
+    assert np.array_equal(brick_values(LATTICE[d], 2), np.eye(3**d))
 
 
 def monomials(xi: Floats, weights: Floats, degree: int) -> None:

@@ -1,7 +1,8 @@
 """The boundary of a deformed body as flat pieces: segments in the plane, triangles in space.
 
 Quadratic facets become the pieces between their nodes (2 segments, 4 triangles); a quadrilateral
-facet becomes 4 triangles round its middle, which enclose the volume under its bilinear patch.
+facet becomes 4 triangles round its middle, which enclose the volume under its bilinear patch; one
+with nine nodes is four quadrilaterals.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ _PIECES = {
     3: ((0, 1, 2),),
     6: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
 }
+_QUARTERS = ((0, 5, 8, 4), (5, 1, 7, 8), (8, 7, 2, 6), (4, 8, 6, 3))  # as in LATTICE
 _SEGMENTS = ((0, 2), (2, 1))  # an edge with its middle node
 
 
@@ -35,6 +37,8 @@ def deformed_boundary(mesh: Mesh, nodal: Floats) -> Boundary:
     Point and piece numbers depend on the mesh alone: two skins of one mesh correspond.
     """
     facets = _boundary(mesh)
+    if facets.shape[1] == 9:
+        facets = facets[:, np.array(_QUARTERS)].reshape(-1, 4)
     if facets.shape[1] == 4:
         middles = len(nodal) + np.arange(len(facets))
         around = [np.stack([facets[:, i], facets[:, (i + 1) % 4], middles], 1) for i in range(4)]
@@ -78,9 +82,9 @@ def _used(points: Floats, pieces: Ints) -> Boundary:
 
 def _boundary(mesh: Mesh) -> Ints:
     """Boundary facets with all their nodes, oriented outward."""
+    if mesh.order == 1 or mesh.bricks:
+        return boundary_facets(mesh.cells, mesh.dimension)
     facets = boundary_facets(mesh.corners, mesh.dimension)
-    if mesh.order == 1:
-        return facets
     ends = np.sort(mesh.cells[:, list(EDGES[mesh.dimension])].reshape(-1, 2), axis=1)
     middle = mesh.cells[:, mesh.dimension + 1 :].ravel()
     n = len(mesh.nodes)

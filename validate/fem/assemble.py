@@ -1,16 +1,20 @@
 """Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7); masses by scikit-fem.
 
-The stiffness is pointwise or with nodal mean dilatation; materials may differ from cell to cell.
+The stiffness is pointwise, mixed or with nodal mean dilatation; materials may differ from cell to
+cell.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 from skfem import (
     Basis,
     BilinearForm,
     ElementHex1,
+    ElementHex2,
     ElementQuad1,
     ElementTetP1,
     ElementTetP2,
@@ -26,7 +30,8 @@ from skfem.models.elasticity import lame_parameters
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.cells import rule, volumes_at
+from validate.fem.cells import rule, values_at, volumes_at
+from validate.fem.mean_dilatation import projections
 from validate.fem.surface import surface_stiffness
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
@@ -40,6 +45,7 @@ _ELEMENTS = {
     "tet10": (MeshTet, ElementTetP2, 4),
     "quad4": (MeshQuad, ElementQuad1, 3),
     "hex8": (MeshHex, ElementHex1, 3),
+    "hex27": (MeshHex, ElementHex2, 5),
 }
 # Our corners in the order in which the library lists a hexahedron's.
 _HEXAHEDRON = (0, 4, 3, 1, 7, 5, 2, 6)
@@ -54,9 +60,9 @@ def stiffness(scene: Scene) -> sparse.csr_array:
     """
     require_positive_cells(scene.mesh)
     if scene.dilatation == "nodal_mean":
-        K = _nodal_mean_stiffness(scene.mesh, scene.material)
+        K = _nodal_mean_stiffness(scene)
     else:
-        K = _assembled(scene.mesh, *(scene.thickness * c for c in lame_constants(scene)))
+        K = _assembled(scene, *(scene.thickness * c for c in lame_constants(scene)))
     for part in surface_stiffness(scene):
         K = K + part
     return sparse.csr_array(K)
@@ -67,7 +73,7 @@ def stiffness_damping(scene: Scene) -> sparse.csr_array:
     if scene.dilatation == "nodal_mean":
         return sparse.csr_array(scene.material.stiffness_damping * stiffness(scene))
     beta = scene.thickness * scene.per_cell(lambda m: m.stiffness_damping)
-    return _assembled(scene.mesh, *(beta * c for c in lame_constants(scene)))
+    return _assembled(scene, *(beta * c for c in lame_constants(scene)))
 
 
 def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
@@ -79,10 +85,13 @@ def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
     if any(m.rho is None for m in materials):
         raise SceneError("a dynamic scheme needs the density; set rho kg/m3 of every material")
     weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
-    basis = _basis(scene.mesh)
-    _require_node_major(basis.doflocs, scene.mesh.nodes, 1)
-    weight = scene.thickness * weight
+    weight, basis = scene.thickness * weight, _basis(scene.mesh)
     scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
+    if scene.mesh.kind == "hex27":
+        theirs = _renumbered(basis.doflocs.T, scene.mesh.nodes)
+        scalar = scalar[theirs][:, theirs]
+    else:
+        _require_node_major(basis.doflocs, scene.mesh.nodes, 1)
     return sparse.csr_array(sparse.kron(scalar, np.eye(scene.mesh.dimension)))
 
 
@@ -124,7 +133,7 @@ def _mu(m: Material) -> float:
 
 def library_mesh(mesh: Mesh) -> Any:
     """The vertices and cells as scikit-fem has them, its order of corners included."""
-    order = _HEXAHEDRON if mesh.kind == "hex8" else slice(None)
+    order = _HEXAHEDRON if mesh.bricks and mesh.dimension == 3 else slice(None)
     corners = np.ascontiguousarray(mesh.corners[:, order].T)
     vertices = int(mesh.corners.max()) + 1
     return _ELEMENTS[mesh.kind][0](np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
@@ -135,42 +144,56 @@ def _basis(mesh: Mesh) -> Basis:
     return Basis(library_mesh(mesh), element(), intorder=mass_degree)
 
 
-def _assembled(mesh: Mesh, lam: Floats, mu: Floats) -> sparse.csr_array:
+def _assembled(scene: Scene, lam: Floats, mu: Floats) -> sparse.csr_array:
     """Stiffness with the Lame constants (e,) Pa of every cell.
 
     For shapes a, b with slopes g: K_ab = sum of w (lam g_a g_b^T + mu g_b g_a^T + mu g_a.g_b 1),
     all of it from the sums of w g_ai g_bj. As scikit-fem's `linear_elasticity`, five times as fast.
+    Mixed cells take kappa = lam + 2 mu/3 with the projected volume strain, -2 mu/3 with its own.
     """
-    slopes, weights = _slopes(mesh)
+    mesh = scene.mesh
+    points = stiffness_points(mesh)
+    slopes, weights = points.slopes, points.weights
     e, q, a, d = slopes.shape
     g = slopes.reshape(e, q, a * d)
+    mixed = scene.dilatation == "mixed"
+    if mixed:
+        mean = projections(mesh, points.places, weights) @ g
+        volume = np.swapaxes(mean * weights[..., None], 1, 2) @ mean
+        volume *= (lam + 2 / 3 * mu)[:, None, None]
+        lam = -2 / 3 * mu
     outer = (np.swapaxes(g * weights[..., None], 1, 2) @ g).reshape(e, a, d, a, d)
     dots = np.einsum("eaibi->eab", outer)[:, :, None, :, None] * np.eye(d)[:, None, :]
     lam, mu = (c[:, None, None, None, None] for c in (lam, mu))
     cells = lam * outer + mu * (np.swapaxes(outer, 2, 4) + dots)
-    return _summed(mesh, cells.reshape(e, a * d, a * d))
+    cells = cells.reshape(e, a * d, a * d)
+    return _summed(mesh, cells + volume if mixed else cells)
 
 
-def _slopes(mesh: Mesh) -> tuple[Floats, Floats]:
-    """dN/dx (e, q, a, d) 1/m and weights times volume (e, q) m^d that integrate a stiffness."""
+@dataclass(frozen=True)
+class StiffnessPoints:
+    """The points that integrate a stiffness: dN/dx (e, q, a, d) 1/m, weights times volume (e, q)
+    m^d, places (e, q, d) m."""
+
+    slopes: Floats
+    weights: Floats
+    places: Floats
+
+
+def stiffness_points(mesh: Mesh) -> StiffnessPoints:
+    """Bricks at order + 1 Gauss points along each axis; straight-sided simplices at one point, or
+    quadratic at the points of equal weight that integrate products of slopes."""
     if mesh.bricks:
-        at = rule(mesh, 2)
+        at = rule(mesh, mesh.order + 1)
         dxi = np.linalg.inv(at.jacobians(mesh.nodes[mesh.cells]))
-        return np.einsum("qaj,eqji->eqai", at.dN, dxi), volumes_at(mesh, at)
-    slopes = point_slopes(mesh)
-    points = slopes.shape[1]
-    return slopes, np.repeat(cell_volumes(mesh)[:, None] / points, points, axis=1)
-
-
-def point_slopes(mesh: Mesh) -> Floats:
-    """dN/dx (e, q, a, d) 1/m of straight-sided simplices: linear at one point, quadratic at the
-    points of equal weight that integrate products of slopes."""
-    dL = shape_gradients(mesh)
-    if mesh.order == 1:
-        return dL[:, None]
-    d = mesh.dimension
-    slopes = simplex_slopes(2, symmetric_points(d, 2)[0])
-    return np.asarray((slopes.reshape(-1, d + 1) @ dL).reshape(len(dL), *slopes.shape[:2], d))
+        slopes = np.einsum("qaj,eqji->eqai", at.dN, dxi)
+        return StiffnessPoints(slopes, volumes_at(mesh, at), values_at(mesh, at, mesh.nodes))
+    d, dL = mesh.dimension, shape_gradients(mesh)
+    L = np.full((1, d + 1), 1 / (d + 1)) if mesh.order == 1 else symmetric_points(d, 2)[0]
+    slopes = simplex_slopes(mesh.order, L)
+    slopes = (slopes.reshape(-1, d + 1) @ dL).reshape(len(dL), *slopes.shape[:2], d)
+    weights = np.repeat(cell_volumes(mesh)[:, None] / len(L), len(L), axis=1)
+    return StiffnessPoints(slopes, weights, L @ mesh.nodes[mesh.corners])
 
 
 def _summed(mesh: Mesh, K: Floats) -> sparse.csr_array:
@@ -183,25 +206,34 @@ def _summed(mesh: Mesh, K: Floats) -> sparse.csr_array:
     return sparse.csr_array(entries)
 
 
+def _renumbered(places: Floats, nodes: Floats) -> Ints:
+    """The library's unknown at each of our nodes; it numbers edges and faces in its own order."""
+    distance, theirs = cKDTree(places).query(nodes)
+    if np.max(distance) > 1e-9 * np.ptp(nodes) or len(np.unique(theirs)) != len(nodes):
+        raise AssertionError("scikit-fem has its unknowns elsewhere than the mesh its nodes")
+    return np.asarray(theirs, dtype=np.int64)
+
+
 def _require_node_major(places: Floats, nodes: Floats, per_node: int) -> None:
     """The library's unknowns must lie where ours do, or every result would be permuted."""
     if not np.allclose(places, np.repeat(nodes, per_node, axis=0).T, atol=1e-9 * np.ptp(nodes)):
         raise AssertionError("scikit-fem numbers its unknowns differently from the mesh")
 
 
-def _nodal_mean_stiffness(mesh: Mesh, material: Material) -> sparse.csr_array:
+def _nodal_mean_stiffness(scene: Scene) -> sparse.csr_array:
     """K = K_dev + D^T kappa V D: the volume strain is averaged over the cells around each node.
 
     D (n, N) maps displacements to nodal dilatations theta_a = sum_e V_e/4 div_e / V_a. The
     deviatoric part is the full stiffness less its pointwise volumetric part.
     Source: nodal averaging after Bonet & Burton (1998), for small strain.
     """
+    mesh, material = scene.mesh, scene.material
     B, volumes = divergence(mesh)
     kappa = material.bulk_modulus
     # A material without volume stiffness shares its deviatoric part with this one.
     pointwise = B.T @ sparse.diags_array(kappa * volumes) @ B
     ones = np.ones(len(mesh.cells))
-    K_dev = _assembled(mesh, _lambda(material) * ones, _mu(material) * ones) - pointwise
+    K_dev = _assembled(scene, _lambda(material) * ones, _mu(material) * ones) - pointwise
     share = _cell_to_node(mesh.corners, volumes, len(mesh.nodes))
     V = np.asarray(share.sum(axis=1))
     D = sparse.diags_array(1 / V) @ share @ B

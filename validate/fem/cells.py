@@ -7,6 +7,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.shape_functions import (
     CORNERS,
     EDGES,
+    LATTICE,
     Quadrature,
     barycentric,
     brick_rule,
@@ -25,7 +26,7 @@ def rule(mesh: Mesh, points: int) -> Quadrature:
 def nodal_rule(mesh: Mesh) -> Quadrature:
     """Shapes at the nodes of a cell, without weights: where slopes of linear fields peak."""
     if mesh.bricks:
-        xi: Floats = CORNERS[mesh.dimension]
+        xi: Floats = (CORNERS if mesh.order == 1 else LATTICE)[mesh.dimension]
     else:
         xi = np.vstack([np.zeros(mesh.dimension), np.eye(mesh.dimension)])
         if mesh.order == 2:
@@ -35,7 +36,7 @@ def nodal_rule(mesh: Mesh) -> Quadrature:
 
 def _rule_at(mesh: Mesh, xi: Floats, weights: Floats) -> Quadrature:
     if mesh.bricks:
-        return brick_rule(xi, weights)
+        return brick_rule(xi, weights, mesh.order)
     return simplex_rule(mesh.order, barycentric(xi), weights)
 
 

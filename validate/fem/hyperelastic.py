@@ -1,12 +1,18 @@
 """A hyperelastic body in total Lagrangian form: energy, internal force and tangent of a mesh.
 
-f_int = sum over points of w P : dN/dX, K_t its derivative (Bonet & Wood 2008, ch. 9). Nodal mean
-dilatation at large strain takes the isochoric law per cell and the volumetric one of the cells'
-measure (tr E or J - 1) averaged around each node; at rest its tangent is that of `fem.assemble`.
+f_int = sum over points of w P : dN/dX, K_t its derivative (Bonet & Wood 2008, ch. 9). The isochoric
+law acts at every point, the volumetric one on the law's measure of volume change (tr E or J - 1):
+pointwise, projected in every cell (`fem.mean_dilatation`), or averaged around each node
+(`fem.nodal_mean`). At rest the tangent is that of `fem.assemble`.
 
-Departures: four points per quadratic cell (degree 2) integrate the stiffness at rest exactly; at
-large strain they are what the order of convergence needs, not exact. Foundations act as linear
-springs at any displacement; membranes are known at small strain only and are refused.
+Near nu = .5 Newton's method wants the pressures p of the tangent to be unknowns of their own,
+p' = U'(theta(u)) + U''(theta(u)) dtheta (`extrapolated`): the pressure that a step of size d leaves
+at its end, kappa d^2 too large, then stiffens or softens nothing (Magisano, Leonetti & Garcea 2017
+for stresses at points). At a solution both are one.
+
+Departures: four points per quadratic tetrahedron (degree 2) integrate the stiffness at rest
+exactly; at large strain they are what the order of convergence needs, not exact. Foundations act as
+linear springs at any displacement; membranes are known at small strain only and are refused.
 """
 
 from collections.abc import Iterator
@@ -15,18 +21,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assemble import point_slopes
-from validate.fem.laws import law_of
+from validate.fem.assemble import stiffness_points
+from validate.fem.laws import Law, parts_of
+from validate.fem.mean_dilatation import projections
 from validate.fem.nodal_mean import NodalMean
 from validate.fem.pattern import NodePattern
 from validate.fem.surface import foundation_stiffness
 from validate.fem.tensors import green_strain, volume_change
-from validate.scene.mesh import cell_volumes, require_positive_cells
+from validate.scene.mesh import require_positive_cells
 from validate.scene.scene import Scene
 
 _BLOCK = 2048  # cells at a time: bounds the memory of the kernel's temporaries
+_KINDS = ("tet4", "tet10", "hex8", "hex27")
 
 
 @dataclass(frozen=True)
@@ -38,103 +46,169 @@ class Inverted:
     first: int
 
 
-class Body:
-    """A scene's mesh and law, prepared once; displacements u (N,) m, node-major.
+@dataclass(frozen=True)
+class _Block:
+    """Cells of one material: its isochoric law and kappa Pa, H (b, q, 3, 3) = du/dX."""
 
-    Raises `SceneError` for other elements than tet4 and tet10, inverted cells, a linear law, a
-    membrane.
+    cells: slice | Ints
+    law: Law
+    kappa: float
+    H: Floats
+
+
+class Body:
+    """A scene's mesh and laws, prepared once; displacements u (N,) m, node-major.
+
+    Raises `SceneError` for other elements than tetrahedra and hexahedra, inverted cells, a linear
+    law, a membrane.
     """
 
     def __init__(self, scene: Scene) -> None:
-        mesh, kappa = scene.mesh, scene.material.bulk_modulus
-        if mesh.kind not in ("tet4", "tet10"):
+        mesh = scene.mesh
+        if mesh.kind not in _KINDS:
             raise SceneError(f"elements of kind {mesh.kind} have no hyperelastic form; use tet4")
         if scene.membranes:
             raise SceneError("membranes are linear only: drop them, or take the linear law")
-        if scene.regions:
-            raise SceneError("large strain is for one material; drop the regions")
         require_positive_cells(mesh)
-        averaged = scene.dilatation == "nodal_mean"
-        self.mesh, self.law = mesh, law_of(scene.material, isochoric=averaged)
-        self.mean = NodalMean(mesh, self.law, kappa) if averaged else None
-        self.gradients = point_slopes(mesh)
+        self.mesh = mesh
+        self.parts = tuple(_parts(scene))
+        points = stiffness_points(mesh)
+        self.gradients, self.weights = points.slopes, points.weights
+        self.projections = None
+        if scene.dilatation == "mixed":
+            self.projections = projections(mesh, points.places, points.weights)
+        self.mean = None
+        if scene.dilatation == "nodal_mean":
+            self.mean = NodalMean(mesh, *self.parts[0][1:])
         springs = [foundation_stiffness(mesh, f) for f in scene.foundations]
         self.springs: sparse.csr_array | None = sum(springs[1:], springs[0]) if springs else None
-        points = self.gradients.shape[1]
-        self.weights = np.repeat(cell_volumes(mesh)[:, None] / points, points, axis=1)
         self.pattern = NodePattern(mesh.cells, len(mesh.nodes))
+        moduli = scene.per_cell(lambda m: m.bulk_modulus + m.shear_modulus)
         spread = np.linalg.norm(self.gradients, axis=-1) * self.weights[..., None]
+        spread *= moduli[:, None, None]
         #: N, norm of the nodal forces that a stress of kappa + mu in every cell would add up to.
-        self.unit_force = float((kappa + self.law.mu) * np.linalg.norm(self._nodal(spread.sum(1))))
+        self.unit_force = float(np.linalg.norm(self._nodal(spread.sum(1))))
+
+    @property
+    def most_stretch(self) -> float:
+        """Above this principal stretch a law of the body has no sense."""
+        return min(law.most_stretch for _, law, _ in self.parts)
 
     def energy(self, u: Floats) -> float:
         """Stored energy J of the mesh (not times the scene's copies)."""
-        total = sum(
-            float((self.weights[part] * self.law.energy(H)).sum()) for part, H in self._blocks(u)
-        )
-        springs = 0.0 if self.springs is None else float(u @ (self.springs @ u)) / 2
-        return total + springs + (self.mean.energy(self._cell_gradient(u)) if self.mean else 0.0)
+        total = 0.0 if self.springs is None else float(u @ (self.springs @ u)) / 2
+        total += self.mean.energy(self._cell_gradient(u)) if self.mean else 0.0
+        for b in self._blocks(u):
+            W = b.law.energy(b.H)
+            if not self.mean:
+                W = W + b.law.volumetric(self._mean(b, b.law.dilatation(b.H)[0]), b.kappa)[0]
+            total += float((self.weights[b.cells] * W).sum())
+        return total
 
     def force(self, u: Floats) -> Floats:
         """Internal nodal forces (N,) N."""
-        pressure = self.mean.pressures(self._cell_gradient(u)) if self.mean else None
         nodal = np.empty((*self.mesh.cells.shape, 3))
-        for part, H in self._blocks(u):
-            P = self.law.stress(H)
-            if self.mean and pressure is not None:
-                P = P + pressure[part, None, None, None] * self.mean.law.dilatation(H)[1]
-            weighted = np.swapaxes(self.weights[part, :, None, None] * P, -1, -2)
-            nodal[part] = (self.gradients[part] @ weighted).sum(axis=1)
+        pressures = self._nodal_pressures(u)
+        for b in self._blocks(u):
+            s, slope = b.law.dilatation(b.H)
+            p = self._slopes(b, s)[0] if pressures is None else pressures[b.cells]
+            P = b.law.stress(b.H) + p[..., None, None] * slope
+            weighted = np.swapaxes(self.weights[b.cells][..., None, None] * P, -1, -2)
+            nodal[b.cells] = (self.gradients[b.cells] @ weighted).sum(axis=1)
         force = np.stack([self._nodal(nodal[..., i]) for i in range(3)], axis=1).ravel()
         return force if self.springs is None else force + self.springs @ u
 
-    def tangent(self, u: Floats) -> sparse.csr_array:
-        """K_t (N, N) N/m, symmetric."""
-        gradient = self._cell_gradient(u)
-        pressure = self.mean.pressures(gradient) if self.mean else None
+    def tangent(self, u: Floats, pressures: Floats | None = None) -> sparse.csr_array:
+        """K_t (N, N) N/m, symmetric; with the `pressures` (e, q) Pa of an iteration, or u's own."""
         blocks = self.pattern.zeros()
-        for part, H in self._blocks(u):
-            A = self.law.tangent(H)
-            if self.mean and pressure is not None:
-                A += pressure[part, None, None, None, None, None] * self.mean.law.curvature(H)
-            self.pattern.add(blocks, part, self._cell_tangents(part, A))
-        K = self.pattern.matrix(blocks)
-        K = K if self.springs is None else sparse.csr_array(K + self.springs)
-        return sparse.csr_array(K + self.mean.tangent(gradient)) if self.mean else K
+        own = self._nodal_pressures(u) if pressures is None else pressures
+        for b in self._blocks(u):
+            s, slope = b.law.dilatation(b.H)
+            p, stiff = self._slopes(b, s)
+            p = p if own is None else own[b.cells]
+            A = b.law.tangent(b.H) + p[..., None, None, None, None] * b.law.curvature(b.H)
+            if self.projections is None and not self.mean:
+                A = A + np.einsum("...,...iJ,...jK->...JijK", stiff, slope, slope)
+            K = self._cell_tangents(b.cells, A)
+            if self.projections is not None:
+                K += self._projected(b, slope, stiff)
+            self.pattern.add(blocks, b.cells, K)
+        total = self.pattern.matrix(blocks)
+        if self.springs is not None:
+            total = sparse.csr_array(total + self.springs)
+        if self.mean:
+            total = sparse.csr_array(total + self.mean.tangent(self._cell_gradient(u)))
+        return total
+
+    def extrapolated(self, u: Floats, du: Floats) -> Floats:
+        """The pressures (e, q) Pa at u + du, by the slope and curvature that they have at u."""
+        if self.mean:
+            p = self.mean.pressures(self._cell_gradient(u), self._cell_gradient(du))
+            return np.asarray(p[:, None])
+        out = np.empty(self.weights.shape)
+        for b, step in zip(self._blocks(u), self._blocks(du), strict=True):
+            s, slope = b.law.dilatation(b.H)
+            out[b.cells] = self._slopes(b, s, (slope * step.H).sum(axis=(-2, -1)))[0]
+        return out
 
     def jacobians(self, u: Floats) -> Floats:
         """det F (e, q) at every quadrature point."""
-        return 1 + np.concatenate([volume_change(H) for _, H in self._blocks(u)])
+        out = np.empty(self.weights.shape)
+        for b in self._blocks(u):
+            out[b.cells] = 1 + volume_change(b.H)
+        return out
 
     def inverted(self, u: Floats) -> Inverted | None:
-        """The points with det F <= 0, if any: no state of a body."""
+        """The points with det F <= 0, of itself or as projected, if any: no state of a body."""
         bad = ~(self.jacobians(u) > 0)
+        if self.projections is not None:
+            for b in self._blocks(u):
+                bad[b.cells] |= ~(self._mean(b, volume_change(b.H)) > -1)
         if not bad.any():
             return None
         return Inverted(int(bad.sum()), bad.size, int(np.argmax(bad.any(axis=1))))
 
     def principal_stretches(self, u: Floats) -> Floats:
         """The principal stretches (e, q, 3), rising, at every quadrature point."""
-        squares = [np.linalg.eigvalsh(2 * green_strain(H) + np.eye(3)) for _, H in self._blocks(u)]
-        return np.sqrt(np.maximum(np.concatenate(squares), 0.0))
+        squares = np.empty((*self.weights.shape, 3))
+        for b in self._blocks(u):
+            squares[b.cells] = np.linalg.eigvalsh(2 * green_strain(b.H) + np.eye(3))
+        return np.sqrt(np.maximum(squares, 0.0))
 
     def beyond_the_law(self, u: Floats) -> str:
-        """Where a principal stretch is one at which the law has no sense, in words, or nothing."""
-        least, most = self.law.least_stretch, self.law.most_stretch
-        if least == 0 and most == np.inf:
+        """Where a principal stretch is one at which its law has no sense, in words, or nothing."""
+        laws = [law for _, law, _ in self.parts]
+        if all(law.least_stretch == 0 and law.most_stretch == np.inf for law in laws):
             return ""
-        stretches = self.principal_stretches(u)
-        low, high = stretches[..., 0].min(axis=1), stretches[..., 2].max(axis=1)
-        if low.min() < least:
-            found, cell, ends = low.min(), low.argmin(), f"below {least:.3f}"
-        elif high.max() > most:
-            found, cell, ends = high.max(), high.argmax(), f"above {most:.3f}"
-        else:
-            return ""
-        words = f"principal stretch {found:.3f} in element {cell}"
-        return f"beyond the law's validity: {words} is {ends}"
+        stretches, numbers = self.principal_stretches(u), np.arange(len(self.mesh.cells))
+        for cells, law, _ in self.parts:
+            low, high = stretches[cells, :, 0].min(axis=1), stretches[cells, :, 2].max(axis=1)
+            if low.min() < law.least_stretch:
+                found, cell, ends = low.min(), low.argmin(), f"below {law.least_stretch:.3f}"
+            elif high.max() > law.most_stretch:
+                found, cell, ends = high.max(), high.argmax(), f"above {law.most_stretch:.3f}"
+            else:
+                continue
+            words = f"principal stretch {found:.3f} in element {numbers[cells][cell]}"
+            return f"beyond the law's validity: {words} is {ends}"
+        return ""
 
-    def _cell_tangents(self, part: slice, A: Floats) -> Floats:
+    def _mean(self, b: _Block, values: Floats) -> Floats:
+        """Values (b, q) at the points as the volumetric law takes them."""
+        if self.projections is None:
+            return values
+        return np.asarray((self.projections[b.cells] @ values[..., None])[..., 0])
+
+    def _slopes(self, b: _Block, s: Floats, ds: Floats | None = None) -> tuple[Floats, Floats]:
+        """Pressures (b, q) Pa and U'' Pa of the measures s, with the change that `ds` makes."""
+        _, p, stiff = b.law.volumetric(self._mean(b, s), b.kappa)
+        return self._mean(b, p if ds is None else p + stiff * self._mean(b, ds)), stiff
+
+    def _nodal_pressures(self, u: Floats) -> Floats | None:
+        """Pressures (e, 1) Pa of nodal mean dilatation, which no cell has for itself."""
+        return self.mean.pressures(self._cell_gradient(u))[:, None] if self.mean else None
+
+    def _cell_tangents(self, part: slice | Ints, A: Floats) -> Floats:
         """K (e, a, i, j, b) of the cells of a block: dN_aJ A_iJjK dN_bK, summed over points."""
         dN, w = self.gradients[part], self.weights[part]
         e, q, a, _ = dN.shape
@@ -142,19 +216,44 @@ class Body:
         left = np.swapaxes(dN, 1, 2).reshape(e, a, 3 * q)
         return (left @ right.reshape(e, 3 * q, 9 * a)).reshape(e, a, 3, 3, a)
 
-    def _blocks(self, u: Floats) -> Iterator[tuple[slice, Floats]]:
-        """H (b, q, 3, 3) = du/dX of the cells, block by block."""
+    def _projected(self, b: _Block, slope: Floats, stiff: Floats) -> Floats:
+        """(Pi ds/du)^T w U'' (Pi ds/du) as (e, a, i, j, b)."""
+        assert self.projections is not None
+        e, q, a, _ = self.gradients[b.cells].shape
+        change = (self.gradients[b.cells] @ np.swapaxes(slope, -1, -2)).reshape(e, q, 3 * a)
+        mean = self.projections[b.cells] @ change
+        weighted = mean * (self.weights[b.cells] * stiff)[..., None]
+        K = np.swapaxes(weighted, 1, 2) @ mean
+        return np.moveaxis(K.reshape(e, a, 3, a, 3), 3, 4)
+
+    def _blocks(self, u: Floats) -> Iterator[_Block]:
+        """The cells, material by material, block by block."""
         nodal = u.reshape(-1, 3)
-        for start in range(0, len(self.mesh.cells), _BLOCK):
-            part = slice(start, start + _BLOCK)
+        for part, law, kappa in self.parts:
             local = np.swapaxes(nodal[self.mesh.cells[part]], 1, 2)
-            yield part, local[:, None] @ self.gradients[part]
+            yield _Block(part, law, kappa, local[:, None] @ self.gradients[part])
 
     def _cell_gradient(self, u: Floats) -> Floats:
         """H (e, 3, 3) of linear cells."""
-        return np.concatenate([H[:, 0] for _, H in self._blocks(u)])
+        return np.concatenate([b.H[:, 0] for b in self._blocks(u)])
 
     def _nodal(self, values: Floats) -> Floats:
         """Sums (n,) of what the cells (e, k) leave at their nodes."""
         cells, n = self.mesh.cells, len(self.mesh.nodes)
         return np.bincount(cells.ravel(), values.ravel(), n).astype(np.float64)
+
+
+def _parts(scene: Scene) -> Iterator[tuple[slice | Ints, Law, float]]:
+    """Cells by material, in blocks; a body of one material is cut in slices, which copy nothing."""
+    averaged = scene.dilatation != "pointwise"
+    if not scene.regions:
+        for start in range(0, len(scene.mesh.cells), _BLOCK):
+            yield slice(start, start + _BLOCK), *parts_of(scene.material, averaged=averaged)
+        return
+    own = np.zeros(len(scene.mesh.cells), dtype=np.int64)
+    for i, region in enumerate(scene.regions, start=1):
+        own[region.cells] = i
+    for i, material in enumerate((scene.material, *(r.material for r in scene.regions))):
+        cells = np.flatnonzero(own == i)
+        for start in range(0, len(cells), _BLOCK):
+            yield cells[start : start + _BLOCK], *parts_of(material, averaged=averaged)

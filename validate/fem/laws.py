@@ -9,7 +9,7 @@ Sources: Bonet & Wood (2008), ch. 6; Simo & Miehe (1992) for the volumetric func
 invariants are in `fem.polynomial`, of principal stretches in `fem.ogden`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -138,3 +138,19 @@ def law_of(material: Material, *, isochoric: bool = False) -> Law:
     bulk = coupled_lambda(c, mu, kappa) if c.volumetric == "coupled" else kappa
     ends = c.stretches if law_kind(law).ranged else (0.0, np.inf)
     return Polynomial(mu / 2 - c.C01, c.C01, c.C20, c.C30, kappa, bulk, c.volumetric, *ends)
+
+
+def parts_of(material: Material, *, averaged: bool) -> tuple[Law, float]:
+    """The law without its volumetric part, and kappa Pa of that, or the factor of ln^2 J/2.
+
+    Raises `SceneError` as `law_of` does where the volume change is `averaged`: what is left of a
+    coupled law is not isochoric.
+    """
+    law, kappa = law_of(material), material.bulk_modulus
+    if averaged or material.coefficients.volumetric == "split":
+        return law_of(material, isochoric=True), kappa
+    bulk = coupled_lambda(material.coefficients, law.mu, kappa)
+    if isinstance(law, Ogden):
+        return replace(law, kappa=2 * law.mu / 3), bulk
+    assert isinstance(law, Polynomial)
+    return replace(law, bulk=0.0), bulk

@@ -117,12 +117,12 @@ def _brick_rows(mesh: Mesh, points: Floats) -> Rows:
     cells = _near_cells(mesh, points)
     x = mesh.nodes[mesh.corners[cells]]
     flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
-    weights = brick_values(np.clip(_local(flat, each), 0.0, 1.0))
-    feet = np.einsum("ka,kad->kd", weights, flat)
+    xi = np.clip(_local(flat, each), 0.0, 1.0)
+    feet = np.einsum("ka,kad->kd", brick_values(xi), flat)
     away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
     # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
     best, pick = np.argmin(away, axis=1), np.arange(len(points))
-    weights = weights.reshape(*cells.shape, -1)[pick, best]
+    weights = brick_values(xi.reshape(*cells.shape, -1)[pick, best], mesh.order)
     return Rows(_csr(mesh.cells[cells[pick, best]], weights, mesh), away[pick, best])
 
 

@@ -47,7 +47,7 @@ def _volume(scene: Scene, cells: str) -> str | None:
     nu = float(scene.per_cell(lambda m: m.nu).max())
     if nu < LOCKING_FROM or scene.dilatation != "pointwise" or scene.plane == "stress":
         return None
-    instead = "a mixed reference" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
+    instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
     return (
         f"nu = {nu:g}: {cells} lock near incompressibility and are too stiff, silently; compare "
         f"with {instead}"

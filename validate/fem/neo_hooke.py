@@ -8,6 +8,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.tensors import EYE, cofactor, green_strain, outer, trace, volume_change
 from validate.fem.volumetric import ByVolume, split_energy
+from validate.scene.laws import VolumetricName
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class NeoHooke(ByVolume):
     mu: float
     kappa: float
 
+    form: VolumetricName = "split"
     least_stretch: ClassVar[float] = 0.0
     most_stretch: ClassVar[float] = np.inf
 

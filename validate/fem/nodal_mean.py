@@ -34,9 +34,14 @@ class NodalMean:
         """J."""
         return float(self.volumes @ self._at_nodes(H)[0])
 
-    def pressures(self, H: Floats) -> Floats:
-        """The slope dU/ds (e,) Pa that acts in every cell: the mean of its nodes' slopes."""
-        return np.asarray(self._at_nodes(H)[1][self.cells].mean(axis=1))
+    def pressures(self, H: Floats, dH: Floats | None = None) -> Floats:
+        """The slope dU/ds (e,) Pa that acts in every cell: the mean of its nodes' slopes, with
+        the linear change that cell gradients dH (e, 3, 3) make."""
+        _, slopes, stiff = self._at_nodes(H)
+        if dH is not None:
+            ds = (self.law.dilatation(H)[1] * dH).sum(axis=(-2, -1))
+            slopes = slopes + stiff * (self.average @ ds)
+        return np.asarray(slopes[self.cells].mean(axis=1))
 
     def tangent(self, H: Floats) -> sparse.csr_array:
         """D^T V U'' D (N, N) N/m, D = ds_a/du; the part with d2s/dF2 is the cells' own."""

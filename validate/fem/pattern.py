@@ -20,7 +20,7 @@ class NodePattern:
     def zeros(self) -> Floats:
         return np.zeros((len(self.columns), 3, 3))
 
-    def add(self, blocks: Floats, part: slice, local: Floats) -> None:
+    def add(self, blocks: Floats, part: slice | Ints, local: Floats) -> None:
         """Adds the matrices (e, a, i, j, b) of the cells `part` to `blocks` in place."""
         place = self.place[part].ravel()
         for i in range(3):

@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.tensors import EYE, cofactor, outer, volume_change
+from validate.scene.laws import VolumetricName
 
 
 def split_energy(dJ: Floats, kappa: float) -> Floats:
@@ -16,7 +17,9 @@ def split_energy(dJ: Floats, kappa: float) -> Floats:
 
 
 class ByVolume:
-    """The measure s = J - 1 and its volumetric energy, for nodal mean dilatation."""
+    """The measure s = J - 1 and the volumetric energy of it, of either form."""
+
+    form: VolumetricName
 
     def dilatation(self, H: Floats) -> tuple[Floats, Floats]:
         return volume_change(H), cofactor(H + EYE)
@@ -29,5 +32,8 @@ class ByVolume:
 
     def volumetric(self, s: Floats, kappa: float) -> tuple[Floats, Floats, Floats]:
         J = 1 + s
+        if self.form == "coupled":
+            L = np.log1p(s)
+            return kappa / 2 * L**2, kappa * L / J, kappa * (1 - L) / J**2
         slope = kappa / 2 * s * (s + 2) / J
         return split_energy(s, kappa), slope, kappa / 2 * (1 + 1 / J**2)

@@ -2,7 +2,8 @@
 
 Conventions: cells are positively oriented; facets are oriented outward from the solid; quadratic
 meshes list the vertices first, then one node per edge at its midpoint (straight edges), in the
-local order of `EDGES`. Corners of quad4 and hex8 run as in `scene.shape_functions`.
+local order of `EDGES`; hex27 has nodes in the middles of faces and cells, too (`LATTICE`).
+Corners of quad4, hex8 and hex27 run as in `scene.shape_functions`.
 """
 
 from collections.abc import Mapping
@@ -16,20 +17,29 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, checked, checked_indices
 from validate.errors import SceneError
-from validate.scene.shape_functions import CORNERS, EDGES, brick_rule, gauss_points
+from validate.scene.shape_functions import (
+    CORNERS,
+    EDGES,
+    LATTICE,
+    brick_rule,
+    brick_values,
+    gauss_points,
+)
 
-Kind = Literal["tri3", "tri6", "tet4", "tet10", "quad4", "hex8"]
+Kind = Literal["tri3", "tri6", "tet4", "tet10", "quad4", "hex8", "hex27"]
 DIMENSION: Mapping[str, int] = {
-    "tri3": 2, "tri6": 2, "tet4": 3, "tet10": 3, "quad4": 2, "hex8": 3,
+    "tri3": 2, "tri6": 2, "tet4": 3, "tet10": 3, "quad4": 2, "hex8": 3, "hex27": 3,
 }  # fmt: skip
-ORDER: Mapping[str, int] = {"tri3": 1, "tri6": 2, "tet4": 1, "tet10": 2, "quad4": 1, "hex8": 1}
+ORDER: Mapping[str, int] = {
+    "tri3": 1, "tri6": 2, "tet4": 1, "tet10": 2, "quad4": 1, "hex8": 1, "hex27": 2,
+}  # fmt: skip
 # Nodes of a cell and of a facet.
 _NODES: Mapping[str, tuple[int, int]] = {
     "tri3": (3, 2), "tri6": (6, 3), "tet4": (4, 3), "tet10": (10, 6), "quad4": (4, 2),
-    "hex8": (8, 4),
+    "hex8": (8, 4), "hex27": (27, 9),
 }  # fmt: skip
-# Outward facets by dimension and corners of a cell.
-_FACETS: Mapping[tuple[int, int], tuple[tuple[int, ...], ...]] = {
+# Outward facets by dimension and nodes of a cell.
+_FACETS: dict[tuple[int, int], tuple[tuple[int, ...], ...]] = {
     (2, 3): ((0, 1), (1, 2), (2, 0)),
     (2, 4): ((0, 1), (1, 2), (2, 3), (3, 0)),
     (3, 4): ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
@@ -37,10 +47,20 @@ _FACETS: Mapping[tuple[int, int], tuple[tuple[int, ...], ...]] = {
         (0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)
     ),
 }  # fmt: skip
-# Kuhn's split of a brick along its diagonal, positively oriented.
-_SIMPLICES: Mapping[str, tuple[tuple[int, ...], ...]] = {
-    "quad4": ((0, 1, 2), (0, 2, 3)),
-    "hex8": (
+
+
+def _lattice_facet(corners: tuple[int, ...]) -> tuple[int, ...]:
+    """The nodes of a quadratic hexahedron on the face between those corners."""
+    on_face = brick_values(LATTICE[2]) @ CORNERS[3][list(corners)]
+    places = LATTICE[3].tolist()
+    return tuple(places.index(place) for place in on_face.tolist())
+
+
+_FACETS[3, 27] = tuple(_lattice_facet(f) for f in _FACETS[3, 8])
+# Kuhn's split of a brick along its diagonal, positively oriented, by dimension.
+_SIMPLICES: Mapping[int, tuple[tuple[int, ...], ...]] = {
+    2: ((0, 1, 2), (0, 2, 3)),
+    3: (
         (0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)
     ),
 }  # fmt: skip
@@ -79,12 +99,12 @@ class Mesh:
     @property
     def bricks(self) -> bool:
         """Whether the cells are quadrilaterals or hexahedra rather than simplices."""
-        return self.kind in _SIMPLICES
+        return self.kind in ("quad4", "hex8", "hex27")
 
     @property
     def corners(self) -> Ints:
         """The vertices of every cell (e, d + 1), of bricks (e, 2^d)."""
-        return self.cells if self.bricks else self.cells[:, : self.dimension + 1]
+        return self.cells[:, : 2**self.dimension if self.bricks else self.dimension + 1]
 
     @property
     def simplices(self) -> Ints:
@@ -95,7 +115,8 @@ class Mesh:
         """
         if not self.bricks:
             return self.corners
-        return self.cells[:, np.array(_SIMPLICES[self.kind])].reshape(-1, self.dimension + 1)
+        split = np.array(_SIMPLICES[self.dimension])
+        return self.cells[:, split].reshape(-1, self.dimension + 1)
 
     @cached_property
     def surface(self) -> Ints:
@@ -173,7 +194,10 @@ def kuhn_cells(shape: tuple[int, ...]) -> Ints:
 
 
 def boundary_facets(corners: Ints, dimension: int) -> Ints:
-    """Facets (f, d), of hexahedra (f, 4), that belong to one cell only, oriented outward."""
+    """Facets (f, d), of hexahedra (f, 4), that belong to one cell only, oriented outward.
+
+    From all nodes of hex27, not just the corners, facets (f, 9) with all of theirs.
+    """
     known = _FACETS[dimension, corners.shape[1]]
     facets = np.vstack([corners[:, list(local)] for local in known])
     _, first, count = np.unique(
@@ -184,11 +208,14 @@ def boundary_facets(corners: Ints, dimension: int) -> Ints:
 
 
 def quadratic(mesh: Mesh) -> Mesh:
-    """The mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10)."""
+    """The mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10), of
+    hexahedra also of every face and cell (hex8 -> hex27). `SceneError` for quadrilaterals."""
     if mesh.order == 2:
         return mesh
+    if mesh.kind == "quad4":
+        raise SceneError("elements of kind quad4 have no quadratic form; use simplices")
     if mesh.bricks:
-        raise SceneError(f"elements of kind {mesh.kind} have no quadratic form; use simplices")
+        return _quadratic_bricks(mesh)
     d, n = mesh.dimension, len(mesh.nodes)
     ends = np.sort(mesh.cells[:, list(EDGES[d])].reshape(-1, 2), axis=1)
     edges, number = np.unique(ends, axis=0, return_inverse=True)
@@ -205,3 +232,32 @@ def _with_middles(facets: Ints, key: Ints, n: int) -> Ints:
     ends = np.sort(facets[:, list(local)], axis=2)
     middles = n + np.searchsorted(key, ends[..., 0] * n + ends[..., 1])
     return np.hstack([facets, middles])
+
+
+def _quadratic_bricks(mesh: Mesh) -> Mesh:
+    """Every new node once: it is known by the corners of the edge, face or cell it is in."""
+    n, keys = len(mesh.nodes), _middle_keys(mesh.cells, 3)
+    known, first, number = np.unique(
+        keys.reshape(-1, 8), axis=0, return_index=True, return_inverse=True
+    )
+    shares = brick_values(LATTICE[3][8:])
+    nodes = np.einsum("ma,eai->emi", shares, mesh.nodes[mesh.cells]).reshape(-1, 3)[first]
+    cells = np.hstack([mesh.cells, n + number.reshape(len(mesh.cells), -1)])
+    at = {tuple(key): n + i for i, key in enumerate(known.tolist())}
+    facets = {name: _with_all_middles(f, at) for name, f in mesh.facets.items()}
+    return Mesh(np.vstack([mesh.nodes, nodes]), cells, "hex27", facets)
+
+
+def _middle_keys(corners: Ints, d: int) -> Ints:
+    """The sorted corners (e, m, 8) that each middle node of bricks (e, 2^d) lies between."""
+    between = brick_values(LATTICE[d][2**d :]) > 0
+    keys = np.where(between, corners[:, None], -1)
+    padded = np.full((*keys.shape[:2], 8), -1)
+    padded[..., : keys.shape[2]] = keys
+    return np.sort(padded, axis=2)
+
+
+def _with_all_middles(facets: Ints, at: Mapping[tuple[int, ...], int]) -> Ints:
+    keys = _middle_keys(facets, 2)
+    middles = [[at[tuple(key)] for key in facet] for facet in keys.tolist()]
+    return np.hstack([facets, np.array(middles).reshape(len(facets), 5)])

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.arrays import Ints
+from validate.errors import SceneError
 from validate.scene.mesh import Kind, Mesh, quadratic
 from validate.scene.scene import Scene
 
@@ -26,9 +27,9 @@ def linear(mesh: Mesh) -> Mesh:
     if mesh.order == 1:
         return mesh
     d = mesh.dimension
-    kind: Kind = "tri3" if d == 2 else "tet4"
+    kind: Kind = "hex8" if mesh.bricks else "tri3" if d == 2 else "tet4"
     count = int(mesh.corners.max()) + 1
-    facets = {name: f[:, :d] for name, f in mesh.facets.items()}
+    facets = {name: f[:, : 4 if mesh.bricks else d] for name, f in mesh.facets.items()}
     return Mesh(mesh.nodes[:count], mesh.corners, kind, facets)
 
 
@@ -37,6 +38,8 @@ def refined(scene: Scene) -> Scene:
 
     Cells of linear elements. Raises `SceneError` for bricks.
     """
+    if scene.mesh.bricks:
+        raise SceneError(f"elements of kind {scene.mesh.kind} are refined by a finer grid()")
     fine = quadratic(linear(scene.mesh))
     d = fine.dimension
     kind: Kind = "tri3" if d == 2 else "tet4"

@@ -14,7 +14,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.select import Place, kind_of, nodes_of
 from validate.scene.stability import require_stable
 
-Dilatation = Literal["pointwise", "nodal_mean"]
+Dilatation = Literal["pointwise", "nodal_mean", "mixed"]
 LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"]
 PlaneState = Literal["strain", "stress"]
 
@@ -72,7 +72,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Region:
-    """Cells (k,) of another material than the scene's; the law must be the same."""
+    """Cells (k,) of another material than the scene's: both linear, or both at large strain."""
 
     name: str
     cells: Ints
@@ -228,8 +228,10 @@ class Scene:
     """What is simulated. Parts that are absent cost nothing.
 
     `copies`: planes of symmetry leave this many equal parts, of which the mesh is one; the force
-    of a drive is that on the whole body. `plane` and `thickness` m are those of a 2-D mesh; at 1 m
-    all forces are per metre.
+    of a drive is that on the whole body. `dilatation`: the volume change is that of every point, in
+    the mean of the cells around each node (tet4), or "mixed", projected in every cell
+    (`fem.mean_dilatation`); the latter two do not lock near nu = .5. `plane` and `thickness` m are
+    those of a 2-D mesh; at 1 m all forces are per metre.
     """
 
     mesh: Mesh
@@ -260,10 +262,10 @@ class Scene:
         if self.dilatation == "nodal_mean" and self.regions:
             raise SceneError("nodal mean dilatation is for one material; drop the regions")
         for region in self.regions:
-            if region.material.law != self.material.law:
+            if (region.material.law == "linear") != (self.material.law == "linear"):
                 raise SceneError(
                     f"region '{region.name}' has law '{region.material.law}', the body "
-                    f"'{self.material.law}': one law a scene"
+                    f"'{self.material.law}': take linear laws alone, or none"
                 )
         if self.copies < 1:
             raise SceneError(f"{self.copies} copies of the mesh: at least 1")
@@ -288,8 +290,13 @@ class Scene:
         """What bricks cannot have, and plane state and thickness, which are for 2-D meshes."""
         flat, kind = self.mesh.dimension == 2, self.mesh.kind
         if self.mesh.bricks and self.dilatation == "nodal_mean":
-            raise SceneError(f"nodal mean dilatation is for simplices, not {kind}; use box()")
-        if kind == "hex8" and (self.foundations or self.membranes or self.cavities):
+            raise SceneError(f"nodal mean dilatation is for simplices, not {kind}; use 'mixed'")
+        if self.dilatation == "mixed" and (kind in ("tri3", "tet4") or self.plane == "stress"):
+            raise SceneError(
+                f"mixed dilatation is for hexahedra and quadratic simplices in 3-D or plane strain,"
+                f" not {kind} in plane {self.plane}; use 'nodal_mean' or order 2"
+            )
+        if self.mesh.bricks and not flat and (self.foundations or self.membranes or self.cavities):
             raise SceneError(
                 "foundations, membranes and cavities need triangular facets; use box()"
             )

@@ -2,7 +2,8 @@
 
 Simplices in barycentric coordinates L (..., d + 1), L_0 = 1 - sum xi, xi >= 0: vertices first, then
 the middles of `EDGES`. Bricks (quadrilaterals, hexahedra) in 0 <= xi <= 1: corners
-counter-clockwise, in 3-D first those of zeta = 0, then those of zeta = 1.
+counter-clockwise, in 3-D first those of zeta = 0, then those of zeta = 1; quadratic ones list the
+other places of `LATTICE` behind them.
 """
 
 from collections.abc import Mapping
@@ -26,6 +27,18 @@ CORNERS: Mapping[int, Floats] = {
     2: np.array(_SQUARE, dtype=np.float64),
     3: np.array([(*xy, z) for z in (0, 1) for xy in _SQUARE], dtype=np.float64),
 }
+
+
+def _lattice(d: int) -> Floats:
+    """Corners, then middles of edges, of faces, of the brick: xi (3^d, d)."""
+    places = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    halves = (places == 0.5).sum(axis=1)
+    rest = np.argsort(halves, kind="stable")[2**d :]
+    return np.vstack([CORNERS[d], places[rest]])
+
+
+#: Nodes (3^d, d) of the quadratic unit brick by dimension.
+LATTICE: Mapping[int, Floats] = {d: _lattice(d) for d in (1, 2, 3)}
 # (dimension, degree): b and the weight of points with all barycentric coordinates b but one.
 # Sources: Dunavant (1985) for degree 4, Keast (1986) for the tetrahedron.
 _SYMMETRIC: Mapping[tuple[int, int], tuple[tuple[float, float], ...]] = {
@@ -60,16 +73,17 @@ def simplex_rule(order: int, L: Floats, weights: Floats) -> Quadrature:
     return Quadrature(simplex_values(order, L), simplex_slopes(order, L) @ along, weights)
 
 
-def brick_rule(xi: Floats, weights: Floats) -> Quadrature:
-    """Bricks at the points xi (q, d)."""
-    return Quadrature(brick_values(xi), brick_slopes(xi), weights)
+def brick_rule(xi: Floats, weights: Floats, order: int = 1) -> Quadrature:
+    """Bricks of order 1 or 2 at the points xi (q, d)."""
+    return Quadrature(brick_values(xi, order), brick_slopes(xi, order), weights)
 
 
 def facet_rule(dimension: int, nodes: int) -> Quadrature:
     """Facets with that many nodes of a mesh in `dimension` 2 or 3: edges exact to degree 5,
-    triangles to 4, quadrilaterals to 3 along each side."""
-    if dimension == 3 and nodes == 4:
-        return brick_rule(*gauss_points(2, 2))
+    triangles to 4, quadrilaterals to 3 along each side, quadratic ones to 5."""
+    if dimension == 3 and nodes in (4, 9):
+        order = 1 if nodes == 4 else 2
+        return brick_rule(*gauss_points(2, order + 1), order)
     if dimension == 3:
         return simplex_rule(1 if nodes == 3 else 2, *symmetric_points(2, 4))
     xi, weights = gauss_points(1, 3)
@@ -99,23 +113,30 @@ def simplex_slopes(order: int, L: Floats) -> Floats:
     return np.concatenate([(4 * L - 1)[..., None] * unit, middles], axis=1)
 
 
-def brick_values(xi: Floats) -> Floats:
-    """N (..., 2^d) at xi (..., d)."""
-    return np.asarray(np.prod(_factors(xi), axis=-1))
+def brick_values(xi: Floats, order: int = 1) -> Floats:
+    """N (..., (order + 1)^d) at xi (..., d)."""
+    return np.asarray(np.prod(_factors(xi, order)[0], axis=-1))
 
 
-def brick_slopes(xi: Floats) -> Floats:
-    """dN/dxi (..., 2^d, d) at xi (..., d)."""
-    factors, d = _factors(xi), xi.shape[-1]
-    signs = 2 * CORNERS[d] - 1
+def brick_slopes(xi: Floats, order: int = 1) -> Floats:
+    """dN/dxi (..., (order + 1)^d, d) at xi (..., d)."""
+    factors, slopes = _factors(xi, order)
+    d = xi.shape[-1]
     others = [np.prod(np.delete(factors, c, axis=-1), axis=-1) for c in range(d)]
-    return np.stack([signs[:, c] * others[c] for c in range(d)], axis=-1)
+    return np.stack([slopes[..., c] * others[c] for c in range(d)], axis=-1)
 
 
-def _factors(xi: Floats) -> Floats:
-    """1 - xi or xi (..., 2^d, d), whichever belongs to the corner."""
-    high = CORNERS[xi.shape[-1]] > 0
-    return np.where(high, xi[..., None, :], 1 - xi[..., None, :])
+def _factors(xi: Floats, order: int) -> tuple[Floats, Floats]:
+    """The polynomial of every node along every axis (..., m, d), and its slope."""
+    x = xi[..., None, :]
+    if order == 1:
+        high = CORNERS[xi.shape[-1]] > 0
+        return np.where(high, x, 1 - x), np.broadcast_to(
+            2.0 * high - 1, (*xi.shape[:-1], *high.shape)
+        )
+    twice = (2 * LATTICE[xi.shape[-1]]).astype(int)  # 0, 1, 2: first, middle, last
+    values = np.choose(twice, [(1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)])
+    return values, np.choose(twice, [4 * x - 3, 4 - 8 * x, 4 * x - 1])
 
 
 def gauss_points(d: int, points: int) -> tuple[Floats, Floats]:

@@ -28,7 +28,7 @@ from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 RateRule = Literal["average", "backward_euler", "static"]
-_HALVINGS = 6  # of a Newton correction that does not lower the residual
+_HALVINGS = 6  # of a Newton correction that inverts cells
 _ROUNDING = 1e-15  # of the body's unit force: below it a residual is nothing but rounding
 
 
@@ -137,30 +137,38 @@ class ImplicitStepper:
         return replace(at, k=k, inner=replace(at.inner, inputs=inputs))
 
     def _solved(self, state: State, inputs: Floats) -> State:
-        """One load step by Newton from the state's displacements."""
+        """One load step by Newton from the state's displacements, every correction taken whole
+        unless it inverts cells: the pressures are unknowns of the iteration (`Body.extrapolated`),
+        whose residual in displacements alone rises a thousandfold on the way near nu = .5."""
         last: Settled = state.inner
         rates, drives = self._rates(last), len(self.scene.drives)
         f, free = self.system.loads @ inputs[drives:], self.system.free
         move = self.system.moves @ (inputs - last.inputs)[:drives]
-        u = last.u
+        u, pressures, negative = last.u, None, 0
         residual, acting = self._residual(u, last, rates, f)
         for iteration in range(self.settings.max_iterations + 1):
             small = self.settings.tolerance * acting + _ROUNDING * self.body.unit_force
             if np.linalg.norm(residual[free]) <= small and not move.any():
+                if negative:
+                    words = f"tangent not positive definite ({negative} negative pivots)"
+                    return replace(state, failure=("not_converged", words))
                 return self._found(state, u, rates, inputs, iteration)
-            if iteration == self.settings.max_iterations:
+            if iteration == self.settings.max_iterations or not np.isfinite(acting):
                 break
             try:
-                correction, negative = self._correction(u, residual, rates, move)
+                correction, negative = self._correction(u, pressures, residual, rates, move)
             except SceneError as vanished:
                 return replace(state, failure=("not_converged", str(vanished)))
-            if negative:
-                words = f"tangent not positive definite ({negative} negative pivots)"
+            taken = self._upright(u, correction, move)
+            if taken is None:
+                words = f"a correction inverts cells even at 1/{2**_HALVINGS} of its size"
                 return replace(state, failure=("not_converged", words))
-            u, residual, acting = self._searched(u, correction, residual, last, rates, f, move)
+            pressures = self.body.extrapolated(u, taken)
+            u = u + taken
+            residual, acting = self._residual(u, last, rates, f)
             move = np.zeros_like(move)
         size = float(np.linalg.norm(residual[free])) / acting if acting else np.inf
-        words = f"residual {size:.1e} after {self.settings.max_iterations} iterations"
+        words = f"residual {size:.1e} after {iteration} iterations"
         return replace(state, failure=("not_converged", words))
 
     def _rates(self, last: Settled) -> _Rates:
@@ -179,32 +187,23 @@ class ImplicitStepper:
         return R + inertia + self.C @ (rates.p * d + rates.v) - f, acting
 
     def _correction(
-        self, u: Floats, residual: Floats, rates: _Rates, move: Floats
+        self, u: Floats, pressures: Floats | None, residual: Floats, rates: _Rates, move: Floats
     ) -> tuple[Floats, int]:
         """The Newton correction (N,), prescribed motion and all, and negative pivots."""
-        J = sparse.csr_array(self.body.tangent(u) + rates.p * self.C + rates.q * self.M)
+        J = self.body.tangent(u, pressures) + rates.p * self.C + rates.q * self.M
         free = self.system.free
-        factor = factorise_indefinite(J[free][:, free], self.order)
+        factor = factorise_indefinite(sparse.csr_array(J)[free][:, free], self.order)
         correction = move.copy()
         correction[free] = -factor.solve((residual + J @ move)[free])
         return correction, factor.negative_pivots
 
-    def _searched(
-        self, u: Floats, correction: Floats, residual: Floats, last: Settled, rates: _Rates,
-        f: Floats, move: Floats,
-    ) -> tuple[Floats, Floats, float]:  # fmt: skip
-        """The correction, halved while it raises the residual or inverts cells.
-
-        A prescribed motion is taken whole: its residual has nothing to be compared with.
-        """
-        free, before = self.system.free, np.linalg.norm(residual[self.system.free])
+    def _upright(self, u: Floats, correction: Floats, move: Floats) -> Floats | None:
+        """The correction, but for the prescribed motion halved while it inverts cells."""
         for share in 0.5 ** np.arange(_HALVINGS + 1):
-            new = u + move + share * (correction - move)
-            after, acting = self._residual(new, last, rates, f)
-            better = np.linalg.norm(after[free]) < before or move.any()
-            if better and not self.body.inverted(new):
-                break
-        return new, after, acting
+            taken = move + share * (correction - move)
+            if not self.body.inverted(u + taken):
+                return np.asarray(taken)
+        return None
 
     def _found(
         self, state: State, u: Floats, rates: _Rates, inputs: Floats, iterations: int
@@ -215,7 +214,7 @@ class ImplicitStepper:
         if bad:
             words = f"{bad.count} of {bad.points} elements inverted (det F <= 0)"
             return replace(state, failure=("invalid", words))
-        beyond = self.body.beyond_the_law(u) if self.body.law.most_stretch < np.inf else ""
+        beyond = self.body.beyond_the_law(u) if self.body.most_stretch < np.inf else ""
         if beyond:
             return replace(state, failure=("invalid", beyond))
         numbers = self._numbers(u, v, a, inputs)
