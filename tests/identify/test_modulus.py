@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.identify import modulus
 from validate.identify.modulus import (
     Cylinder,
     ModulusFit,
@@ -245,3 +246,11 @@ def test_modulus_does_not_depend_on_how_the_file_is_written(
     here, there = fit_modulus(real(shared_data, "EF30_0T_A1")), fit_modulus(read_instron(path))
     assert there.E_apparent == pytest.approx(here.E_apparent, rel=1e-7)
     assert there.noise == pytest.approx(here.noise, rel=1e-4)
+
+
+def test_a_log_that_begins_in_contact_begins_on_a_parabola() -> None:
+    """Of x^3 on 0..1 the best parabola is 3/2 x^2 - 3/5 x + 1/20."""
+    x = np.linspace(0.0, 1.0, 2001)
+    assert modulus._parabola_start(1e-3 * x, x**3, 0.999e-3) == pytest.approx(1 / 20, rel=0.01)
+    parabola = 2.0 + 3.0 * x + 4.0 * x**2
+    assert modulus._parabola_start(1e-3 * x, parabola, 0.999e-3) == pytest.approx(2.0, rel=1e-9)

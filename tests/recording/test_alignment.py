@@ -195,6 +195,15 @@ def test_a_clock_without_date_never_runs_below_zero() -> None:
     assert rebased(moved).t0_ns == 0
 
 
+def test_a_share_that_is_just_met_is_enough() -> None:
+    t = 0.1 * np.arange(10)
+    reference, stream = signal(t, t), signal(t + 0.5, t)
+    at = Offset(0.0, 0.001, "declared", 0, 0.0)
+    assert matched(reference, stream, at, min_coverage=0.5).count == 5
+    with pytest.raises(RecordingError, match=r"5 of 10 samples \(50 %\).*at least 51 %"):
+        matched(reference, stream, at, min_coverage=0.51)
+
+
 def test_a_declared_offset_is_counted_too() -> None:
     recording = sample_recording()
     found = declared_offset(recording, "/outline", 0.01, 0.001)

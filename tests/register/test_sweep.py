@@ -1,11 +1,14 @@
 """From images at 2 mm steps to the inclusion's surface and mesh, against a known shape."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sweeps import LeaningCapsule, sweep_frames
 
-from validate.errors import RegistrationError
+from validate.errors import RecordingError, RegistrationError
 from validate.fem.cavity import cavity_surface, volume_of
+from validate.register import sweep
 from validate.register.sweep import Stack, surface_of, sweep_stack
 from validate.scene.inclusion import Block, block_with_inclusion
 from validate.scene.mesh import cell_volumes
@@ -113,3 +116,38 @@ def test_a_sphere_ends_where_its_sections_say() -> None:
     assert _end(at, np.sqrt(r**2 - at**2), 2e-3) == pytest.approx(r, rel=1e-9)
     assert _end(-at, np.sqrt(r**2 - at**2), 2e-3) == pytest.approx(-r, rel=1e-9)
     assert _end(at, np.array([5e-3, 5e-3]), 2e-3) == pytest.approx(7e-3)  # 1.5 steps at most
+
+
+def test_some_six_images_of_a_sweep_are_looked_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every third of eighteen, from the second on; the clearest and largest one is taken."""
+    looked: list[int] = []
+
+    def outlined(image: int, *_: object, **__: object) -> SimpleNamespace:
+        looked.append(image)
+        return SimpleNamespace(contrast=2.0 if image == 7 else 1.0, radius=1.0)
+
+    monkeypatch.setattr(sweep, "extract_outline", outlined)
+    frames = SimpleNamespace(images=range(18), m_per_px=(1e-4, 1e-4))
+    first, _ = sweep._clearest(frames, None, None, False)
+    assert looked == [1, 4, 7, 10, 13, 16]
+    assert first == 7
+
+
+def test_a_neighbour_is_looked_for_in_three_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An inclusion that narrows: the wall is found with a smaller rough radius, or not at all."""
+    asked: list[float] = []
+
+    def outlined(image: int, m_per_px: object, *, radius: float, **_: object) -> SimpleNamespace:
+        asked.append(radius)
+        if radius > finds * 1.01:
+            raise RecordingError("nothing")
+        return SimpleNamespace(centre=np.zeros(2), radius=radius)
+
+    monkeypatch.setattr(sweep, "extract_outline", outlined)
+    frames = SimpleNamespace(images=range(3), m_per_px=(1e-4, 1e-4))
+    near = SimpleNamespace(centre=np.zeros(2), radius=1.0)
+    finds = 0.45
+    assert sweep._beside(frames, 1, near, False).radius == 0.45
+    assert asked == [1.0, 0.7, 0.45]
+    finds = 0.1
+    assert sweep._beside(frames, 1, near, False) is None

@@ -327,6 +327,7 @@ def test_thinning_keeps_the_extremes() -> None:
     assert y[at].min() == y.min()
     assert y[at].max() == y.max()
     assert rounded(np.array([1 / 3])) == [0.3333333]
+    assert thinned(np.zeros(6), 6).tolist() == [0, 1, 2, 3, 4, 5]  # none too many
 
 
 def test_runs_hold_every_step_and_the_sd(result: Result, tmp_path: Path) -> None:

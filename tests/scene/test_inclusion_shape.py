@@ -43,6 +43,14 @@ def test_a_leaning_cylinder_is_exact_between_its_slices() -> None:
     assert shape.distance(on + [[1e-3, 0, 0], [0, 1e-3, 0]]) == pytest.approx([1e-3, -1e-3])
 
 
+def test_an_axis_with_a_bend_follows_each_pair_of_slices() -> None:
+    z = np.array([0.0, 4e-3, 8e-3])
+    centres = np.array([[0.0, 0.0], [1e-3, 0.0], [0.0, 0.0]])
+    shape = SlicedShape(np.eye(4), z, centres, np.full((3, 16), 3e-3), np.array([-4e-3, 12e-3]))
+    middle = np.array([[0.5e-3 + 3e-3, 0.0, 2e-3], [0.5e-3 + 3e-3, 0.0, 6e-3]])
+    assert shape.distance(middle) == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -24,7 +24,7 @@ from validate.scene.mesh import boundary_facets, cell_volumes
 from validate.scene.refine import linear, of_element, refined
 from validate.scene.scene import Material, Region, Scene, Support
 from validate.solve.quasi_static import QuasiStatic
-from validate.study.gain import GainBench, GainCell, run_cell
+from validate.study.gain import DECADES, GainBench, GainCell, run_cell
 from validate.study.stability import stability
 
 
@@ -151,6 +151,10 @@ def test_a_gains_limit_is_two_over_the_compliance(own_phantom: OwnBody) -> None:
     assert found.holds
     settled = [g for g, n in zip(found.gains, found.updates, strict=True) if n >= 0]
     assert max(settled) < 2 / c
+    reach = 10 ** (DECADES / 2)
+    assert (found.gains[0], found.gains[-1]) == pytest.approx(
+        (found.tuned / reach, found.tuned * reach)
+    )
 
 
 def test_a_material_point_enters_no_study(pulled: Experiment) -> None:

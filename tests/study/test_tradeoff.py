@@ -200,6 +200,22 @@ def test_the_front_by_hand() -> None:
     assert [r.solver.name for r in front(rows, "error", floor=2.5).rows] == ["fast", "mean"]
 
 
+def test_a_row_of_the_front_in_its_own_units(
+    measured: Trade, capsys: pytest.CaptureFixture[str]
+) -> None:
+    row = replace(timed("fast", 2e-3, 4e-6), mesh_error=1e-3, solver_error=5e-4)
+    found = replace(measured, rows=(row,))
+    table = trade_exhibits(found)[0].tables[0]
+    told = dict(zip(table.headings, table.rows[0], strict=True))
+    assert told["time / us"] == pytest.approx(4.0)
+    assert told["rate / Hz"] == pytest.approx(2.5e5)
+    assert told["error / mm"] == pytest.approx(2.0)
+    assert told["of the motion / %"] == pytest.approx(0.2 / measured.moved)
+    studying._show_trade(found)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert lines.count(["fast", "P1", "1", "2.00", "4.00"]) == 2
+
+
 def test_memory_counts_every_array_once() -> None:
     one = np.zeros(1000)
     assert held_bytes((one, one[10:], {"again": one})) == 8000

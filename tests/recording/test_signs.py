@@ -1,0 +1,30 @@
+"""Which way compression points, by the sign that the user gives."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from validate.recording.exports.signs import Signs, signs
+
+
+def pick(slope: float, sign: int | None = None) -> SimpleNamespace:
+    said = None if sign is None else SimpleNamespace(sign=sign)
+    return SimpleNamespace(values=slope * np.linspace(0.0, 1.0, 9), said=said)
+
+
+@pytest.mark.parametrize(
+    ("displacement", "force", "expected"),
+    [
+        (pick(1.0, 1), pick(2.0), (1, 1)),
+        (pick(1.0, 1), pick(-2.0), (1, -1)),
+        (pick(-1.0, -1), pick(-2.0), (-1, -1)),
+        (pick(-1.0), pick(2.0, 1), (-1, 1)),
+        (pick(1.0), pick(2.0, -1), (-1, -1)),
+    ],
+)
+def test_the_other_signal_follows_the_sign_that_is_said(
+    displacement: SimpleNamespace, force: SimpleNamespace, expected: tuple[int, int]
+) -> None:
+    found = signs(displacement, force, None, None, None)
+    assert found == Signs(*expected, "sign given by the user")

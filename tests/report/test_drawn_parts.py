@@ -1,0 +1,113 @@
+"""What pictures and tables of a report are drawn from, by hand: no renderer, no page."""
+
+from types import SimpleNamespace as Made
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from report_samples import small_result
+
+from validate.compare.effects import Change, Effect
+from validate.report import markers
+from validate.report.body import shown_body
+from validate.report.discrimination import _budget
+from validate.report.provenance import _points
+from validate.report.registration import _residuals
+from validate.report.renders import _fill, _View, renders
+
+
+class Plotter:
+    """What is added to a plotter, without a window."""
+
+    def __init__(self) -> None:
+        self.meshes: list[Any] = []
+        self.camera = Made()
+
+    def add_mesh(self, mesh: Any, **looks: Any) -> None:
+        self.meshes.append(mesh)
+
+    def add_text(self, *_: Any, **__: Any) -> None: ...
+
+
+def filled(body: Any, view: _View) -> Plotter:
+    plotter = Plotter()
+    _fill(plotter, body, view)
+    return plotter
+
+
+def test_a_cut_takes_the_plates_with_it_and_rest_is_rest() -> None:
+    found = shown_body(small_result())
+    assert found is not None
+    nodes = 1e3 * found.mesh.nodes
+    rest = filled(found, _View(scale=0.0))
+    body, *plates = rest.meshes
+    assert len(plates) == len(found.plates) == 2
+    assert np.asarray(body.points).min(axis=0) == pytest.approx(nodes.min(axis=0))
+    for plate, told in zip(plates, found.plates, strict=True):
+        x0, x1, y0, y1, *_ = plate.bounds
+        assert (x1 - x0) == pytest.approx(told.sizes[0], rel=1e-6)
+        assert (x0 + x1) / 2 == pytest.approx(told.centre[0], rel=1e-6)
+        whole = found.normal is None or abs(found.normal[1]) < 0.5
+        assert (y1 - y0) == pytest.approx(told.sizes[1] if whole else told.sizes[1] / 2, rel=1e-6)
+    moved = filled(found, _View()).meshes
+    drives = max(found.plates, key=lambda p: float(np.linalg.norm(p.shift)))
+    k = found.plates.index(drives)
+    assert np.subtract(moved[1 + k].center, plates[k].center) == pytest.approx(
+        drives.shift, abs=1e-6
+    )
+
+
+def test_the_body_is_shown_deformed_and_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    views: dict[str, _View] = {}
+    module = "validate.report.renders._picture"
+    monkeypatch.setattr(module, lambda name, words, body, view: views.update({name: view}))
+    renders(shown_body(small_result()))
+    assert {name: (v.scale, v.oblique, v.edges) for name, v in views.items()} == {
+        "render_deformed": (1.0, True, False),
+        "render_rest": (0.0, False, False),
+        "render_flat": (1.0, False, False),
+        "render_mesh": (1.0, True, True),
+    }
+
+
+def test_outlines_of_one_length_have_one_number() -> None:
+    assert _points(("abc", "xyz")) == "3"
+    assert _points(("abc", "abcde", "abcd")) == "3 to 5"
+
+
+def test_circles_stand_where_markers_were_seen() -> None:
+    ax = Figure().add_subplot()
+    markers._circles(ax, np.array([[1.0, 2.0], [np.nan, 3.0], [4.0, np.nan], [5.0, 6.0]]), 0.5)
+    (circles,) = ax.collections
+    assert np.asarray(circles.get_offsets()).tolist() == [[1.0, 2.0], [5.0, 6.0]]
+
+
+def test_axes_of_markers_have_labels_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = Made(rest=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]]))
+    judged = Made(registered=[None], scene=None)
+    shown: list[Any] = []
+    for name, value in {
+        "shown_method": lambda result: judged,
+        "markers_seen": lambda method: seen,
+        "holds": lambda registered: (Made(), Made()),
+        "axis_label": lambda scene, i: "xyz"[i],
+        "_in_plane": lambda made, method: shown.append(made),
+        "_across": lambda result, made: (),
+    }.items():
+        monkeypatch.setattr(markers, name, value)
+    assert markers.markers(Made()) is not None
+    assert shown[0].labels == ("x", "y")
+
+
+def test_a_budget_has_the_quantities_of_its_load() -> None:
+    def moved(name: str, size: float) -> Change:
+        return Change(name, size, size, "m", 3.0)
+
+    other = Effect("nu", "ratio", (moved("pressure@1mm", 1.0), moved("force@2mm", 2.0)), (), ())
+    table = _budget((other,))
+    assert [h.split(" /")[0] for h in table.headings[1:-2]] == ["force"]
+
+
+def test_a_result_without_methods_has_no_registration_to_show() -> None:
+    assert _residuals(Made(recordings=(Made(name="a"),), registered=())).rows == ()
