@@ -1,6 +1,7 @@
 """The modulus from force-displacement logs: exact on synthetic ones, published on real ones."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import RecordingError, UsageError
 from validate.identify import modulus
 from validate.identify.modulus import (
@@ -19,6 +20,7 @@ from validate.identify.modulus import (
     gent_correction,
     identify_modulus,
     load_noise,
+    loading,
     summarise,
 )
 from validate.recording.exports.instron import read_instron
@@ -47,6 +49,41 @@ def linear(slack: float = 0.0, offset: float = 0.0, modulus: float = E) -> tuple
     """Displacement (m) and force (N) of an ideal disc; the plate meets it at `slack` m."""
     d = np.arange(200) * SPEED * 0.1
     return d, modulus * DISC.area / DISC.height * np.maximum(d - slack, 0.0) + offset
+
+
+def on_its_clock(t: Floats, record: Recording) -> Recording:
+    """The log with its force sampled at other times t (n,) s of the same clock."""
+    d, force = record.signals["displacement"], record.signals["force"]
+    at_t = np.interp(t, force.t, force.y[:, 0])
+    return replace(
+        record, signals={"displacement": d, "force": replace(force, t=t, y=at_t[:, None])}
+    )
+
+
+@pytest.mark.parametrize("t", [np.arange(0, 19.9, 0.37), np.arange(2.05, 19.9, 0.1)])
+def test_force_is_read_at_the_time_of_the_displacement(t: Floats) -> None:
+    """Other rates, and a force that begins later: sample by sample it would be another one."""
+    moved = on_its_clock(t, log(*linear()))
+    window = (0.02, 0.05)
+    assert fit_modulus(moved, window=window).E_apparent == pytest.approx(E, rel=1e-9)
+    seen = loading(moved)
+    assert seen.t[0] == pytest.approx(np.ceil(10 * t[0]) / 10)
+    assert seen.force == pytest.approx(E * DISC.area / DISC.height * seen.d)
+    assert seen.error < 1e-9
+
+
+def test_a_force_of_another_time_is_refused() -> None:
+    with pytest.raises(RecordingError, match="covers 5 of the displacement's samples"):
+        fit_modulus(on_its_clock(np.arange(19.5, 30.0, 0.1), log(*linear())))
+
+
+def test_what_interpolation_leaves_is_counted() -> None:
+    """A parabola through samples 1 s apart: at the middle f''/8 of a s^2 is missing."""
+    d = np.linspace(0, 1e-3, 201)
+    record = log(d, np.arange(201.0) ** 2 * 0.01)  # N, so f = t^2
+    found = loading(on_its_clock(np.arange(0.0, 20.5, 1.0), record))
+    missing = np.arange(201) * 0.1 % 1.0
+    assert found.error == pytest.approx(rms(missing * (1 - missing)), rel=0.02)
 
 
 def test_a_linear_log_gives_its_modulus_exactly() -> None:

@@ -18,6 +18,7 @@ from validate.papers.ecoflex.cylinder import (
 )
 from validate.papers.ecoflex.modulus import identified
 from validate.parameters import with_values
+from validate.recording.alignment import Offset, shift
 from validate.recording.types import Recording, Signal, Source
 from validate.register.signals import SignalObservation
 from validate.replay.cards import QuarterGrid
@@ -65,6 +66,17 @@ def found(methods: Mapping[str, Method]) -> Mapping[str, float]:
 
 def values(found: Identified) -> dict[str, float]:
     return {s.name: s.value for s in found.scores}
+
+
+def test_a_moved_force_clock_moves_what_is_compared() -> None:
+    """2 s too late at rates of 0.1 s: 20 samples; and the clock's uncertainty is kept."""
+    plain, offset = pressed(), Offset(2.0, 0.05, "given by the user", 200, 1.0)
+    scene = model_scene(SMALL, CylinderModel(), E)
+    moved = shift(plain, "force", offset)
+    (before,), (after,) = (place(r, SMALL, scene).of(SignalObservation) for r in (plain, moved))
+    assert after.y[:50, 0] - after.y[0, 0] == pytest.approx(before.y[:50, 0] - before.y[0, 0])
+    assert (before.sd_t, after.sd_t) == (0.0, 0.05)
+    assert after.t[0] == pytest.approx(before.t[0] + 2.0)
 
 
 def test_two_elements_find_the_modulus_of_a_round_cylinder(found: Mapping[str, float]) -> None:

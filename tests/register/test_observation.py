@@ -191,6 +191,44 @@ def test_markers_together_are_read_from_the_field_along_their_axes() -> None:
     assert set(seen.units) == {"up", "across"}
 
 
+def looks(t: Floats, z: Floats, *groups: Together) -> MarkerObservation:
+    """One corner seen at times t (nt,) s at heights z (nt,) m above its rest."""
+    x = TOP[:1] + z[:, None, None] * np.array([0.0, 0.0, 1.0])
+    none: object = None
+    return MarkerObservation(
+        "seen", "validates", t, ("a",), x, TOP[:1], nearest_node_rows(MESH, TOP[:1]), 1e-4,
+        np.zeros(1), none, groups,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+UP = Together("up", (2,), "along z")
+
+
+def test_jittered_looks_are_interpolated_onto_the_fields_and_the_error_counts() -> None:
+    """Frames at 0, 1 and 2 s; the nearest look to 1 s is 0.3 s off."""
+    t = np.array([0.0, 0.7, 1.4, 2.0])
+    (steady,) = looks(t, 1e-3 * t, UP).deviations(still(), EVERYTHING)
+    assert steady.values[:, 0] == pytest.approx([0.0, -1e-3, -2e-3])
+    assert (steady.sd, steady.systematic) == (pytest.approx(1e-4), 0.0)
+    (bent,) = looks(t, 1e-3 * t**2, UP).deviations(still(), EVERYTHING)
+    off = 1e-3 * (1.0 - 0.7) * (1.4 - 1.0)  # of a line between two points of t^2
+    assert bent.values[:, 0] == pytest.approx([0.0, -1e-3 - off, -4e-3])
+    assert bent.sd == pytest.approx(np.hypot(1e-4, off / np.sqrt(3)))  # one frame of three
+    (late,) = looks(t[:3], 1e-3 * t[:3], UP).deviations(still(), Selection("w", RUN_T[[2, 4]]))
+    assert len(late.values) == 1  # nothing was seen beyond the last look
+
+
+def test_a_look_beside_its_hold_counts_what_moves_in_between() -> None:
+    """Between two holds lies no hold: the nearest look is taken, 0.1 s late at 1 mm/s."""
+    t = np.array([0.0, 1.1, 2.0])
+    hold = Selection("1s", np.array([1.0]))
+    (late,) = looks(t, 1e-3 * t, UP).deviations(still(), hold)
+    assert late.values[:, 0] == pytest.approx([-1.1e-3])
+    assert late.systematic == pytest.approx(1e-4)
+    (right,) = looks(T, 1e-3 * T, UP).deviations(still(), hold)
+    assert right.systematic == 0.0
+
+
 # --- outlines -------------------------------------------------------------------------------------
 
 ROUND = 8e-3 * np.stack([f(np.deg2rad(np.arange(0, 360, 10))) for f in (np.cos, np.sin)], axis=1)
@@ -227,6 +265,18 @@ def test_the_sd_of_an_outline_is_the_scatter_of_noisy_ones() -> None:
         ramp(()), Selection("rest", T[:1])
     )
     assert (still_one.quantity, still_one.sd) == ("contour", sd)
+
+
+def test_an_outline_beside_its_instant_counts_what_moves_in_between() -> None:
+    """The circle grows by 1 mm a second and is seen 0.1 s after the field."""
+    t = np.array([0.0, 1.1, 2.0])
+    outlines = tuple((1 + s / 8) * ROUND for s in t)
+    none: object = None
+    seen = Round("o", "validates", t, outlines, np.eye(4), 1e-4, none, 0.0)  # type: ignore[arg-type]
+    late = seen.deviations(ramp(()), Selection("1s", T[1:2]))[0]
+    on_time = replace(seen, t=T).deviations(ramp(()), Selection("1s", T[1:2]))[0]
+    assert late.systematic == pytest.approx(1e-4, rel=0.02)
+    assert on_time.systematic == 0.0
 
 
 def noisy(k: int, first: float, sd: float, rng: np.random.Generator) -> Floats:

@@ -9,6 +9,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
+from validate.register.clock import interpolated
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
 from validate.scene.mesh import Mesh
@@ -101,8 +102,8 @@ class Timetable:
 def timetable(measurements: Measurements, dt: float) -> Timetable:
     """Lands every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
 
-    Raises `ComparisonError` when one lies further off than a hundredth of a step (a measurement is
-    never interpolated) or two share a step.
+    Raises `ComparisonError` when one lies further off than a hundredth of a step (here a
+    measurement is not interpolated) or two share a step.
     """
     t = measurements.t
     steps, off = _nearest(t, dt)
@@ -173,8 +174,7 @@ def on_steps(t: Floats, z: Floats, sd: Floats, steps: Floats) -> tuple[Floats, F
     """Looks z (nt, m) at t (nt,) s of sd (m,), interpolated onto the nearest of 0 and `steps` (n,).
 
     Only of times that jitter: those that a smaller step meets are left as they are, for the filter
-    says which. Linear between two looks, whose error is f''/2 (s - a)(b - s): its rms is added to
-    sd, with f'' by divided differences, noise included. Steps beyond the looks get none.
+    says which. What that adds to sd: `interpolated`. Steps beyond the looks get none.
     """
     dt = float(steps[0]) if len(steps) == 1 else float(np.diff(steps).min())
     if len(t) < 3 or _nearest(t, dt)[1].max() <= OFF_STEP or _landed(t, dt) is not None:
@@ -182,11 +182,5 @@ def on_steps(t: Floats, z: Floats, sd: Floats, steps: Floats) -> tuple[Floats, F
     grid = np.concatenate([[0.0], steps[steps > 0]])
     s = np.unique(grid[np.searchsorted((grid[1:] + grid[:-1]) / 2, t)])
     s = s[(s >= t[0]) & (s <= t[-1])]
-    b = np.clip(np.searchsorted(t, s), 1, len(t) - 1)
-    w = ((s - t[b - 1]) / (t[b] - t[b - 1]))[:, None]
-    slope = np.diff(z, axis=0) / np.diff(t)[:, None]
-    bend = 2 * np.diff(slope, axis=0) / (t[2:] - t[:-2])[:, None]
-    error = bend[np.clip(b - 1, 0, len(bend) - 1)] / 2 * ((s - t[b - 1]) * (t[b] - s))[:, None]
-    squared = np.nansum(error**2, axis=0) / np.maximum(np.isfinite(error).sum(axis=0), 1)
-    shown = np.where(w == 0, z[b - 1], np.where(w == 1, z[b], (1 - w) * z[b - 1] + w * z[b]))
+    shown, squared = interpolated(t, z, s)
     return s, shown, np.sqrt(sd**2 + squared)

@@ -20,7 +20,8 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.errors import RecordingError, UsageError
-from validate.recording.types import Recording
+from validate.recording.types import Recording, Signal
+from validate.register.clock import SAME, interpolated
 
 WINDOW = (0.005, 0.05)
 MIN_SAMPLES = 10
@@ -114,9 +115,8 @@ def fit_modulus(
     if not (math.isfinite(high) and 0 <= low < high):
         raise UsageError(f"strain window {window}: expected 0 <= low < high, e.g. {WINDOW}")
     cylinder = cylinder or cylinder_of(recording)
-    d, force = (_samples(recording, *s) for s in (("displacement", "m"), ("force", "N")))
-    if len(d) != len(force):
-        raise RecordingError(f"{recording.name}: {len(d)} displacements, {len(force)} forces")
+    log = loading(recording)
+    d, force = log.d, log.force
     noise = _first_noise(d, force, cylinder.height * high)
     offset, contact = _zero(d, force, noise, cylinder.height * low)
     strain = (d - contact) / cylinder.height
@@ -171,11 +171,43 @@ def load_noise(force: Floats) -> float:
     return rms(np.diff(force, 2)) / float(np.sqrt(6))
 
 
-def _samples(recording: Recording, topic: str, unit: str) -> Floats:
-    y = recording.signal(topic, unit).y
-    if y.shape[1] != 1:
-        raise RecordingError(f"{recording.name}: '{topic}' has {y.shape[1]} columns, expected 1")
-    return np.asarray(y[:, 0])
+@dataclass(frozen=True)
+class Log:
+    """Displacement d m and force N (n,) at the same times t s; `error` N is what putting the force
+    there adds to its noise."""
+
+    t: Floats
+    d: Floats
+    force: Floats
+    error: float
+
+
+def loading(recording: Recording) -> Log:
+    """Signals `displacement` and `force` at the displacement's times, by their clocks.
+
+    Raises `RecordingError` where they have fewer than 10 samples in common.
+    """
+    moved, force = (_samples(recording, *s) for s in (("displacement", "m"), ("force", "N")))
+    if len(moved.t) == len(force.t) and np.abs(moved.t - force.t).max(initial=0.0) <= SAME:
+        return Log(moved.t, moved.y[:, 0], force.y[:, 0], 0.0)
+    shown, squared = interpolated(force.t, force.y, moved.t)
+    both = np.isfinite(shown[:, 0])
+    if both.sum() < MIN_SAMPLES:
+        raise RecordingError(
+            f"{recording.name}: force from {force.t[0]:.3f} to {force.t[-1]:.3f} s covers "
+            f"{both.sum()} of the displacement's samples ({moved.t[0]:.3f} to {moved.t[-1]:.3f} s),"
+            f" at least {MIN_SAMPLES} needed; check the clocks with `validate inspect`"
+        )
+    return Log(moved.t[both], moved.y[both, 0], shown[both, 0], float(np.sqrt(squared[0])))
+
+
+def _samples(recording: Recording, topic: str, unit: str) -> Signal:
+    found = recording.signal(topic, unit)
+    if found.y.shape[1] != 1:
+        raise RecordingError(
+            f"{recording.name}: '{topic}' has {found.y.shape[1]} columns, expected 1"
+        )
+    return found
 
 
 def _first_noise(d: Floats, force: Floats, reach: float) -> float:

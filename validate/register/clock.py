@@ -1,6 +1,8 @@
-"""What an uncertain clock makes of a measurement that moves: u = sd_t |dy/dt|, in u_D.
+"""What clocks do to a measurement that moves: u = sd_t |dy/dt| where one is uncertain, in u_D; and
+samples at other times than the ones that are wanted.
 
-All samples of a stream lie off together, so this is a systematic part, which averaging leaves.
+All samples of a stream lie off together by an uncertain clock, so this is a systematic part, which
+averaging leaves.
 """
 
 from dataclasses import replace
@@ -12,6 +14,8 @@ from validate.errors import ComparisonError, RegistrationError
 from validate.recording.alignment import RECORD
 from validate.recording.types import Recording
 from validate.register.observation import Deviation
+
+SAME = 1e-9  # s: times that are one
 
 
 def clock_sd(recording: Recording, topic: str) -> float:
@@ -43,6 +47,31 @@ def with_clock(found: Deviation, sd_t: float, speed: Floats) -> Deviation:
         )
     moved = sd_t * float(np.sqrt(np.mean(seen**2)))
     return replace(found, systematic=float(np.hypot(found.systematic, moved)))
+
+
+def interpolated(t: Floats, z: Floats, s: Floats) -> tuple[Floats, Floats]:
+    """Samples z (nt, m) at t (nt,) s, NaN = not seen, at times s (n,) s; and the squares (m,) of
+    the error that this makes, in z's unit.
+
+    Linear between two samples, whose error is f''/2 (s - a)(b - s), with f'' by divided
+    differences, noise included. Before the first and after the last sample there is none (NaN).
+    """
+    if len(t) < 3:  # no second difference to judge a straight line by
+        apart = np.abs(np.subtract.outer(s, t))
+        near = apart.min(axis=1)[:, None] <= SAME
+        return np.where(near, z[apart.argmin(axis=1)], np.nan), np.zeros(z.shape[1])
+    b = np.clip(np.searchsorted(t, s), 1, len(t) - 1)
+    before, after = s - t[b - 1], t[b] - s
+    w = (before / (t[b] - t[b - 1]))[:, None]
+    w = np.where(np.abs(before)[:, None] <= SAME, 0.0, w)
+    w = np.where(np.abs(after)[:, None] <= SAME, 1.0, w)
+    slope = np.diff(z, axis=0) / np.diff(t)[:, None]
+    bend = 2 * np.diff(slope, axis=0) / (t[2:] - t[:-2])[:, None]
+    error = bend[np.clip(b - 1, 0, len(bend) - 1)] / 2 * (before * after)[:, None]
+    error = np.where((w > 0) & (w < 1), error, 0.0)
+    squared = np.nansum(error**2, axis=0) / np.maximum(np.isfinite(error).sum(axis=0), 1)
+    shown = np.where(w == 0, z[b - 1], np.where(w == 1, z[b], (1 - w) * z[b - 1] + w * z[b]))
+    return np.where((w < 0) | (w > 1), np.nan, shown), squared
 
 
 def slopes(t: Floats, y: Floats, at: Ints, sd_t: float) -> Floats:

@@ -16,7 +16,7 @@ from validate.fem.locate import (
     standing_rows,
 )
 from validate.recording.types import Markers, Recording
-from validate.register.clock import clock_sd, slopes, with_clock
+from validate.register.clock import SAME, clock_sd, interpolated, slopes, with_clock
 from validate.register.fitting import MarkerFit
 from validate.register.labels import require_steady_labels
 from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
@@ -109,19 +109,34 @@ class MarkerObservation:
         selection = selection.instants(run)
         samples = selection.samples(self.t, run.t, self.name)
         shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
-        off = (shown - self.x[samples]).reshape(-1, self.x.shape[2])
+        x, error, late = self._seen(np.asarray(selection.t), samples)
+        off = (shown - x).reshape(-1, self.x.shape[2])
         off = off[np.isfinite(off).all(axis=1)]
         tre = rms(self.tre) / float(np.sqrt(3))
         found = (
-            Deviation(g.quantity, off[:, list(g.axes)], "m", self.along(g.axes), tre, g.words)
+            Deviation(
+                g.quantity, off[:, list(g.axes)], "m",
+                float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
+            )
             for g in self.together
-        )
-        sd_t = float(np.hypot(self.sd_t, selection.sd_t))
+        )  # fmt: skip
+        sd_t = float(np.sqrt(self.sd_t**2 + selection.sd_t**2 + late**2))
         if sd_t == 0:
             return tuple(found)
         speed = self._speed(slice(None), samples, sd_t)
         axes = (list(g.axes) for g in self.together)
         return tuple(with_clock(d, sd_t, speed[..., a]) for d, a in zip(found, axes, strict=True))
+
+    def _seen(self, t: Floats, samples: Ints) -> tuple[Floats, Floats, float]:
+        """Positions (m, k, d) m at the instants t (m,) s, the rms error (d,) m of interpolating
+        them, and s by which the sample of a hold lies off it: there the body stands, and what lies
+        between two holds says nothing of them."""
+        if len(t) == 1:
+            late = abs(float(self.t[samples][0] - t[0]))
+            return self.x[samples], np.zeros(self.x.shape[2]), late if late > SAME else 0.0
+        x, squared = interpolated(self.t, self.x.reshape(len(self.t), -1), t)
+        error = np.sqrt(squared.reshape(self.x.shape[1:]).mean(axis=0))
+        return x.reshape(len(t), *self.x.shape[1:]), error, 0.0
 
     def _one(self, run: Simulated, selection: Selection, j: int) -> Deviation | None:
         """One marker's displacement, by the run's probe of its name."""

@@ -8,7 +8,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.fem.locate import Rows
 from validate.recording.types import Contours
-from validate.register.clock import around, with_clock
+from validate.register.clock import SAME, around, with_clock
 from validate.register.observation import (
     Deviation,
     Role,
@@ -89,7 +89,9 @@ class OutlineObservation:
         found: list[Deviation] = []
         for t, u in zip(times, frame_at(run, instants), strict=True):
             one = self._between(start, (self.simulated(u), self.measured(float(t))), float(t))
-            found += self._on_clock(one, float(t), sd_t) if sd_t > 0 else one
+            late = float(self.t[nearest_sample(self.t, float(t), self.name)] - t)
+            off = float(np.hypot(sd_t, late)) if abs(late) > SAME else sd_t
+            found += self._on_clock(one, float(t), off) if off > 0 else one
         return _stacked(found)
 
     def _between(

@@ -17,11 +17,14 @@ import numpy as np
 from validate.compare.verdict import Accept
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
-from validate.identify.modulus import Cylinder, ModulusFit, fit_modulus, identify_modulus
+from validate.identify.modulus import (
+    Cylinder,
+    fit_modulus,
+    identify_modulus,
+)
 from validate.parameters import Ranges, known, part, quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.register.signals import SignalObservation, windows_of
 from validate.replay.cards import beside, moved, require_used, scaled
 from validate.replay.experiment import (
     Change,
@@ -32,6 +35,7 @@ from validate.replay.experiment import (
     Uncertainty,
 )
 from validate.replay.method import Method
+from validate.replay.pressed import pressed_log
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.laws import Coefficients
 from validate.scene.mesh import Mesh, cell_volumes
@@ -265,30 +269,6 @@ def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
     return pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise)
-
-
-def pressed_log(
-    recording: Recording,
-    fit: ModulusFit,
-    height: float,
-    limit: float,
-    strains: Mapping[str, tuple[float, float]],
-    noise: float,
-) -> Registered:
-    """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
-
-    The force, of sd `noise` N, is compared in the windows of strain.
-    """
-    d, force = recording.signal("displacement", "m"), recording.signal("force", "N")
-    moved = d.y - fit.contact - fit.toe * height
-    last = int(np.argmax(moved[:, 0] > limit * height)) or len(moved)
-    stage = SignalObservation("displacement", "drives", d.t[:last], moved[:last], "m", d.sd)
-    cell = SignalObservation(
-        "force", "validates", d.t[:last], force.y[:last] - fit.offset, "N", noise, "force",
-        "stage.force",
-    )  # fmt: skip
-    windows = {label: (a * height, b * height) for label, (a, b) in strains.items()}
-    return Registered((stage, cell), windows_of(stage, windows), outside=len(d.t) - last)
 
 
 def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:

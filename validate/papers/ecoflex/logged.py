@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.identify.modulus import loading
 from validate.papers.ecoflex.cylinder import LoggedCylinder, window
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
@@ -74,7 +75,7 @@ def _tenth(recordings: Sequence[Recording], p: LoggedCylinder) -> float:
     """A tenth of the force N at the linear law's strain, mean over the logs."""
     forces = []
     for recording in recordings:
-        d, force = recording.signal("displacement", "m").y, recording.signal("force", "N").y
-        last = int(np.argmax(d[:, 0] >= p.limit_linear * p.specimen.size.height))
-        forces.append(float(force[last, 0]))
+        log = loading(recording)
+        last = int(np.argmax(log.d >= p.limit_linear * p.specimen.size.height))
+        forces.append(float(log.force[last]))
     return 0.1 * float(np.mean(forces))

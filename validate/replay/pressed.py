@@ -1,0 +1,39 @@
+"""A log of a compression test in the scene: displacement from contact, force from its zero."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from validate.identify.modulus import ModulusFit, loading
+from validate.recording.types import Recording
+from validate.register.clock import clock_sd
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, windows_of
+
+
+def pressed_log(
+    recording: Recording,
+    fit: ModulusFit,
+    height: float,
+    limit: float,
+    strains: Mapping[str, tuple[float, float]],
+    noise: float,
+) -> Registered:
+    """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
+
+    The force, of sd `noise` N, is read at the displacement's times and compared in the windows of
+    strain; what an uncertain clock of either makes of it is counted.
+    """
+    log = loading(recording)
+    moved = log.d[:, None] - fit.contact - fit.toe * height
+    last = int(np.argmax(moved[:, 0] > limit * height)) or len(moved)
+    stage = SignalObservation(
+        "displacement", "drives", log.t[:last], moved[:last], "m",
+        recording.signal("displacement", "m").sd, sd_t=clock_sd(recording, "displacement"),
+    )  # fmt: skip
+    cell = SignalObservation(
+        "force", "validates", log.t[:last], log.force[:last, None] - fit.offset, "N",
+        float(np.hypot(noise, log.error)), "force", "stage.force", clock_sd(recording, "force"),
+    )  # fmt: skip
+    windows = {label: (a * height, b * height) for label, (a, b) in strains.items()}
+    return Registered((stage, cell), windows_of(stage, windows), outside=len(log.t) - last)
