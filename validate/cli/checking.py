@@ -1,70 +1,110 @@
 """`validate check`: published figures and accepted limits, today."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from validate.cli.chosen import each
-from validate.cli.display import error_shown, figures_table, say, shown, table
+from validate.cli.display import error_shown, figures_table, relative, say, shown, table
 from validate.cli.progress import progress
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
+from validate.replay.named_run import run_folder
 from validate.replay.options import Options
+from validate.replay.reused import stored_run
 from validate.replay.road import compare
-from validate.report.store import check_members, figure_members
+from validate.report.store import check_members, figure_members, overall_members
+
+Json = dict[str, Any]
 
 
-def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int:
-    """Runs the experiments and holds every figure; 0 when none failed and one was compared."""
-    found: list[tuple[Result, bool]] = []
-    failures: list[dict[str, Any]] = []
+def check(
+    names: tuple[str, ...], *, named: tuple[Path, ...], out: Path | None, fresh: bool, as_json: bool
+) -> int:
+    """Holds every figure of stored runs that match, else of new ones, which are not stored; 0 when
+    none failed and one was compared."""
+    found: list[Json] = []
 
     def one(experiment: Experiment) -> bool:
-        with progress(f"check {experiment.name}") as report:
-            result = compare(experiment, Options({}), report)
-        found.append((result, _holds(result, declared=bool(experiment.published))))
-        return found[-1][1]
+        content = None if fresh else _stored(experiment, out)
+        if content is None:
+            with progress(f"check {experiment.name}") as report:
+                content = _content(compare(experiment, Options({}), report))
+        found.append(_document(content, declared=bool(experiment.published)))
+        if not as_json:
+            _print(content)
+        return bool(found[-1]["holds"])
 
     def failed(name: str, why: str) -> None:
-        failures.append({"experiment": name, "holds": False, "error": why})
+        found.append({"experiment": name, "holds": False, "error": why})
 
     code = each(names, named, one, failed)
     if as_json:
-        told = [*(_document(*pair) for pair in found), *failures]
-        print(json.dumps(told, indent=1, allow_nan=False))
-    else:
-        for result, _ in found:
-            _print(result)
+        print(json.dumps(found, indent=1, allow_nan=False))
     return code
 
 
-def _holds(result: Result, *, declared: bool) -> bool:
-    """Checks agree and figures stand; an experiment that declares figures must have held some."""
-    held_some = any(not p.other for p in result.published) or not declared
-    return result.passed and held_some
+def _stored(experiment: Experiment, out: Path | None) -> Json | None:
+    """The content of the run's results.json where it would be made again from the same."""
+    folder = run_folder(experiment, Options({}), out)
+    content, why = stored_run(experiment, folder)
+    if content is not None:
+        when, where = content["created"], relative(folder)
+        say(f"{experiment.name}: stored run of {when} ({where}); --fresh makes it anew", error=True)
+    elif why:
+        say(f"{experiment.name}: made anew: {why}", error=True)
+    return content
 
 
-def _document(result: Result, holds: bool) -> dict[str, Any]:
+def _content(result: Result) -> Json:
+    """What of results.json is shown here."""
     return {
         "experiment": result.name,
-        "holds": holds,
+        "created": None,
+        "kind": result.kind,
+        "source": result.source,
+        "passed": result.passed,
+        "overall": overall_members(result.overall),
         "published": [figure_members(p) for p in result.published],
-        "checks": [{"method": m.name, **check_members(c)} for m in result.methods
-                   for c in m.checks],
-    }  # fmt: skip
+        "methods": [
+            {"name": m.name, "checks": [check_members(c) for c in m.checks]} for m in result.methods
+        ],
+    }
 
 
-def _print(result: Result) -> None:
-    say(f"{result.name}: {KINDS[result.kind]}")
-    say(result.source)
-    figures_table(result.published)
-    checks = [
-        [c.name, error_shown(c), shown(c.limit, c.unit), str(c.count), c.verdict]
-        for c in result.checks
-    ]
-    table("Accepted limits", ["check", "error", "limit", "n", "verdict"], checks)
-    overall = result.overall
+def _document(content: Json, *, declared: bool) -> Json:
+    return {
+        "experiment": content["experiment"],
+        "holds": _holds(content, declared=declared),
+        "stored": content["created"],
+        "published": content["published"],
+        "checks": [{"method": m["name"], **c} for m in content["methods"] for c in m["checks"]],
+    }
+
+
+def _holds(content: Json, *, declared: bool) -> bool:
+    """Checks agree and figures stand; an experiment that declares figures must have held some."""
+    held_some = any(not p["other"] for p in content["published"]) or not declared
+    return bool(content["passed"]) and held_some
+
+
+def _print(content: Json) -> None:
+    say(f"{content['experiment']}: {KINDS[content['kind']]}")
+    say(content["source"])
+    figures = content["published"]
+    figures_table(figures)
+    for method in content["methods"]:
+        if method["checks"]:
+            head = ["check", "error", "limit", "n", "verdict"]
+            table(f"Accepted limits, {method['name']}", head, [_row(c) for c in method["checks"]])
+    overall, fallen = content["overall"], sum(bool(p["fault"]) for p in figures)
     say(
-        f"\n{len(result.published)} published figures, {len(result.fallen)} no longer stand; "
-        f"checks: {overall.word}, {overall.counted}\n"
+        f"\n{len(figures)} published figures, {fallen} no longer stand; checks: "
+        f"{overall['verdict']}, evidence: {overall['evidence']} of {overall['checks']} checks\n"
     )
+
+
+def _row(check: Mapping[str, Any]) -> list[str]:
+    limit = shown(check["limit"], check["unit"])
+    return [check["name"], error_shown(check), limit, str(check["count"]), check["verdict"]]

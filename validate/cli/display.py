@@ -2,19 +2,14 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import Any, TextIO
 
 from rich.console import Console
 
 from validate.cli.layout import laid, wrapped
 from validate.report.numbers import duration, significant, with_unit
-
-if TYPE_CHECKING:  # what only names a type costs `validate list` nothing
-    from validate.compare.published import Published
-    from validate.compare.verdict import Check
-
 
 _WIDTH = 80  # columns where neither COLUMNS nor a terminal says how many there are
 
@@ -65,26 +60,35 @@ def fits(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
     return len(laid(columns, rows, console().width)) == 1 + len(rows)
 
 
-def figures_table(published: "Sequence[Published]") -> None:
-    """Printed figures beside ours, with today's verdict."""
-    rows = [[p.name, _value(p.ours, p), _value(p.theirs, p), p.line, p.why] for p in published]
+def figures_table(figures: Sequence[Mapping[str, Any]]) -> None:
+    """Printed figures, as in results.json, beside ours with today's verdict."""
+    rows = [
+        [f["name"], shown(f["ours"], f["unit"]), shown(f["theirs"], f["unit"]), _verdict(f),
+         f["reason"]]
+        for f in figures
+    ]  # fmt: skip
     table("Published figures", ["figure", "ours", "theirs", "verdict", "why"], rows)
 
 
-def _value(value: float | None, figure: "Published") -> str:
-    return "-" if value is None else shown(value, figure.unit)
+def _verdict(figure: Mapping[str, Any]) -> str:
+    """With the window that it rests on."""
+    verdict = str(figure["verdict"])
+    return f"{verdict} (within {figure['window']})" if figure["window"] else verdict
 
 
-def shown(value: float, unit: str) -> str:
+def shown(value: float | None, unit: str) -> str:
     """A value with its unit as people read it, four significant digits: a small one is no zero."""
+    if value is None:
+        return "-"
     if unit == "Pa" and abs(value) >= 1000:
         return f"{significant(value / 1e3, 4)} kPa"
     return duration(value) if unit == "s" else with_unit(value, unit, 4)
 
 
-def error_shown(check: "Check") -> str:
-    """The error of a check; that noise explains all of it is no zero."""
-    return "within noise" if check.value == 0 < check.raw else shown(check.value, check.unit)
+def error_shown(check: Mapping[str, Any]) -> str:
+    """The error of a check, as in results.json; that noise explains all of it is no zero."""
+    value, raw = check["value"], check["raw"]
+    return "within noise" if value == 0 < raw else shown(value, check["unit"])
 
 
 def relative(path: Path) -> str:

@@ -113,12 +113,17 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
 @cli.command()
 @click.argument("names", nargs=-1, metavar="[NAME ...]")
 @_EXPERIMENTS
+@click.option("--fresh", is_flag=True, help="Make every run anew, stored ones that match too.")
+@click.option("--out", type=_OUT, help="Where reports lie (as for run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def check(names: tuple[str, ...], named: tuple[Path, ...], as_json: bool) -> int:
-    """Every published figure and accepted limit: ours, theirs, verdict, count."""
+def check(names: tuple[str, ...], **options: Any) -> int:
+    """Every published figure and accepted limit: ours, theirs, verdict, count.
+
+    A stored run is reused where code, experiment, recordings, parameters and machine are the same.
+    """
     from validate.cli import checking
 
-    return checking.check(names, named, as_json)
+    return checking.check(names, **options)
 
 
 @cli.command("history")

@@ -22,14 +22,14 @@ from validate.compare.result import KINDS, MethodResult, Result
 from validate.compare.verdict import Check
 from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
-from validate.replay.find import sources_of
 from validate.replay.named_run import run_folder
-from validate.replay.options import Options, configure, mesh_files
+from validate.replay.options import Options
+from validate.replay.reused import rests_on
 from validate.replay.road import compare
 from validate.report import gl
 from validate.report.folder import STUDIES, try_results
 from validate.report.history import replaced
-from validate.report.made import Made, made
+from validate.report.store import check_members, figure_members
 from validate.report.write import write_report
 
 
@@ -70,7 +70,8 @@ def run(
 
 
 def _reported(experiment: Experiment, options: Options, out: Path | None) -> tuple[Result, Path]:
-    folder, by = run_folder(experiment, options, out), _made(experiment, options)
+    folder = run_folder(experiment, options, out)
+    by = rests_on(experiment, options, command_line())
     try_results(folder, (STUDIES,))
     ask_about(experiment, options.values)
     with progress(experiment.name) as report:
@@ -88,14 +89,6 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
     return result, page
 
 
-def _made(experiment: Experiment, options: Options) -> Made:
-    """Taken before the run: files may be edited while it computes."""
-    path = experiment.path
-    parameters, _ = configure(experiment, options)
-    sources = sources_of(path) if path else ()
-    return made(command_line(), sources, mesh_files(parameters))
-
-
 def _summary(result: Result, page: Path, seconds: float) -> None:
     found = result.overall
     say(f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", indent="  ")
@@ -107,7 +100,7 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
         if method.checks:
             _checks(method)
     if result.published:
-        figures_table(result.published)
+        figures_table([figure_members(p) for p in result.published])
     say(f"\n{result.sentence}")
     say(f"{seconds:.1f} s wall time; report: {relative(page)}")
 
@@ -122,8 +115,6 @@ def _checks(method: MethodResult) -> None:
 
 
 def _row(check: Check, why: str) -> list[str]:
-    unit = check.unit
-    return [
-        check.name, error_shown(check), shown(2 * check.u_val, unit), shown(check.limit, unit),
-        str(check.count), check.verdict, why,
-    ]  # fmt: skip
+    error, doubt = error_shown(check_members(check)), shown(2 * check.u_val, check.unit)
+    limit = shown(check.limit, check.unit)
+    return [check.name, error, doubt, limit, str(check.count), check.verdict, why]

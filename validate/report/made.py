@@ -32,7 +32,8 @@ class Commit:
 
 @dataclass(frozen=True)
 class UsedFile:
-    """A file that a run read beside its recordings: `role` is experiment or mesh."""
+    """A file that a run read beside its recordings: `role` is experiment, mesh, or case: the
+    recording of another truth."""
 
     role: str
     path: str

@@ -64,7 +64,7 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "passed": result.passed,
         "quick": result.quick,
         "kind": result.kind,
-        "overall": _overall(result.overall),
+        "overall": overall_members(result.overall),
         "twin_notice": result.twin_notice,
         "seed": result.seed,
         "notes": list(result.notes),
@@ -185,7 +185,8 @@ def _made(made: Made) -> Json:
     }
 
 
-def _overall(found: Overall) -> Json:
+def overall_members(found: Overall) -> Json:
+    """The verdict over all checks; names of those that decide it."""
     return {
         "verdict": found.word,
         "evidence": found.evidence,
