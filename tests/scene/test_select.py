@@ -22,6 +22,7 @@ MESHES = {
     "tet4": box(SIZE, (3, 2, 2)),
     "tet10": quadratic(box(SIZE, (3, 2, 2))),
     "hex8": grid(SIZE, (3, 2, 2)),
+    "hex27": quadratic(grid(SIZE, (3, 2, 2))),
 }
 
 
@@ -40,12 +41,12 @@ def test_two_planes_meet_in_an_edge(kind: str) -> None:
     mesh = MESHES[kind]
     edge = (FRONT & TOP).edges
     found = edge.entities(mesh)
-    assert found.shape == (2, 3 if kind == "tet10" else 2)
+    assert found.shape == (2, 3 if kind in ("tet10", "hex27") else 2)
     assert mesh.nodes[found][..., [0, 2]] == pytest.approx(np.full((*found.shape, 2), [0.03, 0.01]))
     lengths = uniform_shares(mesh, edge)
     assert lengths.sum() == pytest.approx(1.0, rel=1e-14)
     ends = np.abs(mesh.nodes[:, 1] - 0.01) > 0.009
-    inner = {"tet4": 0.25, "hex8": 0.25, "tet10": 1 / 12}[kind]
+    inner = {"tet4": 0.25, "hex8": 0.25, "tet10": 1 / 12, "hex27": 1 / 12}[kind]
     assert lengths[nodes_of(mesh, edge)][ends[nodes_of(mesh, edge)]] == pytest.approx(inner)
 
 

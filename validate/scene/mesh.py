@@ -121,9 +121,9 @@ class Mesh:
     @cached_property
     def surface(self) -> Ints:
         """Facets (f, m) that belong to one cell only, oriented outward, middles included."""
+        if self.order == 1 or self.bricks:
+            return boundary_facets(self.cells, self.dimension)
         outside = boundary_facets(self.corners, self.dimension)
-        if self.order == 1:
-            return outside
         d, n = self.dimension, len(self.nodes)
         ends = np.sort(self.cells[:, list(EDGES[d])], axis=2)
         key, first = np.unique(ends[..., 0] * n + ends[..., 1], return_index=True)

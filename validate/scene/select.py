@@ -13,8 +13,14 @@ from scipy.spatial import cKDTree
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh
+from validate.scene.shape_functions import CORNERS, LATTICE
 
 EntityKind = Literal["faces", "edges", "points"]
+_SQUARE = CORNERS[2]
+#: Where the middles of the four sides stand among the nodes of a quadratic quadrilateral.
+_MIDDLES = [
+    LATTICE[2].tolist().index(side) for side in ((_SQUARE + np.roll(_SQUARE, -1, 0)) / 2).tolist()
+]
 _SLACK = 1e-6  # of the body's size: rounding of coordinates
 
 
@@ -203,12 +209,13 @@ def _parts(facets: Ints, mesh: Mesh, kind: EntityKind) -> Ints:
         return np.unique(facets)[:, None]
     if kind == "faces" or mesh.dimension == 2:
         return facets
-    corners = 4 if facets.shape[1] == 4 else 3
+    corners = 4 if facets.shape[1] in (4, 9) else 3
     ends = facets[:, [(i, (i + 1) % corners) for i in range(corners)]].reshape(-1, 2)
     _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
-    if facets.shape[1] != 6:
+    if facets.shape[1] == corners:
         return np.asarray(ends[first])
-    return np.hstack([ends, facets[:, 3:].reshape(-1, 1)])[first]
+    middles = facets[:, _MIDDLES if corners == 4 else slice(3, None)].reshape(-1, 1)
+    return np.hstack([ends, middles])[first]
 
 
 def _kind(mesh: Mesh, entities: Ints) -> EntityKind:
