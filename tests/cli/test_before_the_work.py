@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
+from commands import refused
 from study_samples import experiment_file
-from test_cli import refused
 
 from validate.cli import making, running, studying
 

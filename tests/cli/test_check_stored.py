@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from commands import here
 from study_samples import experiment_file
-from test_cli import here
 
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording

@@ -1,16 +1,14 @@
 """The command line from outside: exit codes, one-line errors, light help, files that appear."""
 
-import contextlib
-import io
 import json
 import os
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from unittest import mock
 
 import pytest
+from commands import here, refused
 from study_samples import experiment_file
 
 from validate.cli import checking
@@ -30,30 +28,6 @@ def called(
         [sys.executable, "-m", "validate", *arguments],
         capture_output=True, text=True, cwd=cwd, env={**os.environ, **environment}, timeout=200,
     )  # fmt: skip
-
-
-def here(*arguments: str, cwd: Path | None = None, **environment: str) -> tuple[int, str, str]:
-    """Exit code, standard output and error of a command run in this process."""
-    out, err = io.StringIO(), io.StringIO()
-    with (
-        contextlib.chdir(cwd or Path.cwd()),
-        mock.patch.dict(os.environ, environment),
-        contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err),
-    ):
-        code = cli.run(list(arguments))
-    return code, out.getvalue(), err.getvalue()
-
-
-def refused(*arguments: str, cwd: Path | None = None, **environment: str) -> str:
-    """Runs a command that must be refused: exit 2, one line on standard error, nothing else."""
-    code, out, err = here(*arguments, cwd=cwd, **environment)
-    assert code == 2, (code, out, err)
-    assert out == ""
-    lines = err.splitlines()
-    assert len(lines) == 1
-    assert lines[0].startswith("validate: ")
-    return lines[0]
 
 
 HEAVY = {

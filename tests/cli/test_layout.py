@@ -8,7 +8,7 @@ import struct
 import termios
 
 import pytest
-from test_cli import here
+from commands import here
 
 from validate.cli.display import width
 from validate.cli.layout import laid, wrapped

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from test_cli import here, refused
+from commands import here, refused
 
 from validate.cli import checking, running
 from validate.errors import RecordingError

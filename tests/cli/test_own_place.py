@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
+from commands import here
 from study_samples import experiment_file
-from test_cli import here
 
 
 @pytest.fixture(autouse=True)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from test_cli import here, refused
+from commands import here, refused
 
 from validate.cli import making, running, studying
 from validate.errors import RecordingError

@@ -152,7 +152,7 @@ def test_runs_without_a_shared_method_fit_a_terminal(
                      for i in (12, 13)]  # fmt: skip
     for score in ("node_B.nees.per_dof@stiff_model_200Hz", "corner.rmse@stiff_model_200Hz"):
         assert sum(line.startswith(f"{score} ") for line in lines) == 2  # on one line each
-    assert "left out: 194 pairs of methods, 0 scores; --json has all" in lines
+    assert "left out: 194 pairs of methods; --all, --method, --score or --json show them" in lines
     text = "\n".join(lines)
     assert re.search(r"material.E +2000 Pa +3000 Pa", text)
     assert "methods." not in text

@@ -1,39 +1,151 @@
-"""`validate compare`."""
+"""`validate compare`: stored runs side by side, in so many lines as a screen has."""
 
 import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from validate.cli.display import say, table, warn
+from validate.cli.arguments import complain
+from validate.cli.display import relative, say, warn, width
+from validate.cli.layout import laid, wrapped
+from validate.errors import UsageError
+from validate.report.folder import try_results
 from validate.report.numbers import shown_unit, significant, text
+from validate.study.compare_page import write_comparison
+from validate.study.narrow import narrowed, ordered
 from validate.study.stored import Pair, Row, SideBySide, pairs, read_run, side_by_side
 
+_LINES = 40  # of the whole output
+_LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
+_PARAMETERS = 8  # rows of parameters that differ
 
-def compare(paths: tuple[Path, ...], as_json: bool) -> None:
-    """Prints stored runs side by side; raises when nothing can be compared."""
-    found = side_by_side([read_run(path) for path in paths])
+
+@dataclass(frozen=True)
+class Shown:
+    """What of a comparison is shown: patterns of methods and scores, an order, all of it."""
+
+    methods: tuple[str, ...] = ()
+    scores: tuple[str, ...] = ()
+    sort: str = "change"
+    everything: bool = False
+
+
+def compare(paths: tuple[Path, ...], wanted: Shown, out: Path | None, *, as_json: bool) -> None:
+    """Prints stored runs side by side and draws a page; raises when nothing can be compared."""
+    runs = narrowed([read_run(path) for path in paths], wanted.methods, wanted.scores)
+    found = ordered(side_by_side(runs), wanted.sort)
     if as_json:
         print(json.dumps(document(found), allow_nan=False, ensure_ascii=False, indent=1))
     else:
-        _show(found)
+        _show(found, everything=wanted.everything)
+    if out or not as_json:
+        page = _drawn(found, paths, wanted, out)
+        if page and not as_json:
+            say(f"pictures and all scores: {relative(page)}")
 
 
-def _show(found: SideBySide) -> None:
+def _drawn(
+    found: SideBySide, paths: tuple[Path, ...], wanted: Shown, out: Path | None
+) -> Path | None:
+    """The page below `out`, else beside the first run; none, and a line, where that is closed."""
+    beside = paths[0].resolve()
+    beside = (beside if beside.is_dir() else beside.parent).parent
+    folder = (out or beside) / _name(found, paths, wanted)
+    try:
+        try_results(folder, ())
+    except UsageError as error:
+        if out:
+            raise
+        complain(f"no pictures: {error}")
+        return None
+    return write_comparison(found, document(found), folder)
+
+
+def _name(found: SideBySide, paths: tuple[Path, ...], wanted: Shown) -> str:
+    """One folder for one comparison: of these runs, filtered and sorted so."""
+    first = found.runs[0].name.partition("+")[0]
+    made = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
+    mark = sha256(json.dumps(made).encode()).hexdigest()[:6]
+    return f"compare-{first[:60]}-{mark}"
+
+
+def _show(found: SideBySide, *, everything: bool) -> None:
+    columns = width(sys.stdout)
     for warning in found.warnings:
         warn(warning, error=True)
-    shown, more, unseen = pairs(found)
-    for pair in shown:
-        _scores(pair)
-    if more or unseen:
-        left = f"left out: {more} pairs of methods, {unseen} scores; --json has all"
-        say(f"\n{left}")
-    if found.parameters:
-        rows = [[path, *values] for path, values in found.parameters.items()]
-        names = [f"{r.name} {r.created}" for r in found.runs]
-        table("Parameters that differ", ["path", *names], rows)
-    else:
-        say("\nNo parameter differs.")
-    say(f"\n{len(found.rows)} scores of {len(found.runs)} runs compared")
+    said = sum(len(wrapped(f"warning: {w}", columns, "  ")) for w in found.warnings)
+    parameters = _parameters(found, columns, everything=everything)
+    shown, more, unseen = pairs(found, every=everything)
+    ends = 6 + len(parameters) + said  # what is left out, the count, the page's place
+    lines, rows, drawn = _pairs(shown, columns, None if everything else max(8, _LINES - ends))
+    for line in (*lines, *parameters):
+        say(line)
+    more += len(shown) - drawn
+    left = sum(len(p.rows) for p in shown) - rows
+    counts = {"scores": left, "pairs of methods": more, "scores that no pair has": unseen}
+    if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
+        say(f"left out: {what}; --all, --method, --score or --json show them")
+    say(f"{len(found.rows)} scores of {len(found.runs)} runs compared")
+
+
+def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[str], int, int]:
+    """Lines of the pairs, at most so many; how many rows and pairs they hold."""
+    count = len(shown) if most is None else min(len(shown), max(1, most // (_LEAST + 3)))
+    lines: list[str] = []
+    rows = 0
+    for i, pair in enumerate(shown[:count]):
+        title = wrapped(f"One: {pair.one}; other: {pair.other}", columns, "  ")
+        room = None if most is None else (most - len(lines)) // (count - i) - len(title) - 1
+        found, held = _fitting(pair, columns, room)
+        lines += [*title, *found, ""]
+        rows += held
+    return lines, rows, count
+
+
+def _fitting(pair: Pair, columns: int, room: int | None) -> tuple[list[str], int]:
+    """The first rows of a pair that have room, at least one; and how many."""
+    head, rows = _table(pair)
+    count = len(rows) if room is None else min(len(rows), max(1, room - 1))
+    lines = laid(head, rows[:count], columns)
+    while room is not None and len(lines) > room and count > 1:
+        count -= 1
+        lines = laid(head, rows[:count], columns)
+    return lines, count
+
+
+def _table(pair: Pair) -> tuple[list[str], list[list[str]]]:
+    head, rows = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
+    if any(r.method for r in pair.rows):
+        head = ["method", *head]
+        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
+    return head, rows
+
+
+def _row(row: Row) -> list[str]:
+    one, other = row.values
+    difference, change = row.differences[1] or 0.0, row.changes[1]
+    sign = "+" if difference > 0 else ""
+    apart = f"{significant(100 * change)} %" if change else text(difference, row.unit)
+    return [row.score, text(one, row.unit), text(other, row.unit), f"{sign}{apart}",
+            shown_unit(row.unit)]  # fmt: skip
+
+
+def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[str]:
+    if not found.parameters:
+        return ["No parameter differs."]
+    rows = [[path, *values] for path, values in found.parameters.items()]
+    names = [f"{r.name} {r.created}" for r in found.runs]
+    count = len(rows) if everything else _PARAMETERS
+    lines = laid(["path", *names], rows[:count], columns)
+    if not everything:
+        while len(lines) > 2 * _PARAMETERS and count > 1:
+            count -= 1
+            lines = laid(["path", *names], rows[:count], columns)
+    more = [f"{len(rows) - count} more, see --all"] if len(rows) > count else []
+    return ["Parameters that differ", *lines, *more]
 
 
 def document(found: SideBySide) -> dict[str, Any]:
@@ -54,23 +166,3 @@ def document(found: SideBySide) -> dict[str, Any]:
         "parameters": {path: list(values) for path, values in found.parameters.items()},
         "warnings": list(found.warnings),
     }  # fmt: skip
-
-
-def _scores(pair: Pair) -> None:
-    """One table of two columns, which fits where a table of all would not."""
-    by_method = any(r.method for r in pair.rows)
-    head = ["score", "one", "other", "difference", "unit"]
-    rows = [_row(r) for r in pair.rows]
-    if by_method:
-        head = ["method", *head]
-        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
-    table(f"One: {pair.one}; other: {pair.other}", head, rows)
-
-
-def _row(row: Row) -> list[str]:
-    one, other = row.values
-    difference, change = text(row.differences[1], row.unit), row.changes[1]
-    if change:
-        difference += f" ({'+' if change > 0 else ''}{significant(100 * change)} %)"
-    values = [text(one, row.unit), text(other, row.unit)]
-    return [row.score, *values, difference, shown_unit(row.unit)]

@@ -140,12 +140,20 @@ def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool
 
 @cli.command()
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def compare(runs: tuple[Path, ...], as_json: bool) -> None:
-    """Stored runs (report folders) side by side; nothing is run again."""
+@click.option("--method", "methods", multiple=True, metavar="GLOB", help="Only these: 'kf_*'.")
+@click.option("--score", "scores", multiple=True, metavar="GLOB", help="Only these: '*.rms@9mm'.")
+@click.option(
+    "--sort", type=click.Choice(["change", "difference", "score", "method", "stored"]),
+    default="change", show_default=True, help="Order of the scores, the largest change first.",
+)  # fmt: skip
+@click.option("--all", "everything", is_flag=True, help="Everything, not 40 lines of it.")
+@click.option("--out", type=_OUT, help="Where the page goes (default: beside the first run).")
+@click.option("--json", "as_json", is_flag=True, help="One JSON document; a page only with --out.")
+def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
+    """Stored runs (report folders) side by side, drawn; nothing is run again."""
     from validate.cli import comparing
 
-    comparing.compare(runs, as_json)
+    comparing.compare(runs, comparing.Shown(**wanted), out, as_json=as_json)
 
 
 @cli.group()

@@ -226,18 +226,18 @@ class Pair:
     rows: tuple[Row, ...]
 
 
-def pairs(found: SideBySide) -> tuple[tuple[Pair, ...], int, int]:
+def pairs(found: SideBySide, *, every: bool = False) -> tuple[tuple[Pair, ...], int, int]:
     """The pairs to show, how many more there are, and how many rows of `found` none of them has.
 
     Runs that share methods: the first against every other. Else their methods: accepted ones first,
-    the first of one run against the first of the other, at most `MOST`.
+    the first of one run against the first of the other, at most `MOST` unless `every` is asked for.
     """
-    every = [(one, other, _rows(found, one, other)) for one, other in _columns(found)]
-    kept = [pair for pair in every if pair[2]]
-    shown = kept[:MOST] if found.by_score else kept
+    rows = [(one, other, _rows(found, one, other)) for one, other in _columns(found)]
+    kept = [pair for pair in rows if pair[2]]
+    shown = kept[:MOST] if found.by_score and not every else kept
     names = found.columns
-    seen = {(r.method, r.score) for _, _, rows in shown for r in rows}
-    made = tuple(Pair(names[i], names[j], rows) for i, j, rows in shown)
+    seen = {(r.method, r.score) for _, _, mine in shown for r in mine}
+    made = tuple(Pair(names[i], names[j], mine) for i, j, mine in shown)
     return made, len(kept) - len(shown), len(found.rows) - len(seen)
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from commands import here, refused
 from report_samples import small_result
-from test_cli import here, refused
 
 from validate.parameters import Changed
 from validate.report.made import Commit, Made
