@@ -19,6 +19,7 @@ from validate.register.follow import follow_signal
 from validate.replay.experiment import Experiment, Twin
 from validate.replay.followed import Truth
 from validate.replay.method import Method
+from validate.replay.remade import stamped
 from validate.scene.box import box
 from validate.scene.scene import Load, Material, Probe, Scene, Support
 from validate.solve.march import march
@@ -95,7 +96,7 @@ EXPERIMENT = Experiment(
     methods={"kf": Method("filter", Filter(), markers=("top",)),
              "plain": Method("solver", Newmark())},
     accepted=("kf",), accept=(Accept("top", 1e-3, "made for tests"),),
-    load=lambda p, folder: (record(p, lambda _: None),),
+    load=lambda p, folder: (stamped(record(p, lambda _: None), p),),
     build=lambda recording, p, model: scene(1e4),
     place=lambda recording, p, made: follow_signal(recording, made.mesh, "pull", "N"),
     sets=lambda p, seen: {"dt": DT}, axis="z", reference="plain",

@@ -44,7 +44,7 @@ def test_a_changed_run_leaves_the_plain_one(project: Path) -> None:
 def test_several_runs_are_one_document_and_a_failed_one_is_in_it(project: Path) -> None:
     text = (project / "experiments" / "pulled.py").read_text("utf-8")
     broken = text.replace('name="pulled"', 'name="torn"').replace(
-        "load=lambda p, folder: (record(p, lambda _: None),),", "load=_torn,"
+        "load=lambda p, folder: (stamped(record(p, lambda _: None), p),),", "load=_torn,"
     )
     broken = broken.replace(
         "EXPERIMENT =",
