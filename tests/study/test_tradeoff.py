@@ -1,6 +1,7 @@
 """A small trade whose answers are known, and fronts and memory by hand."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from validate.errors import SceneError
 from validate.fem.factor import factorise
 from validate.fem.system import build
 from validate.replay.experiment import Experiment
-from validate.replay.ladder import LawPair, Rival, Trial
+from validate.replay.ladder import RUNGS, LawPair, Rival, Rung, Trial
 from validate.scene.box import box
 from validate.scene.mesh import quadratic
 from validate.scene.scene import LawName, Load, Material, Scene, Support
@@ -23,13 +24,15 @@ from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
-from validate.study.choose import choose, principal_strains, wanted
+from validate.study import climb
+from validate.study.choose import Wanted, choose, wanted
 from validate.study.choose_exhibits import choose_exhibits
+from validate.study.choose_facts import principal_strains
 from validate.study.engine import finish
 from validate.study.held import held_bytes
 from validate.study.job import Job, Plan, Where
 from validate.study.trade import Trade, TradeRow, front, trade_cells, traded
-from validate.study.trade_cell import Measured, run_cell
+from validate.study.trade_cell import Measured, TradeCell, run_cell
 from validate.study.trade_exhibits import trade_exhibits
 from validate.study.trade_page import trade_document
 
@@ -133,9 +136,80 @@ def test_a_trade_is_told_in_numbers_that_are_finite(measured: Trade) -> None:
     assert [e.anchor for e in made] == ["front", "shares", "costs", "convergence", "unscored"]
     told = trade_document(measured)
     assert len(told["cells"]) == len(measured.rows)
-    choice = choose(measured, wanted("1mm", "1Hz"), False, lambda row, dt: row)
+    climb = [(rung, measured) for rung in RUNGS]
+    choice = choose(climb, wanted("1mm", "1Hz"), False, lambda trade, row, dt: row)
     assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
-    assert [c.rung for c in choice.ladder if c.verdict == "nothing ran"] == ["condensed"]
+    assert {c.verdict for c in choice.ladder[1:]} == {"not climbed"}
+
+
+def climbing(whole: Trade, asked: list[str]) -> Iterator[tuple[Rung, Trade]]:
+    """The trade rung by rung, with those that were asked for."""
+    solvers: set[str] = set()
+    for rung in RUNGS:
+        asked.append(rung)
+        solvers |= {s.name for s in whole.trial.solvers if s.rung == rung}
+        rows = tuple(r for r in whole.rows if r.solver.name in solvers)
+        yield rung, replace(whole, rows=rows)
+
+
+def test_the_climb_ends_at_the_first_rung_that_meets_both(measured: Trade) -> None:
+    asked: list[str] = []
+    best = {s.rung: min((r.total for r in rows_of(measured, s.name) if r.total), default=1.0)
+            for s in measured.trial.solvers}  # fmt: skip
+    assert best["modal"] < best["static superposition"]
+    between = (best["modal"] + best["static superposition"]) / 2
+    want = Wanted(between, 1.0)
+    choice = choose(climbing(measured, asked), want, False, lambda trade, row, dt: row)
+    assert asked == ["static superposition", "modal"]
+    assert choice.pick is not None
+    assert choice.pick.solver.rung == "modal"
+    assert [c.verdict for c in choice.ladder] == ["too wrong", "meets both", *4 * ["not climbed"]]
+    assert choice.ladder[2].evidence == "skipped: 'modal' meets both"
+    assert {r.solver.rung for r in choice.trade.rows} == {"static superposition", "modal"}
+    assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
+
+
+def test_where_nothing_meets_both_every_rung_is_climbed(measured: Trade) -> None:
+    asked: list[str] = []
+    climb = climbing(measured, asked)
+    choice = choose(climb, Wanted(1e-12, 1.0), False, lambda trade, row, dt: row)
+    assert (choice.pick, tuple(asked)) == (None, RUNGS)
+    assert "not climbed" not in {c.verdict for c in choice.ladder}
+
+
+def test_a_rung_that_meets_both_only_at_its_own_step_is_left_for_the_next(measured: Trade) -> None:
+    asked: list[str] = []
+    slow = StepTimes(9.0, 9.0, 9.0, 9)
+    choice = choose(
+        climbing(measured, asked), Wanted(0.1, 1e3), False,
+        lambda trade, row, dt: replace(row, dt=dt, step=slow),
+    )  # fmt: skip
+    assert (choice.pick, tuple(asked)) == (None, RUNGS)
+    assert len(choice.rejected) > 4
+
+
+def test_no_cell_of_a_rung_runs_before_it_is_asked_for(
+    phantom: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran: list[str] = []
+
+    def noted(trial: Trial, cell: TradeCell) -> Measured:
+        ran.append(cell.solver)
+        return run_cell(trial, cell)
+
+    monkeypatch.setattr(climb, "trial_of", lambda *_: small())
+    monkeypatch.setattr(climb, "job_of", lambda *_, **__: Job("", ""))
+    monkeypatch.setattr(
+        climb, "plan_of", lambda job, cells: Plan(job, cells, small, noted, Measured)
+    )
+    climbed = climb.rungs(phantom, declared_law=True, out=tmp_path, where=Where(0))
+    assert ran == []
+    rung, first = next(climbed)
+    assert (rung, set(ran)) == ("static superposition", {"", "static"})
+    rung, second = next(climbed)
+    assert (rung, set(ran)) == ("modal", {"", "static", "all modes"})
+    assert second.rows[: len(first.rows)] == first.rows
+    assert second.done.records.keys() > first.done.records.keys()
 
 
 @pytest.fixture
@@ -143,6 +217,7 @@ def commanded(measured: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command line's trade is the one above."""
     monkeypatch.setattr(studying, "find", lambda *_: measured.experiment)
     monkeypatch.setattr(studying, "trade", lambda experiment, **rest: measured)
+    monkeypatch.setattr(studying, "rungs", lambda experiment, **rest: climbing(measured, []))
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from validate.report.numbers import MISSING, significant
 from validate.study import filter_page, stability_page, still_page, trade_page
 from validate.study.choose import Choice, choose, error_of, wanted
 from validate.study.choose_exhibits import words
+from validate.study.climb import rungs
 from validate.study.engine import CELLS, Finished, study_folder
 from validate.study.filter_exhibits import RANKING, ranking_row
 from validate.study.filters import FilterStudy, study
@@ -126,14 +127,20 @@ def tradeoff(name: str, common: StudyOptions) -> int:
 def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared_law: bool) -> int:
     """Runs the pilots, climbs the ladder; 0 when a method meets both, else 1."""
     want = wanted(error, rate)
-    found = _measured(name, common)
-    choice = choose(
-        found, want, declared_law, lambda row, dt: again(found, row, dt, common.out, common.where)
-    )
-    page = _written(found.experiment, trade_page.told_choice(choice), "choose", common)
+    experiment = find(name, Path.cwd(), common.named)
+    with _running(experiment, "tradeoff", "pilot runs", common) as report:
+        climb = rungs(
+            experiment, declared_law=declared_law, quick=common.quick, out=common.out,
+            where=common.where, report=report,
+        )  # fmt: skip
+        choice = choose(
+            climb, want, declared_law,
+            lambda trade, row, dt: again(trade, row, dt, common.out, common.where),
+        )  # fmt: skip
+    page = _written(experiment, trade_page.told_choice(choice), "choose", common)
     if not common.as_json:
         _show_choice(choice)
-        _end(found.done, page)
+        _end(choice.trade.done, page)
     return OK if choice.pick is not None else FAILED
 
 

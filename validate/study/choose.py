@@ -1,41 +1,33 @@
 """The cheapest method of a scene that meets an error and a rate: a ladder, climbed by pilot runs.
 
-The pilots are the cells of the trade. Each rung of the ladder says what its best cell reaches; the
-choice is the fastest cell that meets the error, if it meets the rate too. For a scene with inertia
-it is run again with a new state at every tick of the rate before it is named.
+The pilots are the cells of the trade, run rung by rung from the cheapest methods on. The first rung
+with a cell that meets both ends the climb: its fastest such cell is the choice, and the rungs above
+are never run. For a scene with inertia it is run again with a new state at every tick of the rate
+before it is named.
 """
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.errors import UsageError
-from validate.fem.assemble import shape_gradients
-from validate.fem.locking import LOCKING_FROM
-from validate.fem.modes import modes_of
-from validate.fem.system import build
-from validate.replay.ladder import RUNGS, Rung, Trial
-from validate.scene.mesh import Mesh
-from validate.scene.scene import Scene
-from validate.solve.fluid import ExactPressure
-from validate.solve.quasi_static import QuasiStatic
+from validate.replay.ladder import RUNGS, Rung
+from validate.study.choose_facts import Fact, facts
 from validate.study.trade import Trade, TradeRow
 from validate.units import si_factor
 
-_WATER = 1000.0  # kg/m3, of a soft tissue whose density nobody declared
-_SLOW = 10.0  # periods of the lowest mode within which a load that rises is nearly static
-_SMALL_STRAIN = 0.02  # strain at which the square terms of Green's strain are 1 % of the linear
 _TRIES = 4  # cells that are run again at the rate's own step
 _QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
 
 _LEFT_OUT = "left out: --declared-law judges the linear law only"
 
-Again = Callable[[TradeRow, float], TradeRow]
-Meets = Literal["meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran"]
+Again = Callable[[Trade, TradeRow, float], TradeRow]
+Meets = Literal[
+    "meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran", "not climbed"
+]
 
 
 @dataclass(frozen=True)
@@ -49,15 +41,6 @@ class Wanted:
         for value, what in ((self.error, "error"), (self.rate, "rate")):
             if not (np.isfinite(value) and value > 0):
                 raise UsageError(f"--{what} {value:g}: a positive number with its unit")
-
-
-@dataclass(frozen=True)
-class Fact:
-    """One of the scene's own numbers, and what it asks of a method."""
-
-    name: str
-    value: str
-    means: str
 
 
 @dataclass(frozen=True)
@@ -147,28 +130,60 @@ def nearest(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> T
     return min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
 
 
-def choose(trade: Trade, want: Wanted, declared_law: bool, again: Again) -> Choice:
-    """The choice from a measured trade; `again` runs a row's cell with another step s.
+def choose(
+    climb: Iterable[tuple[Rung, Trade]], want: Wanted, declared_law: bool, again: Again
+) -> Choice:
+    """The choice from trades that grow rung by rung, taken until a cell of the last rung meets
+    both; `again` runs a row's cell with another step s.
 
     Where large strain could not be solved, what the declared law costs is not counted either.
+    Raises `UsageError` where no rung has a cell, or no cell an error.
     """
-    declared_law = declared_law or trade.gap is None
-    by, dynamic = "error" if declared_law else "total", trade.trial.dynamic
-    rows = [r for r in trade.rows if not declared_law or r.solver.law == "linear"]
     rejected: list[str] = []
+    climbed, trade = list[Rung](), None
     pick = confirmed = None
+    for rung, trade in climb:
+        climbed.append(rung)
+        pick, confirmed = _picked(trade, rung, want, declared_law, again, rejected)
+        if pick is not None:
+            break
+    if trade is None:
+        raise UsageError("no rung of the ladder has a cell for this scene; see 'study tradeoff'")
+    by, rows = _by(trade, declared_law), _judged(trade, declared_law)
+    ladder = tuple(
+        _climbed(trade, rung, rows, want, by) if pick is None or rung in climbed
+        else Climbed(rung, 0, 0, None, "not climbed", f"skipped: '{climbed[-1]}' meets both")
+        for rung in RUNGS
+    )  # fmt: skip
+    closest = nearest(rows, want, by, trade.trial.dynamic)
+    return Choice(
+        trade, want, by, facts(trade, want.error), ladder, pick, confirmed, closest, tuple(rejected)
+    )
+
+
+def _by(trade: Trade, declared_law: bool) -> str:
+    return "error" if declared_law or trade.gap is None else "total"
+
+
+def _judged(trade: Trade, declared_law: bool) -> list[TradeRow]:
+    linear = _by(trade, declared_law) == "error"
+    return [r for r in trade.rows if not linear or r.solver.law == "linear"]
+
+
+def _picked(
+    trade: Trade, rung: Rung, want: Wanted, declared_law: bool, again: Again, rejected: list[str]
+) -> tuple[TradeRow | None, TradeRow | None]:
+    """The rung's fastest cell that meets both, and its run at the rate's own step where it has a
+    longer one; those that fail it are added to `rejected`."""
+    by, dynamic = _by(trade, declared_law), trade.trial.dynamic
+    rows = [r for r in _judged(trade, declared_law) if r.solver.rung == rung]
     for row in meeting(rows, want, by, dynamic)[:_TRIES]:
         dt = _rate_step(trade, row, want)
-        tried = None if dt is None else again(row, dt)
+        tried = None if dt is None else again(trade, row, dt)
         if tried is None or max(misses(tried, want, by, dynamic)) <= 1:
-            pick, confirmed = row, tried
-            break
+            return row, tried
         rejected.append(_refusal(tried, by))
-    ladder = tuple(_climbed(trade, rung, rows, want, by) for rung in RUNGS)
-    closest = nearest(rows, want, by, dynamic)
-    return Choice(
-        trade, want, by, facts(trade, want), ladder, pick, confirmed, closest, tuple(rejected)
-    )
+    return None, None
 
 
 def _rate_step(trade: Trade, row: TradeRow, want: Wanted) -> float | None:
@@ -194,7 +209,9 @@ def _climbed(trade: Trade, rung: Rung, rows: Sequence[TradeRow], want: Wanted, b
     mine = [r for r in rows if r.solver.rung == rung]
     scored = [r for r in mine if error_of(r, by) is not None]
     if not scored:
-        left = rung == "large strain" and len(rows) < len(trade.rows)
+        left = by == "error" and any(
+            s.rung == rung and s.law != "linear" for s in trade.trial.solvers
+        )
         why = _LEFT_OUT if left else _why_not(mine, dynamic)
         return Climbed(rung, len(mine), 0, None, "nothing ran", why)
     lacks = scored[0].solver.lacks
@@ -230,89 +247,3 @@ def _why_not(mine: Sequence[TradeRow], dynamic: bool) -> str:
         "not for this scene: it declares no density, and linear schemes with inertia know no "
         "fluid in cavities"
     )
-
-
-# --- the scene's own numbers ---------------------------------------------------------------------
-
-
-def facts(trade: Trade, want: Wanted) -> tuple[Fact, ...]:
-    """Loading against the lowest frequency, strain, law, Poisson ratio, fluid, noise."""
-    scene = trade.trial
-    element = "P1" if "P1" in scene.meshes else next(iter(scene.meshes))
-    body = scene.build(element, scene.meshes[element][0], "linear")
-    return (
-        _loading(scene, body), _strain(scene, body, trade), _poisson(body), _fluid(body),
-        _noise(scene, want), _mesh(trade),
-    )  # fmt: skip
-
-
-def _loading(scene: Trial, body: Scene) -> Fact:
-    density = body.material.rho or _WATER
-    solid = replace(body, cavities=(), material=replace(body.material, rho=density))
-    modes = modes_of(build(solid), 1)
-    f, ratio = modes.omega[0] / (2 * np.pi), modes.damping[0] / (2 * modes.omega[0])
-    assumed = "" if body.material.rho else f", at an assumed {_WATER:g} kg/m3"
-    name = "loading rate against lowest frequency"
-    if scene.rise_s == 0:
-        return Fact(
-            name, f"switched on at once; {f:.3g} Hz, damping ratio {ratio:.2g}{assumed}",
-            "the load has no rise time: inertia and damping are needed until the motion is over",
-        )  # fmt: skip
-    periods = scene.rise_s * f
-    slow = "nearly static: statics may do" if periods > _SLOW else "not static: inertia matters"
-    return Fact(name, f"rises in {scene.rise_s:.3g} s; {f:.3g} Hz{assumed}: {periods:.3g} periods",
-                slow)  # fmt: skip
-
-
-def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
-    stepper = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
-    u = stepper.field(stepper.step(stepper.rest(), scene.largest_inputs))
-    strain = principal_strains(body.mesh, u)
-    peak, most = float(strain.max()), float(np.quantile(strain, 0.95))
-    cost = f"large strain was not solved ({trade.law_words})"
-    if trade.law_error is not None:
-        moved = f"{1e3 * trade.law_error:.3g} mm"
-        cost = f"large strain changes the answer by {moved} ({trade.law_words})"
-    means = "within small strain" if peak < _SMALL_STRAIN else "large strain is on the ladder"
-    return Fact("strain level (static pilot, coarse mesh)",
-                f"peak {100 * peak:.2g} %, 95 % of cells below {100 * most:.2g} %",
-                f"{means}; measured, {cost}")  # fmt: skip
-
-
-def principal_strains(mesh: Mesh, u: Floats) -> Floats:
-    """Largest |principal small strain| of every simplex (e,), from u (n, d) m at its corners."""
-    if mesh.bricks:
-        mesh = Mesh(mesh.nodes, mesh.simplices, "tri3" if mesh.dimension == 2 else "tet4")
-    H = np.einsum("eai,eaj->eij", u[mesh.corners], shape_gradients(mesh))
-    return np.asarray(np.abs(np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2)).max(axis=1))
-
-
-def _poisson(body: Scene) -> Fact:
-    nu = body.material.nu
-    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: see P1 beside the other elements"
-    return Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect")
-
-
-def _fluid(body: Scene) -> Fact:
-    n = len(body.cavities)
-    means = (
-        "condensed columns with the pressure of constant volume" if n else "no pressure code runs"
-    )
-    return Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means)
-
-
-def _noise(scene: Trial, want: Wanted) -> Fact:
-    if scene.noise is None:
-        return Fact("noise", "no recording", "nothing to say")
-    sd, where = scene.noise
-    means = "a recording can tell such an error" if sd < want.error else (
-        "a recording could not tell such an error at a single point"
-    )  # fmt: skip
-    return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
-
-
-def _mesh(trade: Trade) -> Fact:
-    return Fact(
-        "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its own error "
-        f"about {1e3 * trade.floor:.2g} mm (Richardson)", "errors below it say nothing",
-    )  # fmt: skip

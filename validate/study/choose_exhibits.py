@@ -28,7 +28,8 @@ def words(choice: Choice) -> Iterator[str]:
     want = choice.wanted
     asked = f"{_MM * want.error:.3g} mm and {want.rate:.4g} Hz"
     if choice.pick is not None:
-        yield f"{described(choice.pick, choice)} meets {asked}: the fastest cell that does."
+        first = f"the fastest cell of '{choice.pick.solver.rung}', the first rung that does"
+        yield f"{described(choice.pick, choice)} meets {asked}: {first}."
         yield from _confirmed(choice)
         yield from _as_fast(choice)
     else:

@@ -32,6 +32,12 @@ class Finished(Generic[R]):
     seconds: float
     workers: str
 
+    def and_also(self, more: "Finished[R]") -> "Finished[R]":
+        """Both, the workers of the first."""
+        records = {**self.records, **more.records}
+        reused, seconds = self.reused + more.reused, self.seconds + more.seconds
+        return Finished(records, reused, seconds, self.workers or more.workers)
+
 
 def finish(
     plan: Plan[C, R], folder: Path, where: Where | None = None, report: Report | None = None

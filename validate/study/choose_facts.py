@@ -1,0 +1,114 @@
+"""A scene's own numbers, and what they ask of a method: a choice shows them beside its pilots."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.fem.assemble import shape_gradients
+from validate.fem.locking import LOCKING_FROM
+from validate.fem.modes import modes_of
+from validate.fem.system import build
+from validate.replay.ladder import Trial
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
+from validate.solve.fluid import ExactPressure
+from validate.solve.quasi_static import QuasiStatic
+from validate.study.trade import Trade
+
+_WATER = 1000.0  # kg/m3, of a soft tissue whose density nobody declared
+_SLOW = 10.0  # periods of the lowest mode within which a load that rises is nearly static
+_SMALL_STRAIN = 0.02  # strain at which the square terms of Green's strain are 1 % of the linear
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One of the scene's own numbers, and what it asks of a method."""
+
+    name: str
+    value: str
+    means: str
+
+
+def facts(trade: Trade, error: float) -> tuple[Fact, ...]:
+    """Loading against the lowest frequency, strain, law, Poisson ratio, fluid, noise; `error` m is
+    the one that is wanted."""
+    scene = trade.trial
+    element = "P1" if "P1" in scene.meshes else next(iter(scene.meshes))
+    body = scene.build(element, scene.meshes[element][0], "linear")
+    return (
+        _loading(scene, body), _strain(scene, body, trade), _poisson(body), _fluid(body),
+        _noise(scene, error), _mesh(trade),
+    )  # fmt: skip
+
+
+def _loading(scene: Trial, body: Scene) -> Fact:
+    density = body.material.rho or _WATER
+    solid = replace(body, cavities=(), material=replace(body.material, rho=density))
+    modes = modes_of(build(solid), 1)
+    f, ratio = modes.omega[0] / (2 * np.pi), modes.damping[0] / (2 * modes.omega[0])
+    assumed = "" if body.material.rho else f", at an assumed {_WATER:g} kg/m3"
+    name = "loading rate against lowest frequency"
+    if scene.rise_s == 0:
+        return Fact(
+            name, f"switched on at once; {f:.3g} Hz, damping ratio {ratio:.2g}{assumed}",
+            "the load has no rise time: inertia and damping are needed until the motion is over",
+        )  # fmt: skip
+    periods = scene.rise_s * f
+    slow = "nearly static: statics may do" if periods > _SLOW else "not static: inertia matters"
+    return Fact(name, f"rises in {scene.rise_s:.3g} s; {f:.3g} Hz{assumed}: {periods:.3g} periods",
+                slow)  # fmt: skip
+
+
+def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
+    stepper = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
+    u = stepper.field(stepper.step(stepper.rest(), scene.largest_inputs))
+    strain = principal_strains(body.mesh, u)
+    peak, most = float(strain.max()), float(np.quantile(strain, 0.95))
+    cost = f"large strain was not solved ({trade.law_words})"
+    if trade.law_error is not None:
+        moved = f"{1e3 * trade.law_error:.3g} mm"
+        cost = f"large strain changes the answer by {moved} ({trade.law_words})"
+    means = "within small strain" if peak < _SMALL_STRAIN else "large strain is on the ladder"
+    return Fact("strain level (static pilot, coarse mesh)",
+                f"peak {100 * peak:.2g} %, 95 % of cells below {100 * most:.2g} %",
+                f"{means}; measured, {cost}")  # fmt: skip
+
+
+def principal_strains(mesh: Mesh, u: Floats) -> Floats:
+    """Largest |principal small strain| of every simplex (e,), from u (n, d) m at its corners."""
+    if mesh.bricks:
+        mesh = Mesh(mesh.nodes, mesh.simplices, "tri3" if mesh.dimension == 2 else "tet4")
+    H = np.einsum("eai,eaj->eij", u[mesh.corners], shape_gradients(mesh))
+    return np.asarray(np.abs(np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2)).max(axis=1))
+
+
+def _poisson(body: Scene) -> Fact:
+    nu = body.material.nu
+    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: see P1 beside the other elements"
+    return Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect")
+
+
+def _fluid(body: Scene) -> Fact:
+    n = len(body.cavities)
+    means = (
+        "condensed columns with the pressure of constant volume" if n else "no pressure code runs"
+    )
+    return Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means)
+
+
+def _noise(scene: Trial, error: float) -> Fact:
+    if scene.noise is None:
+        return Fact("noise", "no recording", "nothing to say")
+    sd, where = scene.noise
+    means = "a recording can tell such an error" if sd < error else (
+        "a recording could not tell such an error at a single point"
+    )  # fmt: skip
+    return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
+
+
+def _mesh(trade: Trade) -> Fact:
+    return Fact(
+        "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its own error "
+        f"about {1e3 * trade.floor:.2g} mm (Richardson)", "errors below it say nothing",
+    )  # fmt: skip
