@@ -23,7 +23,7 @@ from validate.estimate.kalman import Innovation
 from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.handles import COMPILED_DYNAMICS, Handles, require_handled
+from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
 from validate.solve.types import Ending, Stepper
 
 Block = Literal["component", "node", "companion"]
@@ -40,7 +40,7 @@ class NodeEKF:
     variances beyond 1e300 m^2 the run stops, or they are held there and counted.
     """
 
-    handles: ClassVar[Handles] = COMPILED_DYNAMICS
+    handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")

@@ -30,7 +30,7 @@ from validate.estimate.reduced_basis import Basis, modes, pod
 from validate.estimate.reduced_kf import steady
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.handles import COMPILED_DYNAMICS, Handles, require_handled
+from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
 from validate.solve.types import Ending, Stepper
 
 _SETTLED = 1e-9  # change of a gain from one update to the next: with slow modes 1e-6 is too early
@@ -44,7 +44,7 @@ class ReducedEKF:
     found before the run, or the steady gain from the start.
     """
 
-    handles: ClassVar[Handles] = COMPILED_DYNAMICS
+    handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")

@@ -8,6 +8,8 @@ written before the index names it; what two indices can lose to each other is co
 """
 
 from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar, cast
 from uuid import uuid4
 
@@ -16,12 +18,18 @@ from numba import njit
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
-def compiled(**options: Any) -> Callable[[_Function], _Function]:
-    """`numba.njit` with these options, its code kept beside the function's own file."""
+def compiled(*inlined: ModuleType, **options: Any) -> Callable[[_Function], _Function]:
+    """`numba.njit` with these options, its code kept beside the function's own file.
+
+    `inlined`: other modules whose functions are in it; a change of theirs compiles it anew, too.
+    """
+    stamps = tuple(Path(str(module.__file__)).stat().st_mtime_ns for module in inlined)
 
     def made(function: _Function) -> _Function:
         dispatcher = njit(cache=True, **options)(function)
-        name_apart(dispatcher._cache._cache_file)
+        stored: Any = dispatcher._cache._cache_file
+        stored._source_stamp = (stored._source_stamp, stamps)
+        name_apart(stored)
         return cast(_Function, dispatcher)
 
     return made

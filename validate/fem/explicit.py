@@ -7,6 +7,8 @@ The element loops are in `fem.explicit_kernels`; this is their packing and their
 import math
 import os
 from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
 from typing import Literal, get_args
 
 import numpy as np
@@ -18,15 +20,27 @@ from validate.fem import explicit_kernels as kernels
 from validate.fem.assemble import shape_gradients
 from validate.fem.explicit_kernels import LANES, NEO_HOOKE, ROWS, SVK
 from validate.fem.surface import foundation_stiffness
+from validate.scene.laws import ogden_terms
 from validate.scene.mesh import cell_volumes, require_positive_cells
-from validate.scene.scene import Scene
+from validate.scene.scene import Material, Scene
+from validate.scene.stability import coupled_lambda
 
 RowName = Literal["u", "d", "r", "old", "v", "a"]
 _ROWS: tuple[RowName, ...] = get_args(RowName)
 # Turns that a thread waits awake for the next step; read when GNU OpenMP is loaded. With its own
 # default steps take a hundred times as long where another process has the core.
 _PATIENCE = "3000"
-_LAWS = {"svk": SVK, "neo_hooke": NEO_HOOKE}
+_LAWS = {
+    ("svk", "split"): SVK,
+    ("neo_hooke", "split"): NEO_HOOKE,
+    ("neo_hooke", "coupled"): kernels.INVARIANTS_COUPLED,
+    ("ogden", "split"): kernels.OGDEN,
+    ("ogden", "coupled"): kernels.OGDEN_COUPLED,
+    **dict.fromkeys((("mooney_rivlin", "split"), ("yeoh", "split")), kernels.INVARIANTS),
+    **dict.fromkeys(
+        (("mooney_rivlin", "coupled"), ("yeoh", "coupled")), kernels.INVARIANTS_COUPLED
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -83,7 +97,7 @@ class ExplicitBody:
         if threads < 1:
             raise SceneError(f"{threads} threads: take 1, or as many as there are idle cores")
         mesh = scene.mesh
-        self.scene, self.law, self.size = scene, _LAWS[scene.material.law], mesh.nodes.size
+        self.scene, self.law, self.size = scene, _code(scene.material), mesh.nodes.size
         self.geometry, self.cells = _packed(scene)
         self.work = np.zeros(kernels.WORK + kernels.WIDE * len(mesh.nodes))
         self._parts = self.work
@@ -166,12 +180,7 @@ def _own(x: Floats) -> Floats:
 def _require(scene: Scene) -> None:
     if scene.mesh.kind != "tet4":
         raise SceneError(f"elements of kind {scene.mesh.kind} have no explicit form; use tet4")
-    if scene.material.law not in _LAWS:
-        raise SceneError(
-            f"law '{scene.material.law}' has no form at large strain; choose one of {sorted(_LAWS)}"
-        )
-    if scene.material.coefficients.volumetric == "coupled":
-        raise SceneError("the coupled volumetric form is not compiled; take 'split'")
+    _code(scene.material)
     if scene.membranes:
         raise SceneError("membranes are linear only: drop them, or take the linear law")
     if scene.dilatation != "pointwise":
@@ -179,17 +188,58 @@ def _require(scene: Scene) -> None:
     require_positive_cells(scene.mesh)
 
 
+def _code(material: Material) -> int:
+    law, form = material.law, material.coefficients.volumetric
+    if (law, form) not in _LAWS:
+        known = sorted({name for name, _ in _LAWS})
+        raise SceneError(f"law '{law}' has no form at large strain; choose one of {known}")
+    return _LAWS[law, form]
+
+
 def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
-    """Geometry (blocks, 11 x 16) and cells (blocks, 4, 16), the rest filled up with soft cells."""
-    mesh = scene.mesh
+    """Geometry (blocks, 11 x 16) and cells (blocks, 4, 16), the rest filled up with soft cells.
+
+    Rows: 9 gradients and two moduli times volume; with the card of a law (blocks, 11 + k, 16).
+    """
+    mesh, (bulk, cards) = scene.mesh, _cards(scene)
     e, blocks = len(mesh.cells), -(-len(mesh.cells) // LANES)
-    rows, cells = np.zeros((blocks * LANES, ROWS)), np.zeros((blocks * LANES, 4), np.int32)
+    n = ROWS + cards.shape[1]
+    rows, cells = np.zeros((blocks * LANES, n)), np.zeros((blocks * LANES, 4), np.int32)
     rows[:e, :9] = shape_gradients(mesh)[:, 1:].reshape(e, 9)
     volumes, mu = cell_volumes(mesh), scene.per_cell(lambda m: m.shear_modulus)
-    kappa = scene.per_cell(lambda m: m.bulk_modulus)
-    rows[:e, 9] = volumes * (kappa - 2 * mu / 3 if scene.material.law == "svk" else kappa)
-    rows[:e, 10] = volumes * mu
+    rows[:e, 9], rows[:e, 10], rows[:e, ROWS:] = volumes * bulk, volumes * mu, cards
     cells[:e] = 3 * mesh.cells
-    packed = np.ascontiguousarray(rows.reshape(blocks, LANES, ROWS).swapaxes(1, 2))
+    packed = np.ascontiguousarray(rows.reshape(blocks, LANES, n).swapaxes(1, 2))
     lanes = np.ascontiguousarray(cells.reshape(blocks, LANES, 4).swapaxes(1, 2))
-    return packed.reshape(blocks, ROWS * LANES), lanes
+    return packed if cards.shape[1] else packed.reshape(blocks, n * LANES), lanes
+
+
+def _cards(scene: Scene) -> tuple[Floats, Floats]:
+    """What every cell's volume resists by, Pa (e,), and its card (e, k), moduli times volume."""
+    law, volumes = _code(scene.material), cell_volumes(scene.mesh)[:, None]
+    lame = law in (SVK, kernels.OGDEN_COUPLED)
+    bulk = scene.per_cell(lambda m: m.bulk_modulus - (2 * m.shear_modulus / 3 if lame else 0.0))
+    if law in (SVK, NEO_HOOKE):
+        return bulk, np.zeros((len(bulk), 0))
+    if law in (kernels.OGDEN, kernels.OGDEN_COUPLED):
+        return bulk, _terms(scene, volumes)
+    if law == kernels.INVARIANTS_COUPLED:
+        bulk = scene.per_cell(
+            lambda m: coupled_lambda(m.coefficients, m.shear_modulus, m.bulk_modulus)
+        )
+    values = [scene.per_cell(attrgetter(f"coefficients.{name}")) for name in ("C01", "C20", "C30")]
+    return bulk, volumes * np.stack(values, axis=1)
+
+
+def _terms(scene: Scene, volumes: Floats) -> Floats:
+    """mu_p times volume and alpha_p of every cell's terms, in turn; none has power 1, modulus 0."""
+    found = [scene.material, *(region.material for region in scene.regions)]
+    most = max(len(m.coefficients.ogden_alpha) for m in found)
+
+    def number(k: int, m: Material) -> float:
+        flat = np.ravel(ogden_terms(m.coefficients, m.shear_modulus))
+        return float(flat[k]) if k < len(flat) else float(k % 2)
+
+    cards = np.stack([scene.per_cell(partial(number, k)) for k in range(2 * most)], axis=1)
+    cards[:, ::2] *= volumes
+    return cards

@@ -10,53 +10,74 @@ One thread takes 11.5 ns a tet for St. Venant-Kirchhoff and 15 ns for neo-Hooke 
 52 GFLOP/s: 5.4 and 8.5 ns of arithmetic, the rest gather and scatter; the order of the cells makes
 no difference there. The tangent's diagonal is 105 flop more on 228 (1.46), the nodes' own blocks
 153 (1.67); measured 1.32 and 1.73, since gathering is shared and forces and blocks are scattered
-together as vectors (`benchmarks/explicit.py`). All is in one file because compiled code is cached
-by its own file's date: an inlined function elsewhere could change without being compiled anew.
+together as vectors (`benchmarks/explicit.py`).
+
+The other laws (`fem.law_kernels`) have cards, and geometry of three dimensions instead of two: the
+compiler knows which, so that neither kind is in the code of the other. Mooney-Rivlin and Yeoh in
+their split form take the vector registers too (17 ns a tet); with logarithms or principal stretches
+a law is worked through cell by cell (coupled about 120 ns, Ogden of three terms 1 us).
 
 Neither NaN nor infinity is assumed away (no `nnan`, `ninf`): a run that diverges must be seen to.
 The numpy reference is `fem.hyperelastic.Body`.
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, prange
+from numba import prange
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
+from validate.fem import kernel_tensors, law_kernels
 from validate.fem.compiled import compiled
+from validate.fem.kernel_tensors import (
+    FAST,
+    Nine,
+    Six,
+    Three,
+    combined,
+    deformation,
+    dot,
+    inlined,
+    inner,
+    inverse_cube_root,
+    product,
+    strain,
+    times,
+    transposed,
+    volume,
+)
+from validate.fem.law_kernels import (
+    Four,
+    energy_invariants,
+    energy_ogden,
+    first_invariants,
+    first_of_four,
+    first_ogden,
+    product_invariants,
+    product_ogden,
+)
 
 Cells = NDArray[np.int32]
 Springs = tuple[Cells, Cells, Floats]
-Nine = tuple[float, float, float, float, float, float, float, float, float]
-Six = tuple[float, float, float, float, float, float]
-Three = tuple[float, float, float]
-_Function = TypeVar("_Function", bound=Callable[..., object])
 
 LANES = 16
-ROWS = 11  # of geometry: 9 gradients, 2 moduli
+ROWS = 11  # of geometry: 9 gradients, 2 moduli; the card of other laws follows
 WORK = 80 * LANES  # length of the workspace
 WIDE = 12  # numbers a node that `add_forces_and_blocks` needs behind the workspace
-SVK, NEO_HOOKE = 0, 1
+SVK, NEO_HOOKE, INVARIANTS, INVARIANTS_COUPLED, OGDEN, OGDEN_COUPLED = range(6)
 _U, _V, _OUT, _NODES = ROWS * LANES, 20 * LANES, 29 * LANES, 29 * LANES
-_FAST = {"contract", "reassoc", "nsz", "arcp"}
-_CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 3 % off
+_CARD = 77 * LANES  # the last three rows
+
+_compiled = compiled(kernel_tensors, law_kernels, nogil=True, fastmath=FAST, error_model="numpy")
+_threaded = compiled(kernel_tensors, law_kernels, nogil=True, parallel=True, error_model="numpy")
 
 
-_compiled = compiled(nogil=True, fastmath=_FAST, error_model="numpy")
-_threaded = compiled(nogil=True, parallel=True, error_model="numpy")
-
-
-def _inlined(function: _Function) -> _Function:
-    made = njit(fastmath=_FAST, error_model="numpy", forceinline=True)(function)
-    return cast(_Function, made)
-
-
-@_inlined
+@inlined
 def _matrix(w: Floats, o: int) -> Nine:
     return (
         w[o], w[o + 16], w[o + 32], w[o + 48], w[o + 64], w[o + 80], w[o + 96], w[o + 112],
@@ -64,117 +85,22 @@ def _matrix(w: Floats, o: int) -> Nine:
     )  # fmt: skip
 
 
-@_inlined
-def _product(A: Nine, B: Nine) -> Nine:
-    return (
-        A[0] * B[0] + A[1] * B[3] + A[2] * B[6],
-        A[0] * B[1] + A[1] * B[4] + A[2] * B[7],
-        A[0] * B[2] + A[1] * B[5] + A[2] * B[8],
-        A[3] * B[0] + A[4] * B[3] + A[5] * B[6],
-        A[3] * B[1] + A[4] * B[4] + A[5] * B[7],
-        A[3] * B[2] + A[4] * B[5] + A[5] * B[8],
-        A[6] * B[0] + A[7] * B[3] + A[8] * B[6],
-        A[6] * B[1] + A[7] * B[4] + A[8] * B[7],
-        A[6] * B[2] + A[7] * B[5] + A[8] * B[8],
-    )
-
-
-@_inlined
-def _times(A: Nine, x: Three) -> Three:
-    return (
-        A[0] * x[0] + A[1] * x[1] + A[2] * x[2],
-        A[3] * x[0] + A[4] * x[1] + A[5] * x[2],
-        A[6] * x[0] + A[7] * x[1] + A[8] * x[2],
-    )
-
-
-@_inlined
-def _transposed(A: Nine) -> Nine:
-    return A[0], A[3], A[6], A[1], A[4], A[7], A[2], A[5], A[8]
-
-
-@_inlined
-def _deformation(H: Nine) -> Nine:
-    """F = I + H."""
-    return 1 + H[0], H[1], H[2], H[3], 1 + H[4], H[5], H[6], H[7], 1 + H[8]
-
-
-@_inlined
-def _dot(x: Three, y: Three) -> float:
-    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-
-
-@_inlined
-def _inner(A: Nine, B: Nine) -> float:
-    return (
-        A[0] * B[0] + A[1] * B[1] + A[2] * B[2] + A[3] * B[3] + A[4] * B[4] + A[5] * B[5]
-        + A[6] * B[6] + A[7] * B[7] + A[8] * B[8]
-    )  # fmt: skip
-
-
-@_inlined
-def _strain(H: Nine) -> Six:
-    """2 E = H + H^T + H^T H as xx, yy, zz, xy, xz, yz: small strains keep their digits."""
-    return (
-        2 * H[0] + H[0] * H[0] + H[3] * H[3] + H[6] * H[6],
-        2 * H[4] + H[1] * H[1] + H[4] * H[4] + H[7] * H[7],
-        2 * H[8] + H[2] * H[2] + H[5] * H[5] + H[8] * H[8],
-        H[1] + H[3] + H[0] * H[1] + H[3] * H[4] + H[6] * H[7],
-        H[2] + H[6] + H[0] * H[2] + H[3] * H[5] + H[6] * H[8],
-        H[5] + H[7] + H[1] * H[2] + H[4] * H[5] + H[7] * H[8],
-    )
-
-
-@_inlined
+@inlined
 def _second(H: Nine, a: float, b: float) -> Nine:
     """V S = a tr(E) I + 2 b E, a = V lambda, b = V mu (paper 003, eq 10)."""
-    C = _strain(H)
+    C = strain(H)
     t = 0.5 * a * (C[0] + C[1] + C[2])
     xy, xz, yz = b * C[3], b * C[4], b * C[5]
     return t + b * C[0], xy, xz, xy, t + b * C[1], yz, xz, yz, t + b * C[2]
 
 
-@_inlined
-def _cofactor(H: Nine) -> Nine:
-    return (
-        H[4] * H[8] - H[5] * H[7], H[5] * H[6] - H[3] * H[8], H[3] * H[7] - H[4] * H[6],
-        H[7] * H[2] - H[8] * H[1], H[8] * H[0] - H[6] * H[2], H[6] * H[1] - H[7] * H[0],
-        H[1] * H[5] - H[2] * H[4], H[2] * H[3] - H[0] * H[5], H[0] * H[4] - H[1] * H[3],
-    )  # fmt: skip
-
-
-@_inlined
-def _volume(H: Nine) -> tuple[float, Nine]:
-    """J - 1 without cancellation, and cof(F) - I = tr(H) I - H^T + cof(H)."""
-    K = _cofactor(H)
-    t = H[0] + H[4] + H[8]
-    dJ = t + K[0] + K[4] + K[8] + H[0] * K[0] + H[1] * K[1] + H[2] * K[2]
-    return dJ, (
-        t - H[0] + K[0], K[1] - H[3], K[2] - H[6],
-        K[3] - H[1], t - H[4] + K[4], K[5] - H[7],
-        K[6] - H[2], K[7] - H[5], t - H[8] + K[8],
-    )  # fmt: skip
-
-
-@_inlined
-def _inverse_cube_root(x: float) -> float:
-    """x^(-1/3) to rounding, without a division: a first guess from the bits, two steps of order
-    four. NaN for x <= 0, where neo-Hooke has no state."""
-    bits = np.float32(x).view(np.int32)
-    y = np.float64(np.int32(_CUBE_ROOT - bits // np.int32(3)).view(np.float32))
-    for _ in range(2):
-        r = 1 - x * y * y * y
-        y += y * r * (1 / 3 + r * (2 / 9 + r * (14 / 81)))
-    return y if x > 0 else np.nan
-
-
-@_inlined
+@inlined
 def _first_svk(H: Nine, a: float, b: float) -> Nine:
     """V P = F V S."""
-    return _product(_deformation(H), _second(H, a, b))
+    return product(deformation(H), _second(H, a, b))
 
 
-@_inlined
+@inlined
 def _shares(H: Nine, dJ: float, y: float, a: float, b: float) -> Three:
     """i, h, k of V P = i I + h H + k (cof F - I), y = J^(-1/3).
 
@@ -182,16 +108,16 @@ def _shares(H: Nine, dJ: float, y: float, a: float, b: float) -> Three:
     differences of numbers near 1 that it has at small strain.
     """
     shear = b * y * y * (y * y * y)
-    t = (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
+    t = (2 * (H[0] + H[4] + H[8]) + inner(H, H)) / 3
     bulk = 0.5 * a * dJ * (dJ + 2) * (y * y * y)
     return shear * (dJ - t) + bulk, shear * (1 + dJ), bulk - shear * (1 + t)
 
 
-@_inlined
+@inlined
 def _first_neo_hooke(H: Nine, a: float, b: float) -> Nine:
     """V P."""
-    dJ, K = _volume(H)
-    i, h, k = _shares(H, dJ, _inverse_cube_root(1 + dJ), a, b)
+    dJ, K = volume(H)
+    i, h, k = _shares(H, dJ, inverse_cube_root(1 + dJ), a, b)
     return (
         i + h * H[0] + k * K[0], h * H[1] + k * K[1], h * H[2] + k * K[2],
         h * H[3] + k * K[3], i + h * H[4] + k * K[4], h * H[5] + k * K[5],
@@ -199,37 +125,93 @@ def _first_neo_hooke(H: Nine, a: float, b: float) -> Nine:
     )  # fmt: skip
 
 
-@_inlined
+@inlined
 def _put_forces(w: Floats, l: int, P: Nine, G: Nine) -> None:
     """Forces V P g of nodes 1-3 in rows 0-8 of the results, 3 i + a - 1."""
-    f = _product(P, _transposed(G))
+    f = product(P, transposed(G))
     for k in range(9):
         w[_OUT + k * LANES + l] = f[k]
 
 
-@_inlined
+@inlined
 def _forces_svk(w: Floats) -> None:
     for l in range(LANES):
         G = _matrix(w, l)
-        H = _product(_matrix(w, _U + l), G)
+        H = product(_matrix(w, _U + l), G)
         _put_forces(w, l, _first_svk(H, w[144 + l], w[160 + l]), G)
 
 
-@_inlined
+@inlined
 def _forces_neo_hooke(w: Floats) -> None:
     for l in range(LANES):
         G = _matrix(w, l)
-        H = _product(_matrix(w, _U + l), G)
+        H = product(_matrix(w, _U + l), G)
         _put_forces(w, l, _first_neo_hooke(H, w[144 + l], w[160 + l]), G)
 
 
-@_inlined
+@inlined
+def _card(geometry: Floats, block: int, l: int) -> Floats:
+    """What a cell's law has beyond the two moduli: rows of the geometry that stay there."""
+    return geometry[block, ROWS:, l]
+
+
+@inlined
+def _four(card: Floats, b: float) -> Four:
+    """C10 V, C01 V, C20 V, C30 V of mu V and the last three of them."""
+    return 0.5 * b - card[0], card[0], card[1], card[2]
+
+
+@inlined
+def _first_carded(law: int, H: Nine, a: float, b: float, card: Floats) -> Nine:
+    """V P of the laws that have a card."""
+    if law < OGDEN:
+        return first_of_four(law == INVARIANTS_COUPLED, H, a, _four(card, b))
+    return first_ogden(law == OGDEN_COUPLED, H, a, card)
+
+
+@inlined
+def _first_along(law: int, H: Nine, D: Nine, a: float, b: float, card: Floats) -> Nine:
+    """V dP along D of the laws that have a card."""
+    if law < OGDEN:
+        return product_invariants(law == INVARIANTS_COUPLED, H, D, a, _four(card, b))
+    return product_ogden(law == OGDEN_COUPLED, H, D, a, card)
+
+
+@inlined
+def _forces_invariants(w: Floats, geometry: Floats, block: int) -> None:
+    for k in range(3):
+        for l in range(LANES):
+            w[_CARD + k * LANES + l] = geometry[block, ROWS + k, l]
+    for l in range(LANES):
+        G, b = _matrix(w, l), w[160 + l]
+        H = product(_matrix(w, _U + l), G)
+        c = w[_CARD + l], w[_CARD + LANES + l], w[_CARD + 2 * LANES + l]
+        four = 0.5 * b - c[0], c[0], c[1], c[2]
+        _put_forces(w, l, first_invariants(False, H, w[144 + l], four), G)
+
+
+@inlined
+def _forces_carded(w: Floats, law: int, geometry: Floats, block: int) -> None:
+    """Lane by lane: these laws have branches and logarithms that no vector register takes."""
+    for l in range(LANES):
+        G = _matrix(w, l)
+        H = product(_matrix(w, _U + l), G)
+        card = _card(geometry, block, l)
+        _put_forces(w, l, _first_carded(law, H, w[144 + l], w[160 + l], card), G)
+
+
+@inlined
 def _load(w: Floats, geometry: Floats, block: int) -> None:
-    for k in range(ROWS * LANES):
-        w[k] = geometry[block, k]
+    if geometry.ndim == 3:
+        for k in range(ROWS):
+            for l in range(LANES):
+                w[k * LANES + l] = geometry[block, k, l]
+    else:
+        for k in range(ROWS * LANES):
+            w[k] = geometry[block, k]
 
 
-@_inlined
+@inlined
 def _corners(cells: Cells, block: int, l: int) -> tuple[Any, Any, Any, Any]:
     """First unknowns of a cell's nodes. Unsigned: a sign would be tested for at every access."""
     return (
@@ -240,7 +222,7 @@ def _corners(cells: Cells, block: int, l: int) -> tuple[Any, Any, Any, Any]:
     )
 
 
-@_inlined
+@inlined
 def _gather(w: Floats, at: int, cells: Cells, block: int, u: Floats) -> None:
     """Edges u_a - u_0 of the block's cells, rows 3 i + a - 1 from `at`."""
     for l in range(LANES):
@@ -253,7 +235,7 @@ def _gather(w: Floats, at: int, cells: Cells, block: int, u: Floats) -> None:
             w[o + 2 * LANES] = u[n3 + c] - x
 
 
-@_inlined
+@inlined
 def _scatter(w: Floats, cells: Cells, block: int, f: Floats) -> None:
     """Adds what `_put_forces` left; node 0 takes minus the sum of the others."""
     for l in range(LANES):
@@ -273,7 +255,11 @@ def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w
     for block in range(cells.shape[0]):
         _load(w, geometry, block)
         _gather(w, _U, cells, block, u)
-        if law == SVK:
+        if geometry.ndim == 3 and law == INVARIANTS:
+            _forces_invariants(w, geometry, block)
+        elif geometry.ndim == 3:
+            _forces_carded(w, law, geometry, block)
+        elif law == SVK:
             _forces_svk(w)
         else:
             _forces_neo_hooke(w)
@@ -300,28 +286,28 @@ def add_forces_in_parts(
             f[i] += parts[t, WORK + i]
 
 
-@_inlined
+@inlined
 def _row(A: Nine, a: int) -> Three:
     return A[3 * a], A[3 * a + 1], A[3 * a + 2]
 
 
-@_inlined
+@inlined
 def _plus(x: Three, y: Three) -> Three:
     return x[0] + y[0], x[1] + y[1], x[2] + y[2]
 
 
-@_inlined
+@inlined
 def _rest(x: Three, y: Three, z: Three) -> Three:
     """What node 0 has: minus the sum of the others."""
     return -(x[0] + y[0] + z[0]), -(x[1] + y[1] + z[1]), -(x[2] + y[2] + z[2])
 
 
-@_inlined
+@inlined
 def _put_three(w: Floats, o: int, x: Three) -> None:
     w[o], w[o + 16], w[o + 32] = x[0], x[1], x[2]
 
 
-@_inlined
+@inlined
 def _put_node_forces(w: Floats, o: int, f1: Three, f2: Three, f3: Three) -> None:
     """V P g of all four nodes, in the first three of the 12 rows that each has."""
     _put_three(w, o, _rest(f1, f2, f3))
@@ -330,7 +316,7 @@ def _put_node_forces(w: Floats, o: int, f1: Three, f2: Three, f3: Three) -> None
     _put_three(w, o + 3 * WIDE * LANES, f3)
 
 
-@_inlined
+@inlined
 def _put_block(w: Floats, o: int, rows: int, block: Six) -> None:
     """Three or all six entries of a symmetric block, in the rows after the force."""
     _put_three(w, o + 48, (block[0], block[1], block[2]))
@@ -338,7 +324,7 @@ def _put_block(w: Floats, o: int, rows: int, block: Six) -> None:
         _put_three(w, o + 96, (block[3], block[4], block[5]))
 
 
-@_inlined
+@inlined
 def _node_svk(
     w: Floats, o: int, rows: int, g: Three, q: Three, ab: float, b: float, T: Nine
 ) -> None:
@@ -346,7 +332,7 @@ def _node_svk(
 
     With F S g = T q this is g.S g I + (lambda + mu) q q^T + mu |g|^2 F F^T in fewer products.
     """
-    m, x, y, z = _dot(g, g), q[0] * q[0], q[1] * q[1], q[2] * q[2]
+    m, x, y, z = dot(g, g), q[0] * q[0], q[1] * q[1], q[2] * q[2]
     s = b * (x + y + z)
     block = (
         s + ab * x + m * T[0],
@@ -359,7 +345,7 @@ def _node_svk(
     _put_block(w, o, rows, block)
 
 
-@_inlined
+@inlined
 def _tangents_svk(w: Floats, rows: int) -> None:
     """The nodes' own blocks of the tangent, and the forces V F S g = V T F g.
 
@@ -367,11 +353,11 @@ def _tangents_svk(w: Floats, rows: int) -> None:
     """
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
-        H = _product(_matrix(w, _U + l), G)
-        F, T, o = _deformation(H), _second(_transposed(H), a, b), _NODES + l
+        H = product(_matrix(w, _U + l), G)
+        F, T, o = deformation(H), _second(transposed(H), a, b), _NODES + l
         g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
-        q1, q2, q3 = _times(F, g1), _times(F, g2), _times(F, g3)
-        _put_node_forces(w, o, _times(T, q1), _times(T, q2), _times(T, q3))
+        q1, q2, q3 = times(F, g1), times(F, g2), times(F, g3)
+        _put_node_forces(w, o, times(T, q1), times(T, q2), times(T, q3))
         g0, q0 = _rest(g1, g2, g3), _rest(q1, q2, q3)
         _node_svk(w, o, rows, g0, q0, a + b, b, T)
         _node_svk(w, o + 1 * WIDE * LANES, rows, g1, q1, a + b, b, T)
@@ -379,12 +365,12 @@ def _tangents_svk(w: Floats, rows: int) -> None:
         _node_svk(w, o + 3 * WIDE * LANES, rows, g3, q3, a + b, b, T)
 
 
-@_inlined
+@inlined
 def _node_neo_hooke(
     w: Floats, o: int, rows: int, g: Three, q: Three, h: Three, m: float, c: float, k: float
 ) -> None:
     """m |g|^2 I + c h h^T - k/2 (q h^T + h q^T) of one node, q = F g, h = cof(F) g."""
-    s = m * _dot(g, g)
+    s = m * dot(g, g)
     x, y, z = c * h[0] - k * q[0], c * h[1] - k * q[1], c * h[2] - k * q[2]
     block = (
         s + x * h[0],
@@ -397,24 +383,24 @@ def _node_neo_hooke(
     _put_block(w, o, rows, block)
 
 
-@_inlined
+@inlined
 def _tangents_neo_hooke(w: Floats, rows: int) -> None:
     """The nodes' own blocks of the tangent, and the forces V P g."""
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
-        H = _product(_matrix(w, _U + l), G)
-        dJ, K = _volume(H)
-        y = _inverse_cube_root(1 + dJ)
+        H = product(_matrix(w, _U + l), G)
+        dJ, K = volume(H)
+        y = inverse_cube_root(1 + dJ)
         i, h, k = _shares(H, dJ, y, a, b)
         g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
-        q1, q2, q3 = _times(H, g1), _times(H, g2), _times(H, g3)
-        h1, h2, h3 = _times(K, g1), _times(K, g2), _times(K, g3)
+        q1, q2, q3 = times(H, g1), times(H, g2), times(H, g3)
+        h1, h2, h3 = times(K, g1), times(K, g2), times(K, g3)
         f1, f2 = _mixed(i, g1, h, q1, k, h1), _mixed(i, g2, h, q2, k, h2)
         _put_node_forces(w, _NODES + l, f1, f2, _mixed(i, g3, h, q3, k, h3))
         q1, q2, q3 = _plus(g1, q1), _plus(g2, q2), _plus(g3, q3)
         h1, h2, h3 = _plus(g1, h1), _plus(g2, h2), _plus(g3, h3)
         g0, q0, h0 = _rest(g1, g2, g3), _rest(q1, q2, q3), _rest(h1, h2, h3)
-        third = 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
+        third = 1 + (2 * (H[0] + H[4] + H[8]) + inner(H, H)) / 3
         m, inverse, o = b * y * y, y * y * y, _NODES + l
         c = (5 / 3 * m * third + 0.5 * a * (2 + dJ * (dJ + 2))) * inverse * inverse
         k = 4 / 3 * m * inverse
@@ -424,7 +410,32 @@ def _tangents_neo_hooke(w: Floats, rows: int) -> None:
         _node_neo_hooke(w, o + 3 * WIDE * LANES, rows, g3, q3, h3, m, c, k)
 
 
-@_inlined
+@inlined
+def _tangents_carded(w: Floats, law: int, geometry: Floats, block: int, rows: int) -> None:
+    """The nodes' own blocks of the tangent by its columns, and the forces V P g."""
+    for l in range(LANES):
+        G, a, b, o = _matrix(w, l), w[144 + l], w[160 + l], _NODES + l
+        H, card = product(_matrix(w, _U + l), G), _card(geometry, block, l)
+        P = _first_carded(law, H, a, b, card)
+        g1, g2, g3 = _row(G, 0), _row(G, 1), _row(G, 2)
+        _put_node_forces(w, o, times(P, g1), times(P, g2), times(P, g3))
+        for node in range(4):
+            g = g1 if node == 1 else g2 if node == 2 else g3 if node == 3 else _rest(g1, g2, g3)
+            place = o + node * WIDE * LANES
+            x = y = z = (0.0, 0.0, 0.0)
+            for axis in range(3):  # dP g of D = e g^T
+                e0 = 1.0 if axis == 0 else 0.0
+                e1 = 1.0 if axis == 1 else 0.0
+                e2 = 1.0 if axis == 2 else 0.0
+                D = (
+                    e0 * g[0], e0 * g[1], e0 * g[2], e1 * g[0], e1 * g[1], e1 * g[2],
+                    e2 * g[0], e2 * g[1], e2 * g[2],
+                )  # fmt: skip
+                x, y, z = y, z, times(_first_along(law, H, D, a, b, card), g)
+            _put_block(w, place, rows, (x[0], y[1], z[2], x[1], x[2], y[2]))
+
+
+@inlined
 def _mixed(a: float, x: Three, b: float, y: Three, c: float, z: Three) -> Three:
     return (
         a * x[0] + b * y[0] + c * z[0],
@@ -469,12 +480,12 @@ def _add_four(typing: Any, to: Any, n: Any, w: Any, o: Any) -> Any:
 _add_lanes = cast(Callable[..., None], intrinsic(_add_four))
 
 
-@_inlined
+@inlined
 def _place(cells: Cells, block: int, a: int, l: int, wide: int) -> Any:
     return np.uint64(cells[block, a, l]) // np.uint64(3) * np.uint64(wide)
 
 
-@_inlined
+@inlined
 def _scatter_nodes(w: Floats, cells: Cells, block: int, wide: int, to: Floats) -> None:
     """Adds the first `wide` (8 or 12) rows of every node to `to`, as many numbers a node."""
     for l in range(0, LANES, 4):
@@ -503,7 +514,9 @@ def add_forces_and_blocks(
     for block in range(cells.shape[0]):
         _load(w, geometry, block)
         _gather(w, _U, cells, block, u)
-        if law == SVK and rows == 6:
+        if geometry.ndim == 3:
+            _tangents_carded(w, law, geometry, block, rows)
+        elif law == SVK and rows == 6:
             _tangents_svk(w, 6)
         elif law == SVK:
             _tangents_svk(w, 3)
@@ -523,46 +536,46 @@ def add_forces_and_blocks(
                 d[rows * n + 3 + i] += to[wide * n + 6 + i]
 
 
-@_inlined
+@inlined
 def _products_svk(w: Floats) -> None:
     """V dP = dH V S + F V dS of the direction v, dH = dv/dX."""
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
-        H, D = _product(_matrix(w, _U + l), G), _product(_matrix(w, _V + l), G)
-        F, S = _deformation(H), _second(H, a, b)
-        Q = _product(_transposed(F), D)
+        H, D = product(_matrix(w, _U + l), G), product(_matrix(w, _V + l), G)
+        F, S = deformation(H), _second(H, a, b)
+        Q = product(transposed(F), D)
         t = a * (Q[0] + Q[4] + Q[8])
         xy, xz, yz = b * (Q[1] + Q[3]), b * (Q[2] + Q[6]), b * (Q[5] + Q[7])
         dS = t + 2 * b * Q[0], xy, xz, xy, t + 2 * b * Q[4], yz, xz, yz, t + 2 * b * Q[8]
-        P, R = _product(D, S), _product(F, dS)
-        _put_forces(w, l, _combined(1.0, P, 1.0, R), G)
+        P, R = product(D, S), product(F, dS)
+        _put_forces(w, l, combined(1.0, P, 1.0, R), G)
 
 
-@_inlined
-def _combined(a: float, A: Nine, b: float, B: Nine) -> Nine:
-    return (
-        a * A[0] + b * B[0], a * A[1] + b * B[1], a * A[2] + b * B[2],
-        a * A[3] + b * B[3], a * A[4] + b * B[4], a * A[5] + b * B[5],
-        a * A[6] + b * B[6], a * A[7] + b * B[7], a * A[8] + b * B[8],
-    )  # fmt: skip
-
-
-@_inlined
+@inlined
 def _products_neo_hooke(w: Floats) -> None:
     """V dP along v: the tangent of `fem.laws.NeoHooke` times dH, with X = F^-T."""
     for l in range(LANES):
         G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
-        H, D = _product(_matrix(w, _U + l), G), _product(_matrix(w, _V + l), G)
-        F, (dJ, K) = _deformation(H), _volume(H)
-        y = _inverse_cube_root(1 + dJ)
-        m, third = b * y * y, 1 + (2 * (H[0] + H[4] + H[8]) + _inner(H, H)) / 3
+        H, D = product(_matrix(w, _U + l), G), product(_matrix(w, _V + l), G)
+        F, (dJ, K) = deformation(H), volume(H)
+        y = inverse_cube_root(1 + dJ)
+        m, third = b * y * y, 1 + (2 * (H[0] + H[4] + H[8]) + inner(H, H)) / 3
         p = 0.5 * a * dJ * (dJ + 2)
-        X = _combined(y * y * y, _deformation(K), 0.0, F)
-        into, along = _inner(X, D), 2 / 3 * m * _inner(F, D)
-        straight = _combined(-2 / 3 * m * into, F, m, D)
+        X = combined(y * y * y, deformation(K), 0.0, F)
+        into, along = inner(X, D), 2 / 3 * m * inner(F, D)
+        straight = combined(-2 / 3 * m * into, F, m, D)
         c = (2 / 3 * m * third + a * (1 + dJ) * (1 + dJ)) * into - along
-        turned = _product(X, _product(_transposed(D), X))
-        _put_forces(w, l, _combined(1.0, _combined(1.0, straight, c, X), m * third - p, turned), G)
+        turned = product(X, product(transposed(D), X))
+        _put_forces(w, l, combined(1.0, combined(1.0, straight, c, X), m * third - p, turned), G)
+
+
+@inlined
+def _products_carded(w: Floats, law: int, geometry: Floats, block: int) -> None:
+    for l in range(LANES):
+        G = _matrix(w, l)
+        H, D = product(_matrix(w, _U + l), G), product(_matrix(w, _V + l), G)
+        card = _card(geometry, block, l)
+        _put_forces(w, l, _first_along(law, H, D, w[144 + l], w[160 + l], card), G)
 
 
 @_compiled
@@ -574,26 +587,35 @@ def add_products(
         _load(w, geometry, block)
         _gather(w, _U, cells, block, u)
         _gather(w, _V, cells, block, v)
-        if law == SVK:
+        if geometry.ndim == 3:
+            _products_carded(w, law, geometry, block)
+        elif law == SVK:
             _products_svk(w)
         else:
             _products_neo_hooke(w)
         _scatter(w, cells, block, f)
 
 
-@_inlined
+@inlined
 def _energy(law: int, H: Nine, a: float, b: float, dJ: float) -> float:
     """V W of one cell; logarithms by log1p, so that small strains keep their digits."""
     if law == SVK:
-        C = _strain(H)
+        C = strain(H)
         trace = C[0] + C[1] + C[2]
         square = C[0] * C[0] + C[1] * C[1] + C[2] * C[2]
         square += 2 * (C[3] * C[3] + C[4] * C[4] + C[5] * C[5])
         return a / 8 * trace * trace + b / 4 * square
-    trace = 2 * (H[0] + H[4] + H[8]) + _inner(H, H)
+    trace = 2 * (H[0] + H[4] + H[8]) + inner(H, H)
     log = float(np.log1p(dJ))
     shape = (3 + trace) * float(np.expm1(-2 / 3 * log)) + trace
     return b / 2 * shape + a / 4 * (dJ * (dJ + 2) - 2 * log)
+
+
+@inlined
+def _energy_carded(law: int, H: Nine, a: float, b: float, dJ: float, card: Floats) -> float:
+    if law < OGDEN:
+        return energy_invariants(law == INVARIANTS_COUPLED, H, a, _four(card, b), dJ)
+    return energy_ogden(law == OGDEN_COUPLED, H, a, card, dJ)
 
 
 @_compiled
@@ -606,15 +628,19 @@ def looked_at(
         _load(w, geometry, block)
         _gather(w, _U, cells, block, u)
         for l in range(min(LANES, count - block * LANES)):
-            H = _product(_matrix(w, _U + l), _matrix(w, l))
-            dJ, _ = _volume(H)
+            H = product(_matrix(w, _U + l), _matrix(w, l))
+            dJ, _ = volume(H)
             least = min(least, 1 + dJ)
             inverted += not 1 + dJ > 0
-            energy += _energy(law, H, w[144 + l], w[160 + l], dJ)
+            a, b = w[144 + l], w[160 + l]
+            if geometry.ndim == 3:
+                energy += _energy_carded(law, H, a, b, dJ, _card(geometry, block, l))
+            else:
+                energy += _energy(law, H, a, b, dJ)
     return energy, least, inverted
 
 
-@_inlined
+@inlined
 def _pull(springs: Springs, u: Floats, r: Floats) -> None:
     """r = K u of springs, rows of a csr matrix; zero without any."""
     starts, columns, values = springs
@@ -626,14 +652,14 @@ def _pull(springs: Springs, u: Floats, r: Floats) -> None:
                 r[i] += values[k] * u[columns[k]]
 
 
-@_inlined
+@inlined
 def _moved(u: Floats, d: Floats, r: Floats, keep: Floats, gain: Floats) -> None:
     for i in range(u.size):
         d[i] = keep[i] * d[i] - gain[i] * r[i]
         u[i] += d[i]
 
 
-@_inlined
+@inlined
 def _moved_damped(
     u: Floats, d: Floats, r: Floats, old: Floats, keep: Floats, gain: Floats, lag: float
 ) -> float:
@@ -650,7 +676,7 @@ def _moved_damped(
     return taken
 
 
-@_inlined
+@inlined
 def _rates(rows: Floats, keep: Floats, gain: Floats, lag: float, dt: float) -> float:
     """v and a at u (paper 003, eqs 13-14), which know the next increment; sum of d^2."""
     u, d, r, old, v, a = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
@@ -663,7 +689,7 @@ def _rates(rows: Floats, keep: Floats, gain: Floats, lag: float, dt: float) -> f
     return total
 
 
-@_inlined
+@inlined
 def _input(columns: Floats, j: int, begin: Floats, end: Floats, share: float, first: int) -> float:
     """Row j of `columns` (., k) times the inputs from `first` on, a share of the way."""
     total = 0.0

@@ -22,7 +22,7 @@ from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitM
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
-from validate.solve.handles import COMPILED_DYNAMICS, Handles, require_handled
+from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -45,7 +45,7 @@ class CentralDifference:
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
 
-    handles: ClassVar[Handles] = COMPILED_DYNAMICS
+    handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")

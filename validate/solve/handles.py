@@ -11,7 +11,6 @@ from validate.scene.scene import LawName, Scene
 
 ContactName = Literal["foundations", "membranes"]
 LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS))
-COMPILED: tuple[LawName, ...] = ("svk", "neo_hooke")
 GLUED: tuple[ContactName, ...] = ("foundations", "membranes")
 
 
@@ -37,7 +36,6 @@ class Handles:
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
 LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False)
-COMPILED_DYNAMICS = Handles(COMPILED, inertia=True, cavities=False)
 LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, loads=False)
 
 
