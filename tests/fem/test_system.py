@@ -8,6 +8,7 @@ from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_responses, ph
 
 from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
+from validate.scene.box import box
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.scene import Cavity, Dilatation, Drive, Material, Pin, Scene, Support
@@ -223,3 +224,11 @@ def test_system_is_frozen() -> None:
     assert [f.name for f in fields(system)] == ["scene", "free", "moves", "cavities"]
     with pytest.raises(AttributeError):
         system.free = np.zeros(1)  # type: ignore[misc]
+
+
+def test_a_body_whose_nodes_are_all_held_is_refused_with_the_elements_it_takes() -> None:
+    held = (Support("z0", (0, 1, 2)), Support("z1", (0, 1)))
+    stage = Drive("stage", "z1", (0.0, 0.0, -1.0))
+    pressed = Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), held, drives=(stage,))
+    with pytest.raises(SceneError, match=r"all 24 unknowns of 8 nodes are held .*at least 2 elem"):
+        build(pressed)

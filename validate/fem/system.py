@@ -117,6 +117,11 @@ def build(scene: Scene) -> System:
         driven = _driven(scene, drive)
         held[driven] = True
         moves[driven, j] = sum(drive.direction)
+    if held.all():
+        raise SceneError(
+            f"all {N} unknowns of {len(mesh.nodes)} nodes are held or driven, nothing is left to "
+            "solve: put at least 2 elements between what is held, or one of order 2"
+        )
     _require_felt(scene, held)
     cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
     return System(scene, np.flatnonzero(~held), moves, cavities)

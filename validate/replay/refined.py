@@ -84,10 +84,16 @@ class Refined:
 
     def _converged(self, part: str, residual: Residual, rounding: float) -> GridConvergence | None:
         answers: dict[float, Floats] = {}
+        meshes: set[int] = set()
         for size, run in zip(self._sizes[part], self._runs[part], strict=True):
             mine = run.residuals.get(residual.name) if run else None
-            if mine is not None and mine.values.shape == residual.values.shape:
+            if run is None or mine is None or mine.values.shape != residual.values.shape:
+                continue
+            # A method whose own settings fix its mesh is no ladder, whatever the sizes say.
+            nodes = len(run.scene.mesh.nodes) if part == "mesh" else len(meshes)
+            if nodes not in meshes:
                 answers.setdefault(size, mine.values)
+            meshes.add(nodes)
         if len(answers) < 3 or self._sizes[part][0] not in answers:
             return None
         return convergence(list(answers), list(answers.values()), 0, self._formal(part), rounding)
@@ -99,7 +105,7 @@ class Refined:
 
     def _words(self, part: str, found: GridConvergence | None) -> str:
         if found is None:
-            return "fewer than three sizes compare the same points"
+            return "fewer than three different sizes compare the same points"
         by = f" by {self._stands_in} in its place" if part == "mesh" and self._stands_in else ""
         return found.words + by
 
