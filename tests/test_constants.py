@@ -9,24 +9,40 @@ _TABLES = (ast.Dict, ast.DictComp)  # they grow by an entry, and are tested entr
 
 
 def _named(root: Path) -> dict[str, dict[str, str]]:
-    """What the top of each module names that is written with numbers."""
+    """What modules name at their top, and fields declare, that is written with numbers."""
     found: dict[str, dict[str, str]] = {}
     for path in sorted((root / "validate").rglob("*.py")):
         module = ".".join(path.relative_to(root / "validate").with_suffix("").parts)
-        for statement in ast.parse(path.read_text("utf-8")).body:
-            match statement:
-                case ast.Assign(targets=[target], value=value):
-                    pass
-                case ast.AnnAssign(target=target, value=ast.expr() as value):
-                    pass
-                case _:
-                    continue
-            text = ast.unparse(value)
-            if isinstance(value, _TABLES) or len(text) > _LONGEST:
-                continue
-            if any(_number(part) for part in ast.walk(value)):
-                found.setdefault(module, {})[ast.unparse(target)] = text
+        tree = ast.parse(path.read_text("utf-8"))
+        kinds = [n for n in tree.body if isinstance(n, ast.ClassDef)]
+        named = {**_written(tree.body, ""), **_fields(kinds)}
+        if named:
+            found[module] = named
     return found
+
+
+def _written(body: list[ast.stmt], prefix: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for statement in body:
+        match statement:
+            case ast.Assign(targets=[target], value=value):
+                pass
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                pass
+            case _:
+                continue
+        text = ast.unparse(value)
+        if isinstance(value, _TABLES) or len(text) > _LONGEST:
+            continue
+        if text in ("True", "False") or any(_number(part) for part in ast.walk(value)):
+            found[prefix + ast.unparse(target)] = text
+    return found
+
+
+def _fields(kinds: list[ast.ClassDef]) -> dict[str, str]:
+    """Defaults of fields; those with a unit are in `defaults.toml`."""
+    each = (_written(kind.body, f"{kind.name}.") for kind in kinds)
+    return {n: text for found in each for n, text in found.items() if "quantity(" not in text}
 
 
 def _number(part: ast.AST) -> bool:

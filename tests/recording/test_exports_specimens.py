@@ -7,7 +7,8 @@ import pytest
 from exports import D, F, T, assert_test, comma, read, rows
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports.specimens import column_groups
+from validate.recording.exports.specimens import _group, column_groups
+from validate.recording.exports.table import Column, Table
 
 NAMES = "Time (s),Extension (mm),Load (N)\n"
 LINES = rows().splitlines(keepends=True)
@@ -174,3 +175,15 @@ def test_an_idle_sensor_is_no_rival(tmp_path: Path) -> None:
     moving = "".join(f"{t},{d:.5f},{f:.5f},{np.sqrt(d):.5f}\n" for t, d, f in PAIRS)
     with pytest.raises(RecordingError, match="2 different columns may be displacement"):
         read(tmp_path, "Time (s),Stroke (mm),Force (N),Deflection (mm)\n" + moving)
+
+
+def test_a_specimen_goes_on_while_any_of_its_columns_does() -> None:
+    cells = {
+        "Time": ("0", "1", "2", "3"),
+        "Load 1": ("1", "2", "3", ""),
+        "Way 1": ("1", "2", "", ""),
+    }
+    columns = tuple(Column(name, name, None, c) for name, c in cells.items())
+    table = Table({}, columns, (2, 3, 4, 5), 1, "utf-8", "", ",", ".")
+    assert _group(table, (0, 1, 2), "1").lines == (2, 3, 4)  # the common time alone goes on
+    assert _group(table, (1, 2), "").lines == (2, 3, 4)

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validate.replay.compression import pressed_log
+from validate.parameters import describe
+from validate.replay.compression import Specimen, pressed_log
 from validate.replay.refined import Refined
 
 
@@ -17,7 +18,7 @@ def test_a_log_begins_where_the_fitted_line_meets_no_force() -> None:
         "displacement": SimpleNamespace(t=t, y=d, sd=1e-6),
         "force": SimpleNamespace(t=t, y=force, sd=0.01),
     }
-    recording = SimpleNamespace(signal=lambda name, unit: signals[name])
+    recording = SimpleNamespace(metadata={}, signal=lambda name, unit: signals[name])
     fit = SimpleNamespace(contact=1e-3, toe=0.02, offset=0.5)
     seen = pressed_log(recording, fit, 0.05, 0.1, {"late": (0.04, 0.08)}, 0.02)
     stage, cell = seen.observations
@@ -39,3 +40,8 @@ def test_what_is_rounding_is_the_larger_of_two_bounds() -> None:
     assert 0 < alone < 1e-6
     assert rounding(1e-30) == alone
     assert rounding(1e6) > 1e3 * alone
+
+
+def test_both_sizes_of_a_specimen_are_asked_for() -> None:
+    asked = {p.path: p.asked for p in describe(Specimen())}
+    assert asked == {"diameter": True, "height": True, "mesh": False}

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from report_samples import small_result
 
 from validate.compare.effects import Change, Effect
-from validate.report import markers
+from validate.report import markers, outlines
 from validate.report.body import shown_body
 from validate.report.discrimination import _budget
 from validate.report.provenance import _points
@@ -98,6 +98,25 @@ def test_axes_of_markers_have_labels_each(monkeypatch: pytest.MonkeyPatch) -> No
         monkeypatch.setattr(markers, name, value)
     assert markers.markers(Made()) is not None
     assert shown[0].labels == ("x", "y")
+
+
+def test_every_load_shows_the_section_of_the_judged_method(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judged, rival = Made(registered=[None]), Made()
+    shown: list[Any] = []
+    for name, value in {
+        "shown_method": lambda result: judged,
+        "outline_seen": lambda method: Made(corners=(), measured=lambda t: t),
+        "holds": lambda registered: (Made(t=0.0), Made(t=1.0)),
+        "_drawn": lambda result, measured: [Made(method=rival), Made(method=judged)],
+        "moving_outline": lambda method: (),
+        "_at_last": lambda measured, drawn: None,
+        "_by_load": lambda measured, first, drawn: shown.append(first.method),
+    }.items():
+        monkeypatch.setattr(outlines, name, value)
+    assert outlines.outlines(Made()) is not None
+    assert shown == [judged]
 
 
 def test_a_budget_has_the_quantities_of_its_load() -> None:

@@ -29,6 +29,15 @@ def test_loop_tends_to_the_exact_pressure(phantom: Responses) -> None:
         assert pressures(loop) == pytest.approx(pressures(exact), abs=30e3 * tolerance)
 
 
+def test_a_volume_that_is_just_within_the_tolerance_is_left_alone(phantom: Responses) -> None:
+    off = abs(volume_ratios(phantom, stepped(PressureLoop(tolerance=1.0), phantom, NINE))[0] - 1)
+    exact = abs(1 - (phantom.volumes @ np.array([1.0, *NINE, 0.0]) @ np.array([1.0, *NINE, 0.0])
+                     @ np.array([1.0, *NINE, 0.0]))[0] / phantom.rest_volumes[0])  # fmt: skip
+    assert off == exact
+    assert stepped(PressureLoop(tolerance=exact), phantom, NINE).updates == 0
+    assert stepped(PressureLoop(tolerance=0.999 * exact), phantom, NINE).updates > 0
+
+
 @pytest.mark.parametrize("factor", [0.5, 1.0, 1.5])
 def test_tolerance_zero_ends_by_stagnation(phantom: Responses, factor: float) -> None:
     exact = stepped(ExactPressure(), phantom, NINE)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ from validate.study.job import Job, Plan, Where
 from validate.study.trade import Trade, TradeRow, front, trade_cells, traded
 from validate.study.trade_cell import Measured, TradeCell, run_cell
 from validate.study.trade_exhibits import trade_exhibits
-from validate.study.trade_page import trade_document
+from validate.study.trade_page import cells_table, trade_document
 
 STEPS = (0.02, 0.01, 0.005)
 STATIC = Rival("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
@@ -66,7 +67,7 @@ def small(job: Job | None = None) -> Trial:
             Rival("explicit", "explicit", lambda dt: ExplicitLinear(dt, damping_terms="full")),
             Rival("large", "large strain",
                    lambda dt: NewtonDynamics(dt, mass="consistent"), law="neo_hooke",
-                   elements=("P1",), finest=1, shortest=STEPS[0]),
+                   elements=("P1",), finest=1, shortest=STEPS[1]),
         ),
         LawPair("P1", 1, STEPS[0], Newmark, lambda dt: NewtonDynamics(dt, mass="consistent")),
         dynamic=True, rise_s=0.0,
@@ -90,7 +91,7 @@ def rows_of(found: Trade, name: str, element: str = "P1", level: int = 2) -> lis
 
 
 def test_every_solver_runs_on_every_mesh_element_and_step(measured: Trade) -> None:
-    assert len(measured.rows) == 3 * (1 + 1 + 3 + 3) + 1
+    assert len(measured.rows) == 3 * (1 + 1 + 3 + 3) + 2
     assert all(r.step is not None and r.step.n > 0 for r in measured.rows if not r.failed)
     assert [r.dt for r in rows_of(measured, "average")] == list(STEPS)
 
@@ -110,6 +111,8 @@ def test_the_step_error_is_of_second_order_and_the_mesh_rules(measured: Trade) -
     assert errors[2] < 0.1 * (rows_of(measured, "average")[2].mesh_error or 0.0)
     ladder = next(x for x in measured.refinements if x.what.startswith("steps of average"))
     assert ladder.found.order == pytest.approx(2.0, abs=0.6)
+    stepped = [x.what.split(",")[0] for x in measured.refinements if x.what.startswith("steps")]
+    assert stepped == ["steps of average", "steps of explicit"]  # of one law
 
 
 def test_too_long_explicit_steps_are_rows_with_the_reason(measured: Trade) -> None:
@@ -124,7 +127,7 @@ def test_statics_assemble_no_mass_and_say_so(measured: Trade) -> None:
 
 
 def test_large_strain_is_held_against_its_own_truth(measured: Trade) -> None:
-    (large,) = rows_of(measured, "large", level=1)
+    large, _ = rows_of(measured, "large", level=1)
     linear = rows_of(measured, "average", level=1)[0]
     assert measured.law_error > 0
     # On the pair's own mesh and step the law's share cancels: what is left is the linear error.
@@ -135,6 +138,8 @@ def test_a_trade_is_told_in_numbers_that_are_finite(measured: Trade) -> None:
     made = trade_exhibits(measured)
     assert [e.anchor for e in made] == ["front", "shares", "costs", "convergence", "unscored"]
     told = trade_document(measured)
+    assert {row[-1] for row in cells_table(measured)} == {r.failed or None for r in measured.rows}
+    assert None in {row[-1] for row in cells_table(measured)}
     assert len(told["cells"]) == len(measured.rows)
     climb = [(rung, measured) for rung in RUNGS]
     choice = choose(climb, wanted("1mm", "1Hz"), False, lambda trade, row, dt: row)
@@ -289,6 +294,23 @@ def test_a_row_of_the_front_in_its_own_units(
     studying._show_trade(found)
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines.count(["fast", "P1", "1", "2.00", "4.00"]) == 2
+
+
+def test_a_ladder_has_the_error_of_its_rungs(
+    measured: Trade, capsys: pytest.CaptureFixture[str]
+) -> None:
+    best = timed("fast", 2e-3, 4e-6)
+    rungs = (Made(rung="modal", verdict="meets", best=best, evidence="one"),
+             Made(rung="large", verdict="nothing ran", best=None, evidence="none"))  # fmt: skip
+    choice = Made(trade=measured, facts=(), ladder=rungs, by="error", rejected=())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(studying, "words", lambda choice: ())
+        studying._show_choice(choice)
+    told = capsys.readouterr().out.split("The ladder")[1]
+    modal, large = (next(x for x in told.splitlines() if x.startswith(r)) for r in ("mod", "lar"))
+    assert modal.split() == ["modal", "meets", "2.00", "one"]
+    assert "none" in large
+    assert "0.00" not in large
 
 
 def test_memory_counts_every_array_once() -> None:

@@ -1,0 +1,15 @@
+"""What `validate list NAME --json` may hold: numbers only."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from validate.cli import listing
+
+
+def test_a_number_that_is_none_is_never_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listing, "find", lambda *_: SimpleNamespace())
+    monkeypatch.setattr(listing, "_summary", lambda experiment: {"limit": float("nan")})
+    monkeypatch.setattr(listing, "_details", lambda experiment: {})
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        listing.show("cube", (), as_json=True)

@@ -1,0 +1,54 @@
+"""The rivals of a ladder: which of them depend on the step, and where they run."""
+
+import pytest
+
+from validate.replay.ladder_solvers import (
+    exact_in_ramps,
+    exact_in_time,
+    still,
+    still_best,
+    swinging,
+    swinging_pair,
+)
+from validate.solve.fluid import ExactPressure
+from validate.solve.quasi_static import QuasiStatic
+
+STEPS = (0.02, 0.01)
+EXACT = {"quasi-static", "10 modes", "40 modes"}  # none of these has an error of the step
+
+
+def test_only_what_depends_on_the_step_takes_several() -> None:
+    rivals = swinging(STEPS, small=3, medium=5, law="svk")
+    taken = dict.fromkeys((r.name for r in rivals), STEPS)
+    taken |= dict.fromkeys(EXACT, STEPS[1:]) | {"large strain, implicit": STEPS[:1]}
+    assert {r.name: r.steps("P1", 1, STEPS) for r in rivals} == taken
+    assert {r.name for r in rivals if not r.steps("P1", 4, STEPS)} == {
+        "implicit, sparse LU every step", "implicit, Gaussian elimination every step",
+    }  # fmt: skip
+    assert {r.name for r in rivals if not r.steps("P1", 6, STEPS)} == {
+        "implicit, sparse LU every step", "implicit, Gaussian elimination every step",
+        "implicit, dense inverse", "large strain, implicit",
+    }  # fmt: skip
+    assert {r.law for r in rivals if r.rung == "large strain"} == {"svk"}
+    assert {r.order for r in rivals} == {1.0, 2.0}
+    assert next(r.order for r in rivals if r.name.startswith("backward Euler")) == 1.0
+
+
+def test_statics_are_stepped_by_newton_alone() -> None:
+    for cavities, count in ((True, 5), (False, 3)):
+        rivals = still(cavities, 0.02, 0.01, medium=5, coarse=3)
+        assert len(rivals) == count
+        stepped = {r.name for r in rivals if r.steps("P1", 1, STEPS) == STEPS[:1]}
+        assert stepped == {"large strain, Newton every step"}
+        assert all(r.steps("P1", 1, STEPS) == STEPS[1:] for r in rivals if r.name not in stepped)
+        assert {r.name for r in rivals if not r.steps("P1", 4, STEPS)} == stepped
+        assert len({r.name for r in rivals if r.steps("P1", 6, STEPS)}) == count - 2
+        assert [r.name for r in rivals if r.lacks] == ["superposition, cavity empty"] * cavities
+
+
+def test_the_most_exact_solver_of_each_kind() -> None:
+    assert isinstance(still_best(True)(0.1), ExactPressure)
+    assert isinstance(still_best(False)(0.1), QuasiStatic)
+    assert (exact_in_time(0.1).propagate, exact_in_ramps(0.1).propagate) == ("constant", "linear")
+    assert exact_in_time(0.1).modes == exact_in_ramps(0.1).modes == 60
+    assert swinging_pair("P1", 2, 0.1).declared(0.3).dt == pytest.approx(0.3)
