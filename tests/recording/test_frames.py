@@ -221,7 +221,9 @@ def test_png_stack_is_sorted_by_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scale", ["0.1", "8", "1e-7", "1e999"])
 def test_a_pixel_beyond_reason_is_asked_back(tmp_path: Path, scale: str) -> None:
     (tmp_path / "1.png").write_bytes(encode_png(IMAGES[0]))
-    with pytest.raises(UsageError, match=f"m_per_px={scale}: .* outside 1e-06 to 0.01 m; mm or um"):
+    with pytest.raises(
+        UsageError, match=f"m_per_px={scale}: .* outside 1e-06 to 0.01 m.* With its"
+    ):
         read_png_stack(tmp_path, {"m_per_px": scale, "rate": "1"})
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.parameters import Parameter
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Frames, Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay.followed import Followed
@@ -79,3 +79,15 @@ def test_strain_and_stress_of_the_whole_recording() -> None:
     assert "1e+04 mm2 is a stress of 0.1 Pa, 1/10 of 1 Pa" in soft
     (hard,) = said(force=1e6)
     assert "stress of 1e+08 Pa, 10 times" in hard
+
+
+def test_a_run_doubts_images_beyond_reason() -> None:
+    image = np.zeros((300, 400), np.uint8)
+    frames = Frames(np.array([0.0]), (image,), (8.0, 8.0), np.eye(4), "probe")
+    recording = Recording("r", Source("x", "", 0, "x"), 0, frames={"us": frames})
+    stage = SignalObservation("stage", "drives", T, 0 * T[:, None], "m", 0.0)
+    point = Followed(
+        "m", "m", "", replace(SCENE, drives=()), (Registered((stage,)),), (), {}
+    )  # fmt: skip
+    (found,) = doubts((), {}, (recording,), point)
+    assert found.startswith("r: 'us': 8 m a pixel is outside 1e-06 to 0.01 m: an image of 3.2e+03")

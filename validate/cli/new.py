@@ -13,6 +13,7 @@ from string import Template
 import numpy as np
 
 from validate.cli.display import say
+from validate.cli.recordings import ask_back
 from validate.errors import UsageError
 from validate.places import try_folder, write_whole
 from validate.recording.mcap.read import read_recording
@@ -35,7 +36,9 @@ def new(name: str, source: Path, out: Path | None) -> None:
     if path.exists():
         raise UsageError(f"{path} exists and is left alone; give another NAME or -o")
     try_folder(path, _LARGEST)
-    text = written(name, read_recording(source), _beside(source, path))
+    recording = read_recording(source)
+    ask_back(recording)
+    text = written(name, recording, _beside(source, path))
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, text)
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")

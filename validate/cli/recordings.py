@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from validate.cli.arguments import pairs
+from validate.cli.arguments import complain, pairs
 from validate.cli.display import say
 from validate.errors import UsageError
 from validate.places import try_file
@@ -13,6 +13,7 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
 from validate.recording.readers import named, recognised
+from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 
 
@@ -26,6 +27,7 @@ def import_file(
     recording = reader.read(file, pairs(mapping, "--map") | said)
     write_recording(recording, out)
     written(recording, out)
+    ask_back(recording)
 
 
 def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
@@ -36,6 +38,13 @@ def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> 
         merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))
     write_recording(merged, out)
     written(merged, out)
+    ask_back(merged)
+
+
+def ask_back(recording: Recording) -> None:
+    """A line on standard error for every scale of images or outlines that is beyond reason."""
+    for line in odd_scales(recording):
+        complain(line)
 
 
 def _seconds(topic: str, text: str) -> tuple[float, float]:

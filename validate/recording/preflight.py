@@ -23,7 +23,8 @@ from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIR
 from validate.recording.mcap.streams import Collected, fill, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.readers import READERS
-from validate.recording.types import Clock, Frames, Source, odd_scale
+from validate.recording.scales import odd_stream
+from validate.recording.types import Clock, Source
 
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
 _KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours", IMAGE: "frames"}
@@ -177,7 +178,7 @@ def _content(verified: Verified, raw: Collected | None) -> tuple[Ints | None, li
         stream = stream_of(raw, int(raw.times_ns.min()), by_name(verified.metadata))
     except RecordingError as error:
         return stamps, [str(error)]
-    odd = odd_scale(stream.m_per_px) if isinstance(stream, Frames) else ""
+    odd = odd_stream(stream)
     return stamps, [f"{raw.channel.topic!r}: {odd}"] if odd else []
 
 

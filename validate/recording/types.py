@@ -124,18 +124,6 @@ def _image(image: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:
     return image
 
 
-_PIXELS = (1e-6, 1e-2)  # m: sides of a pixel from a microscope's to a photograph's of a table
-
-
-def odd_scale(m_per_px: tuple[float, float]) -> str:
-    """What is odd about the size of a pixel; empty where images of bodies have such."""
-    low, high = _PIXELS
-    if all(low <= side <= high for side in m_per_px):
-        return ""
-    sides = " x ".join(f"{side:g}" for side in dict.fromkeys(m_per_px))
-    return f"{sides} m a pixel is outside {low:g} to {high:g} m"
-
-
 @dataclass(frozen=True)
 class Frames:
     """B-mode images over time: images nt x (h, w) uint8, m_per_px (x, y), pose T_frame_from_image.

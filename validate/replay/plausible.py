@@ -1,4 +1,4 @@
-"""Doubts of what was given: sizes, strain, stress and modulus that no soft tissue has, by factor.
+"""Doubts of what was given: sizes, scales of images, strain, stress and modulus beyond soft tissue.
 
 They are warnings: a run with a metre for a millimetre agrees with itself as well as any other, for
 what is identified follows the size.
@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from validate.parameters import Parameter
+from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 from validate.replay.followed import Followed
@@ -30,6 +31,7 @@ def doubts(
 ) -> tuple[str, ...]:
     """A sentence with the factor for everything implausible; `first` is any method that was run."""
     found = [w for p in parameters for w in _of_value(p, stated)]
+    found += [f"{r.name}: {line}" for r in recordings for line in odd_scales(r)]
     if isinstance(first.scene, Scene) and first.scene.mesh.dimension == 3:
         for drive in (d for d in first.scene.drives[:1] if d.point is None):
             found += _of_compression(first.scene, drive, recordings[0], first)

@@ -10,7 +10,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.reader import Options, Reader, require_known
-from validate.recording.types import Frames, Recording, Source, odd_scale
+from validate.recording.scales import odd_pixel
+from validate.recording.types import Frames, Recording, Source
 from validate.units import in_si, split
 
 MAX_STACK = 400 * 2**20  # bytes of all images of one stack
@@ -33,6 +34,7 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         raise UsageError(f"{folder} is no folder of PNG images")
     side, rate = _pixel(options["m_per_px"]), _above_zero(options, "rate")
     images = _images(folder)
+    _require_meant(options["m_per_px"], side, images[0])
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
     topic, name = options.get("topic", "images"), folder.resolve().name
@@ -48,14 +50,20 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
 
 
 def _pixel(text: str) -> float:
-    """Side of a pixel, m; a bare number beyond reason is asked back, one with its unit is meant."""
+    """Side of a pixel, m."""
     number, unit = split(text) or (0.0, "")
     side = in_si(number, unit or "m", "m")
     if side is None or side <= 0:
         raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
-    if not unit and (odd := odd_scale((side, side))):
-        raise UsageError(f"m_per_px={text}: {odd}; mm or um? with its unit it is taken")
     return side
+
+
+def _require_meant(text: str, side: float, image: Pixels) -> None:
+    """A bare number beyond reason is asked back; one with its unit is meant."""
+    height, width = image.shape
+    bare = (split(text) or (0.0, ""))[1] == ""
+    if bare and (odd := odd_pixel((side, side), (height, width))):
+        raise UsageError(f"m_per_px={text}: {odd} With its unit it is taken")
 
 
 def _above_zero(options: Options, key: str) -> float:

@@ -1,0 +1,85 @@
+"""Scales of images and outlines beyond reason: by how much, and which unit may have been meant.
+
+A recording whose metres are millimetres agrees with itself as well as any other, so it is asked
+back where images enter.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from validate.recording.types import Contours, Frames, Recording
+
+_PIXELS = (1e-6, 1e-2)  # m: sides of a pixel from a microscope's to a photograph's of a table
+_EXTENTS = (1e-4, 5.0)  # m: of an image, from a cell's to a room's
+_OUTLINES = (1e-5, 5.0)  # m: of an outline in such an image
+_UNITS = (("mm", 1e-3), ("um", 1e-6))
+
+
+def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = None) -> str:
+    """What is odd about the size of a pixel, or of an image (h, w) of such; "" for nothing."""
+    inside = _within(m_per_px, shape)
+    if inside:
+        return ""
+    low, high = _PIXELS
+    sides = " x ".join(f"{side:g}" for side in dict.fromkeys(m_per_px))
+    found = f"{sides} m a pixel is outside {low:g} to {high:g} m"
+    if all(low <= side <= high for side in m_per_px):
+        found = f"{sides} m a pixel"
+    return f"{found}{_image(m_per_px, shape)}{_meant(m_per_px, shape)}"
+
+
+def odd_scales(recording: Recording) -> tuple[str, ...]:
+    """A line for every stream of images or outlines whose metres may be something else."""
+    return tuple(f"'{topic}': {text}" for topic, text in _odd(recording) if text)
+
+
+def odd_stream(stream: object) -> str:
+    """What is odd about the scale of one stream; "" for nothing, and for other streams."""
+    if isinstance(stream, Frames):
+        height, width = stream.images[0].shape
+        return odd_pixel(stream.m_per_px, (height, width))
+    return _odd_outlines(stream) if isinstance(stream, Contours) else ""
+
+
+def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
+    for topic, stream in recording.streams.items():
+        yield topic, odd_stream(stream)
+
+
+def _odd_outlines(contours: Contours) -> str:
+    size = max(float(np.ptp(outline, axis=0).max()) for outline in contours.outlines)
+    low, high = _OUTLINES
+    if low <= size <= high:
+        return ""
+    return f"outlines of {size:.3g} m are outside {low:g} to {high:g} m{_factor(size, _OUTLINES)}"
+
+
+def _within(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> bool:
+    pixel = all(_PIXELS[0] <= side <= _PIXELS[1] for side in m_per_px)
+    return pixel and all(_EXTENTS[0] <= e <= _EXTENTS[1] for e in _extents(m_per_px, shape))
+
+
+def _extents(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> tuple[float, ...]:
+    """Width and height of an image, m; of a few pixels nothing is said."""
+    if shape is None or min(shape) < 64:
+        return ()
+    return m_per_px[0] * shape[1], m_per_px[1] * shape[0]
+
+
+def _image(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> str:
+    found = _extents(m_per_px, shape)
+    return f": an image of {' x '.join(f'{e:.3g}' for e in found)} m" if found else ""
+
+
+def _meant(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> str:
+    """The units whose name would make it reasonable, each with its factor."""
+    x, y = m_per_px
+    fit = [(unit, f) for unit, f in _UNITS if _within((x * f, y * f), shape)]
+    said = " or ".join(f"{round(1 / f)} ({x:g}{unit})" for unit, f in fit)
+    return f"; a factor {said}?" if fit else ""
+
+
+def _factor(size: float, within: tuple[float, float]) -> str:
+    fit = [f for _, f in _UNITS if within[0] <= size * f <= within[1]]
+    return f"; a factor {' or '.join(str(round(1 / f)) for f in fit)}?" if fit else ""
