@@ -17,6 +17,18 @@ def test_listed_values_stay_as_written() -> None:
     assert axis("methods.kf.rule = average, backward_euler").values == ("average", "backward_euler")
 
 
+def test_values_carry_units_and_are_numbers_in_the_first_one() -> None:
+    listed = axis("material.E=10kPa,20kPa,0.05MPa")
+    assert listed.values == ("10kPa", "20kPa", "0.05MPa")
+    assert (listed.numbers, listed.label) == ((10.0, 20.0, 50.0), "material.E / kPa")
+    spaced = axis("methods.kf.Q=log:1e-6mm2:1e-4mm2:3")
+    assert spaced.values == ("1e-06mm2", "1e-05mm2", "0.0001mm2")
+    assert axis("a=lin:1kPa:3000Pa:3").numbers == (1.0, 2.0, 3.0)
+    assert axis("a=10kPa,20").numbers is None  # a bare number is SI: not the same axis
+    assert axis("a=10kPa,5mm").numbers is None
+    assert (axis("a=1,2").numbers, axis("a=1,2").label) == ((1.0, 2.0), "a")
+
+
 def test_several_axes_make_a_grid_with_the_last_fastest() -> None:
     rows = grid(axes(["a=1,2", "b=x,y"]))
     assert [tuple(r.values()) for r in rows] == [("1", "x"), ("1", "y"), ("2", "x"), ("2", "y")]
@@ -33,7 +45,9 @@ def test_several_axes_make_a_grid_with_the_last_fastest() -> None:
         ("a=log:0:1:5", "above 0"),
         ("a=log:1:2", "FIRST:LAST:COUNT"),
         ("a=lin:0:1:1", "2 to"),
-        ("a=lin:0:inf:3", "2 to"),
+        ("a=lin:0:inf:3", "FIRST and LAST are numbers"),
+        ("a=log:1kPa:5:3", "of one unit"),
+        ("a=log:1kPa:5mm:3", "of one unit"),
         ("a=lin:0:1:9999999999", "2 to"),
     ],
 )

@@ -193,7 +193,7 @@ def _common(options: dict[str, Any]) -> Any:
     "sweeps",
     multiple=True,
     metavar="PATH=VALUES",
-    help="log:1e-6:1e-1:7, lin:0:1:5 or a,b,c of a parameter or setting; several make a grid.",
+    help="log:1e-6:1e-1:7, lin:1kPa:5kPa:5 or a,b,c of a parameter; several make a grid.",
 )
 @click.option("--seeds", default="10", show_default=True, metavar="N|A,B,C", help="Noise samples.")
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")

@@ -107,7 +107,7 @@ def _curves(
         name = "nis" if what == NIS else "error"
         yield Chart(
             f"{name}_{method}", f"{method}: {name.upper() if name == 'nis' else what} over "
-            f"{short(axis.path)}", short(axis.path), label, (Series(method, x, y),),
+            f"{short(axis.path)}", axis.label, label, (Series(method, x, y),),
             (("consistent", 1.0),) if what == NIS else (),
             scale if y.min() > 0 else log,  # type: ignore[arg-type]
         )  # fmt: skip

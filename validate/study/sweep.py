@@ -1,4 +1,4 @@
-"""Sweeps as text: `path=log:1e-6:1e-1:7`, `path=lin:0:1:5`, `path=a,b,c`; several make a grid."""
+"""Sweeps as text: `path=log:1e-6:1e-1:7`, `path=lin:1kPa:5kPa:5`, `path=a,b,c`; several a grid."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from validate.errors import UsageError
+from validate.units import in_si, split
 
 LARGEST = 1_000_000  # values of one axis: beyond it a slip of the keyboard, not a study
 
@@ -19,12 +20,20 @@ class Axis:
     values: tuple[str, ...]
 
     @property
+    def unit(self) -> str:
+        """What the first value has behind its number; "" for a bare one, which is SI."""
+        return (split(self.values[0]) or (0.0, ""))[1]
+
+    @property
     def numbers(self) -> tuple[float, ...] | None:
-        """The values as numbers; None where one is none."""
-        try:
-            return tuple(float(v) for v in self.values)
-        except ValueError:
-            return None
+        """The values as numbers in `unit`; None where one is none, or only some have a unit."""
+        found = [_number(v, self.unit) for v in self.values]
+        return None if None in found else tuple(v for v in found if v is not None)
+
+    @property
+    def label(self) -> str:
+        """As an axis has it: with the unit that the values were given in."""
+        return f"{short(self.path)} / {self.unit}" if self.unit else short(self.path)
 
 
 def axis(text: str) -> Axis:
@@ -69,6 +78,15 @@ def short(path: str) -> str:
     return inner.removeprefix("settings.")
 
 
+def _number(text: str, unit: str) -> float | None:
+    """`10kPa` in `unit`; None for no number, another dimension, or a bare one among those with
+    units."""
+    found = split(text)
+    if found is None or bool(found[1]) != bool(unit):
+        return None
+    return in_si(found[0], found[1], unit) if unit else found[0]
+
+
 def _listed(text: str, values: str) -> tuple[str, ...]:
     found = tuple(part.strip() for part in values.split(","))
     if not all(found):
@@ -78,16 +96,20 @@ def _listed(text: str, values: str) -> tuple[str, ...]:
 
 def _spaced(text: str, kind: str, values: str) -> tuple[str, ...]:
     parts = values.split(":")
+    unit = (split(parts[1]) or (0.0, ""))[1] if len(parts) == 4 else ""
     try:
-        start, end, count = float(parts[1]), float(parts[2]), int(parts[3])
+        count = int(parts[3])
+        start, end = (_number(part, unit) for part in parts[1:3])
     except (IndexError, ValueError):
         raise UsageError(f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT") from None
+    if start is None or end is None:
+        raise UsageError(f"--sweep {text}: FIRST and LAST are numbers, bare (SI) or of one unit")
     if len(parts) != 4 or not 2 <= count <= LARGEST or not np.isfinite([start, end]).all():
         raise UsageError(
             f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT with 2 to {LARGEST} values"
         )
     if kind == "lin":
-        return tuple(f"{v:.6g}" for v in np.linspace(start, end, count))
+        return tuple(f"{v:.6g}{unit}" for v in np.linspace(start, end, count))
     if min(start, end) <= 0:
         raise UsageError(f"--sweep {text}: a logarithmic sweep needs ends above 0")
-    return tuple(f"{v:.6g}" for v in np.geomspace(start, end, count))
+    return tuple(f"{v:.6g}{unit}" for v in np.geomspace(start, end, count))
