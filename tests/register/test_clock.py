@@ -133,3 +133,11 @@ def test_an_unreadable_doubt_is_refused() -> None:
     with pytest.raises(RegistrationError, match="sd 'nan' is not a time >= 0 s"):
         clock_sd(replace(recording, metadata=spoilt), "force")
     assert clock_sd(recording, "stage") == 0.0
+
+
+def test_a_slope_needs_two_samples_that_were_seen() -> None:
+    t = np.array([0.0, 0.1, 0.2])
+    y = np.column_stack([3.0 * t, [np.nan, 0.3, np.nan], np.full(3, np.nan), [0.0, np.nan, 0.6]])
+    found = slopes(t, y, np.array([1]), 0.1)[0]
+    assert found[[0, 3]] == pytest.approx([3.0, 3.0])
+    assert np.isnan(found[1:3]).all()

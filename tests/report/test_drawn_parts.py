@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from report_samples import small_result
 
 from validate.compare.effects import Change, Effect
-from validate.report import markers, outlines
+from validate.report import cut, markers, outlines
 from validate.report.body import shown_body
 from validate.report.discrimination import _budget
 from validate.report.provenance import _points
@@ -69,6 +69,17 @@ def test_the_body_is_shown_deformed_and_at_rest(monkeypatch: pytest.MonkeyPatch)
         "render_flat": (1.0, False, False),
         "render_mesh": (1.0, True, True),
     }
+
+
+def test_a_section_fills_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+    square = np.array([[1.0, 10.0], [3.0, 10.0], [3.0, 14.0], [1.0, 14.0]])
+    monkeypatch.setattr(cut, "_polygons", lambda body, normal: ([square], np.array([0.5])))
+    body = shown_body(small_result())
+    assert body is not None
+    figure = Figure()
+    cut._axes(figure, body, np.array([0.0, 0.0, 1.0]))
+    assert figure.axes[0].get_xlim() == pytest.approx((1 - 0.24, 3 + 0.24))
+    assert figure.axes[0].get_ylim() == pytest.approx((10 - 0.24, 14 + 0.24))
 
 
 def test_outlines_of_one_length_have_one_number() -> None:

@@ -113,3 +113,10 @@ def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
     file = tmp_path / f"{key}.json"
     file.write_text(file.read_text("utf-8")[:-20], encoding="utf-8")
     assert read_records(tmp_path, [key], FilterScores) == {}
+
+
+def test_a_worker_keeps_few_systems_and_many_recordings(pulled: Experiment) -> None:
+    """Its memory is bounded: factors of four meshes, seeds of one study."""
+    bench = Bench(pulled, planned(pulled).job)
+    kept = (bench._systems, bench._truths, bench._seen, bench._recordings)
+    assert [k._most for k in kept] == [4, 4, 40, 40]
