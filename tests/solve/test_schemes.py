@@ -11,11 +11,12 @@ from validate.estimate.filters import FILTERS
 from validate.fem.system import System, build
 from validate.parameters import with_values
 from validate.scene.box import box
+from validate.scene.contact import RigidContact, RigidPlane
 from validate.scene.scene import Drive, LawName, Load, Material, Scene, Support
 from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton
-from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, LINEAR, SCHEMES, SOLVERS
+from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, LINEAR, SCHEMES, SOLVERS, TOUCHING
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
@@ -52,7 +53,7 @@ def settings(scheme: type[Scheme]) -> Scheme:
 
 @pytest.mark.parametrize(
     "scheme",
-    [s for s in SCHEMES if s not in (*INERTIAL, *LARGE_INERTIAL)],
+    [s for s in SCHEMES if s not in (*INERTIAL, *LARGE_INERTIAL, *TOUCHING)],
     ids=lambda s: s.__name__,
 )
 def test_a_scheme_steps_and_says_what_its_states_mean(
@@ -149,6 +150,37 @@ def test_dynamics_at_large_strain_refuse_cavities_and_the_linear_law(
         scheme().prepare(build(replace(pressed.scene, material=Material(1e4, 0.4, rho=1000.0))))
 
 
+@pytest.mark.parametrize("scheme", TOUCHING, ids=lambda s: s.__name__)
+def test_contact_says_what_its_states_mean(scheme: type[Scheme], pressed: System) -> None:
+    """A plate that has pressed for a step: force, area and nodes of a whole face, no depth left."""
+    scene, down = pressed.scene, (0.0, 0.0, -1.0)
+    plate = RigidContact("plate", "z1", RigidPlane((0.0, 0.0, 0.02), down), down, 0.2)
+    material = replace(scene.material, law=scheme.handles.law[-1], stiffness_damping=0.0)
+    touched = replace(scene, material=material, drives=(), contacts=(plate,))
+    stepper = scheme().prepare(build(touched))
+    rest = stepper.rest()
+    state = stepper.step(stepper.step(rest, np.array([0.0, 1e-5])), np.array([0.0, 2e-5]))
+    assert state.failure is None
+    assert np.abs(stepper.field(rest)).max() == 0.0
+    assert set(rest.numbers) == set(state.numbers) == set(stepper.units)
+    assert rest.numbers["plate.force"] == 0.0
+    assert state.numbers["plate.force"] > 0
+    assert state.numbers["plate.touching"] == 9.0
+    assert state.numbers["plate.area"] == pytest.approx(4e-4)
+    assert state.numbers["plate.penetration"] < 1e-12
+    assert stepper.field(state)[scene.mesh.facet_nodes("z1"), 2] == pytest.approx(-2e-5)
+
+
+@pytest.mark.parametrize("scheme", [s for s in SCHEMES if s not in TOUCHING])
+def test_contact_is_refused_by_the_others(scheme: type[Scheme], pressed: System) -> None:
+    law, down = scheme.handles.law[-1], (0.0, 0.0, -1.0)
+    plate = RigidContact("plate", "z1", RigidPlane((0.0, 0.0, 0.02), down), down)
+    material = replace(pressed.scene.material, law=law)
+    scene = replace(pressed.scene, material=material, loads=(), contacts=(plate,))
+    with pytest.raises(SceneError, match="knows no rigid bodies that touch, the scene has 1"):
+        settings(scheme).prepare(build(scene))
+
+
 @pytest.mark.parametrize("kind", SCHEMES)
 def test_every_setting_says_what_it_is_and_in_which_unit(kind: type[Scheme]) -> None:
     for f in fields(kind):  # type: ignore[arg-type]
@@ -172,6 +204,7 @@ def test_what_a_refusal_names_instead_handles_it() -> None:
                 "mesh": h.mesh,
                 "point": not h.mesh,
                 "membranes": "membranes" in h.contact,
+                "rigid": "rigid" in h.contact,
                 **{law: law in h.law for law in ("linear", *LARGE)},
             }
             assert has.get(part) or getattr(h, part, False), (part, name)
@@ -185,4 +218,5 @@ def test_handles_cover_what_prepares(system: System, large: System, pressed: Sys
                 continue
             with pytest.raises(SceneError, match="; use "):
                 settings(scheme).prepare(body)
-    assert sum(s.handles.covers(pressed.scene) for s in SCHEMES) == len(INERTIAL)
+    linear = {s for s in TOUCHING if "linear" in s.handles.law}
+    assert {s for s in SCHEMES if s.handles.covers(pressed.scene)} == {*INERTIAL, *linear}

@@ -60,6 +60,21 @@ def factorise_indefinite(A: sparse.csr_array, order: Ints) -> Factor:
     return factor
 
 
+def factorise_general(A: sparse.csr_array, order: Ints) -> Factor:
+    """Factorises an A (m, m) of symmetric pattern that is not symmetric, in the given order.
+
+    Its pivots say nothing of stability. Raises `SceneError` where one vanishes.
+    """
+    try:
+        lu = splu(A[order][:, order].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0)
+    except RuntimeError as singular:
+        raise _not_definite(0.0, int(A.shape[0])) from singular
+    pivots = np.abs(lu.U.diagonal())
+    if pivots.min() <= 1e-13 * pivots.max():
+        raise _not_definite(float(pivots.min() / pivots.max()), 1)
+    return Factor(lu, order)
+
+
 def _factorised(A: sparse.csr_array, order: Ints) -> tuple[Factor, Floats]:
     """The factor and its pivots (m,): without row exchanges these are U's diagonal."""
     B = A[order][:, order].tocsc()

@@ -14,9 +14,10 @@ from validate.scene.shape_functions import facet_rule
 def load_columns(scene: Scene) -> Floats:
     """Forces (N, l) on all unknowns for one newton or m/s^2 of each load, node-major.
 
+    What moves a rigid body is an input after the loads and no force: its column is zero.
     Raises `SceneError` for a weight without densities.
     """
-    columns = np.zeros((scene.mesh.nodes.size, len(scene.loads)))
+    columns = np.zeros((scene.mesh.nodes.size, len(scene.loads) + len(scene.movers)))
     for j, load in enumerate(scene.loads):
         if isinstance(load, Weight):
             pull = np.tile(load.direction, len(scene.mesh.nodes))
@@ -45,14 +46,19 @@ def _nodal(mesh: Mesh, load: Load) -> Floats:
 
 def uniform_shares(mesh: Mesh, place: Place) -> Floats:
     """Shares (n,) of 1 that is spread evenly over faces or edges, equally over points."""
-    shares, entities = np.zeros(len(mesh.nodes)), facets_of(mesh, place)
+    parts = nodal_integrals(mesh, place)
+    return np.asarray(parts / parts.sum())
+
+
+def nodal_integrals(mesh: Mesh, place: Place) -> Floats:
+    """Integral (n,) of every node's shape function over faces m^(d - 1) or edges m; 1 at points."""
+    found, entities = np.zeros(len(mesh.nodes)), facets_of(mesh, place)
     if kind_of(place) == "points":
-        shares[entities[:, 0]] = 1 / len(entities)
-        return shares
+        found[entities[:, 0]] = 1.0
+        return found
     integrals = _edge_integrals if kind_of(place) == "edges" else facet_integrals
-    parts = integrals(mesh, entities)
-    np.add.at(shares, entities, parts / parts.sum())
-    return shares
+    np.add.at(found, entities, integrals(mesh, entities))
+    return found
 
 
 def _edge_integrals(mesh: Mesh, edges: Ints) -> Floats:

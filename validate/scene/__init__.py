@@ -24,6 +24,7 @@ _HOMES = {
     "rubber": ("mooney_rivlin", "ogden", "yeoh"),
     "material_point": ("MaterialPoint",),
     "box": ("grid",),
+    "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
     "cylinder": ("quarter_cylinder",),
     "inclusion": ("Block", "Capsule", "block_with_inclusion"),
     "plates": ("Plates", "between_plates"),

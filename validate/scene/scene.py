@@ -9,6 +9,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.parameters import part, quantity
+from validate.scene.contact import RigidContact, require_clear
 from validate.scene.laws import Coefficients, law_kind
 from validate.scene.mesh import Mesh
 from validate.scene.select import Place, kind_of, nodes_of
@@ -250,6 +251,7 @@ class Scene:
     plane: PlaneState = "strain"
     thickness: float = 1.0
     masses: tuple[Mass, ...] = ()
+    contacts: tuple[RigidContact, ...] = ()
 
     def __post_init__(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
@@ -285,6 +287,7 @@ class Scene:
                 )
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)
+        require_clear(self.contacts, self.mesh)
 
     def _check_cells(self) -> None:
         """What bricks cannot have, and plane state and thickness, which are for 2-D meshes."""
@@ -309,8 +312,15 @@ class Scene:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of what a step is given: drives in m, then loads in N and weights in m/s^2."""
-        return tuple(d.name for d in self.drives) + tuple(load.name for load in self.loads)
+        """Names of what a step is given: drives in m, then loads in N and weights in m/s^2, then
+        rigid bodies that move in m."""
+        parts = (*self.drives, *self.loads, *self.movers)
+        return tuple(part.name for part in parts)
+
+    @property
+    def movers(self) -> tuple[RigidContact, ...]:
+        """The rigid bodies that an input moves."""
+        return tuple(c for c in self.contacts if c.direction is not None)
 
     def per_cell(self, value: Callable[[Material], float]) -> Floats:
         """A number of every cell's material (e,)."""

@@ -9,14 +9,14 @@ from validate.scene.laws import LAWS
 from validate.scene.material_point import MaterialPoint
 from validate.scene.scene import LawName, Scene
 
-ContactName = Literal["foundations", "membranes"]
+ContactName = Literal["foundations", "membranes", "rigid"]
 LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS))
 GLUED: tuple[ContactName, ...] = ("foundations", "membranes")
 
 
 @dataclass(frozen=True)
 class Handles:
-    """`law`: the laws it solves; `contact`: what may be glued to facets.
+    """`law`: the laws it solves; `contact`: what may be glued to facets, or touch them ("rigid").
 
     `inertia` says that it marches in time with masses; the others which parts a scene may have.
     `mesh` is False for what solves a material point.
@@ -55,6 +55,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "loads": ("QuasiStatic", "NewtonDynamics"),
     "drives": ("KfFem", "ModalKf"),
     "membranes": ("QuasiStatic", "Newmark"),
+    "rigid": ("ContactNewton",),
 }
 
 
@@ -85,4 +86,6 @@ def _refused(handles: Handles, scene: Scene | MaterialPoint) -> tuple[str, str] 
         return "drives", f"needs loads alone, the scene has {counts}"
     if scene.membranes and "membranes" not in handles.contact:
         return "membranes", "knows no membranes: they are linear only"
+    if scene.contacts and "rigid" not in handles.contact:
+        return "rigid", f"knows no rigid bodies that touch, the scene has {len(scene.contacts)}"
     return None

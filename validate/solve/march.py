@@ -131,7 +131,7 @@ def _walk(
 
 def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     """`<drive>.displacement` m, `<load>.force` N (with `per_node` that at each node, else the
-    total), `<weight>.acceleration` m/s^2."""
+    total), `<weight>.acceleration` m/s^2, of a rigid body `<contact>.displacement` m."""
     traces = {
         f"{d.name}.displacement": Trace(y, "m")
         for d, y in zip(scene.drives, inputs.T, strict=False)
@@ -139,6 +139,8 @@ def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     for load, y in zip(scene.loads, inputs.T[len(scene.drives) :], strict=False):
         kind, unit = ("acceleration", "m/s^2") if isinstance(load, Weight) else ("force", "N")
         traces[f"{load.name}.{kind}"] = Trace(y, unit)
+    for mover, y in zip(scene.movers[::-1], inputs.T[::-1], strict=False):
+        traces[f"{mover.name}.displacement"] = Trace(y, "m")
     return traces
 
 

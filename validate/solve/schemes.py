@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from validate.solve.central import CentralDifference
+from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
 from validate.solve.handles import Handles
@@ -27,6 +28,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
     ExplicitLinear,
     CentralDifference,
     NewtonDynamics,
+    ContactNewton,
 )
 
 # What solves a whole scene at once.
@@ -40,7 +42,10 @@ def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
 
 # Linear schemes of drives and cavities, and those of drives and loads.
 LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities)
-INERTIAL = schemes_that(lambda h: "linear" in h.law and h.loads)
+INERTIAL = schemes_that(lambda h: h.law == ("linear",) and h.loads)
 
 # Dynamics at large strain of drives and loads, without cavities.
 LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia)
+
+# Bodies that touch rigid ones.
+TOUCHING = schemes_that(lambda h: "rigid" in h.contact)
