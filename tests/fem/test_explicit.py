@@ -219,5 +219,9 @@ def test_what_has_no_explicit_form_is_refused() -> None:
         ExplicitBody(replace(body, mesh=quadratic(body.mesh)))
     with pytest.raises(SceneError, match="law 'linear' has no form"):
         ExplicitBody(replace(body, material=Material(30e3, 0.3)))
-    with pytest.raises(SceneError, match="dilatation='pointwise'"):
+    with pytest.raises(SceneError, match="use 'pointwise'"):
         ExplicitBody(replace(body, dilatation="nodal_mean"))
+    other = Region("core", np.array([0]), Material(30e3, 0.3, "neo_hooke"))
+    svk = replace(body, material=Material(30e3, 0.3, "svk"), regions=(other,))
+    with pytest.raises(SceneError, match=r"one law in one form, not .'neo_hooke"):
+        ExplicitBody(svk)

@@ -291,7 +291,7 @@ def test_what_cannot_begin_is_refused() -> None:
         StaticNewton().prepare(build(replace(scene, material=Material(1e3, 0.3))))
     with pytest.raises(SceneError, match="the body can move rigidly"):
         StaticNewton().prepare(build(replace(scene, supports=scene.supports[:2])))
-    with pytest.raises(SceneError, match="without drive and cavity"):
+    with pytest.raises(SceneError, match="without drive, load and cavity"):
         StaticNewton().prepare(build(replace(scene, drives=())))
     with pytest.raises(SceneError, match="volume ratio -1: a fluid volume must be positive"):
         StaticNewton(volume_ratio=-1.0)

@@ -1,5 +1,7 @@
 """How a static solution ends, the constrained inertia, and the fluid's constraint."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 from newton_scenes import cube, phantom_system, prepared, pressed, two_cavities, two_cavity_system
@@ -12,6 +14,8 @@ from validate.scene.scene import Cavity, Drive, Material, Scene, Support
 from validate.solve.equilibrium import equilibrium
 from validate.solve.march import march
 from validate.solve.newton import NewtonStepper, StaticNewton
+
+STILL = np.zeros(1)  # the drive
 
 # Outcomes
 
@@ -47,8 +51,11 @@ def test_inverted_cells_are_invalid_and_named() -> None:
     count, total = (int(why.split()[i]) for i in (0, 2))
     assert 0 < count <= total == 162
     assert "quadrature points inverted (det F <= 0), first in element" in why
-    assert why.endswith("last good load 10 mm")
-    assert failed.inner.drives.tolist() == [0.01]
+    assert why.endswith(
+        "last good load 10 mm (0 % of the step); take more cuts or smaller steps, or a finer mesh "
+        "there"
+    )
+    assert failed.inner.inputs.tolist() == [0.01]
     assert failed.inner.u is state.inner.u
 
 
@@ -60,8 +67,8 @@ def test_end_of_the_law_is_invalid_with_the_last_good_load() -> None:
     assert failed.failure[0] == "invalid"
     assert failed.failure[1].startswith("beyond the law's validity: principal stretch 0.57")
     assert "is below 0.577; last good load 4" in failed.failure[1]
-    assert failed.inner.drives[0] == pytest.approx(0.042265, abs=0.02 / 2**6)
-    assert failed.inner.drives[0] < 0.042265
+    assert failed.inner.inputs[0] == pytest.approx(0.042265, abs=0.02 / 2**6)
+    assert failed.inner.inputs[0] < 0.042265
 
 
 def test_no_static_solution_beyond_a_load() -> None:
@@ -74,12 +81,12 @@ def test_no_static_solution_beyond_a_load() -> None:
     assert state.failure is not None
     ending, why = state.failure
     assert ending == "not_converged"
-    assert why.startswith(
-        f"no static solution beyond {1e3 * state.inner.drives[0]:.4g} mm: tangent not"
-    )
+    assert why.startswith(f"no static solution beyond {1e3 * state.inner.inputs[0]:.4g} mm (")
+    assert "% of the step): tangent not positive definite" in why
     assert "negative pivots" in why
-    assert 0.69 < 1 - state.inner.drives[0] / 0.1 < 0.76
-    assert state.inner.drives[0] >= good.inner.drives[0]
+    assert why.endswith("if the body snaps there, go on with NewtonDynamics")
+    assert 0.69 < 1 - state.inner.inputs[0] / 0.1 < 0.76
+    assert state.inner.inputs[0] >= good.inner.inputs[0]
     assert state.numbers["stage.force"] > good.numbers["stage.force"] * 0.99
 
 
@@ -110,8 +117,8 @@ def test_inertia_is_that_of_the_constrained_hessian(pressure: float) -> None:
     rng = np.random.default_rng(0)
     u = np.zeros(system.K.shape[0])
     u[system.free] = 2e-4 * rng.normal(size=len(system.free))
-    at = problem.balance(u, np.array([pressure, 0.3 * pressure]), np.ones(2))
-    tangent = problem.tangent(at, np.zeros(1))
+    at = problem.balance(u, np.array([pressure, 0.3 * pressure]), STILL, np.ones(2))
+    tangent = problem.tangent(at)
     A = problem.body.tangent(u)
     x = system.scene.mesh.nodes + u.reshape(-1, 3)
     for P, cavity in zip(at.pressures, system.cavities, strict=True):
@@ -140,8 +147,8 @@ def test_fluid_holds_what_pressure_would_not() -> None:
         assert isinstance(stepper, NewtonStepper)
         state = stepper.step(stepper.rest(), np.array([1e-6]))
         assert state.failure is None
-        at = stepper.problem.balance(state.inner.u, state.inner.pressures, np.array([ratio]))
-        tangent = stepper.problem.tangent(at, state.inner.drives)
+        at = stepper.problem.balance(*astuple(state.inner), np.array([ratio]))
+        tangent = stepper.problem.tangent(at)
         found[ratio] = (tangent.factor.negative_pivots, tangent.negative)
         assert state.numbers["tangent.negative_pivots"] == tangent.negative
     assert found == {3.0: (0, 0), 5.0: (1, 0)}
@@ -155,9 +162,9 @@ def test_bordered_system_is_the_derivative_of_the_balance() -> None:
     N, h = system.K.shape[0], 1e-7
     u, v = 1e-4 * rng.normal(size=N), rng.normal(size=N)
     P, dP = np.array([800.0]), np.array([1e6])
-    plus = problem.balance(u + h * v, P + h * dP, np.ones(1))
-    minus = problem.balance(u - h * v, P - h * dP, np.ones(1))
-    at = problem.balance(u, P, np.ones(1))
+    plus = problem.balance(u + h * v, P + h * dP, STILL, np.ones(1))
+    minus = problem.balance(u - h * v, P - h * dP, STILL, np.ones(1))
+    at = problem.balance(u, P, STILL, np.ones(1))
     x = system.scene.mesh.nodes + u.reshape(-1, 3)
     A = problem.body.tangent(u) - P[0] * volume_hessian(system.cavities[0], x)
     slope = (plus.residual - minus.residual) / (2 * h)
@@ -172,13 +179,13 @@ def test_newton_converges_quadratically() -> None:
     system = two_cavity_system()
     problem = equilibrium(system, True)
     target = np.ones(2)
-    at = problem.balance(np.zeros(system.K.shape[0]), np.zeros(2), target)
-    at = problem.predicted(at, problem.tangent(at, np.zeros(1)), np.array([0.012]), target)
-    at = problem.balance(at.u, at.pressures, target)
+    at = problem.balance(np.zeros(system.K.shape[0]), np.zeros(2), STILL, target)
+    at = problem.predicted(at, problem.tangent(at), np.array([0.012]), target)
+    at = problem.balance(at.u, at.pressures, STILL, target)
     force, merits = at.acting, []
     for _ in range(5):
-        at = problem.correction(at, problem.tangent(at, np.zeros(1)), target)
-        at = problem.balance(at.u, at.pressures, target)
+        at = problem.correction(at, problem.tangent(at), target)
+        at = problem.balance(at.u, at.pressures, STILL, target)
         merits.append(at.merit(force))
     digits = -np.log10(merits)
     assert merits[-1] < 1e-13

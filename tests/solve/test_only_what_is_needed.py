@@ -133,7 +133,7 @@ def test_large_strain_makes_tangents_where_it_must(calls: Counter[str]) -> None:
     assert calls["tangent"] > 0
     assert calls["stiffness"] == 0
     calls.clear()
-    stepped(NewtonDynamics(rule="static"), block(replace(LARGE, rho=None)), 0.01)
+    stepped(StaticNewton(), block(replace(LARGE, rho=None)), 0.01)
     assert not INERTIA & set(calls)
 
 

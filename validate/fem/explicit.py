@@ -180,11 +180,16 @@ def _own(x: Floats) -> Floats:
 def _require(scene: Scene) -> None:
     if scene.mesh.kind != "tet4":
         raise SceneError(f"elements of kind {scene.mesh.kind} have no explicit form; use tet4")
-    _code(scene.material)
+    materials = (scene.material, *(r.material for r in scene.regions))
+    if len({_code(m) for m in materials}) > 1:
+        forms = sorted({f"{m.law} {m.coefficients.volumetric}" for m in materials})
+        raise SceneError(f"explicit steps are for one law in one form, not {forms}")
     if scene.membranes:
         raise SceneError("membranes are linear only: drop them, or take the linear law")
     if scene.dilatation != "pointwise":
-        raise SceneError("nodal mean dilatation has no explicit form; use dilatation='pointwise'")
+        raise SceneError(
+            f"{scene.dilatation} dilatation of tet4 has no explicit form; use 'pointwise'"
+        )
     require_positive_cells(scene.mesh)
 
 

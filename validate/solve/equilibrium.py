@@ -1,8 +1,8 @@
-"""Static equilibrium of a hyperelastic body with fluid cavities: balance, tangent, corrections.
+"""Static equilibrium of a hyperelastic body with fluid cavities under drives and dead loads.
 
 Unknowns are the free displacements and the cavity pressures:
 
-    f_int(u) - sum_i P_i dV_i/dx = 0,    V_i(x) = volume ratio x V_i0
+    f_int(u) - sum_i P_i dV_i/dx = f,    V_i(x) = volume ratio x V_i0
 
 Newton's bordered system [A, -G; G^T, 0], A = K_t - sum_i P_i d2V_i/dx2 and G = dV/dx, is solved by
 block elimination with one factorisation of A. It has as many negative eigenvalues as A has plus the
@@ -26,7 +26,11 @@ from validate.fem.system import System
 
 @dataclass(frozen=True)
 class Balance:
-    """Forces at u (N,) m and P (c,) Pa: `residual` (N,) N with reactions, loads dV/dx (c, N) m^2.
+    """Forces at u (N,) m and P (c,) Pa under `inputs` (k + l,), drives in m and then loads.
+
+    `residual` (N,) N holds the reactions, `loads` (c, N) m^2 are dV/dx. `stresses` (e, q) Pa are
+    the volumetric law's slopes that the next tangent takes: those of u, but on the way of an
+    iteration the ones that it has foreseen (`Body.extrapolated`).
 
     `unbalanced` N is the residual's norm over the free unknowns, zero where it is the stress's own
     rounding; `acting` N the norm of the forces that act; `gap` the largest error of V/V0.
@@ -34,12 +38,14 @@ class Balance:
 
     u: Floats
     pressures: Floats
+    inputs: Floats
     residual: Floats
     loads: Floats
     ratios: Floats
     gap: float
     unbalanced: float
     acting: float
+    stresses: Floats | None = None
 
     def merit(self, force: float) -> float:
         """What a line search lowers: the residual in units of `force` N and the volume error."""
@@ -48,17 +54,16 @@ class Balance:
 
 @dataclass(frozen=True)
 class Tangent:
-    """A factorised at a state: what a unit drive (N, k) and unit pressure (N, c) move.
+    """A factorised at u (N,) m: what unit inputs (N, k + l) and unit pressures (N, c) move.
 
-    `negative` counts the negative eigenvalues of the Hessian under constant volume; `inputs` (k,) m
-    are the drives at which it was made.
+    `negative` counts the negative eigenvalues of the Hessian under constant volume.
     """
 
     factor: Factor
-    drives: Floats
+    inputs: Floats
     pressures: Floats
     negative: int
-    inputs: Floats
+    u: Floats
 
 
 @dataclass(frozen=True)
@@ -74,37 +79,48 @@ class Equilibrium:
     rest_volumes: Floats
     order: Ints
 
-    def balance(self, u: Floats, pressures: Floats, target: Floats) -> Balance:
-        """The forces at u, P with volumes asked for as ratios `target` (c,)."""
+    def balance(
+        self,
+        u: Floats,
+        pressures: Floats,
+        inputs: Floats,
+        target: Floats,
+        stresses: Floats | None = None,
+    ) -> Balance:
+        """The forces at u, P and the inputs, with volumes asked for as ratios `target` (c,)."""
         cavities = self.system.cavities
         x = self.system.scene.mesh.nodes + u.reshape(-1, 3)
         ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
         loads = np.array([pressure_load(c, x).ravel() for c in cavities]).reshape(-1, len(u))
         inner = self.body.force(u)
-        residual = inner - pressures @ loads
+        f = self.system.loads @ inputs[len(self.system.scene.drives) :]
+        residual = inner - pressures @ loads - f
         rounding = 4 * np.finfo(float).eps * self.body.unit_force
         free = float(np.linalg.norm(residual[self.system.free]))
         pushing = float(np.abs(pressures) @ np.linalg.norm(loads, axis=1))
-        acting = max(float(np.linalg.norm(inner)), pushing, rounding)
+        acting = max(*(float(np.linalg.norm(x)) for x in (inner, f)), pushing, rounding)
         gap = float(np.abs(ratios - target).max(initial=0.0)) if self.constrained else 0.0
         unbalanced = free if free > rounding else 0.0
-        return Balance(u, pressures, residual, loads, ratios, gap, unbalanced, acting)
+        return Balance(
+            u, pressures, inputs, residual, loads, ratios, gap, unbalanced, acting, stresses
+        )
 
-    def tangent(self, at: Balance, drives: Floats) -> Tangent:
+    def tangent(self, at: Balance) -> Tangent:
         """Factorises A at a balance; `SceneError` where a pivot vanishes."""
         free, moves = self.system.free, self.system.moves
         A = self._matrix(at)
         factor = factorise_indefinite(A[free][:, free], self.order)
-        pushed = self._solved(factor, -(A @ moves).T).T + moves
+        driven = self._solved(factor, -(A @ moves).T).T + moves
+        loaded = self._solved(factor, self.system.loads.T).T
         pressed = self._solved(factor, at.loads).T
         negative = factor.negative_pivots
         if self.constrained:
             S = at.loads @ pressed
             negative -= int((np.linalg.eigvalsh((S + S.T) / 2) < 0).sum())
-        return Tangent(factor, pushed, pressed, negative, drives)
+        return Tangent(factor, np.hstack([driven, loaded]), pressed, negative, at.u)
 
     def _matrix(self, at: Balance) -> sparse.csr_array:
-        A = self.body.tangent(at.u)
+        A = self.body.tangent(at.u, at.stresses)
         x = self.system.scene.mesh.nodes + at.u.reshape(-1, 3)
         for P, cavity in zip(at.pressures, self.system.cavities, strict=True):
             if P:
@@ -119,8 +135,8 @@ class Equilibrium:
         return out
 
     def predicted(self, at: Balance, tangent: Tangent, move: Floats, target: Floats) -> Balance:
-        """The linear response to a change `move` (k,) m of the drives, forces not yet known."""
-        return self._moved(at, tangent, tangent.drives @ move, target)
+        """The linear response to a change `move` (k + l,) of the inputs, forces not yet known."""
+        return self._moved(at, tangent, tangent.inputs @ move, target)
 
     def correction(self, at: Balance, tangent: Tangent, target: Floats) -> Balance:
         """The Newton correction of an imbalance, forces not yet known."""

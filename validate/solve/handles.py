@@ -36,7 +36,7 @@ class Handles:
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
 LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False)
-LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, loads=False)
+LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True)
 
 
 class Handling(Protocol):
@@ -71,6 +71,9 @@ def require_handled(scene: Scene | MaterialPoint, settings: Handling) -> None:
 def _refused(handles: Handles, scene: Scene | MaterialPoint) -> tuple[str, str] | None:
     """The first part of a scene that is not handled, as a key of `INSTEAD` and in words."""
     law, point = scene.material.law, isinstance(scene, MaterialPoint)
+    if not isinstance(scene, MaterialPoint):  # the first that is not handled, or the body's own
+        laws = (law, *(r.material.law for r in scene.regions))
+        law = next((x for x in laws if x not in handles.law), law)
     if handles.mesh == point:
         return ("point", "needs a mesh") if point else ("mesh", "solves a material point alone")
     if law not in handles.law:

@@ -1,9 +1,9 @@
-"""Implicit dynamics at large strain by Newton's method, and statics under loads.
+"""Implicit dynamics at large strain by Newton's method.
 
 R(u) + C v + M a = f at the end of every step, with the rates of the rule: the trapezoidal one
-("average", Newmark 1959), backward Euler, or none at all ("static"). The tangent and its
-factorisation are made anew at every iteration: this is the reference of the explicit schemes, and
-what paper 003's rates for the plain finite elements correspond to.
+("average", Newmark 1959) or backward Euler. The tangent and its factorisation are made anew at
+every iteration: this is the reference of the explicit schemes, and what paper 003's rates for the
+plain finite elements correspond to.
 
 Departures: stiffness damping is that of the body at rest, not of K(U).
 """
@@ -18,60 +18,52 @@ from scipy import sparse
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assemble import stiffness_damping
-from validate.fem.factor import elimination_order, factorise, factorise_indefinite
+from validate.fem.factor import elimination_order, factorise_indefinite
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central import lumped_damping
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
-from validate.solve.types import Ending, State, Stepper
+from validate.solve.types import State, Stepper
 
-RateRule = Literal["average", "backward_euler", "static"]
+RateRule = Literal["average", "backward_euler"]
 _HALVINGS = 6  # of a Newton correction that inverts cells
 _ROUNDING = 1e-15  # of the body's unit force: below it a residual is nothing but rounding
 
 
 @dataclass(frozen=True)
 class NewtonDynamics:
-    """Settings. `mass` "lumped" is what the explicit schemes use.
-
-    `cuts`: for load steps of statics; a dynamic step fails at once: take a smaller dt.
-    """
+    """Settings. `mass` "lumped" is what the explicit schemes use."""
 
     handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(0.01, "s", "time step")
-    rule: RateRule = quantity("average", "1", "how v and a follow u; static: neither")
+    rule: RateRule = quantity("average", "1", "how v and a follow u")
     mass: Literal["lumped", "consistent"] = quantity("lumped", "1", "mass matrix")
     tolerance: float = quantity(1e-9, "1", "residual, of the forces that act")
     max_iterations: int = quantity(20, "1", "of Newton in a step")
-    cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
 
     def __post_init__(self) -> None:
-        if not (self.dt > 0 and self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):
+        if not (self.dt > 0 and self.tolerance > 0 and self.max_iterations >= 1):
             raise SceneError(
                 f"dt {self.dt:g} s, tolerance {self.tolerance:g}, {self.max_iterations} "
                 "iterations: all must be positive"
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a linear law, cavities, regions, or a missing density, and in
-        statics for a body that can move rigidly."""
+        """Raises `SceneError` for a linear law, cavities, or a missing density."""
         scene = system.scene
         require_handled(scene, self)
         N = len(system.moves)
-        M = C = sparse.csr_array((N, N))
-        if self.rule != "static" and self.mass == "lumped":
+        if self.mass == "lumped":
             M = sparse.csr_array(sparse.diags_array(system.masses))
             C = sparse.csr_array(sparse.diags_array(lumped_damping(system)))
             C = sparse.csr_array(C + stiffness_damping(scene))
-        elif self.rule != "static":
+        else:
             M, C = system.M, system.C
         body, free = Body(scene), system.free
         K = body.tangent(np.zeros(N))[free][:, free]
-        if self.rule == "static":
-            factorise(K, free // 3, scene.mesh.nodes)  # a body that can move rigidly ends here
         order = elimination_order(K, free // 3, scene.mesh.nodes)
         return ImplicitStepper(self, system, body, M, C, order)
 
@@ -98,7 +90,7 @@ class Settled:
 
 @dataclass(frozen=True)
 class ImplicitStepper:
-    """`M` kg and `C` N s/m (N, N) are zero in statics; `order` (free,) is that of elimination."""
+    """`M` kg and `C` N s/m are (N, N); `order` (free,) is that of elimination."""
 
     settings: NewtonDynamics
     system: System
@@ -122,22 +114,14 @@ class ImplicitStepper:
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
-        at, k = replace(state, updates=0), state.k + 1
-        done, size, begin = 0.0, 1.0, state.inner.inputs
-        static = self.settings.rule == "static"
-        while done < 1:
-            share = min(done + size, 1.0)
-            new = self._solved(at, begin + share * (inputs - begin))
-            if new.failure is None:
-                at, done = replace(new, updates=at.updates + new.updates), share
-            elif static and size > 0.5**self.settings.cuts:
-                size /= 2
-            else:
-                return replace(state, failure=_stopped(new, k, done))
-        return replace(at, k=k, inner=replace(at.inner, inputs=inputs))
+        new = self._solved(state, inputs)
+        if new.failure is None:
+            return replace(new, k=state.k + 1)
+        ending, why = new.failure
+        return replace(state, failure=(ending, f"step {state.k + 1}: {why}; take a smaller dt"))
 
     def _solved(self, state: State, inputs: Floats) -> State:
-        """One load step by Newton from the state's displacements, every correction taken whole
+        """A step by Newton from the state's displacements, every correction taken whole
         unless it inverts cells: the pressures are unknowns of the iteration (`Body.extrapolated`),
         whose residual in displacements alone rises a thousandfold on the way near nu = .5."""
         last: Settled = state.inner
@@ -175,9 +159,7 @@ class ImplicitStepper:
         dt, zero = self.settings.dt, np.zeros(len(self.system.moves))
         if self.settings.rule == "average":
             return _Rates(2 / dt, 4 / dt**2, -last.v, -4 / dt * last.v - last.a)
-        if self.settings.rule == "backward_euler":
-            return _Rates(1 / dt, 1 / dt**2, zero, -last.v / dt)
-        return _Rates(0.0, 0.0, zero, zero)
+        return _Rates(1 / dt, 1 / dt**2, zero, -last.v / dt)
 
     def _residual(self, u: Floats, last: Settled, rates: _Rates, f: Floats) -> tuple[Floats, float]:
         """R + C v + M a - f (N,) N, and the size of what acts."""
@@ -234,9 +216,3 @@ class ImplicitStepper:
         """Displacements (n, 3) m of all nodes."""
         u: Floats = state.inner.u
         return u.reshape(-1, 3)
-
-
-def _stopped(failed: State, k: int, done: float) -> tuple[Ending, str]:
-    assert failed.failure is not None
-    ending, why = failed.failure
-    return ending, f"step {k}: {why}; {100 * done:.3g} % of the step's load was reached"

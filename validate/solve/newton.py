@@ -1,4 +1,10 @@
-"""Static Newton for large strain: load steps with cut-back, line search, reused factorisations.
+"""Static Newton for large strain: load steps with cut-back, whole corrections, reused
+factorisations, under drives, dead loads and the fluid in cavities.
+
+The pressures of the volumetric law are unknowns of the iteration (`Body.extrapolated`). A
+correction of size d changes volumes by d^2, which near nu = .5 raises the residual of the
+displacements a thousandfold and says nothing: it is taken whole, halved only while it inverts
+cells; what does not converge is cut.
 
 Departures from a textbook Newton: a factorisation is kept, across steps too, while every iteration
 shrinks the error by `contraction` or better (Shamanskii 1967); the last one is remembered together
@@ -17,14 +23,15 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.scene.scene import Scene
+from validate.scene.scene import Scene, Weight
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
 from validate.solve.handles import LARGE_STATICS, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
 
 _VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
 _NEGATIVE, _MADE = "tangent.negative_pivots", "newton.factorisations"
-_HALVINGS = 8  # of a Newton correction in the line search
+_FEW = 6  # iterations after which the next load step is twice as large
+_HALVINGS = 6  # of a Newton correction that inverts cells
 
 
 @dataclass(frozen=True)
@@ -58,8 +65,8 @@ class StaticNewton:
         """Raises `SceneError` for a linear law or a body that can move rigidly."""
         scene = system.scene
         require_handled(scene, self)
-        if not (scene.cavities or scene.drives):
-            raise SceneError("scene without drive and cavity: nothing moves")
+        if not (scene.cavities or scene.inputs):
+            raise SceneError("scene without drive, load and cavity: nothing moves")
         problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
         rest = _rest(problem)
         return NewtonStepper(self, problem, replace(rest, factorisations=0), _Memory(rest))
@@ -71,7 +78,6 @@ class Found:
 
     balance: Balance
     tangent: Tangent
-    drives: Floats
     iterations: int = 0
     factorisations: int = 0
 
@@ -95,25 +101,26 @@ class _Memory:
 
 def _rest(problem: Equilibrium) -> Found:
     """The body at rest; `SceneError` where it can move rigidly."""
-    cavities, k = len(problem.rest_volumes), len(problem.system.scene.drives)
+    cavities, inputs = len(problem.rest_volumes), np.zeros(len(problem.system.scene.inputs))
     u, ones = np.zeros(len(problem.system.moves)), np.ones(cavities)
-    balance = problem.balance(u, np.zeros(cavities), ones)
-    tangent = problem.tangent(balance, np.zeros(k))
+    balance = problem.balance(u, np.zeros(cavities), inputs, ones)
+    tangent = problem.tangent(balance)
     if tangent.factor.negative_pivots:
         raise SceneError(
             f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an element "
             "is inverted; refine the mesh"
         )
-    return Found(balance, tangent, np.zeros(k), factorisations=1)
+    return Found(balance, tangent, factorisations=1)
 
 
 @dataclass(frozen=True)
 class Loaded:
-    """Displacements u (N,) m and pressures (c,) Pa in equilibrium under drives (k,) m."""
+    """Displacements u (N,) m and pressures (c,) Pa in equilibrium under inputs (k + l,): drives in
+    m, then loads in N and weights in m/s^2."""
 
     u: Floats
     pressures: Floats
-    drives: Floats
+    inputs: Floats
 
 
 @dataclass(frozen=True)
@@ -142,14 +149,14 @@ class NewtonStepper:
         return self._state(0, self.start)
 
     def step(self, state: State, inputs: Floats) -> State:
-        """From the state's load to drives (k,) m, at once or in halves of the way.
+        """From the state's load to the inputs (k + l,), at once or in parts of the way.
 
         A failure keeps the last load that was reached and says what stopped the body there.
         """
         target = np.full(len(state.inner.pressures), self.settings.volume_ratio)
         good = self._known(state.inner, target)
         kept = not self.problem.constrained or np.abs(good.balance.ratios - target).max() <= _VOLUME
-        if kept and (inputs == state.inner.drives).all():
+        if kept and (inputs == state.inner.inputs).all():
             numbers = MappingProxyType({**state.numbers, _MADE: 0.0})
             return replace(state, k=state.k + 1, updates=0, numbers=numbers)
         return self._walked(state.k, good, np.array(inputs, dtype=np.float64), target)
@@ -158,35 +165,38 @@ class NewtonStepper:
         """The equilibrium of a state: remembered, or its forces and tangent made again."""
         if self.memory.last.balance.u is at.u:
             return replace(self.memory.last, iterations=0, factorisations=0)
-        balance = self.problem.balance(at.u, at.pressures, target)
-        tangent = self.problem.tangent(balance, at.drives)
-        return Found(balance, tangent, at.drives, factorisations=1)
+        balance = self.problem.balance(at.u, at.pressures, at.inputs, target)
+        return Found(balance, self.problem.tangent(balance), factorisations=1)
 
-    def _walked(self, k: int, good: Found, drives: Floats, target: Floats) -> State:
-        """Load steps to `drives`; each failure halves them, to 2^-max_cuts of the way at least."""
-        begin, ratios = good.drives, good.balance.ratios
+    def _walked(self, k: int, good: Found, inputs: Floats, target: Floats) -> State:
+        """Load steps to `inputs`; each failure halves them, to 2^-max_cuts of the way at least,
+        and each that takes few iterations doubles them again."""
+        begin, ratios = good.balance.inputs, good.balance.ratios
         done, size = 0.0, 1.0
         while done < 1:
             share = min(done + size, 1.0)
-            load = drives if share == 1 else begin + share * (drives - begin)
+            load = inputs if share == 1 else begin + share * (inputs - begin)
             found = self._load_step(good, load, ratios + share * (target - ratios))
             if isinstance(found, Found):
                 good, done = _added(good, found), share
+                size *= 2 if found.iterations <= _FEW else 1
             elif size > 2.0**-self.settings.max_cuts:
                 size /= 2
             else:
-                return self._state(k, good, _stopped(found, good.drives))
+                why = _stopped(found, self._load_words(good.balance.inputs), done)
+                return self._state(k, good, why)
         self.memory.last = good
         return self._state(k + 1, good)
 
-    def _load_step(self, good: Found, drives: Floats, target: Floats) -> Found | Failed:
+    def _load_step(self, good: Found, inputs: Floats, target: Floats) -> Found | Failed:
         """One load step: linear prediction, corrections, and what the result must satisfy."""
-        move = drives - good.drives
-        at = self._forces(self.problem.predicted(good.balance, good.tangent, move, target), target)
+        move = inputs - good.balance.inputs
+        guess = self.problem.predicted(good.balance, good.tangent, move, target)
+        at = self._forces(good.balance, replace(guess, inputs=inputs), target)
         if isinstance(at, Failed):
             return replace(at, negative=good.tangent.negative)
         try:
-            found = self._corrected(replace(good, balance=at, drives=drives), target)
+            found = self._corrected(replace(good, balance=at), target)
             return found if isinstance(found, Failed) else self._checked(found)
         except SceneError as vanished:
             return Failed("not_converged", str(vanished), negative=1)
@@ -197,44 +207,47 @@ class NewtonStepper:
         force, own, renew = at.acting, False, self.settings.contraction == 0
         for iteration in range(self.settings.max_iterations):
             if self._settled(at):
-                return Found(at, tangent, start.drives, iteration, made)
+                return Found(at, tangent, iteration, made)
             if renew:
-                tangent, made, own = self.problem.tangent(at, start.drives), made + 1, True
+                tangent, made, own = self.problem.tangent(at), made + 1, True
                 negative = max(negative, tangent.negative)
-            new = self._searched(at, tangent, target, force, halvings=_HALVINGS if own else 0)
-            if new is None and own:
-                why = f"no step lowers the residual {at.unbalanced / at.acting:.1e}"
-                return Failed("not_converged", why, negative)
-            renew = new is None or new.merit(force) > self.settings.contraction * at.merit(force)
-            at, own = new or at, False
+            new = self._taken(at, tangent, target)
+            if isinstance(new, Failed) and own:
+                return replace(new, negative=negative)
+            shrinks = not isinstance(new, Failed) and new.merit(force) < at.merit(force)
+            if isinstance(new, Balance) and (own or shrinks):
+                renew = new.merit(force) > self.settings.contraction * at.merit(force)
+                at, own = new, False
+            else:
+                renew = True
         if self._settled(at):
-            return Found(at, tangent, start.drives, self.settings.max_iterations, made)
+            return Found(at, tangent, self.settings.max_iterations, made)
         why = (
             f"residual {at.unbalanced / at.acting:.1e} after {self.settings.max_iterations} "
             f"iterations, tolerance {self.settings.tolerance:.1e}"
         )
         return Failed("not_converged", why, negative)
 
-    def _searched(
-        self, at: Balance, tangent: Tangent, target: Floats, force: float, halvings: int
-    ) -> Balance | None:
-        """The correction, halved until it lowers the merit and inverts nothing; None: it never."""
+    def _taken(self, at: Balance, tangent: Tangent, target: Floats) -> Balance | Failed:
+        """The correction, halved while it inverts cells."""
         full = self.problem.correction(at, tangent, target)
-        for share in 0.5 ** np.arange(halvings + 1):
+        for share in 0.5 ** np.arange(_HALVINGS + 1):
             u = at.u + share * (full.u - at.u)
             pressures = at.pressures + share * (full.pressures - at.pressures)
-            new = self._forces(replace(full, u=u, pressures=pressures), target)
-            if isinstance(new, Balance) and new.merit(force) < at.merit(force):
-                return new
-        return None
+            new = self._forces(at, replace(full, u=u, pressures=pressures), target)
+            if isinstance(new, Balance):
+                break
+        return new
 
-    def _forces(self, at: Balance, target: Floats) -> Balance | Failed:
-        """The balance at the displacements and pressures of `at`, unless cells are inverted."""
-        bad = self.problem.body.inverted(at.u)
+    def _forces(self, last: Balance, at: Balance, target: Floats) -> Balance | Failed:
+        """The balance at the unknowns of `at`, reached from `last`, unless cells are inverted."""
+        body = self.problem.body
+        bad = body.inverted(at.u)
         if bad:
             words = f"{bad.count} of {bad.points} quadrature points inverted (det F <= 0)"
             return Failed("invalid", f"{words}, first in element {bad.first}")
-        return self.problem.balance(at.u, at.pressures, target)
+        stresses = body.extrapolated(last.u, at.u - last.u)
+        return self.problem.balance(at.u, at.pressures, at.inputs, target, stresses)
 
     def _settled(self, at: Balance) -> bool:
         return at.unbalanced <= self.settings.tolerance * at.acting and at.gap <= _VOLUME
@@ -245,11 +258,19 @@ class NewtonStepper:
         if beyond:
             return Failed("invalid", beyond)
         size = float(np.ptp(self.scene.mesh.nodes, axis=0).max())
-        moved = np.abs(found.drives - found.tangent.inputs).max(initial=0.0)
-        if moved <= self.settings.watch * size:
-            return found
-        tangent = self.problem.tangent(found.balance, found.drives)
-        return replace(found, tangent=tangent, factorisations=found.factorisations + 1)
+        if np.abs(found.balance.u - found.tangent.u).max() > self.settings.watch * size:
+            tangent = self.problem.tangent(replace(found.balance, stresses=None))
+            found = replace(found, tangent=tangent, factorisations=found.factorisations + 1)
+        if found.tangent.negative and self.scene.loads:
+            return Failed("not_converged", "the equilibrium is unstable", found.tangent.negative)
+        return found
+
+    def _load_words(self, inputs: Floats) -> str:
+        scene = self.scene
+        drives = [f"{1e3 * d:.4g} mm" for d in inputs[: len(scene.drives)]]
+        units = ["m/s^2" if isinstance(x, Weight) else "N" for x in scene.loads]
+        loads = zip(inputs[len(scene.drives) :], units, strict=True)
+        return ", ".join(drives + [f"{x:.4g} {unit}" for x, unit in loads])
 
     def _state(self, k: int, found: Found, failure: tuple[Ending, str] | None = None) -> State:
         at = found.balance
@@ -262,7 +283,7 @@ class NewtonStepper:
             float(found.factorisations),
         )
         named = MappingProxyType(dict(zip(self.units, numbers, strict=True)))
-        return State(k, Loaded(at.u, at.pressures, found.drives), failure, found.iterations, named)
+        return State(k, Loaded(at.u, at.pressures, at.inputs), failure, found.iterations, named)
 
     def field(self, state: State) -> Floats:
         """Displacements (n, 3) m of all nodes."""
@@ -279,10 +300,16 @@ def _added(before: Found, found: Found) -> Found:
     )
 
 
-def _stopped(failed: Failed, drives: Floats) -> tuple[Ending, str]:
+def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:
     """The outcome of a step whose smallest load step failed, with the last good load."""
-    load = ", ".join(f"{1e3 * d:.4g}" for d in drives)
-    if failed.negative and "validity" not in failed.why:
+    reached = f"{load} ({100 * done:.3g} % of the step)"
+    if "validity" in failed.why:
+        return failed.ending, f"{failed.why}; last good load {reached}; take a law for such strains"
+    if failed.negative:
         words = f"tangent not positive definite ({failed.negative} negative pivots)"
-        return "not_converged", f"no static solution beyond {load} mm: {words}; {failed.why}"
-    return failed.ending, f"{failed.why}; last good load {load} mm"
+        why = f"no static solution beyond {reached}: {words}; {failed.why}"
+        return "not_converged", f"{why}; if the body snaps there, go on with NewtonDynamics"
+    helps = "more cuts or smaller steps"
+    if failed.ending == "invalid":
+        helps += ", or a finer mesh there"
+    return failed.ending, f"{failed.why}; last good load {reached}; take {helps}"

@@ -8,9 +8,9 @@ from validate.compare.exhibit import Entry, NumberTable
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.scene.scene import Load, Scene
-from validate.solve.implicit import NewtonDynamics
 from validate.solve.locking import locking_factor
 from validate.solve.march import march
+from validate.solve.newton import StaticNewton
 
 
 def readings_table(scene: Scene, force: float, axis: str) -> NumberTable:
@@ -23,7 +23,7 @@ def readings_table(scene: Scene, force: float, axis: str) -> NumberTable:
         )
         system = build_system(replace(scene, loads=loads))
         total = float(np.abs(system.loads.sum())) * force
-        stepper = NewtonDynamics(rule="static").prepare(system)
+        stepper = StaticNewton().prepare(system)
         run = march("static", stepper, np.ones(1), np.full((1, 1), force), np.zeros(1, int), 0.0)
         ended = run.outcome.state if run.finished else f"{run.outcome.state}: {run.outcome.why}"
         moved = [
