@@ -66,7 +66,7 @@ def test_terminals_of_run_and_check_show_the_verdict_of_today(
     line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = showing(STATES[line])
-    checking._print(result)
+    checking._print(checking._content(result))
     checked = capsys.readouterr().out
     running._summary(result, Path("report.html"), 1.0)
     for shown in (checked, capsys.readouterr().out):
@@ -87,14 +87,15 @@ def test_a_run_fails_where_a_figure_does_not_stand(line: str, *, stands: bool) -
 
 
 def test_figures_of_other_data_alone_hold_nothing() -> None:
-    assert checking._holds(showing(HELD), declared=True)
-    assert not checking._holds(showing(STATES["other data"]), declared=True)
+    assert checking._holds(checking._content(showing(HELD)), declared=True)
+    other = checking._content(showing(STATES["other data"]))
+    assert not checking._holds(other, declared=True)
 
 
 def test_both_json_documents_hold_what_the_verdicts_rest_on() -> None:
     run = document(showing(HELD), CREATED)
     jsonschema.Draft202012Validator(schema()).validate(run)
-    check = checking._document(showing(HELD), holds=True)
+    check = checking._document(checking._content(showing(HELD)), declared=True)
     for found in (run, check):
         (figure,) = found["published"]
         assert [figure[k] for k in ("ours", "theirs", "tolerance", "expected", "drift")] == [

@@ -110,7 +110,10 @@ def _checks(method: MethodResult) -> None:
     head = ["check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
     rows = [_row(c, method.why(c)) for c in method.checks]
     if not fits(head, rows):
-        rows = [_row(c, "" if c.verdict == "agrees" else method.why(c)) for c in method.checks]
+        rows = [
+            _row(c, method.chosen if c.verdict == "agrees" else method.why(c))
+            for c in method.checks
+        ]
     table(f"Checks of {method.name}", head, rows)
 
 

@@ -122,7 +122,7 @@ def build(scene: Scene) -> System:
             f"all {N} unknowns of {len(mesh.nodes)} nodes are held or driven, nothing is left to "
             "solve: put at least 2 elements between what is held, or one of order 2"
         )
-    _require_felt(scene, held)
+    _require_felt(scene, held & ~moves.any(axis=1))
     cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
     return System(scene, np.flatnonzero(~held), moves, cavities)
 
@@ -185,16 +185,14 @@ def _driven(scene: Scene, drive: Drive) -> Ints:
 
 
 def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:
-    """Raises `SceneError` for a load or mass all of whose unknowns are held: it would do nothing.
-
-    What hangs at a driven set is felt by the drive.
-    """
+    """Raises `SceneError` for a load or mass all of whose unknowns are held still: it would do
+    nothing. What acts on a driven set is felt by the drive."""
     mesh = scene.mesh
     free = ~held.reshape(mesh.nodes.shape)
     loads = [load for load in scene.loads if isinstance(load, Load)]
     parts = [("load", p.name, p.facets, np.array(p.direction) != 0) for p in loads]
     every = np.ones(mesh.dimension, dtype=bool)
-    parts += [("mass", p.name, p.facets, every) for p in scene.masses if not scene.drives]
+    parts += [("mass", p.name, p.facets, every) for p in scene.masses]
     for what, name, place, along in parts:
         nodes = nodes_of(mesh, place)
         if free[nodes][:, along].any():
@@ -204,7 +202,7 @@ def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:
             "the body has no free node" if not len(open_ones) else _nearest(mesh, nodes, open_ones)
         )
         raise SceneError(
-            f"{what} '{name}': supports, pins and drives hold all {len(nodes) * int(along.sum())} "
+            f"{what} '{name}': supports and pins hold all {len(nodes) * int(along.sum())} "
             f"unknowns of its {len(nodes)} nodes, it would do nothing; {hint}"
         )
 
