@@ -12,6 +12,7 @@ from validate.compare.overall import Overall, judge_all
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.score import Score
+from validate.compare.streams import StreamUse, stream_uses
 from validate.compare.verdict import Check
 from validate.parameters import Changed, Parameter
 from validate.recording.types import Recording
@@ -101,6 +102,11 @@ class Result:
     def registered(self) -> tuple[Registered, ...]:
         """The registrations of the first method, one per recording."""
         return self.methods[0].registered if self.methods else ()
+
+    @property
+    def streams(self) -> tuple[StreamUse, ...]:
+        """Every stream of the recordings, and whether the experiment uses it."""
+        return stream_uses(self.recordings, [m.registered for m in self.methods])
 
     @property
     def checks(self) -> tuple[Check, ...]:

@@ -31,6 +31,7 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
         t0_ns=start,
         **by_kind({k: s for r in parts for k, s in r.streams.items()}),
         clock={k: c for r in parts for k, c in r.clock.items()},
+        unread={k: why for r in parts for k, why in r.unread.items()},
         metadata={**_records(recordings), "merged": _origins(recordings)},
     )
 

@@ -87,7 +87,8 @@ class Signal:
 class Contours:
     """Closed outlines in an image plane: outlines nt x (k_i, 2) m, sd m along the normal.
 
-    `pose` is T_frame_from_image (4, 4): image x, y in metres become `frame` coordinates.
+    `pose` is T_frame_from_image (4, 4): image x, y in metres become `frame` coordinates. `images`
+    is the topic of the images that they were found in; empty: recorded as outlines.
     """
 
     t: Floats
@@ -95,6 +96,7 @@ class Contours:
     sd: float
     pose: Floats
     frame: str
+    images: str = ""
 
     def __post_init__(self) -> None:
         _set(self, "t", _times(self.t, "contours"))
@@ -195,6 +197,7 @@ class Source:
 class Recording:
     """All streams of one experiment by topic, with metadata records (calibration, provenance).
 
+    `unread` are the topics of the file that are no stream here, and why.
     Raises `RecordingError` for a topic in two kinds of streams.
     """
 
@@ -207,9 +210,10 @@ class Recording:
     frames: Mapping[str, Frames] = field(default_factory=dict)
     clock: Mapping[str, Clock] = field(default_factory=dict)
     metadata: Mapping[str, Record] = field(default_factory=dict)
+    unread: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in (*_KINDS, "clock", "metadata"):
+        for name in (*_KINDS, "clock", "metadata", "unread"):
             _set(self, name, MappingProxyType(dict(getattr(self, name))))
         topics = Counter(topic for name in _KINDS for topic in getattr(self, name))
         twice = sorted(topic for topic, count in topics.items() if count > 1)

@@ -21,10 +21,22 @@ def recording(result: Result) -> Exhibit | None:
     if not result.recordings:
         return None
     several = len(result.recordings) > 1
-    tables = [_files(result.recordings)]
+    tables = [_files(result.recordings), _used(result)]
     tables += [_streams(r, several) for r in result.recordings]
     tables += [_metadata(r) for r in result.recordings if any(r.metadata.values())]
-    return Exhibit("recording", "Recording", (), tuple(tables))
+    unused = [s for s in result.streams if not s.used]
+    words = tuple(f"Not used: {s.kind} '{s.topic}' of {s.recording}: {s.why}." for s in unused)
+    return Exhibit("recording", "Recording", words, tuple(tables))
+
+
+def _used(result: Result) -> NumberTable:
+    rows = tuple(
+        (s.recording, s.topic, s.kind, TableCell("yes" if s.used else "no", emphasis="strong"),
+         s.why)
+        for s in result.streams
+    )  # fmt: skip
+    title = "Every stream of the recordings, and whether this experiment uses it."
+    return NumberTable("streams", title, ("recording", "topic", "kind", "used", "why"), rows)
 
 
 def _files(recordings: tuple[Recording, ...]) -> NumberTable:

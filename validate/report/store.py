@@ -71,6 +71,7 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "warnings": list(result.warnings),
         "inputs": [members(r.source) | {"path": file_name(r.source.path)}
                    for r in result.recordings],
+        "streams": [members(s) | {"topic": s.topic} for s in result.streams],  # no path: "/a/b"
         "parameters": {
             p.path: {"value": recorded(p.default), "unit": p.unit, "origin": p.origin}
             for p in result.parameters

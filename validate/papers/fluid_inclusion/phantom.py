@@ -128,7 +128,8 @@ def read(recording: Recording, parameters: Phantom) -> Recording:
     """The recording with the outlines that are to be used."""
     if parameters.outlines == "recorded":
         return recording
-    return replace(recording, contours={"outline": outlines_of(recording.frame("b_mode"))})
+    outlines = outlines_of(recording.frame(IMAGES), images=IMAGES)
+    return replace(recording, contours={"outline": outlines})
 
 
 def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Scene:
@@ -161,7 +162,7 @@ def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered
     return replace(seen, findings=_misplaced(capsule, inclusion(recording, p)))
 
 
-STREAMS = Streams()
+STREAMS, IMAGES = Streams(), "b_mode"
 SIGNALS = {"load_cell": "N", "pressure": "Pa"}
 TOP_LEFT = Corner(
     "contour.top_left",

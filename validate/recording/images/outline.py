@@ -98,11 +98,13 @@ def outlines_of(
     radius: float | None = None,
     shape: Shape = "free",
     bright: bool = False,
+    images: str = "",
 ) -> Contours:
     """The outline of every image; sd is the root mean square of all.
 
-    Options as in `extract_outline`. Raises `RecordingError` naming the first image without one and
-    how many there are: none is left out silently.
+    `images` is the topic of the frames, kept with the outlines. Other options as in
+    `extract_outline`. Raises `RecordingError` naming the first image without one and how many there
+    are: none is left out silently.
     """
     find = partial(extract_outline, centre=centre, radius=radius, shape=shape, bright=bright)
     outlines: list[Outline] = []
@@ -117,7 +119,8 @@ def outlines_of(
             f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
         )
     sd = rms([o.sd for o in outlines])
-    return Contours(frames.t, tuple(o.points for o in outlines), sd, frames.pose, frames.frame)
+    points = tuple(o.points for o in outlines)
+    return Contours(frames.t, points, sd, frames.pose, frames.frame, images)
 
 
 def _starts(

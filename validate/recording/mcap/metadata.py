@@ -15,6 +15,7 @@ RECORD = "validate.recording"  # the recording's name and the format of its file
 FORMAT = "1"
 POSE = "pose/"  # POSE + topic of every stream of contours or frames
 POSE_KEY = "T_frame_from_image"
+FOUND_IN = "found_in"  # in the pose record of contours: the topic of the images they come from
 CALIBRATION = "calibration/"  # CALIBRATION + topic of every stream of frames
 CALIBRATION_KEYS = ("m_per_px_x", "m_per_px_y")
 
@@ -25,6 +26,8 @@ def own_records(recording: Recording) -> dict[str, Record]:
     posed: dict[str, Contours | Frames] = {**recording.contours, **recording.frames}
     for topic, stream in posed.items():
         own[POSE + topic] = {POSE_KEY: " ".join(map(repr, stream.pose.ravel().tolist()))}
+        if isinstance(stream, Contours) and stream.images:
+            own[POSE + topic] = {**own[POSE + topic], FOUND_IN: stream.images}
     for topic, frames in recording.frames.items():
         scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
         own[CALIBRATION + topic] = {key: repr(scale) for key, scale in scales}

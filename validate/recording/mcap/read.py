@@ -16,7 +16,7 @@ from validate.recording.clocks import clock_of
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import by_name, name_of, own_records
 from validate.recording.mcap.records import MAGIC
-from validate.recording.mcap.streams import Collected, fill, ours, stream_of
+from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.types import Clock, Recording, by_kind
@@ -66,7 +66,8 @@ def _recording(path: Path, verified: Verified, collected: list[Collected]) -> Re
     t0 = min(int(raw.checked().times_ns.min()) for raw in collected)
     streams = {raw.channel.topic: stream_of(raw, t0, records) for raw in collected}
     clock = {raw.channel.topic: _clock(raw) for raw in collected}
-    found = Recording(name, verified.source, t0, **by_kind(streams), clock=clock)
+    unread = not_ours(verified)
+    found = Recording(name, verified.source, t0, **by_kind(streams), clock=clock, unread=unread)
     own = own_records(found)
     return replace(found, metadata={n: r for n, r in records.items() if n not in own})
 

@@ -13,13 +13,14 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
-from validate.recording.mcap.metadata import CALIBRATION, pose_of, scale_of
+from validate.recording.mcap.metadata import CALIBRATION, FOUND_IN, POSE, pose_of, scale_of
 from validate.recording.mcap.records import Channel, Message
 from validate.recording.mcap.schemas import (
     CONTOUR,
     IMAGE,
     MARKERS,
     MESSAGE_ENCODING,
+    MIRROR_OF,
     SCHEMA_ENCODING,
     SIGNAL,
     Sample,
@@ -103,6 +104,23 @@ def ours(verified: Verified) -> dict[int, Collected]:
     return found
 
 
+def not_ours(verified: Verified) -> dict[str, str]:
+    """The topics that are no stream, but for mirrors of one, and why."""
+    ours_by_topic = {c.channel.topic for c in ours(verified).values()}
+    found: dict[str, str] = {}
+    for channel in verified.channels.values():
+        if channel.topic in ours_by_topic or MIRROR_OF in channel.metadata:
+            continue
+        schema = verified.schemas.get(channel.schema_id)
+        name = schema.name if schema else "no schema"
+        found[channel.topic] = (
+            f"images without a record '{CALIBRATION}{channel.topic}' of their pixels' size"
+            if name == IMAGE
+            else f"its messages are not read ({name})"
+        )
+    return found
+
+
 def fill(collected: dict[int, Collected], messages: Iterable[Message]) -> None:
     """Decode `messages` into their collectors; raises `RecordingError` over `MAX_NUMBERS`."""
     total = 0
@@ -129,7 +147,8 @@ def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stre
     pose = pose_of(records, topic)
     if raw.schema == CONTOUR:
         outlines = tuple(s.values for s in raw.samples)
-        return _named(topic, lambda: Contours(t, outlines, sd, pose, frame))
+        found_in = records[POSE + topic].get(FOUND_IN, "")
+        return _named(topic, lambda: Contours(t, outlines, sd, pose, frame, found_in))
     images = tuple(s.image for s in raw.samples if s.image is not None)
     scale = scale_of(records, topic)
     return _named(topic, lambda: Frames(t, images, scale, pose, frame))
