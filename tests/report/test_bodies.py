@@ -130,4 +130,4 @@ def near(a: np.ndarray, b: np.ndarray) -> bool:
 
 def height(pixels: np.ndarray) -> int:
     """Rows in which the body or a plate is drawn, in the middle column."""
-    return int((pixels[:, 550].min(axis=1) < 250).sum())
+    return int((pixels[:, pixels.shape[1] // 2].min(axis=1) < 250).sum())

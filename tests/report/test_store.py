@@ -12,8 +12,8 @@ from report_samples import CHECK, bare_result, small_result
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import Score
-from validate.report.discrimination import _row
 from validate.report.environment import without_folder
+from validate.report.over_noise import _row
 from validate.report.registration import _statistics
 from validate.report.store import Json, _rest, document, schema, write_json, write_runs
 

@@ -69,13 +69,22 @@ class NumberTable:
 
 @dataclass(frozen=True)
 class Series:
-    """y (k,) over x (k,), drawn as a line, as points, or as a band to `upper` (k,)."""
+    """y (k,) over x (k,), drawn as a line, as points, or as a band to `upper` (k,).
+
+    `of` tells lines of one label apart: the recording that each belongs to.
+    """
 
     label: str
     x: Floats
     y: Floats
     style: Literal["line", "points", "band"] = "line"
     upper: Floats | None = None
+    of: str = ""
+
+    @property
+    def name(self) -> str:
+        """The label, and what the line is of."""
+        return f"{self.label}, {self.of}" if self.of else self.label
 
     def __post_init__(self) -> None:
         x = checked(self.x, f"series '{self.label}' x", (None,), error=ComparisonError)
@@ -89,6 +98,8 @@ class Chart:
     """One picture: axes with units, series, and named levels (horizontal lines).
 
     `linear`: y is linear between -linear and linear and logarithmic beyond (0: `log` alone counts).
+    `scale` is the size, in y's unit, of what y is a difference of: on a logarithmic axis a y far
+    below it is rounding and is not drawn.
     """
 
     name: str
@@ -100,6 +111,7 @@ class Chart:
     log: Literal["", "x", "y", "xy"] = ""
     caption: str = ""
     linear: float = 0.0
+    scale: float = 0.0
 
 
 @dataclass(frozen=True)

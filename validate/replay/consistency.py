@@ -154,9 +154,9 @@ def _chart(followed: Followed) -> Chart:
         "NIS per dof / 1",
         (
             Series("95 % band of one step", t[seen], low, "band", high),
-            Series("NIS", t[seen], np.maximum(per, 1e-6), "points"),
+            Series("NIS", t[seen], per, "points"),
         ),
-        levels=(("expected", 1.0),), log="y",
+        levels=(("expected", 1.0),), log="y", scale=1.0,
     )  # fmt: skip
 
 

@@ -14,9 +14,10 @@ from validate.compare.result import MethodResult
 from validate.report.loads import HOW, Instant, in_steps
 from validate.report.numbers import fixed_with_unit, spaced
 from validate.report.observed import drive, holds, outline_seen
-from validate.report.style import ACCEPTED, MEASURED, film
+from validate.report.style import ACCEPTED, MEASURED, film, legend_columns
 
 _MM = 1e3
+_SIDE = 4.8  # inches of a picture
 _STEPS = 24  # pictures over the whole load, about
 _BEFORE = "#A0A0A0"  # what was measured at an earlier load
 _STILL, _HELD, _MOVING = 2000, 1000, 90  # ms
@@ -56,7 +57,7 @@ def _film(shots: list[_Shot], label: str, driven: str) -> Animation:
         f"The still picture shows {shots[0].title}.",
         f"Animation: the measured outline points over the simulated outline of {label} from rest "
         f"to {shots[0].title}; the still picture shows the last load.",
-        film(lambda figure: _paint(figure, shots, label, driven), len(shots), 4.6, 4.4),
+        film(lambda figure: _paint(figure, shots, label, driven), len(shots), _SIDE, _SIDE),
         tuple(times),
     )
 
@@ -92,7 +93,9 @@ def _paint(
     (points,) = ax.plot([], [], ".", color=MEASURED, ms=4, label="measured")
     (line,) = ax.plot([], [], color=ACCEPTED, label=label)
     image_axes(ax, (o for s in shots for o in (s.simulated, s.measured)))
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    handles, labels = ax.get_legend_handles_labels()
+    columns = legend_columns(labels, _SIDE)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
     def turn(i: int) -> tuple[Artist, ...]:
         shot = shots[i]

@@ -1,42 +1,48 @@
-"""A chart as a picture: lines, points, bands and named levels, the legend below the axes."""
+"""A chart as a picture: all lines on one axes, or one axes a line where they could not be followed.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+The legend lies below the axes. What lies below rounding on a logarithmic axis is named and not
+drawn.
+"""
 
-import matplotlib as mpl
-import numpy as np
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from textwrap import fill
+
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from validate.compare.exhibit import Chart, Picture, Series
 from validate.compare.result import Result
-from validate.report.style import MEASURED, NOISE, PALETTE, Style, draw, free_look, looks
+from validate.report.chart_axes import (
+    beneath,
+    cut_dips,
+    fill_axes,
+    floor_of,
+    levels,
+    name_levels,
+    readable,
+)
+from validate.report.chart_looks import Drawn, alone, panel_series, panels, styled
+from validate.report.numbers import significant
+from validate.report.style import WIDTH, draw, legend_columns, legend_height
 
-_WIDTH, _HEIGHT = 8.6, 4.3  # inches without the legend
-_LEGEND_WIDTH = 96  # characters of a legend's row at this width
-_FEW = 16  # points of a line that are marked, so that a sweep shows what was run
-_MANY = 400  # points drawn smaller from here on
-_SPARSE = 60  # points that lie on the lines; more of them would hide these
-_SHADES = (MEASURED, "#5F5F5F", "#8C8C8C", "#AFAFAF")  # of several recordings
-_GAP = 0.058  # between the names of two levels, share of the axes' height
-
-
-@dataclass(frozen=True)
-class _Drawn:
-    series: Series
-    look: Style
+Drawing = tuple[Callable[[Figure], None], float, float]
+_HEIGHT = 3.3  # inches of one axes without the legend
+_PANEL = 1.45  # inches of one of several
+_ROOM = 0.75  # inches of titles and labels about several axes
+_FEW = 8  # panels that stand in two columns
+_WIDE, _NARROW = 36, 24  # letters of a panel's title in one line, in two columns or three
+_TITLE = 66  # letters of a title in one line
+_NAME = 60  # letters of a legend's entry in one line
 
 
 def picture(result: Result, chart: Chart) -> Picture:
     """The chart drawn; series named after a method have its colour of all other figures."""
-    drawn = _styled(result, chart)
-    rows = _legend_rows([d.series.label for d in drawn])
-    pixels = draw(lambda f: _fill(f, chart, drawn), _WIDTH, _HEIGHT + 0.22 * rows)
-    names = "; ".join(dict.fromkeys(s.label for s in chart.series))
+    pixels = draw(*drawing(result, chart))
+    names = "; ".join(dict.fromkeys(s.name for s in chart.series))
     scale = {"x": " Logarithmic x.", "y": " Logarithmic y.", "xy": " Logarithmic axes."}
-    words = " ".join(_sentence(w) for w in (chart.title, chart.caption) if w)
+    words = " ".join(_sentence(w) for w in (chart.title, chart.caption, _undrawn(chart)) if w)
     return Picture(
         f"chart_{chart.name}",
         f"{words} Upward: {chart.y}; across: {chart.x}.{scale.get(chart.log, '')}",
@@ -49,162 +55,116 @@ def _sentence(words: str) -> str:
     return words if words.endswith((".", "!", "?")) else f"{words}."
 
 
-# --- who looks how -------------------------------------------------------------------------------
+def _undrawn(chart: Chart) -> str:
+    """What lies below rounding, in words."""
+    lost = beneath(chart)
+    return f"Not drawn, below {_floor(chart)} (rounding): {'; '.join(lost)}" if lost else ""
 
 
-def _styled(result: Result, chart: Chart) -> list[_Drawn]:
-    """Measured points black, methods as elsewhere, bands in their line's colour, others in turn."""
-    found = _of_lines(result, [s for s in chart.series if s.style != "band"])
-    lines = {s.label: look for s, look in found if s.style == "line"}
-    bands = [(s, _of_band(s, lines)) for s in chart.series if s.style == "band"]
-    pairs = {id(s): look for s, look in (*found, *bands)}
-    return [_Drawn(s, pairs[id(s)]) for s in chart.series]
+def _floor(chart: Chart) -> str:
+    unit = chart.y.rpartition(" / ")[2].removesuffix("1")
+    return f"{significant(floor_of(chart), 1)} {unit}".strip()
 
 
-def _of_lines(result: Result, series: list[Series]) -> list[tuple[Series, Style]]:
-    known = _known(result)
-    unknown = [s for s in series if s.label not in known and not _is_given(s, series)]
-    taken = {known[s.label].colour for s in series if s.label in known}
-    free = [c for c in PALETTE if c not in taken] or list(PALETTE)
-    if len(unknown) > len(free):  # a sweep: its order becomes the order of the colours
-        ramp = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(unknown)))
-        free = [mpl.colors.to_hex(c) for c in ramp]
-    others = {id(s): free_look(i, free[i]) for i, s in enumerate(unknown)}
-    logs = (s for s in series if s.style == "points" and _is_given(s, series))
-    shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
-    return [
-        (s, known.get(s.label) or others.get(id(s)) or _given(s, shades.get(id(s), MEASURED)))
-        for s in series
-    ]
+def drawing(result: Result, chart: Chart) -> Drawing:
+    """What fills the figure, and its width and height in inches."""
+    labels = panels(chart)
+    if labels:
+        return _one_each(result, chart, labels)
+    drawn = styled(result, chart.series)
+    names = _drawn_names(chart, drawn)
+    below = legend_height(_broken(names)) if len(names) > 1 else 0.0
+    return lambda f: _together(f, chart, drawn), WIDTH, _HEIGHT + below
 
 
-def _given(series: Series, shade: str) -> Style:
-    """A reference is a wide grey line under the others, what was measured dark points."""
-    if series.style == "line":
-        return Style("#9A9A9A", "-", "o", 3.6)
-    return Style(shade, "-", "o", 1.2)
-
-
-def _known(result: Result) -> Mapping[str, Style]:
-    styles = looks(result)
-    return {**styles, **{m.label: styles[m.name] for m in result.methods}}
-
-
-def _is_given(one: Series, series: list[Series]) -> bool:
-    """A line named a reference; points that say measured, or the only points beside lines."""
-    if one.style == "line":
-        return one.label.lower().startswith("reference")
-    alone = sum(s.style == "points" for s in series) == 1 and len(series) > 1
-    return alone or "measured" in one.label.lower()
-
-
-def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
-    own = [name for name in lines if band.label.startswith(name)]
-    return lines[max(own, key=len)] if own else Style(NOISE, "-", "o", 0.0)
-
-
-# --- drawing -------------------------------------------------------------------------------------
-
-
-def _fill(figure: Figure, chart: Chart, drawn: list[_Drawn]) -> None:
+def _together(figure: Figure, chart: Chart, drawn: list[Drawn]) -> None:
     ax = figure.subplots()
-    if "x" in chart.log:
-        ax.set_xscale("log", nonpositive="mask")
-    if "y" in chart.log:
-        ax.set_yscale("log", nonpositive="mask")
-    if chart.linear:
-        ax.set_yscale("symlog", linthresh=chart.linear, linscale=1.0)
-        ax.yaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "−"))
-        ax.axhline(0, color=MEASURED, lw=0.8)
-    for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
-        _draw_one(ax, d)
+    fill_axes(ax, chart, drawn)
     ax.set(xlabel=chart.x, ylabel=chart.y)
-    _levels(ax, chart)
-    _readable(ax, chart)
-    ax.set_title(chart.title, loc="left")
-    handles, labels = ax.get_legend_handles_labels()
-    found = dict(zip(labels, handles, strict=True))  # of one name the upper one: a line, not a band
-    named = list(dict.fromkeys(d.series.label for d in drawn))
-    if len(named) > 1:
-        figure.legend([found[name] for name in named], named, loc="outside lower center",
-                      ncols=_columns(named))  # fmt: skip
+    cut_dips(ax, chart)
+    readable(ax, chart)
+    name_levels(ax, chart)
+    _title(figure, chart)
+    names = _drawn_names(chart, drawn)
+    if len(names) > 1:
+        _legend(figure, [ax], names)
 
 
-def _layer(series: Series) -> int:
-    """Bands lie lowest, then crowded points, lines, single points."""
-    if series.style == "points":
-        return 3 if len(series.x) <= _SPARSE else 1
-    return 0 if series.style == "band" else 2
+def _drawn_names(chart: Chart, drawn: Sequence[Drawn]) -> list[str]:
+    lost = beneath(chart)
+    return [n for n in dict.fromkeys(d.series.name for d in drawn) if n not in lost]
 
 
-def _draw_one(ax: Axes, drawn: _Drawn) -> None:
-    s, look = drawn.series, drawn.look
-    if s.style == "band":
-        shade: dict[str, Any] = {"color": look.colour, "alpha": 1.0 if look.width == 0 else 0.2}
-        ax.fill_between(s.x, s.y, _upper(s), lw=0, label=s.label, **shade)
-    elif s.style == "points":
-        size = 4.5 if len(s.x) <= _SPARSE else 3.0 if len(s.x) <= _MANY else 1.6
-        ax.plot(s.x, s.y, look.point, color=look.colour, ms=size, mew=0.6, label=s.label)
-    else:
-        marker = look.point if len(s.x) <= _FEW else ""
-        dash, width = ("-", min(look.width, 0.9)) if _jagged(s) else (look.dash, look.width)
-        ax.plot(s.x, s.y, color=look.colour, ls=dash, lw=width, marker=marker, ms=4.5,
-                label=s.label)  # fmt: skip
+def _title(figure: Figure, chart: Chart) -> None:
+    figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontsize="medium")
 
 
-def _jagged(series: Series) -> bool:
-    """A line that turns so often that dashes could not be told from its turns."""
-    turns = np.count_nonzero(np.diff(np.sign(np.diff(series.y))))
-    return bool(len(series.y) > _MANY and turns > 0.1 * len(series.y))
+def _legend(figure: Figure, axes: Iterable[Axes], names: Sequence[str]) -> None:
+    """Of one name the upper one: a line, not a band."""
+    found: dict[str, Artist] = {}
+    for ax in axes:
+        handles, labels = ax.get_legend_handles_labels()
+        found |= dict(zip(labels, handles, strict=True))
+    shown = [name for name in names if name in found]
+    broken = _broken(shown)
+    figure.legend([found[name] for name in shown], broken, loc="outside lower center",
+                  ncols=legend_columns(broken))  # fmt: skip
 
 
-def _upper(band: Series) -> Any:
-    return band.upper if band.upper is not None else np.zeros_like(band.y)
+def _broken(names: Sequence[str]) -> list[str]:
+    return [fill(name, _NAME) for name in names]
 
 
-def _levels(ax: Axes, chart: Chart) -> None:
-    """Horizontal lines, named to the right of the axes where no data are hidden."""
-    shown = [(name, y) for name, y in chart.levels if y > 0 or "y" not in chart.log]
-    for _, y in shown:
-        ax.axhline(y, color="#5A5A5A", lw=1.0, ls=(0, (4, 2)), zorder=1.5)
-    if not shown:
-        return
-    ax.set_ylim(*ax.get_ylim())  # the names belong to these limits
-    shown.sort(key=lambda pair: pair[1])
-    to_axes = (ax.transData + ax.transAxes.inverted()).transform
-    at = _apart([float(to_axes((1.0, y))[1]) for _, y in shown])
-    for (name, _), height in zip(shown, at, strict=True):
-        ax.text(1.012, height, name, transform=ax.transAxes, va="center", fontsize=8.5,
-                color="#404040")  # fmt: skip
+# --- one axes a line -----------------------------------------------------------------------------
 
 
-def _apart(heights: list[float]) -> list[float]:
-    """The same rising heights, each at least `_GAP` above the one below."""
-    found: list[float] = []
-    for height in heights:
-        found.append(max(height, found[-1] + _GAP) if found else height)
-    return found
+def _one_each(result: Result, chart: Chart, labels: tuple[str, ...]) -> Drawing:
+    found = {name: alone(result, panel_series(chart, name, labels), name) for name in labels}
+    names = [*_common(chart, found), *(name for name, _ in levels(chart))]
+    below = legend_height(_broken(names)) if names else 0.0
+    rows = -(-len(labels) // _columns(labels))
+    height = _PANEL * rows + _ROOM + below
+    return lambda f: _panels(f, chart, found, names), WIDTH, height
 
 
-def _readable(ax: Axes, chart: Chart) -> None:
-    """Plain numbers on logarithmic axes of ordinary size; all ticks of one decade named."""
-    for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
-        if name not in chart.log:
-            continue
-        low, high = sorted(axis.get_view_interval())
-        if low >= 1e-3 and high <= 1e5:
-            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        if high < 15 * low:
-            axis.set_minor_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        else:
-            axis.set_minor_formatter(NullFormatter())
+def _columns(labels: Sequence[str]) -> int:
+    return 2 if len(labels) <= _FEW else 3
 
 
-def _columns(labels: list[str]) -> int:
-    widest = max(len(name) for name in labels) + 7
-    return max(1, min(len(labels), 4, _LEGEND_WIDTH // widest))
+def _common(chart: Chart, found: Mapping[str, Sequence[Drawn]]) -> list[str]:
+    """What a legend names: all that is not the one line of its panel."""
+    drawn = [d for shown in found.values() for d in shown]
+    named = [d.series.name for d in drawn if d.series.label not in found or d.series.of]
+    shaded = [d.series.name for d in drawn if d.series.style == "band"]
+    of = {d.series.name: d.series.of for d in drawn if d.series.of}
+    return list(dict.fromkeys(of.get(n, n) for n in (*named, *shaded) if n not in found))
 
 
-def _legend_rows(labels: list[str]) -> int:
-    names = list(dict.fromkeys(labels))
-    return -(-len(names) // _columns(names)) if len(names) > 1 else 0
+def _panels(
+    figure: Figure, chart: Chart, found: Mapping[str, Sequence[Drawn]], names: Sequence[str]
+) -> None:
+    columns = _columns(tuple(found))
+    rows = -(-len(found) // columns)
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for ax, (label, drawn) in zip(axes.flat, found.items(), strict=False):
+        fill_axes(ax, chart, [replace(d, series=_short(d.series)) for d in drawn])
+        ax.set_title(fill(label, _WIDE if columns == 2 else _NARROW), loc="left", fontsize=8.5)
+        if label in beneath(chart):
+            ax.text(0.5, 0.5, f"below {_floor(chart)}", transform=ax.transAxes, ha="center",
+                    fontsize=8.5)  # fmt: skip
+    for ax in axes.flat[len(found) :]:
+        ax.set_axis_off()
+    for ax in axes.flat[: len(found)][-columns:]:  # the lowest of every column
+        ax.tick_params(labelbottom=True)
+        ax.set_xlabel(fill(chart.x, _WIDE if columns == 2 else _NARROW), fontsize=9)
+    cut_dips(axes[0, 0], chart)
+    readable(axes[0, 0], chart, most=4)
+    figure.supylabel(chart.y, fontsize="medium")
+    _title(figure, chart)
+    if names:
+        _legend(figure, axes.flat, names)
+
+
+def _short(series: Series) -> Series:
+    """Named in a legend that serves all panels: by what it is of alone."""
+    return replace(series, label=series.of, of="") if series.of else series

@@ -74,9 +74,10 @@ def _signal(result: Result, quantity: str) -> tuple[Chart, ...]:
     unit, factor = _AXIS.get(unit, (shown_unit(unit), scale(unit)))
     count = f"{len(logs)} recordings" if len(logs) > 1 else "one recording"
     q, noise = f"{drive(logs[0][1]).name} / mm", 2 * factor * max(s.sd for _, _, s in logs)
+    simulated = (s for line in lines for s in _level(result, line, factor))
     level = Chart(
         f"curve_{name}", f"{quantity}, measured and simulated", q, f"{quantity} / {unit}",
-        (*_measured(result, logs, factor), *(s for line in lines for s in _level(line, factor))),
+        (*_measured(result, logs, factor), *simulated),
         caption=f"Points: every sample of {count}.{_band_words(lines)}{_left_out(hidden)}",
     )  # fmt: skip
     ends = np.array([f(q) for f in (np.min, np.max) for q in [np.hstack(longest.q)]])
@@ -84,7 +85,7 @@ def _signal(result: Result, quantity: str) -> tuple[Chart, ...]:
     off = Chart(
         f"curve_{name}_error", f"{quantity}, model less measurement", q,
         f"simulated − measured / {unit}",
-        (band, *(s for line in lines for s in _off(line, factor))), linear=noise,
+        (band, *(s for line in lines for s in _off(result, line, factor))), linear=noise,
         caption="Outside of the grey band the axis is logarithmic.",
     )  # fmt: skip
     return level, off
@@ -132,19 +133,25 @@ def _measured(result: Result, logs: list[Log], factor: float) -> Iterator[Series
         yield Series(label, _MM * driven(registered, s.t), factor * s.y[:, 0], "points")
 
 
-def _level(line: _Line, factor: float) -> Iterator[Series]:
+def _of(result: Result, line: _Line) -> list[str]:
+    """Which recording each of a method's lines is of; nothing where there is one."""
+    names = [r.name for r in result.recordings]
+    return names if len(line.q) > 1 else [""]
+
+
+def _level(result: Result, line: _Line, factor: float) -> Iterator[Series]:
     """The model's line of every log; about the first the uncertainty of its modulus."""
     label, wide = line.method.label, 2 * line.method.band
     if wide:
         y = factor * line.y[0]
         yield Series(label, line.q[0], y * (1 - wide), "band", y * (1 + wide))
-    for q, y in zip(line.q, line.y, strict=True):
-        yield Series(label, q, factor * y)
+    for of, q, y in zip(_of(result, line), line.q, line.y, strict=False):
+        yield Series(label, q, factor * y, of=of)
 
 
-def _off(line: _Line, factor: float) -> Iterator[Series]:
-    for q, off in zip(line.q, line.off, strict=True):
-        yield Series(line.method.label, q, factor * off)
+def _off(result: Result, line: _Line, factor: float) -> Iterator[Series]:
+    for of, q, off in zip(_of(result, line), line.q, line.off, strict=False):
+        yield Series(line.method.label, q, factor * off, of=of)
 
 
 def _band_words(lines: list[_Line]) -> str:

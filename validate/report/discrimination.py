@@ -1,35 +1,18 @@
 """What this recording can tell apart: errors against noise, effects against sensors, sentences."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import numpy as np
-from matplotlib.figure import Figure
-from scipy.special import chdtri
-
-from validate.arrays import rms
 from validate.compare.effects import TELLS_APART, Change, Effect
-from validate.compare.exhibit import Exhibit, NumberTable, Picture, TableCell
-from validate.compare.residual import Residual
-from validate.compare.result import MethodResult, Result
+from validate.compare.exhibit import Exhibit, NumberTable, TableCell
+from validate.compare.result import Result
 from validate.report.numbers import at_load, fixed, scale, shown_unit, text, with_unit
-from validate.report.observed import finished, last_residual
-from validate.report.style import MEASURED, NOISE, draw, looks
+from validate.report.over_noise import over_noise
 
 _DECIMALS = {"m": 2, "N": 3, "Pa": 0}
 _EFFECTS = (
     "effect", "doc", "quantity", "rms", "max", "unit", "separation", "seen", "would_see",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Row:
-    """One quantity: every method's rms error over the noise of the measurement."""
-
-    quantity: str
-    noise: str
-    band: tuple[float, float]
-    ratios: tuple[tuple[MethodResult, float], ...]
 
 
 def discrimination(result: Result) -> Exhibit:
@@ -40,7 +23,7 @@ def discrimination(result: Result) -> Exhibit:
         "What this recording can tell apart",
         tuple(map(_sentence, effects)),
         (_matrix(effects), _budget(effects)) if effects else (),
-        pictures=_over_noise(result),
+        pictures=over_noise(result),
         data=(_all_changes(result.effects),),
     )
 
@@ -63,71 +46,6 @@ def _all_changes(effects: tuple[Effect, ...]) -> NumberTable:
         for c in e.changes
     )  # fmt: skip
     return NumberTable("effects", "Effects", _EFFECTS, rows)
-
-
-# --- errors over noise ---------------------------------------------------------------------------
-
-
-def _over_noise(result: Result) -> tuple[Picture, ...]:
-    rows = _rows(result)
-    if not rows:
-        return ()
-    pixels = draw(lambda f: _dots(f, result, rows), 9.0, 1.5 + 0.42 * len(rows))
-    over_time = all(r.load == "all" for m in finished(result) for r in m.residuals.values())
-    where = at_load("all") if over_time else "at the last load"
-    shown = Picture(
-        "errors_over_noise",
-        f"Rms error of every model {where} over the rms that measurement noise alone gives "
-        "(no unit, logarithmic). Grey: where noise alone puts 95 % of repetitions (chi-square with "
-        "the number of values); right of it the recording sees the model's error. Where all models "
-        "lie on grey, that quantity cannot choose between them. Ratios below 0.02 lie at 0.02.",
-        "Dot chart: rms error over measurement noise for each quantity and model.",
-        pixels,
-    )
-    return (shown,)
-
-
-def _rows(result: Result) -> list[_Row]:
-    done = finished(result)
-    quantities = dict.fromkeys(r.quantity for m in done for r in m.residuals.values() if r.sd > 0)
-    return [_row(done, quantity) for quantity in quantities]
-
-
-def _row(done: Iterable[MethodResult], quantity: str) -> _Row:
-    seen = [(m, r) for m in done if (r := last_residual(m, quantity)) is not None]
-    ratios = tuple((m, rms(r.values) / _noise(r)) for m, r in seen)
-    first = seen[0][1]
-    dof = first.values.size
-    low, high = (float(np.sqrt(chdtri(dof, p) / dof)) for p in (0.975, 0.025))
-    return _Row(quantity, with_unit(_noise(first), first.unit), (low, high), ratios)
-
-
-def _noise(residual: Residual) -> float:
-    """The rms (SI) that the noise of the measurement gives a perfect model."""
-    c = residual.values.shape[1]
-    return float(np.sqrt(c * (residual.sd**2 + residual.systematic**2)))
-
-
-def _dots(figure: Figure, result: Result, rows: list[_Row]) -> None:
-    ax, styles = figure.subplots(), looks(result)
-    ax.axvline(1, color=MEASURED, lw=0.8)
-    named: set[str] = set()
-    for y, row in enumerate(rows):
-        ax.fill_betweenx([y - 0.42, y + 0.42], *row.band, color=NOISE, lw=0)
-        for j, (method, ratio) in enumerate(row.ratios):
-            look = styles[method.name]
-            lift = 0.5 * (j / max(len(row.ratios) - 1, 1) - 0.5)
-            label = None if method.name in named else method.label
-            named.add(method.name)
-            ax.plot(max(ratio, 0.02), y + lift, look.point, color=look.colour, ms=6, label=label)
-    ax.set_xscale("log")
-    low, high = ax.get_xlim()
-    ax.set_xlim(max(min(low, 0.09), 0.018), max(high, 11))
-    ax.xaxis.set_major_formatter(lambda v, _: f"{v:g}")
-    ax.set_yticks(range(len(rows)), [f"{r.quantity}\nnoise {r.noise}" for r in rows], fontsize=8)
-    ax.set_ylim(len(rows) - 0.5, -0.5)
-    ax.set_xlabel("rms error / rms of the noise")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
 # --- effects against sensors ---------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.compare.exhibit import Animation, Exhibit, NodeMap, Picture
@@ -10,7 +10,7 @@ from validate.compare.result import Result
 from validate.errors import ComparisonError
 from validate.report import charts, gl, heat, regime_map
 from validate.report.encode import gif, png
-from validate.report.maps import Range, drawn, ranges
+from validate.report.maps import Range, drawn, legible, ranges
 from validate.report.tables import write_chart, write_table
 
 
@@ -39,6 +39,8 @@ def draw_all(result: Result, found: Iterable[Exhibit]) -> tuple[DrawnExhibit, ..
     """
     exhibits = tuple(found)
     _require_distinct(exhibits)
+    clear = iter(legible(m for e in exhibits for m in e.maps))
+    exhibits = tuple(replace(e, maps=tuple(next(clear) for _ in e.maps)) for e in exhibits)
     scales = ranges(m for e in exhibits for m in e.maps)
     return tuple(DrawnExhibit(e, _drawings(result, e, scales)) for e in exhibits)
 

@@ -11,9 +11,9 @@ from validate.compare.exhibit import Heat, Picture
 from validate.report.numbers import significant
 from validate.report.style import draw
 
-_CELL = (0.78, 0.42)  # inches of a square that holds its number
-_LARGEST = (9.0, 7.0)  # inches of all squares
-_LEGIBLE = 0.5  # inches across below which numbers would run into each other
+_CELL = (0.6, 0.36)  # inches of a square that holds its number
+_LARGEST = (6.2, 6.5)  # inches of all squares
+_LEGIBLE = 0.42  # inches across below which numbers would run into each other
 _TICKS = 24  # texts of an axis
 _EMPTY = "#BDBDBD"
 
@@ -23,7 +23,7 @@ def picture(heat: Heat) -> Picture:
     rows, columns = heat.values.shape
     width = min(max(columns * _CELL[0], 3.0), _LARGEST[0])
     height = min(max(rows * _CELL[1], 1.6), _LARGEST[1])
-    pixels = draw(lambda f: _fill(f, heat, width / columns), width + 2.3, height + 1.1)
+    pixels = draw(lambda f: _fill(f, heat, width / columns), width + 1.9, height + 1.1)
     turn = "" if heat.centre is None else f" White is {heat.centre:g}."
     scale = " Logarithmic colours." if _logarithmic(heat.values) else ""
     missing = int(np.isnan(heat.values).sum())

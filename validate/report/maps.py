@@ -1,6 +1,7 @@
 """Numbers at the nodes: their common ranges and, for machines that cannot render, flat drawings."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +16,7 @@ from validate.scene.mesh import Mesh, boundary_facets
 
 Range = tuple[float, float]
 _MM = 1e3
+_FAINT = 0.2  # of the largest of a scale
 # Every map is seen from the corner of +x, -y and +z, z upward on paper: its triad says so.
 TOWARD_EYE = np.array([0.62, -1.0, 0.62]) / np.linalg.norm([0.62, -1.0, 0.62])
 
@@ -22,6 +24,25 @@ TOWARD_EYE = np.array([0.62, -1.0, 0.62]) / np.linalg.norm([0.62, -1.0, 0.62])
 def values(shown: NodeMap) -> Floats:
     """The numbers (n,) in the unit that readers see."""
     return scale(shown.unit) * shown.values
+
+
+def legible(maps: Iterable[NodeMap]) -> tuple[NodeMap, ...]:
+    """The maps; one too faint to be read in the colours of its scale has colours of its own."""
+    shown = tuple(maps)
+    largest: dict[str, float] = {}
+    for m in shown:
+        largest[m.scale] = max(largest.get(m.scale, 0.0), _top(m))
+    return tuple(_own(m) if m.scale and _top(m) < _FAINT * largest[m.scale] else m for m in shown)
+
+
+def _top(shown: NodeMap) -> float:
+    return float(np.abs(values(shown)).max())
+
+
+def _own(shown: NodeMap) -> NodeMap:
+    title = shown.title.removesuffix(".")
+    words = f"{title} (colours of its own, far below the largest of {shown.scale})"
+    return replace(shown, title=words, scale="")
 
 
 def ranges(maps: Iterable[NodeMap]) -> dict[str, Range]:

@@ -1,6 +1,8 @@
 """Markers at the loads: vectors and positions in their plane, and what they do across it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,9 +25,23 @@ from validate.report.observed import (
     shown_method,
 )
 from validate.report.plane import flattest
-from validate.report.style import ACCEPTED, MEASURED, Style, draw, looks
+from validate.report.style import (
+    ACCEPTED,
+    MEASURED,
+    WIDTH,
+    Style,
+    draw,
+    legend_columns,
+    legend_height,
+    looks,
+)
 
 _MM = 1e3
+# Wide and pale under thin and black: they are told apart on grey paper too.
+_WIDE: Mapping[str, Any] = {"color": ACCEPTED, "alpha": 0.45, "width": 0.014, "headwidth": 2.2,
+                            "headlength": 2.2, "headaxislength": 2.2}  # fmt: skip
+_THIN: Mapping[str, Any] = {"color": MEASURED, "width": 0.005, "headwidth": 3.5, "headlength": 4}
+_PANEL = 2.9  # inches of a row of panels
 _BANDS = 7  # groups of neighbours that a line joins
 
 
@@ -72,42 +88,41 @@ def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
     return Picture(
         "markers",
         f"The markers in the plane of {' and '.join('xyz'[i] for i in seen.plane)}{along}, mm. "
-        "Upper row: displacement from "
-        f"rest, measured (black) and {judged.label} (blue), drawn to scale. Lower row: measured "
+        "Left: displacement from "
+        f"rest, measured (thin, black) and {judged.label} (wide, blue), to scale. Right: measured "
         f"positions as circles of the declared noise ({with_unit(seen.markers.sd, 'm')} per axis), "
         "the simulated ones as dots. About four dots in ten fall inside their circle when the "
         "model is right.",
         f"Marker displacement vectors and positions for {count} loads, measured and simulated.",
-        draw(lambda f: _panels(f, seen, judged), 3.3 * count + 0.6, 8.2),
+        draw(lambda f: _panels(f, seen, judged), WIDTH, _PANEL * count + 0.7),
     )
 
 
 def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
-    axes = figure.subplots(2, len(seen.loaded), sharex=True, sharey=True, squeeze=False)
+    axes = figure.subplots(len(seen.loaded), 2, sharex=True, sharey=True, squeeze=False)
     start, rest = _MM * seen.at(seen.rest)[:, seen.plane], _MM * seen.markers.rest[:, seen.plane]
     for i, hold in enumerate(seen.loaded):
         simulated = _MM * seen.markers.simulated(judged.run.u[i + 1])[:, seen.plane]
         measured = _MM * seen.at(hold)[:, seen.plane]
-        upper, lower = axes[:, i]
-        _vectors(upper, start, measured, MEASURED, "measured")
-        _vectors(upper, rest, simulated, ACCEPTED, judged.label)
-        _circles(lower, measured, _MM * seen.markers.sd)
-        lower.plot(*simulated.T, ".", color=ACCEPTED, ms=4.5, label=judged.label)
-        upper.set_title(spaced(hold.label))
-        lower.set_xlabel(seen.labels[seen.plane[0]])
-        for ax in (upper, lower):
+        left, right = axes[i]
+        _vectors(left, rest, simulated, _WIDE, judged.label)
+        _vectors(left, start, measured, _THIN, "measured")
+        _circles(right, measured, _MM * seen.markers.sd)
+        right.plot(*simulated.T, ".", color=ACCEPTED, ms=4.5, label=judged.label)
+        left.set_title(f"{spaced(hold.label)}: displacement", loc="left", fontsize=8.5)
+        right.set_title(f"{spaced(hold.label)}: position", loc="left", fontsize=8.5)
+        left.set_ylabel(seen.labels[seen.plane[1]])
+        for ax in (left, right):
             ax.set_aspect("equal")
-    for ax in axes[:, 0]:
-        ax.set_ylabel(seen.labels[seen.plane[1]])
+    for ax in axes[-1]:
+        ax.set_xlabel(seen.labels[seen.plane[0]])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
 
 
-def _vectors(ax: Axes, start: Floats, end: Floats, colour: str, label: str) -> None:
+def _vectors(ax: Axes, start: Floats, end: Floats, look: Mapping[str, Any], label: str) -> None:
     ax.quiver(
-        *start.T, *(end - start).T, angles="xy", scale_units="xy", scale=1, color=colour,
-        label=label, width=0.005, headwidth=3.5, headlength=4,
-        zorder=3 if colour == ACCEPTED else 2,
-    )  # fmt: skip
+        *start.T, *(end - start).T, angles="xy", scale_units="xy", scale=1, label=label, **look
+    )
 
 
 def _circles(ax: Axes, centres: Floats, sd: float) -> None:
@@ -143,7 +158,7 @@ def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
         f"line joins the mean of markers of equal rank in {x}.",
         f"Displacement of the markers along {'xyz'[c]} against {x} for each load: measured and "
         f"{names}.",
-        draw(lambda f: _across_panels(f, seen, c, drawn), 3.3 * len(seen.loaded) + 0.6, 3.9),
+        draw(lambda f: _across_panels(f, seen, c, drawn), WIDTH, _across_height(seen, drawn)),
     )
     return (made,)
 
@@ -151,7 +166,10 @@ def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
 def _across_panels(
     figure: Figure, seen: _Seen, c: int, drawn: list[tuple[MethodResult, Style]]
 ) -> None:
-    axes = figure.subplots(1, len(seen.loaded), sharex=True, sharey=True, squeeze=False)[0]
+    columns = min(len(seen.loaded), 2)
+    rows = -(-len(seen.loaded) // columns)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    axes = grid.flat[: len(seen.loaded)]
     x, start = _MM * seen.markers.rest[:, seen.plane[0]], seen.at(seen.rest)[:, c]
     for i, (ax, hold) in enumerate(zip(axes, seen.loaded, strict=True), start=1):
         ax.errorbar(x, _MM * (seen.at(hold)[:, c] - start), np.sqrt(2) * _MM * seen.markers.sd,
@@ -163,10 +181,20 @@ def _across_panels(
             line = _banded(x, _MM * own.positions.apply(method.run.u[i])[:, c])
             ax.plot(*line, color=look.colour, ls=look.dash, lw=look.width, marker=look.point, ms=4,
                     label=method.label)  # fmt: skip
-        ax.set(title=spaced(hold.label), xlabel=seen.labels[seen.plane[0]])
-    axes[0].set_ylabel(f"displacement along {'xyz'[c]} / mm")
-    columns = min(4, len(seen.loaded) + 1)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns)
+        ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
+    for ax in axes[-columns:]:
+        ax.set_xlabel(seen.labels[seen.plane[0]])
+        ax.tick_params(labelbottom=True)
+    for ax in grid.flat[len(seen.loaded) :]:
+        ax.set_axis_off()
+    figure.supylabel(f"displacement along {'xyz'[c]} / mm", fontsize="medium")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=legend_columns(labels))
+
+
+def _across_height(seen: _Seen, drawn: list[tuple[MethodResult, Style]]) -> float:
+    names = ["measured", *(m.label for m, _ in drawn)]
+    return 2.2 * -(-len(seen.loaded) // 2) + 0.6 + legend_height(names)
 
 
 def _banded(x: Floats, y: Floats) -> tuple[Floats, Floats]:

@@ -23,10 +23,20 @@ from validate.report.observed import (
     outline_seen,
     shown_method,
 )
-from validate.report.style import MEASURED, Style, draw, looks
+from validate.report.outline_images import outline_images
+from validate.report.style import (
+    MEASURED,
+    WIDTH,
+    Style,
+    draw,
+    legend_columns,
+    legend_height,
+    looks,
+)
 
 _MM = 1e3
 _GREY = "#9A9A9A"
+_COLUMNS, _PANEL = 2, 2.6  # panels of a row, and their inches
 
 
 @dataclass(frozen=True)
@@ -66,7 +76,11 @@ def outlines(result: Result) -> Exhibit | None:
         "Outlines in the image",
         tables=tuple(t for c in seen.corners if (t := _corner_table(result, at[1:], c))),
         charts=(_at_last(measured, drawn),),
-        pictures=(*moving_outline(judged), _by_load(measured, first, drawn)),
+        pictures=(
+            *moving_outline(judged),
+            _by_load(measured, first, drawn),
+            *outline_images(result.recordings[0], seen.name, at),
+        ),
     )
 
 
@@ -91,7 +105,9 @@ def _off(drawn: _Sections, measured: _Outlines) -> Floats:
 
 
 def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> Picture:
-    width = 2.6 * len(measured.holds) + 0.4
+    rows = -(-len(measured.holds) // _COLUMNS)
+    names = ["measured at rest", "measured", *(d.method.label for d in drawn)]
+    height = _PANEL * rows + 0.4 + legend_height(names)
     label, loads = judged.method.label, measured.loads
     ringed = "".join(
         f" Ringed: the image angle {np.rad2deg(c.angle):.0f}°, {c.quantity}; its displacement "
@@ -105,13 +121,15 @@ def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> 
         f"panel also the other models, but for those whose line would lie on another's.{ringed}",
         f"Measured outline points and the simulated section of {label}, one panel per load "
         f"({loads}).",
-        draw(lambda figure: _panels(figure, measured, judged, drawn), width, 3.5),
+        draw(lambda figure: _panels(figure, measured, judged, drawn), WIDTH, height),
     )
 
 
 def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> None:
     count, rest = len(measured.holds), closed(measured.measured[0])
-    axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
+    rows = -(-count // _COLUMNS)
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+    axes = grid.flat[:count]
     for i, (ax, hold) in enumerate(zip(axes, measured.holds, strict=True)):
         ax.plot(*rest.T, color=_GREY, lw=0.8, label="measured at rest")
         ax.plot(*(_MM * measured.measured[i]).T, ".", color=MEASURED, ms=3, label="measured")
@@ -121,10 +139,12 @@ def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[
             _ring(ax, corner, measured.measured[i], MEASURED)
             _ring(ax, corner, judged.sections[i], judged.look.colour)
         image_axes(ax, (_MM * o for o in (*measured.measured, *judged.sections)))
-        ax.set_title(spaced(hold.label))
+        ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
         ax.label_outer()
+    for ax in grid.flat[count:]:
+        ax.set_axis_off()
     handles, labels = axes[-1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(count + 1, 4))
+    figure.legend(handles, labels, loc="outside lower center", ncols=legend_columns(labels))
 
 
 def _section(ax: Axes, drawn: _Sections, i: int) -> None:

@@ -15,12 +15,12 @@ from matplotlib.patches import Patch
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Mark, Panel, Picture, RegimeMap
-from validate.report.style import draw
+from validate.report.style import WIDTH, draw, legend_columns, legend_height
 
 _COLOURS = ("#56B4E9", "#CFE8F7", "#D55E00", "#7F7F7F")  # Okabe-Ito, the second a paler first
-_COLUMNS = 4
-_PANEL = (2.75, 1.25)  # inches, before the rows
-_ROW = 0.13  # inches of a row
+_HATCHES = ("", "", "////", "....")  # what colours say, on paper without any
+_COLUMNS = 2
+_PANEL, _ROW = 0.62, 0.16  # inches of a panel before its rows, and of a row
 _BORDER, _MARK = "#000000", "#F0E442"
 _SIGNS = ("o", "s", "D", "^", "v", "P")
 
@@ -29,10 +29,9 @@ def picture(shown: RegimeMap) -> Picture:
     """The map drawn; its caption explains line and marks."""
     columns = min(_COLUMNS, len(shown.panels))
     rows = -(-len(shown.panels) // columns)
-    height = _PANEL[1] + _ROW * len(shown.rows)
-    pixels = draw(
-        lambda f: _fill(f, shown, rows, columns), columns * _PANEL[0] + 0.6, rows * height + 0.7
-    )
+    height = _PANEL + _ROW * len(shown.rows)
+    below = legend_height([str(e.get_label()) for e in _entries(shown)])
+    pixels = draw(lambda f: _fill(f, shown, rows, columns), WIDTH, rows * height + 0.4 + below)
     counted = ", ".join(
         f"{name} {sum(int((p.codes == i).sum()) for p in shown.panels)}"
         for i, name in enumerate(shown.regimes)
@@ -56,8 +55,8 @@ def _fill(figure: Figure, shown: RegimeMap, rows: int, columns: int) -> None:
         ax.set_xlabel(shown.x_label)
         ax.tick_params(labelbottom=True)
     for ax in axes[:, 0]:
-        ax.set_ylabel(shown.y_label)
-        ax.set_yticks(range(len(shown.rows)), shown.rows, fontsize=7)
+        ax.set_yticks(range(len(shown.rows)), shown.rows, fontsize=8)
+    figure.supylabel(shown.y_label, fontsize="medium")
     _legend(figure, shown)
 
 
@@ -70,15 +69,26 @@ def _panel(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
         _edges(shown.x), edges, panel.codes, cmap=colours, norm=norm,
         edgecolors="white", linewidth=0.2,
     )  # fmt: skip
+    _hatch(ax, shown, panel)
     span = _edges(shown.x)[[0, -1]]
     for row, at in enumerate(panel.border):
         if np.isfinite(at) and span[0] < at < span[1]:
             ax.plot([at, at], [row - 0.5, row + 0.5], color=_BORDER, linewidth=1.6)
     for i, mark in enumerate(shown.marks):
         ax.plot(mark.x, mark.row, **_look(i, mark))
-    ax.set(title=panel.title, xlim=tuple(span), ylim=(edges[0], edges[-1]))
+    ax.set_title(panel.title, loc="left", fontsize=8.5)
+    ax.set(xlim=tuple(span), ylim=(edges[0], edges[-1]))
     ax.grid(visible=False)
     ax.minorticks_off()
+
+
+def _hatch(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
+    """Strokes over the regimes that grey paper would not tell apart."""
+    x = _edges(shown.x)
+    for code, hatch in enumerate(_HATCHES[: len(shown.regimes)]):
+        for row, column in np.argwhere(panel.codes == code) if hatch else ():
+            ax.fill_between(x[column : column + 2], row - 0.5, row + 0.5, facecolor="none",
+                            edgecolor="#00000055", hatch=hatch, lw=0)  # fmt: skip
 
 
 def _look(i: int, mark: Mark) -> dict[str, Any]:
@@ -96,11 +106,18 @@ def _edges(x: Floats) -> Floats:
     return np.asarray(np.exp(np.array([ends[0], *middles, ends[1]])))
 
 
-def _legend(figure: Figure, shown: RegimeMap) -> None:
+def _entries(shown: RegimeMap) -> list[Patch | Line2D]:
     entries: list[Patch | Line2D] = [
-        Patch(color=_COLOURS[i], label=name) for i, name in enumerate(shown.regimes)
+        Patch(facecolor=_COLOURS[i], edgecolor="#00000088", hatch=_HATCHES[i], lw=0, label=name)
+        for i, name in enumerate(shown.regimes)
     ]
     entries.append(Line2D([], [], color=_BORDER, linewidth=1.6, label="predicted limit"))
     for i, mark in enumerate(shown.marks):
         entries.append(Line2D([], [], label=mark.label, **_look(i, mark)))
-    figure.legend(handles=entries, loc="outside lower center", ncols=min(len(entries), 6))
+    return entries
+
+
+def _legend(figure: Figure, shown: RegimeMap) -> None:
+    entries = _entries(shown)
+    columns = legend_columns([str(e.get_label()) for e in entries])
+    figure.legend(handles=entries, loc="outside lower center", ncols=columns)

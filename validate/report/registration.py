@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from validate.arrays import rms
-from validate.compare.exhibit import Entry, Exhibit, NumberTable, Picture, TableCell
+from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import max_length
@@ -14,12 +13,8 @@ from validate.register.markers import MarkerObservation
 from validate.register.quality import Registration
 from validate.report.numbers import shown_unit, with_unit
 from validate.report.observed import markers
-from validate.report.plane import flattest
-from validate.report.style import MEASURED, draw
+from validate.report.residual_arrows import residual_arrows
 
-_MM = 1e3
-_MAGNIFIED = 5.0
-_NAMED = 60  # markers; the names of more would hide each other
 _CLEAN = ("No findings: no outlier, no mirror image, no permuted labels.",)
 
 
@@ -34,7 +29,7 @@ def registration(result: Result) -> Exhibit:
         "Registration",
         seen.registration.findings or _CLEAN,
         (_quality(result, seen), *rest, _residuals(result)),
-        pictures=(_vectors(seen.registration),),
+        pictures=(residual_arrows(seen.registration),),
     )
 
 
@@ -63,34 +58,6 @@ def _target(result: Result, found: Registration) -> Iterator[tuple[str, str, str
         nodes = scene.mesh.nodes[scene.mesh.facet_nodes(cavity.facets)]
         tre = float(found.tre_at(nodes.mean(axis=0)[None])[0])
         yield f"TRE at {cavity.name}", with_unit(tre, "m"), "predicted at the cavity's centre"
-
-
-def _vectors(found: Registration) -> Picture:
-    plane, across = flattest(found.markers)
-    along = "the normal of their plane" if across is None else "xyz"[across]
-    return Picture(
-        "registration",
-        "Registration residuals of the markers at rest, mapped less target, in mm, seen along "
-        f"{along}; arrows magnified {_MAGNIFIED:g} times. A pattern "
-        "(all outward, all turned) would mean a wrong scale or rotation; noise has none.",
-        "Arrows of the registration residual at each marker, without a common direction if only "
-        "noise is left.",
-        draw(lambda f: _vector_axes(f, found, plane), 6.4, 5.2),
-    )
-
-
-def _vector_axes(figure: Figure, found: Registration, plane: list[int]) -> None:
-    ax = figure.subplots()
-    x, r = _MM * found.markers[:, plane], _MAGNIFIED * _MM * found.residuals[:, plane]
-    ax.quiver(*x.T, *r.T, angles="xy", scale_units="xy", scale=1, color=MEASURED, width=0.004)
-    ax.plot(*x.T, ".", color="#D55E00", ms=4)
-    for name, (a, b) in zip(found.names, x, strict=True) if len(x) <= _NAMED else ():
-        ax.annotate(name, (a, b), xytext=(2, -8), textcoords="offset points", fontsize=6.5,
-                    color="#5A5A5A")  # fmt: skip
-    across, up = ("xyz"[i] for i in plane)
-    ax.set_title(f"residuals, magnified {_MAGNIFIED:g} times")
-    ax.set(xlabel=f"{across} / mm", ylabel=f"{up} / mm", aspect="equal")
-    ax.margins(0.12)
 
 
 def _rest(rest: tuple[Residual, ...]) -> NumberTable:

@@ -9,7 +9,7 @@ from validate.report.maps import TOWARD_EYE, Range, bar_title, colours, values, 
 from validate.report.renders import BAR, aim, shot, triangulated
 from validate.scene.mesh import boundary_facets
 
-_SIZE = (960, 660)
+_SIZE = (880, 620)
 _EDGES = 6000  # facets above which their edges would hide the colours
 
 
@@ -29,7 +29,7 @@ def _fill(plotter: Any, shown: NodeMap, span: Range) -> None:
     facets = boundary_facets(shown.mesh.simplices, 3)
     surface = triangulated(1e3 * shown.mesh.nodes, facets)
     surface.point_data["value"] = values(shown)
-    bar: Any = {**BAR, "title": f"{bar_title(shown)}\n", "position_x": 0.88, "fmt": "%.3g"}
+    bar: Any = {**BAR, "title": f"{bar_title(shown)}\n", "position_x": 0.84, "fmt": "%.3g"}
     plotter.add_mesh(
         surface, scalars="value", cmap=colours(span), clim=span, ambient=0.6, diffuse=0.45,
         show_edges=len(facets) <= _EDGES, edge_color="#505050", line_width=0.5,

@@ -15,15 +15,15 @@ from validate.scene.shape_functions import EDGES
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
 )
-_SIZE = (1100, 760)
+_SIZE = (880, 640)
 _CELL = {4: 10, 8: 12, 10: 24}  # VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA: local order as ours
 BAR: dict[str, Any] = {
     "vertical": True,
-    "height": 0.6,
-    "width": 0.06,
-    "position_y": 0.2,
-    "title_font_size": 19,
-    "label_font_size": 18,
+    "height": 0.62,
+    "width": 0.07,
+    "position_y": 0.16,
+    "title_font_size": 24,
+    "label_font_size": 24,
     "color": "black",
     "n_labels": 5,
 }
@@ -134,7 +134,7 @@ def _add_body(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
         return
     grid.point_data["displacement"] = np.linalg.norm(moved, axis=1)
     top = max(float(np.linalg.norm(body.u, axis=1).max()), 1e-9)
-    bar: Any = {**BAR, "title": "displacement / mm\n", "position_x": 0.87, "fmt": _decimals(top)}
+    bar: Any = {**BAR, "title": "u / mm\n", "position_x": 0.84, "fmt": _decimals(top)}
     plotter.add_mesh(
         grid, scalars="displacement", cmap="viridis", clim=(0.0, top), show_edges=edges,
         edge_color="#303030", line_width=1, ambient=0.3, scalar_bar_args=bar,
@@ -166,7 +166,7 @@ def _add_wall(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
         plotter.add_mesh(wall, color="#B98B5E", ambient=0.3)
         return
     wall.point_data["pressure"] = np.full(wall.n_points, body.pressure)
-    bar: Any = {**BAR, "title": "pressure / Pa\n", "position_x": 0.05, "fmt": "%.0f"}
+    bar: Any = {**BAR, "title": "p / Pa\n", "position_x": 0.03, "fmt": "%.0f"}
     plotter.add_mesh(
         wall,
         scalars="pressure",
@@ -174,9 +174,6 @@ def _add_wall(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
         clim=body.pressures,
         scalar_bar_args=bar,
         ambient=0.45,
-    )
-    plotter.add_text(
-        f"cavity pressure {body.pressure:.0f} Pa", position=(20, 20), font_size=10, color="black"
     )
 
 

@@ -48,7 +48,7 @@ def _series(series: Series, most: int) -> Json:
     arrays = {"x": rounded(series.x[at]), "y": rounded(series.y[at])}
     if series.upper is not None:
         arrays["upper"] = rounded(series.upper[at])
-    return {"label": series.label, "style": series.style, "points": len(series.x), **arrays}
+    return {"label": series.name, "style": series.style, "points": len(series.x), **arrays}
 
 
 def _map(shown: NodeMap) -> Json:

@@ -1,4 +1,8 @@
-"""How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state."""
+"""How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state.
+
+Figures are `WIDTH` wide where they can be: a telephone and a printed page show that much with
+letters that can be read.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,21 +26,25 @@ _DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (
 _POINTS = ("s", "^", "D", "v", "P", "X")
 _SETTINGS: Mapping[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 9.0,
+    "font.size": 9.5,
+    "axes.titlesize": 10.0,
+    "axes.labelsize": 9.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
     "grid.color": "#E5E5E5",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
-    "legend.fontsize": 8.5,
+    "legend.fontsize": 9.0,
+    "legend.handlelength": 2.6,
     "legend.frameon": False,
     "lines.linewidth": 1.4,
     "savefig.facecolor": "white",
 }
 _DPI = 130
+WIDTH = 5.6  # inches
+_LETTER = 0.07  # inches of a legend's letter, about
+_HANDLE = 0.6  # inches of a legend's line and the room beside it
 
 
 @dataclass(frozen=True)
@@ -104,13 +112,30 @@ def film(
 
 def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels:
     """Pixels (h, w, 3) of a figure of width x height inches that `paint` fills."""
+    return _pixels(painted(paint, width, height).canvas)
+
+
+def painted(paint: Callable[[Figure], None], width: float, height: float) -> Figure:
+    """The figure itself, laid out and drawn."""
     settings: Any = dict(_SETTINGS)
     with mpl.rc_context(settings):
         figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
         paint(figure)
         canvas.draw()
-        return _pixels(canvas)
+    return figure
+
+
+def legend_columns(labels: Sequence[str], width: float = WIDTH) -> int:
+    """How many columns of a legend of these labels fit below a figure."""
+    widest = max(len(line) for label in labels for line in label.splitlines())
+    return max(1, min(len(labels), int(width / (_HANDLE + _LETTER * widest))))
+
+
+def legend_height(labels: Sequence[str], width: float = WIDTH) -> float:
+    """Inches that the legend takes."""
+    lines = max(len(label.splitlines()) for label in labels)
+    return 0.21 * lines * -(-len(labels) // legend_columns(labels, width)) + 0.1
 
 
 def _pixels(canvas: Any) -> Pixels:

@@ -74,6 +74,6 @@ def _points(chart: Chart) -> Iterator[Row]:
     for s in chart.series:
         upper = s.upper.tolist() if s.upper is not None else [None] * len(s.x)
         for x, y, top in zip(s.x.tolist(), s.y.tolist(), upper, strict=True):
-            yield s.label, s.style, x, y, top
+            yield s.name, s.style, x, y, top
     for name, y in chart.levels:
         yield name, "level", None, float(y), None

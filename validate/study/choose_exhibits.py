@@ -149,7 +149,7 @@ def _chart(choice: Choice) -> Chart:
     shown = choice.pick or choice.nearest
     series.append(_series("the choice" if choice.pick else "the nearest", [shown], by))
     return Chart(
-        "choice", "What is wanted and what there is", "time of a step with its displacements / us",
+        "choice", "What is wanted and what there is", "time of a step with its displacements / µs",
         "error / mm", tuple(series), log="xy",
     )  # fmt: skip
 

@@ -113,12 +113,12 @@ def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
         if mine:
             series.append(Series(rung, *_points(mine, front.by), "points"))
     series.append(Series("Pareto front", *_points(front.rows, front.by)))
-    levels = [("reference", _MM * trade.floor)]
+    levels = [("reference's own error", _MM * trade.floor)]
     if front.by == "total":
         levels += _law_level(trade)
     return Chart(
         f"front_{front.by}", f"{_NAMES[front.by].capitalize()} against time per step",
-        "time of a step with its displacements / us", f"{_NAMES[front.by]} / mm", tuple(series),
+        "time of a step with its displacements / µs", f"{_NAMES[front.by]} / mm", tuple(series),
         levels=tuple(levels), log="xy",
         caption="A point is one solver on one mesh with one element and one step. Levels: the "
         "reference's own error" + (", what the linear law costs" if len(levels) > 1 else ""),
@@ -126,7 +126,7 @@ def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
 
 
 def _law_level(trade: Trade) -> list[tuple[str, float]]:
-    return [] if trade.law_error is None else [("the law", _MM * trade.law_error)]
+    return [] if trade.law_error is None else [("the linear law", _MM * trade.law_error)]
 
 
 def _points(rows: Sequence[TradeRow], by: str) -> tuple[np.ndarray, np.ndarray]:
@@ -185,7 +185,7 @@ def _mesh_chart(trade: Trade) -> Chart:
             series.append(Series(element, x, _MM * np.array([found[level] for level in at])))
     return Chart(
         "mesh_error", "What the mesh costs", "cell size / mm", "mesh's share / mm", tuple(series),
-        levels=(("reference", _MM * trade.floor), *_law_level(trade)), log="xy",
+        levels=(("reference's own error", _MM * trade.floor), *_law_level(trade)), log="xy",
     )  # fmt: skip
 
 

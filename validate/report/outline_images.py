@@ -1,0 +1,119 @@
+"""The images of a recording with what was found in them: the outline, and the circle through it."""
+
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Picture
+from validate.errors import RegistrationError
+from validate.recording.types import Contours, Frames, Recording
+from validate.register.circle import Circle, fit_circle
+from validate.register.observation import nearest_sample
+from validate.report.numbers import spaced, with_unit
+from validate.report.observed import Held
+from validate.report.style import WIDTH, draw, legend_columns
+
+_MM = 1e3
+_COLUMNS = 2
+_FOUND, _FITTED = "#F0E442", "#56B4E9"  # light, on dark images
+_DASH = (0, (4, 3))
+
+
+def outline_images(
+    recording: Recording, topic: str, holds: tuple[Held, ...]
+) -> tuple[Picture, ...]:
+    """One picture of the images at the loads; none where outlines `topic` were not found in any."""
+    contours = recording.contours.get(topic)
+    frames = recording.frames.get(contours.images) if contours is not None else None
+    if contours is None or frames is None:
+        return ()
+    circles = [_circle(contours, hold) for hold in holds]
+    told = "; ".join(f"{spaced(h.label)}: {_told(c)}" for h, c in zip(holds, circles, strict=True))
+    rows = -(-len(holds) // _COLUMNS)
+    tall = frames.images[0].shape[0] * frames.m_per_px[1]
+    wide = frames.images[0].shape[1] * frames.m_per_px[0]
+    panel = float(np.clip(0.42 * WIDTH * tall / wide, 1.2, 4.0)) + 0.35
+    made = Picture(
+        "outline_images",
+        f"The images '{contours.images}' at the loads, image coordinates in mm, with the outline "
+        "that was found in each (solid, yellow) and the circle through it (dashed, blue). Radius "
+        f"of that circle and rms distance of the outline from it: {told}. The circle at rest "
+        "places the inclusion; the outlines are what runs are compared with.",
+        f"{len(holds)} images with the outline found in each and the circle fitted to it.",
+        draw(lambda f: _panels(f, frames, contours, holds, circles), WIDTH, panel * rows + 0.6),
+        photo=True,
+    )
+    return (made,)
+
+
+def _outline(contours: Contours, hold: Held) -> Floats:
+    return contours.outlines[nearest_sample(contours.t, hold.t, "outlines")]
+
+
+def _circle(contours: Contours, hold: Held) -> Circle | None:
+    try:
+        return fit_circle(_outline(contours, hold), contours.sd)
+    except RegistrationError:
+        return None  # an outline pressed flat is none
+
+
+def _told(circle: Circle | None) -> str:
+    if circle is None:
+        return "no circle"
+    return f"{with_unit(circle.radius, 'm')} ({with_unit(circle.rms, 'm', 2)})"
+
+
+def _panels(
+    figure: Figure,
+    frames: Frames,
+    contours: Contours,
+    holds: tuple[Held, ...],
+    circles: list[Circle | None],
+) -> None:
+    rows = -(-len(holds) // _COLUMNS)
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+    for ax, hold, circle in zip(grid.flat, holds, circles, strict=False):
+        at = nearest_sample(frames.t, hold.t, "images")
+        _image(ax, frames, at)
+        outline = _MM * _outline(contours, hold)
+        _line(ax, np.vstack([outline, outline[:1]]).T, _FOUND, "-", "outline found")
+        if circle is not None:
+            _line(ax, _round(circle), _FITTED, _DASH, "circle through it")
+        ax.set_title(fill(f"{spaced(hold.label)}, image {at}, t = {frames.t[at]:.4g} s", 36),
+                     loc="left", fontsize=8.5)  # fmt: skip
+        ax.set(xlabel="image x / mm", ylabel="image y / mm")
+        ax.label_outer()
+    for ax in grid.flat[len(holds) :]:
+        ax.set_axis_off()
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    legend = figure.legend(handles, labels, loc="outside lower center",
+                           ncols=legend_columns(labels), frameon=True)  # fmt: skip
+    legend.get_frame().set(facecolor="#303030", edgecolor="#303030")
+    for text in legend.get_texts():
+        text.set_color("white")
+
+
+def _line(ax: Axes, points: Floats, colour: str, dash: Any, label: str) -> None:
+    """With a dark seam, to be seen on light and dark pixels and on grey paper."""
+    ax.plot(*points, color="black", lw=2.8, alpha=0.6)
+    ax.plot(*points, color=colour, ls=dash, lw=1.4, label=label)
+
+
+def _image(ax: Axes, frames: Frames, i: int) -> None:
+    """Pixel centres at their image metres; rows count downward."""
+    x, y = (_MM * side for side in frames.m_per_px)
+    height, width = frames.images[i].shape
+    extent = (-0.5 * x, (width - 0.5) * x, (height - 0.5) * y, -0.5 * y)
+    ax.imshow(frames.images[i], cmap="gray", vmin=0, vmax=255, extent=extent, aspect="equal")
+    ax.grid(visible=False)
+
+
+def _round(circle: Circle) -> Floats:
+    """A closed line (2, k) mm."""
+    angle = np.linspace(0, 2 * np.pi, 121)
+    around = np.stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(_MM * (circle.centre[:, None] + circle.radius * around))

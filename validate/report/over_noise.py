@@ -1,0 +1,125 @@
+"""Every model's error over what noise alone gives: a row a model, one axes a quantity."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from textwrap import fill
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from scipy.special import chdtri
+
+from validate.arrays import rms
+from validate.compare.exhibit import Picture
+from validate.compare.residual import Residual
+from validate.compare.result import MethodResult, Result
+from validate.report.numbers import at_load, with_unit
+from validate.report.observed import finished, last_residual
+from validate.report.style import ACCEPTED, MEASURED, NOISE, WIDTH, draw
+
+_LOWEST = 0.02  # ratios below lie there, as a sign that points on
+_LINE, _ROOM = 0.145, 0.62  # inches of a line of a model's name; of title and ticks
+_NAME = 32  # letters of a model's name in one line
+
+
+@dataclass(frozen=True)
+class NoiseRow:
+    """One quantity: every method's rms error over the noise of the measurement."""
+
+    quantity: str
+    noise: str
+    band: tuple[float, float]
+    ratios: tuple[tuple[MethodResult, float], ...]
+
+
+def over_noise(result: Result) -> tuple[Picture, ...]:
+    """The picture; none where nothing with noise was compared."""
+    rows = noise_rows(result)
+    if not rows:
+        return ()
+    names = [m for m in finished(result) if any(m is one for r in rows for one, _ in r.ratios)]
+    lines = max(len(fill(m.label, _NAME).splitlines()) for m in names)
+    one = (_LINE * lines + 0.05) * len(names) + _ROOM
+    high = -(-len(rows) // _columns(rows)) * one + 0.35
+    pixels = draw(lambda f: _fill(f, rows, names), WIDTH, high)
+    over_time = all(r.load == "all" for m in finished(result) for r in m.residuals.values())
+    where = at_load("all") if over_time else "at the last load"
+    shown = Picture(
+        "errors_over_noise",
+        f"Rms error of every model {where} over the rms that measurement noise alone gives "
+        "(no unit, logarithmic; the noise stands in the title). Filled: the judged models; hollow: "
+        "the others. Grey: where noise alone puts 95 % of repetitions (chi-square with the number "
+        "of values); right of it the recording sees the model's error. Where all models lie on "
+        f"grey, that quantity cannot choose between them. Ratios below {_LOWEST:g} are arrows.",
+        "Dot chart: rms error over measurement noise for each quantity and model.",
+        pixels,
+    )
+    return (shown,)
+
+
+def noise_rows(result: Result) -> list[NoiseRow]:
+    """A row for every quantity that has noise."""
+    done = finished(result)
+    quantities = dict.fromkeys(r.quantity for m in done for r in m.residuals.values() if r.sd > 0)
+    return [_row(done, quantity) for quantity in quantities]
+
+
+def _row(done: Iterable[MethodResult], quantity: str) -> NoiseRow:
+    seen = [(m, r) for m in done if (r := last_residual(m, quantity)) is not None]
+    ratios = tuple((m, rms(r.values) / _noise(r)) for m, r in seen)
+    first = seen[0][1]
+    dof = first.values.size
+    low, high = (float(np.sqrt(chdtri(dof, p) / dof)) for p in (0.975, 0.025))
+    return NoiseRow(quantity, with_unit(_noise(first), first.unit), (low, high), ratios)
+
+
+def _noise(residual: Residual) -> float:
+    """The rms (SI) that the noise of the measurement gives a perfect model."""
+    c = residual.values.shape[1]
+    return float(np.sqrt(c * (residual.sd**2 + residual.systematic**2)))
+
+
+def _columns(rows: list[NoiseRow]) -> int:
+    return min(len(rows), 2)
+
+
+def _fill(figure: Figure, rows: list[NoiseRow], methods: list[MethodResult]) -> None:
+    columns = _columns(rows)
+    axes = figure.subplots(
+        -(-len(rows) // columns), columns, sharex=True, sharey=True, squeeze=False
+    )
+    for ax, row in zip(axes.flat, rows, strict=False):
+        _dots(ax, row, methods)
+    for ax in axes.flat[len(rows) :]:
+        ax.set_axis_off()
+    for ax in axes.flat[: len(rows)][-columns:]:
+        ax.tick_params(labelbottom=True)
+        ax.set_xlabel("rms error / rms of noise", fontsize=9)
+    for ax in axes[:, 0]:
+        ax.tick_params(axis="y", labelsize=8)
+    first = axes[0, 0]
+    names = [fill(m.label, _NAME) for m in methods]
+    first.set_yticks(range(len(methods)), names)
+    first.set_ylim(len(methods) - 0.5, -0.5)
+    _ratio_axis(first)
+
+
+def _dots(ax: Axes, row: NoiseRow, methods: list[MethodResult]) -> None:
+    ax.axvspan(*row.band, color=NOISE, lw=0)
+    ax.axvline(1, color=MEASURED, lw=0.8)
+    for method, ratio in row.ratios:
+        sign = "<" if ratio < _LOWEST else "o"
+        face = ACCEPTED if method.accepted else "white"
+        ax.plot(max(ratio, _LOWEST), methods.index(method), sign, ms=5.5, mfc=face,
+                mec=ACCEPTED if method.accepted else MEASURED)  # fmt: skip
+    ax.set_title(f"{row.quantity}\nnoise {row.noise}", loc="left", fontsize=8.5)
+
+
+def _ratio_axis(ax: Axes) -> None:
+    ax.set_xscale("log")
+    low, high = ax.get_xlim()
+    ax.set_xlim(max(min(low, 0.09), 0.8 * _LOWEST), max(high, 11))
+    ax.xaxis.set_major_locator(LogLocator(numticks=5))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
