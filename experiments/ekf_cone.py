@@ -25,7 +25,7 @@ from validate.papers.ekf_nfem.cone_exhibits import tell_cone
 from validate.papers.ekf_nfem.figures import CONE_FIGURES
 from validate.replay.cards import shipped
 from validate.replay.experiment import Case, Experiment, Twin
-from validate.replay.method import Method
+from validate.replay.method import WALK_UNRECORDED, Method
 from validate.solve.central import CentralDifference
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
@@ -51,9 +51,15 @@ METHODS = {
     "ekf_companion": Method(
         "node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), Model(), A
     ),
-    "reduced_modes": Method("reduced EKF, 20 modes and load bias", ReducedEKF(), Model(), A),
+    "reduced_modes": Method(
+        "reduced EKF, 20 modes and load bias", ReducedEKF(), Model(), A, chosen=WALK_UNRECORDED
+    ),
     "reduced_pod": Method(
-        "reduced EKF, POD and load bias", ReducedEKF(basis="pod", shapes=5), Model(), A
+        "reduced EKF, POD and load bias",
+        ReducedEKF(basis="pod", shapes=5),
+        Model(),
+        A,
+        chosen=WALK_UNRECORDED,
     ),
 }
 

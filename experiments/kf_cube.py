@@ -20,7 +20,7 @@ from validate.papers.kf_fem.ladders import PRINTED_LADDER
 from validate.papers.kf_fem.seeds import tell
 from validate.replay.cards import changed, shipped
 from validate.replay.experiment import Case, Experiment, Twin
-from validate.replay.method import Method
+from validate.replay.method import WALK_UNRECORDED, Method
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 
@@ -76,9 +76,14 @@ METHODS = {
     ),
     "load_scale": Method("two states: amplitude and load scale", LoadScale(), markers=A),
     "kf_reduced": Method(
-        "20 modes and load bias, steady gain", ReducedKf(gains="steady"), markers=A
+        "20 modes and load bias, steady gain",
+        ReducedKf(gains="steady"),
+        markers=A,
+        chosen=WALK_UNRECORDED,
     ),
-    "filterpy": Method("filterpy's KalmanFilter, 5 modes", Guest(), markers=A),
+    "filterpy": Method(
+        "filterpy's KalmanFilter, 5 modes", Guest(), markers=A, chosen=WALK_UNRECORDED
+    ),
 }
 
 

@@ -6,6 +6,7 @@ import pytest
 from validate.compare.published import Figure
 from validate.replay import load
 from validate.replay.experiment import Experiment
+from validate.replay.method import WALK_UNRECORDED
 
 DECLARED = {
     "bending_rod": 7,
@@ -99,6 +100,14 @@ def test_what_was_chosen_on_the_judging_twin_is_declared_by_its_method() -> None
     white = [n for n, m in kf.items() if "Q = P0" in m.chosen]
     assert white == ["kf_dense", "kf_printed", "kf_posterior", "kf_modal", "kf_load"]
     assert [n for n, m in ekf.items() if m.chosen] == ["reduced_modes", "reduced_pod"]
+
+
+@pytest.mark.parametrize("name", ["kf_cube", "kf_cube_inertia", "ekf_cube", "ekf_cone"])
+def test_a_load_walk_of_unknown_origin_is_marked(name: str) -> None:
+    """Whether it was tuned on the twin that judges it is not known, so the verdict says that."""
+    walking = {n: m for n, m in load(name).methods.items() if hasattr(m.settings, "load_walk")}
+    assert walking
+    assert [n for n, m in walking.items() if WALK_UNRECORDED not in m.chosen] == []
 
 
 def test_tetrahedra_at_a_rate_that_no_mesh_has_are_no_fault() -> None:

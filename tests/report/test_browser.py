@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,11 @@ FINDINGS = """<script>addEventListener("load", () => {
                         return box.width > 100 && box.height > 10; };
   const found = {pictures: [...document.images].map(i => i.naturalWidth),
                  verdict: shown("verdict"), title: document.querySelector("h1").innerText,
-                 spilt: [...document.querySelectorAll("td, th")]
+                 whys: [...document.querySelectorAll("tr.below div")]
+                   .map(d => [d.getBoundingClientRect().left, d.getBoundingClientRect().right]),
+                 verdicts: [...document.querySelectorAll("tr.parted td.good")]
+                   .map(d => [d.getBoundingClientRect().left, d.getBoundingClientRect().right]),
+                 wide: innerWidth, spilt: [...document.querySelectorAll("td, th")]
                    .filter(c => c.scrollWidth > c.clientWidth + 1).map(c => c.innerText),
                  anchors: [...document.querySelectorAll("nav a")]
                    .map(a => document.querySelectorAll(a.getAttribute("href")).length),
@@ -64,11 +69,11 @@ def run(browser: str, page: Path, profile: Path, *more: str) -> subprocess.Compl
     )
 
 
-def look(browser: str, page: Path, folder: Path) -> tuple[dict[str, Any], str]:
+def look(browser: str, page: Path, folder: Path, width: int = 1280) -> tuple[dict[str, Any], str]:
     """What `FINDINGS` found on a page, and the page's text; the console stays empty."""
     probe = folder / "probe.html"
     probe.write_text(page.read_text().replace("</body>", FINDINGS))
-    done = run(browser, probe, folder / "profile", "--window-size=1280,1000", "--dump-dom")
+    done = run(browser, probe, folder / "profile", f"--window-size={width},1000", "--dump-dom")
     match = re.search(r'<pre id="found">(.*?)</pre>', done.stdout)
     assert match, done.stdout[-500:]
     assert "CONSOLE" not in done.stderr
@@ -84,6 +89,26 @@ def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
     assert all(width > 300 for width in found["pictures"])
     assert found["overflow"] <= 0
     assert small_result().sentence in text
+
+
+@pytest.mark.parametrize("width", [1200, 400])
+def test_why_a_check_ends_as_it_does_is_seen_without_scrolling(
+    browser: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    result = small_result()
+    check = replace(
+        result.checks[0], why=f"|E| is 0.5 u_val; {12 * 'what would decide, '}and so on"
+    )
+    methods = (replace(result.methods[0], checks=(check,)), *result.methods[1:])
+    folder = tmp_path / "long"
+    page = write_report(replace(result, methods=methods), folder, created="2026-11-21T04:00:00Z")
+    found, text = look(browser, page, tmp_path, width)
+    assert found["overflow"] <= 0
+    assert len(found["whys"]) == 1
+    assert check.why in text
+    for left, right in (*found["whys"], *found["verdicts"]):
+        assert 0 <= left < right <= found["wide"]
 
 
 @pytest.mark.slow

@@ -141,9 +141,8 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
         "force@3mm", "N", "0.0200", "0.0300", "? 50.0", "12",
     ]  # fmt: skip
     assert [shown(c) for c in table.rows[0]] == [
-        "soft", "force.plate@2mm", "N",
-        "0.0120", "0.00800", "0.0100", "0.0400", "0.0150", "0.0100", "0.00500", "0.500", "1",
-        "✓ agrees", "|E| is 0.5 u_val",
+        "soft", "force.plate@2mm", "✓ agrees", "N", "0.0100", "0.0400", "0.500",
+        "0.0120", "0.00800", "0.0150", "0.0100", "0.00500", "1", "|E| is 0.5 u_val",
     ]  # fmt: skip
 
 

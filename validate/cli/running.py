@@ -106,7 +106,8 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
 
 
 def _checks(method: MethodResult) -> None:
-    """A line a check; where there is no room beside, why stands below those that do not agree."""
+    """A line a check; where there is no room beside, why stands below those that do not agree, and
+    what was chosen on the judging twin below all."""
     head = ["check", "error E", "2 u_val", "limit", "n", "verdict", "why"]
     rows = [_row(c, method.why(c)) for c in method.checks]
     if not fits(head, rows):

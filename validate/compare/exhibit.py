@@ -46,7 +46,8 @@ class NumberTable:
 
     Values are as shown (mm where the heading says mm) but for cells with a unit, which are SI.
     `name` is the file's in tables/; empty: only on the page, its numbers stand in another table.
-    `folded` tables are opened by their reader.
+    `folded` tables are opened by their reader. `below` is a heading whose texts stand on a line of
+    their own below the row, so that no width of a page hides them.
     """
 
     name: str
@@ -55,9 +56,12 @@ class NumberTable:
     rows: tuple[tuple[Entry | TableCell, ...], ...]
     note: str = ""
     folded: bool = False
+    below: str = ""
 
     def __post_init__(self) -> None:
         named = f"table '{self.name or self.title}'"
+        if self.below and self.below not in self.headings:
+            raise ComparisonError(f"{named}: no heading '{self.below}' to stand below")
         for row in self.rows:
             if len(row) != len(self.headings):
                 raise ComparisonError(

@@ -11,6 +11,9 @@ from validate.parameters import part, quantity
 from validate.register.registered import Registered
 from validate.solve.types import Stepper
 
+# Filters whose loads walk: the history of their defaults does not say what they were chosen on.
+WALK_UNRECORDED = "not recorded whether the load's walk was chosen on this twin"
+
 
 @dataclass(frozen=True)
 class Method:

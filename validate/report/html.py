@@ -9,7 +9,7 @@ from validate.compare.exhibit import Picture
 from validate.compare.result import Result
 from validate.report.encode import uri
 from validate.report.exhibits import DrawnExhibit
-from validate.report.tables import caption, shown, word_columns
+from validate.report.tables import across, caption, shown, word_columns
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then
 
@@ -25,6 +25,7 @@ def page(
                               lstrip_blocks=True)  # fmt: skip
     environment.filters.update(
         uri=uri,
+        across=across,
         caption=caption,
         shown=shown,
         word_columns=word_columns,

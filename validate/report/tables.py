@@ -37,6 +37,11 @@ def word_columns(table: NumberTable) -> tuple[int, ...]:
     return tuple(i for i, c in enumerate(columns) if any(isinstance(plain(v), str) for v in c))
 
 
+def across(table: NumberTable) -> tuple[int, ...]:
+    """The columns beside each other: all but the one whose texts stand below the rows."""
+    return tuple(i for i, heading in enumerate(table.headings) if heading != table.below)
+
+
 def caption(table: NumberTable) -> str:
     """Title and note as sentences."""
     title = table.title if table.title.endswith(".") else f"{table.title}."

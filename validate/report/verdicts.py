@@ -13,8 +13,8 @@ _EMPHASIS: dict[str, Emphasis] = {
 }  # fmt: skip
 _BEYOND = 25.0  # %: a difference that a dozen draws of a linear model hardly show
 _HEADINGS = (
-    "method", "check", "unit", "raw rms", "noise rms", "E", "2 u_val", "u_D", "u_num", "u_input",
-    "limit", "values", "verdict", "why",
+    "method", "check", "verdict", "unit", "E", "2 u_val", "limit", "raw rms", "noise rms", "u_D",
+    "u_num", "u_input", "values", "why",
 )  # fmt: skip
 _BANDS = {
     "differs": ("bad", "Differs"),
@@ -47,6 +47,7 @@ def checks(result: Result) -> Exhibit | None:
         "recording and model are one; neither is evidence.",
         _HEADINGS,
         tuple((m.name, *_row(c), m.why(c)) for m in result.methods for c in m.checks),
+        below="why",
     )
     checked = "; ".join(f"{m.name} ({m.called})" for m in result.methods if m.checks)
     words = f"Checked: {checked}. Other methods are rivals, shown for discrimination."
@@ -96,13 +97,13 @@ def _row(check: Check) -> tuple[TableCell | int | str, ...]:
         E = (TableCell(0.0, check.unit, text="within noise"),)
     return (
         TableCell(check.name, emphasis="strong"),
-        unit_cell(check.unit),
-        *_figures(check, check.raw, check.noise),
-        *E,
-        *_figures(check, 2 * check.u_val, check.u_D, check.u_num, check.u_input),
-        TableCell(check.limit, check.unit),
-        check.count,
         TableCell(check.verdict, emphasis=_EMPHASIS[check.verdict]),
+        unit_cell(check.unit),
+        *E,
+        *_figures(check, 2 * check.u_val),
+        TableCell(check.limit, check.unit),
+        *_figures(check, check.raw, check.noise, check.u_D, check.u_num, check.u_input),
+        check.count,
     )
 
 
