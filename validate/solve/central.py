@@ -22,7 +22,9 @@ from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitM
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
+from validate.solve.central_contact import ExplicitContact, Struck, explicit_contact
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
+from validate.solve.touching_traces import contact_units
 from validate.solve.types import Ending, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -45,7 +47,7 @@ class CentralDifference:
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
 
-    handles: ClassVar[Handles] = LARGE_DYNAMICS
+    handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, contact=("foundations", "rigid"))
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")
@@ -81,8 +83,11 @@ class CentralDifference:
         body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
         rule = self._rule(system, beta)
         stepper = CentralStepper(
-            self, system, body, rule, beta, system.held, plates, feels_loads, masses, past
-        )
+            self, system, body, rule, beta, system.held, plates, feels_loads, masses, past,
+            explicit_contact(system, body, rule),
+        )  # fmt: skip
+        if stepper.contact:
+            stepper = replace(stepper, start=replace(past, struck=stepper.contact.rest()))
         stepper.warm()
         return replace(stepper, start=stepper.limited(stepper.start))
 
@@ -129,6 +134,7 @@ class Past:
     work: float = 0.0
     taken: float = 0.0
     most: float = 0.0
+    struck: Struck | None = None
 
 
 @dataclass(frozen=True)
@@ -145,6 +151,7 @@ class CentralStepper:
     feels_loads: bool
     masses: Floats
     start: Past
+    contact: ExplicitContact | None = None
 
     @property
     def scene(self) -> Scene:
@@ -153,7 +160,8 @@ class CentralStepper:
     @property
     def units(self) -> Mapping[str, str]:
         """Energies half a step before the last watch, det F and critical step then, forces."""
-        return _SEEN | {f"{d.name}.force": "N" for d in self.scene.drives}
+        forces = {f"{d.name}.force": "N" for d in self.scene.drives}
+        return _SEEN | forces | contact_units(self.scene)
 
     def warm(self) -> None:
         """Compiles: no step is charged with it."""
@@ -164,7 +172,8 @@ class CentralStepper:
     def rest(self) -> State:
         u = self.start.motion["u"]
         seen = self._seen(self.start, self.body.look(u))
-        return State(0, self.start, numbers=seen | self._forces(u, self.start.inputs))
+        numbers = seen | self._forces(u, self.start.inputs) | self._touched(self.start)
+        return State(0, self.start, numbers=numbers)
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
@@ -172,20 +181,33 @@ class CentralStepper:
         if state.k == 0 and self._refused(past.limit, self.settings.margin):
             return replace(state, failure=("refused", self._too_large(past.limit)))
         k, substeps = state.k + 1, self.settings.substeps
-        motion, work, taken, finite = self.body.advance(
-            past.motion, self.rule, past.inputs, inputs, substeps
-        )
+        motion, struck, work, taken, finite = self._advanced(past, inputs)
         if not finite:
             ratio = self.rule.dt / past.limit
             words = f"step {k}: displacements not finite; dt is {ratio:.3g} of the critical step"
             return replace(state, failure=("diverged", words))
-        new = _worked(past, motion, inputs, work, taken)
+        new = _worked(replace(past, struck=struck), motion, inputs, work, taken)
         numbers, failure = dict(state.numbers), None
         if k % self.settings.watch == 0 or k == 1:
             new, seen, failure = self._watched(new, k)
             numbers |= seen
-        numbers |= self._forces(motion["r"], inputs)
+        numbers |= self._forces(motion["r"], inputs) | self._touched(new)
         return State(k, new, failure, substeps, numbers)
+
+    def _advanced(
+        self, past: Past, inputs: Floats
+    ) -> tuple[ExplicitMotion, Struck | None, float, float, bool]:
+        """Motion, contact, work, what damping took, and whether all is finite."""
+        motion, begin, substeps = past.motion, past.inputs, self.settings.substeps
+        if self.contact and past.struck:
+            return self.contact.advance(motion, past.struck, begin, inputs, substeps)
+        new, work, taken, finite = self.body.advance(motion, self.rule, begin, inputs, substeps)
+        return new, None, work, taken, finite
+
+    def _touched(self, past: Past) -> dict[str, float]:
+        if not (self.contact and past.struck):
+            return {}
+        return self.contact.numbers(past.motion, past.struck, past.inputs)
 
     def _forces(self, r: Floats, inputs: Floats) -> dict[str, float]:
         """Forces N of the plates on the whole body (eq 32), compression positive, no inertia."""

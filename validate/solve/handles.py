@@ -55,7 +55,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "loads": ("QuasiStatic", "NewtonDynamics"),
     "drives": ("KfFem", "ModalKf"),
     "membranes": ("QuasiStatic", "Newmark"),
-    "rigid": ("ContactNewton",),
+    "rigid": ("ContactNewton", "CentralDifference"),
 }
 
 
