@@ -79,9 +79,14 @@ def collect(root: Path) -> dict[str, Entry]:
     """Every number of the reports (results.json) below a folder, by a name that says whence."""
     found: dict[str, Entry] = {}
     for path in sorted(root.rglob("results.json")):
-        kind = path.parent.name.removeprefix("study-")
-        read = _study(path.parent, _STUDIES[kind]) if kind in _STUDIES else _run(path)
-        _put(found, path.parent.relative_to(root).as_posix(), read)
+        folder = path.parent
+        if folder.name.startswith("compare-"):
+            continue  # pages about runs that are read themselves
+        plain = folder.with_name(folder.name.partition("+")[0])  # a quick study has its own folder
+        kind = plain.name.removeprefix("study-")
+        study = kind in _STUDIES
+        read = _study(folder, _STUDIES[kind]) if study else _run(path)
+        _put(found, (plain if study else folder).relative_to(root).as_posix(), read)
     return found
 
 

@@ -30,11 +30,17 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def swept(made: Path) -> Path:
+    """The folder of the study, which says what was swept."""
+    (folder,) = (made / "reports" / "pulled").glob("study-filters+methods.kf.Q+twin.noise+seeds-*")
+    return folder
+
+
 def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
-    folder = made / "reports" / "pulled" / "study-filters"
+    folder = swept(made)
     content = json.loads((folder / "results.json").read_text("utf-8"))
     jsonschema.validate(content, schema())
-    assert len(list((folder / "cells").glob("*.json"))) == 6
+    assert len(list((folder.parent / "study-filters" / "cells").glob("*.json"))) == 6
     with (folder / "tables" / "cells.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [bool(r["all.rmse_m"]) for r in rows] == [not r["failed"] for r in rows]
@@ -50,7 +56,7 @@ def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
 
 
 def test_the_best_line_is_the_best_cell(made: Path) -> None:
-    folder = made / "reports" / "pulled" / "study-filters"
+    folder = swept(made)
     told = json.loads((folder / "results.json").read_text("utf-8"))["study"]
     best = told["best"][0]
     words = shlex.split(best["command"])
@@ -71,7 +77,7 @@ def test_the_best_line_is_the_best_cell(made: Path) -> None:
 def test_the_best_line_decides_and_names_what_decides(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = made / "reports" / "pulled" / "study-filters"
+    folder = swept(made)
     told = json.loads((folder / "results.json").read_text("utf-8"))["study"]
     monkeypatch.chdir(made)
     words = shlex.split(told["best"][0]["command"])

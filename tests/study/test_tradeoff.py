@@ -242,7 +242,7 @@ def test_choose_writes_its_folder_and_exits_by_its_verdict(
     assert run([*asked, "--error", "1nm"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "Nothing meets both 1e-06 mm and 1 Hz. Nearest: " in said
-    folder = tmp_path / "small" / "study-choose"
+    (folder,) = (tmp_path / "small").glob("study-choose*+1nm+1Hz-*")
     assert (folder / "tables" / "cells.csv").is_file()
     assert (folder / "figures" / "chart_choice.png").is_file()
 

@@ -6,15 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from validate.cli.arguments import FAILED, OK, pairs
+from validate.cli.arguments import FAILED, OK, command_line, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import relative, say, table, warn
 from validate.cli.progress import progress
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
-from validate.replay.find import find
-from validate.replay.options import Report
+from validate.replay.find import find, sources_of
+from validate.replay.named_run import differences, tag
+from validate.replay.options import Options, Report
 from validate.report.folder import try_results
+from validate.report.made import made
 from validate.report.numbers import MISSING, significant
 from validate.study import filter_page, stability_page, still_page, trade_page
 from validate.study.choose import Choice, choose, error_of, wanted
@@ -22,10 +24,11 @@ from validate.study.choose_exhibits import words
 from validate.study.climb import rungs
 from validate.study.engine import CELLS, Finished, study_folder
 from validate.study.filter_exhibits import RANKING, ranking_row
-from validate.study.filters import FilterStudy, study
+from validate.study.filters import SEEDS, FilterStudy, study
 from validate.study.gain import GainMap, gain_map
 from validate.study.job import Where
 from validate.study.ranking import Ranking
+from validate.study.score import POOLED
 from validate.study.stability import Stability, stability
 from validate.study.study_page import Findings, write_study
 from validate.study.sweep import named
@@ -69,13 +72,17 @@ def filters(
     chosen = tuple(m.strip() for m in methods.split(",") if m.strip())
     given = pairs(values, "--set")
     ask_about(experiment, given)
-    with _running(experiment, "filters", "filters", common) as report:
+    words, content = differences(experiment, Options(given, chosen, common.quick))
+    words += [text.partition("=")[0].strip() for text in sweeps]
+    words += ["seeds"] * (seeds_of(seeds) != SEEDS) + [by] * (by != POOLED)
+    place = f"filters{tag(words, [content, sorted(sweeps), seeds_of(seeds), by])}"
+    with _running(experiment, place, "filters", common) as report:
         found = study(
             experiment, sweeps, methods=chosen, values=given,
             seeds=seeds_of(seeds), by=by, quick=common.quick, out=common.out, where=common.where,
             report=report,
         )  # fmt: skip
-    page = _written(experiment, filter_page.told(found), "filters", common)
+    page = _written(experiment, filter_page.told(found), place, common)
     if not common.as_json:
         _show_filters(found)
         _end(found.done, page)
@@ -85,7 +92,8 @@ def filters(
 def stability_map(name: str, common: StudyOptions) -> int:
     """Maps where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
     experiment = find(name, Path.cwd(), common.named)
-    with _running(experiment, "stability", "stability", common) as report:
+    place = f"stability{_quick(common)}"
+    with _running(experiment, place, "stability", common) as report:
         found = stability(
             experiment, quick=common.quick, out=common.out, where=common.where, report=report
         )
@@ -93,22 +101,22 @@ def stability_map(name: str, common: StudyOptions) -> int:
         if found is None:
             still = gain_map(experiment, out=common.out, where=common.where, report=report)
     if found is None:
-        return _still(experiment, still, common)
-    page = _written(experiment, stability_page.told(found), "stability", common)
+        return _still(experiment, still, place, common)
+    page = _written(experiment, stability_page.told(found), place, common)
     if not common.as_json:
         _show_stability(found)
         _end(found.done, page)
     return OK if found.passed else FAILED
 
 
-def _still(experiment: Experiment, still: GainMap | None, common: StudyOptions) -> int:
+def _still(experiment: Experiment, still: GainMap | None, place: str, common: StudyOptions) -> int:
     """A static experiment: the gain of its loop, or that nothing is stepped."""
     told = (
         still_page.told_nothing(experiment, common.quick)
         if still is None
         else still_page.told_gain(still, common.quick)
     )
-    page = _written(experiment, told, "stability", common)
+    page = _written(experiment, told, place, common)
     if not common.as_json:
         say(f"{told.sentence}\nreport: {relative(page)}")
     return FAILED if told.passed is False else OK
@@ -116,8 +124,12 @@ def _still(experiment: Experiment, still: GainMap | None, common: StudyOptions) 
 
 def tradeoff(name: str, common: StudyOptions) -> int:
     """Measures error against time; 0."""
-    found = _measured(name, common)
-    page = _written(found.experiment, trade_page.told(found), "tradeoff", common)
+    experiment, place = find(name, Path.cwd(), common.named), f"tradeoff{_quick(common)}"
+    with _running(experiment, place, "pilot runs", common) as report:
+        found = trade(
+            experiment, quick=common.quick, out=common.out, where=common.where, report=report
+        )
+    page = _written(experiment, trade_page.told(found), place, common)
     if not common.as_json:
         _show_trade(found)
         _end(found.done, page)
@@ -128,7 +140,9 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
     """Runs the pilots, climbs the ladder; 0 when a method meets both, else 1."""
     want = wanted(error, rate)
     experiment = find(name, Path.cwd(), common.named)
-    with _running(experiment, "tradeoff", "pilot runs", common) as report:
+    words = ["quick"] * common.quick + [error, rate] + ["declared_law"] * declared_law
+    place = f"choose{tag(words, [common.quick, want, declared_law])}"
+    with _running(experiment, place, "pilot runs", common) as report:
         climb = rungs(
             experiment, declared_law=declared_law, quick=common.quick, out=common.out,
             where=common.where, report=report,
@@ -137,7 +151,7 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
             climb, want, declared_law,
             lambda trade, row, dt: again(trade, row, dt, common.out, common.where),
         )  # fmt: skip
-    page = _written(experiment, trade_page.told_choice(choice), "choose", common)
+    page = _written(experiment, trade_page.told_choice(choice), place, common)
     if not common.as_json:
         _show_choice(choice)
         _end(choice.trade.done, page)
@@ -156,33 +170,32 @@ def seeds_of(text: str) -> int | tuple[int, ...]:
 # --- what all do ----------------------------------------------------------------------------------
 
 
-def _measured(name: str, common: StudyOptions) -> Trade:
-    experiment = find(name, Path.cwd(), common.named)
-    with _running(experiment, "tradeoff", "pilot runs", common) as report:
-        return trade(
-            experiment, quick=common.quick, out=common.out, where=common.where, report=report
-        )
+def _quick(common: StudyOptions) -> str:
+    """A quick study has a folder of its own."""
+    return tag(["quick"] * common.quick, common.quick)
 
 
 @contextmanager
 def _running(
-    experiment: Experiment, kind: str, title: str, common: StudyOptions
+    experiment: Experiment, place: str, title: str, common: StudyOptions
 ) -> Iterator[Report]:
-    """A progress bar, once the place was tried; an interruption says what is kept."""
-    try_results(study_folder(experiment, kind, common.out), (CELLS,))
+    """A progress bar, once the place was tried; an interruption says that cells are kept."""
+    try_results(study_folder(experiment, place, common.out), (CELLS,))
     try:
         with progress(f"{experiment.name}: {title}") as report:
             yield report
     except KeyboardInterrupt:
+        kind = place.partition("+")[0].replace("choose", "tradeoff")  # whose cells it climbs over
         cells = study_folder(experiment, kind, common.out) / CELLS
         kept = sum(1 for _ in cells.glob("*.json"))
         say(f"{kept} finished cells are kept; the same command goes on from there", error=True)
         raise
 
 
-def _written(experiment: Experiment, told: Findings, kind: str, common: StudyOptions) -> Path:
+def _written(experiment: Experiment, told: Findings, place: str, common: StudyOptions) -> Path:
     """The page's path; prints results.json where that is asked for."""
-    page = write_study(experiment, told, study_folder(experiment, kind, common.out))
+    by = made(command_line(), sources_of(experiment.path) if experiment.path else ())
+    page = write_study(experiment, told, study_folder(experiment, place, common.out), by)
     if common.as_json:
         print((page.parent / "results.json").read_text(encoding="utf-8"))
     return page

@@ -35,13 +35,21 @@ def reports_of(path: Path | None, out: Path | None) -> Path:
 
 def run_name(experiment: Experiment, options: Options) -> str:
     """`NAME` of the run as declared, else as in `NAME+quick+material.E-3fa2c1`."""
+    return experiment.name + tag(*differences(experiment, options))
+
+
+def differences(experiment: Experiment, options: Options) -> tuple[list[str], list[Any]]:
+    """What the user changed: its words, and its content with every value.
+
+    Raises `UsageError` for unknown methods, paths and values.
+    """
     declared = _settable(experiment, Options({}, (), options.quick))
     differing = sorted((c.path, c.value) for c in changed(declared, _settable(experiment, options)))
     methods = sorted(set(options.methods))
     if methods == sorted(experiment.methods):
         methods = []
     words = ["quick"] * options.quick + ["methods"] * bool(methods) + [p for p, _ in differing]
-    return experiment.name + tag(words, [options.quick, methods, differing])
+    return words, [options.quick, methods, differing]
 
 
 def _settable(experiment: Experiment, options: Options) -> tuple[Parameter, ...]:

@@ -10,6 +10,9 @@ from validate.compare.result import Result
 from validate.parameters import Parameter
 from validate.replay.experiment import Experiment
 from validate.report.folder import MARK, replace_folder
+from validate.report.history import carried, write_lines
+from validate.report.made import Made
+from validate.report.plain import Json
 from validate.report.store import document, write_json
 from validate.report.tables import write_csv
 from validate.study.engine import CELLS
@@ -39,10 +42,13 @@ class Findings:
     seed: int | None = None
 
 
-def write_study(experiment: Experiment, told: Findings, folder: Path) -> Path:
+def write_study(
+    experiment: Experiment, told: Findings, folder: Path, made: Made | None = None
+) -> Path:
     """Replaces all of `folder` but its cells; returns the path of report.html.
 
-    Raises what `replace_folder` and `draw_all` do.
+    A study that was there leaves its line, unless all that made it is equal. Raises what
+    `replace_folder` and `draw_all` do.
     """
     twin = told.seed is not None
     result = Result(
@@ -62,25 +68,31 @@ def write_study(experiment: Experiment, told: Findings, folder: Path) -> Path:
         twin_notice=experiment.twin_notice if twin else "",
         exhibits=told.exhibits,
     )
-    return replace_folder(folder, lambda f: _fill(told, result, f), (CELLS,)) / "report.html"
+    by, created = made or Made(), datetime.now(UTC).isoformat(timespec="seconds")
+    content = {**document(result, created, by), "study": told.document}
+    if told.passed is not None:
+        content["passed"] = told.passed
+    lines = carried(folder, content)
+
+    def fill(fresh: Path) -> None:
+        write_lines(lines, fresh)
+        _fill(told, result, content, by, fresh)
+
+    return replace_folder(folder, fill, (CELLS,)) / "report.html"
 
 
-def _fill(told: Findings, result: Result, folder: Path) -> None:
+def _fill(told: Findings, result: Result, content: Json, made: Made, folder: Path) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
     from validate.report.exhibits import draw_all, write_files
     from validate.report.html import page
-    from validate.report.provenance import parameters
+    from validate.report.provenance import how, parameters
 
-    created = datetime.now(UTC).isoformat(timespec="seconds")
     for name in ("tables", "figures"):
         (folder / name).mkdir()
-    content = {**document(result, created), "study": told.document}
-    if told.passed is not None:
-        content["passed"] = told.passed
     write_json(content, folder / MARK)
     write_csv(folder / "tables" / "cells.csv", *told.cells)
-    drawn = draw_all(result, (*result.exhibits, parameters(result)))
+    drawn = draw_all(result, (*result.exhibits, parameters(result), how(result, made)))
     for exhibit in drawn:
         write_files(exhibit, folder)
-    text = page(result, drawn, created, told.band)
+    text = page(result, drawn, content["created"], told.band)
     (folder / "report.html").write_text(text, encoding="utf-8")
