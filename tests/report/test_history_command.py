@@ -50,6 +50,12 @@ def test_runs_and_what_changed_at_80_columns(reports: Path, tmp_path: Path) -> N
     assert "moved: soft: force.plate@2mm 0.01000 N -> 0.3000 N (20.5 u)" in since
 
 
+def test_a_run_with_fewer_methods_names_them(reports: Path, tmp_path: Path) -> None:
+    (reports / "cube+material.E-123456").rename(reports / "cube+methods+material.E-123456")
+    text = " ".join(here("history", "cube", "--out", str(reports), cwd=tmp_path)[1].split())
+    assert "differs: methods soft, stiff, material.E 10000 -> 14000 Pa;" in text
+
+
 def test_json_is_one_document(reports: Path, tmp_path: Path) -> None:
     code, out, err = here("history", "cube.py", "--out", str(reports), "--json", cwd=tmp_path)
     assert (code, err) == (0, "")

@@ -56,7 +56,10 @@ def _differs(run: PastRun) -> str:
         f"{c['path']} {with_unit(c['default'], '1')} -> {with_unit(c['value'], c['unit'])}"
         for c in run.line.get("changed", [])
     ]
-    return ", ".join([*(["quick"] if run.line.get("quick") else []), *changed]) or "nothing"
+    words = run.folder.rpartition("-")[0].split("+")  # a run with fewer methods is called so
+    some = [f"methods {', '.join(run.methods)}"] if "methods" in words else []
+    quick = ["quick"] if run.line.get("quick") else []
+    return ", ".join([*quick, *some, *changed]) or "nothing"
 
 
 def _figures(run: PastRun) -> str:
