@@ -1,7 +1,8 @@
-"""A tet4 body at large strain for explicit schemes: the forces of `fem.hyperelastic`, compiled.
+"""A body of tet4 or mixed hex8 at large strain for explicit schemes: the forces of
+`fem.hyperelastic`, compiled.
 
-The element loops are in `fem.explicit_kernels`; this is their packing and their interface. Unlike
-`Body` it takes regions: moduli are per cell.
+The element loops are in `fem.explicit_kernels` and `fem.brick_kernels`; this is their packing and
+their interface.
 """
 
 import math
@@ -18,6 +19,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem import explicit_kernels as kernels
 from validate.fem.assemble import shape_gradients
+from validate.fem.brick_packing import packed_bricks, require_bricks
 from validate.fem.explicit_kernels import LANES, NEO_HOOKE, ROWS, SVK
 from validate.fem.surface import foundation_stiffness
 from validate.scene.laws import ogden_terms
@@ -30,6 +32,7 @@ _ROWS: tuple[RowName, ...] = get_args(RowName)
 # Turns that a thread waits awake for the next step; read when GNU OpenMP is loaded. With its own
 # default steps take a hundred times as long where another process has the core.
 _PATIENCE = "3000"
+_DIFFERENCE = 1e-6  # of the body's size: half the step of a difference of forces
 _LAWS = {
     ("svk", "split"): SVK,
     ("neo_hooke", "split"): NEO_HOOKE,
@@ -85,11 +88,11 @@ class ExplicitBody:
     """A scene's cells packed in blocks; displacements u (N,) m, node-major.
 
     Foundations act as linear springs, as in `Body`. Raises `SceneError` for other elements than
-    tet4, inverted cells, a linear law, membranes and nodal mean dilatation. One object serves one
-    caller at a time: its workspace is its own. `threads` above 1 share the cells of `force` and
-    `advance`, with the same results to rounding: two are 1.8 times as fast at 8640 tets where the
-    cores are idle, and several times slower than one where they are not. Without OpenMP numba
-    bears only one caller a process with threads.
+    tet4 and mixed hex8, inverted cells, a linear law, membranes and nodal mean dilatation. One
+    object serves one caller at a time: its workspace is its own. `threads` above 1 share the cells
+    of `force` and `advance`, with the same results to rounding: two are 1.8 times as fast at 8640
+    tets where the cores are idle, and several times slower than one where they are not. Without
+    OpenMP numba bears only one caller a process with threads.
     """
 
     def __init__(self, scene: Scene, threads: int = 1) -> None:
@@ -98,7 +101,7 @@ class ExplicitBody:
             raise SceneError(f"{threads} threads: take 1, or as many as there are idle cores")
         mesh = scene.mesh
         self.scene, self.law, self.size = scene, _code(scene.material), mesh.nodes.size
-        self.geometry, self.cells = _packed(scene)
+        self.geometry, self.cells = packed_bricks(scene) if mesh.bricks else _packed(scene)
         self.work = np.zeros(kernels.WORK + kernels.WIDE * len(mesh.nodes))
         self._parts = self.work
         if threads > 1:
@@ -132,7 +135,11 @@ class ExplicitBody:
         return f, d.reshape(-1, 6)
 
     def tangent_product(self, u: Floats, v: Floats) -> Floats:
-        """K_t(u) v (N,) N."""
+        """K_t(u) v (N,) N; of hexahedra by a central difference, good to 7 digits."""
+        if self.scene.mesh.bricks:
+            size = float(np.ptp(self.scene.mesh.nodes)) * _DIFFERENCE
+            h = size / max(float(np.abs(v).max()), np.finfo(float).tiny)
+            return (self.force(u + h * v) - self.force(u - h * v)) / (2 * h)
         f = self._pull(v)
         kernels.add_products(self.law, self.geometry, self.cells, _own(u), _own(v), f, self.work)
         return f
@@ -169,6 +176,8 @@ class ExplicitBody:
         return np.asarray(self.springs @ u) if self.springs.nnz else np.zeros(self.size)
 
     def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
+        if self.scene.mesh.bricks:
+            raise SceneError("filters of single nodes are for tetrahedra; use box()")
         kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, _own(u), f, d, self.work)
 
 
@@ -178,15 +187,18 @@ def _own(x: Floats) -> Floats:
 
 
 def _require(scene: Scene) -> None:
-    if scene.mesh.kind != "tet4":
-        raise SceneError(f"elements of kind {scene.mesh.kind} have no explicit form; use tet4")
+    kind = scene.mesh.kind
+    if kind not in ("tet4", "hex8"):
+        raise SceneError(f"elements of kind {kind} have no explicit form; use tet4, or hex8")
+    if kind == "hex8":
+        require_bricks(scene)
     materials = (scene.material, *(r.material for r in scene.regions))
-    if len({_code(m) for m in materials}) > 1:
+    if kind == "tet4" and len({_code(m) for m in materials}) > 1:
         forms = sorted({f"{m.law} {m.coefficients.volumetric}" for m in materials})
         raise SceneError(f"explicit steps are for one law in one form, not {forms}")
     if scene.membranes:
         raise SceneError("membranes are linear only: drop them, or take the linear law")
-    if scene.dilatation != "pointwise":
+    if kind == "tet4" and scene.dilatation != "pointwise":
         raise SceneError(
             f"{scene.dilatation} dilatation of tet4 has no explicit form; use 'pointwise'"
         )

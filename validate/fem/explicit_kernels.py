@@ -32,7 +32,8 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
-from validate.fem import kernel_tensors, law_kernels
+from validate.fem import brick_kernels, kernel_tensors, law_kernels
+from validate.fem.brick_kernels import add_brick_forces, bricks_looked_at
 from validate.fem.compiled import compiled
 from validate.fem.kernel_tensors import (
     FAST,
@@ -67,14 +68,15 @@ Springs = tuple[Cells, Cells, Floats]
 
 LANES = 16
 ROWS = 11  # of geometry: 9 gradients, 2 moduli; the card of other laws follows
-WORK = 80 * LANES  # length of the workspace
+WORK = max(80 * LANES, brick_kernels.WORK)  # length of the workspace
 WIDE = 12  # numbers a node that `add_forces_and_blocks` needs behind the workspace
 SVK, NEO_HOOKE, INVARIANTS, INVARIANTS_COUPLED, OGDEN, OGDEN_COUPLED = range(6)
 _U, _V, _OUT, _NODES = ROWS * LANES, 20 * LANES, 29 * LANES, 29 * LANES
 _CARD = 77 * LANES  # the last three rows
 
-_compiled = compiled(kernel_tensors, law_kernels, nogil=True, fastmath=FAST, error_model="numpy")
-_threaded = compiled(kernel_tensors, law_kernels, nogil=True, parallel=True, error_model="numpy")
+_INLINED = kernel_tensors, law_kernels, brick_kernels
+_compiled = compiled(*_INLINED, nogil=True, fastmath=FAST, error_model="numpy")
+_threaded = compiled(*_INLINED, nogil=True, parallel=True, error_model="numpy")
 
 
 @inlined
@@ -251,7 +253,13 @@ def _scatter(w: Floats, cells: Cells, block: int, f: Floats) -> None:
 
 @_compiled
 def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w: Floats) -> None:
-    """Adds the internal forces N of all blocks to f (N,); cells (blocks, 4, 16) hold 3 x node."""
+    """Adds the internal forces N of all blocks to f (N,); cells (blocks, 4, 16) hold 3 x node.
+
+    Geometry of four dimensions is that of hexahedra (`fem.brick_kernels`).
+    """
+    if geometry.ndim == 4:
+        add_brick_forces(geometry, cells, u, f, w)
+        return
     for block in range(cells.shape[0]):
         _load(w, geometry, block)
         _gather(w, _U, cells, block, u)
@@ -623,6 +631,8 @@ def looked_at(
     law: int, count: int, geometry: Floats, cells: Cells, u: Floats, w: Floats
 ) -> tuple[float, float, int]:
     """Strain energy J, least det F and number of det F <= 0 of the first `count` cells."""
+    if geometry.ndim == 4:
+        return bricks_looked_at(count, geometry, cells, u, w)
     energy, least, inverted = 0.0, np.inf, 0
     for block in range(cells.shape[0]):
         _load(w, geometry, block)
