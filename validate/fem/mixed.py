@@ -97,8 +97,10 @@ def _require_plain(scene: Scene) -> None:
         )
     places = [p.facets for p in (*scene.supports, *scene.drives, *scene.loads)
               if not isinstance(p, Weight)]  # fmt: skip
-    if scene.masses or {"faces"} != {"faces", *map(kind_of, places)}:
-        raise SceneError("mixed elements know faces alone, no edges, points or hanging masses")
+    if scene.masses or scene.tracked or {"faces"} != {"faces", *map(kind_of, places)}:
+        raise SceneError(
+            "mixed elements know faces alone, no edges, points, masses or tracked sets"
+        )
     if scene.foundations or scene.membranes or scene.cavities:
         raise SceneError("mixed elements know supports, pins, drives and loads alone")
     spread = [x.name for x in scene.loads if isinstance(x, Load) and x.spread != "consistent"]

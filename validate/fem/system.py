@@ -114,6 +114,13 @@ def build(scene: Scene) -> System:
         held[[node * mesh.dimension + c for c in pin.components]] = True
     moves = np.zeros((N, len(scene.drives)))
     for j, drive in enumerate(scene.drives):
+        if drive.follows:
+            part, i = drive.follows
+            nodes = nodes_of(mesh, part.facets)
+            driven = _unknowns(scene, part.facets, tuple(range(mesh.dimension)))
+            held[driven] = True
+            moves[driven, j] = part.columns(mesh.nodes[nodes])[:, i]
+            continue
         driven = _driven(scene, drive)
         held[driven] = True
         moves[driven, j] = sum(drive.direction)

@@ -29,6 +29,7 @@ _HOMES = {
     "inclusion": ("Block", "Capsule", "block_with_inclusion"),
     "plates": ("Plates", "between_plates"),
     "refine": ("refined",),
+    "tracked": ("Prescribed",),
     "select": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),
 }
 

@@ -14,6 +14,7 @@ from validate.scene.laws import Coefficients, law_kind
 from validate.scene.mesh import Mesh
 from validate.scene.select import Place, kind_of, nodes_of
 from validate.scene.stability import require_stable
+from validate.scene.tracked import Prescribed
 
 Dilatation = Literal["pointwise", "nodal_mean", "mixed"]
 LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"]
@@ -111,6 +112,8 @@ class Drive:
     direction: tuple[float, ...]
     point: tuple[float, ...] | None = None
     speeds: tuple[tuple[float, float], ...] = ()
+    #: The set of tracked points that makes this drive, and which of its inputs it is.
+    follows: tuple[Prescribed, int] | None = None
 
     def __post_init__(self) -> None:
         starts = [t for t, _ in self.speeds]
@@ -252,8 +255,11 @@ class Scene:
     thickness: float = 1.0
     masses: tuple[Mass, ...] = ()
     contacts: tuple[RigidContact, ...] = ()
+    tracked: tuple[Prescribed, ...] = ()
 
     def __post_init__(self) -> None:
+        own = tuple(d for d in self.drives if d.follows is None)
+        object.__setattr__(self, "drives", (*own, *(d for p in self.tracked for d in _drives(p))))
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation is for linear elements; use order 1")
         if self.mesh.dimension == 2 and (
@@ -328,3 +334,13 @@ class Scene:
         for region in self.regions:
             numbers[region.cells] = value(region.material)
         return numbers
+
+
+def _drives(part: Prescribed) -> tuple[Drive, ...]:
+    """One drive for every component of every tracked point."""
+    d = part.places.shape[1]
+    axes = np.eye(d).tolist()
+    return tuple(
+        Drive(name, part.facets, tuple(axes[i % d]), part.points[i // d][1], follows=(part, i))
+        for i, name in enumerate(part.inputs)
+    )

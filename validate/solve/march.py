@@ -84,6 +84,7 @@ def march(
     traces |= _given(stepper.scene, inputs[:done])
     for name, unit in stepper.units.items():
         traces[name] = Trace(np.array([numbers[name] for numbers in walk.numbers]), unit)
+    traces |= _totals(stepper.scene, traces)
     traces |= _probed(stepper, walk.probes)
     seconds = np.array(walk.seconds)
     seconds = seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds[:done]
@@ -142,6 +143,18 @@ def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     for mover, y in zip(scene.movers[::-1], inputs.T[::-1], strict=False):
         traces[f"{mover.name}.displacement"] = Trace(y, "m")
     return traces
+
+
+def _totals(scene: Scene, traces: Mapping[str, Trace]) -> dict[str, Trace]:
+    """`<set>.force.<axis>` N of sets that follow tracked points: the sum over the points."""
+    totals = {}
+    for part in scene.tracked:
+        for c, axis in enumerate(_AXES[: part.places.shape[1]]):
+            of = [traces.get(f"{name}.force") for name in part.inputs[c :: part.places.shape[1]]]
+            forces = [trace.y for trace in of if trace is not None]
+            if forces:
+                totals[f"{part.name}.force.{axis}"] = Trace(np.sum(forces, axis=0), "N")
+    return totals
 
 
 def _probe_rows(stepper: Stepper) -> Rows | None:

@@ -11,6 +11,7 @@ from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
+from validate.solve.propagated import Propagated
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
@@ -32,7 +33,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
 )
 
 # What solves a whole scene at once.
-SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest,)
+SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest, Propagated)
 
 
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:

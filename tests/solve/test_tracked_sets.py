@@ -1,0 +1,214 @@
+"""Sets of nodes that follow tracked points: exact motions, totals, covariance by hand and draw."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.system import build
+from validate.scene.box import box
+from validate.scene.scene import LawName, Load, Material, Probe, Scene
+from validate.scene.select import InBox, OnPlane
+from validate.scene.tracked import Prescribed
+from validate.solve.march import run_scheme
+from validate.solve.newmark import Newmark
+from validate.solve.newton import StaticNewton
+from validate.solve.propagated import Propagated
+from validate.solve.quasi_static import QuasiStatic
+from validate.solve.types import Run, SceneSolver, Scheme
+
+SIZE = (0.03, 0.02, 0.02)
+CORNERS = (
+    ("a", (0.0, 0.0, 0.0)),
+    ("b", (0.0, 0.02, 0.0)),
+    ("c", (0.0, 0.0, 0.02)),
+    ("d", (0.03, 0.0, 0.0)),
+)
+BASE = OnPlane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).faces
+LAST = np.array([0])
+TURN = np.array([[0.0, -0.02, 0.01], [0.02, 0.0, -0.03], [-0.01, 0.03, 0.0]])  # antisymmetric
+STRAIN = TURN + np.array([[0.01, 0.0, 0.005], [0.0, -0.02, 0.0], [0.005, 0.0, 0.03]])
+SHIFT = np.array([1e-3, -2e-3, 5e-4])
+
+
+def at(points: tuple[tuple[str, tuple[float, ...]], ...]) -> Floats:
+    return np.array([place for _, place in points])
+
+
+def affine(x: Floats, gradient: Floats) -> Floats:
+    return np.asarray(SHIFT + x @ gradient.T)
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "gradient"),
+    [("rigid", 3, TURN), ("rigid", 4, TURN), ("affine", 4, STRAIN), ("radial", 4, STRAIN)],
+)
+def test_motions_of_their_kind_are_exact(kind: str, count: int, gradient: Floats) -> None:
+    part = Prescribed("base", BASE, CORNERS[:count], kind)  # type: ignore[arg-type]
+    x = np.random.default_rng(0).uniform(-0.05, 0.05, (20, 3))
+    found = part.columns(x) @ affine(part.places, gradient).ravel()
+    assert found.reshape(-1, 3) == pytest.approx(affine(x, gradient), abs=1e-12)
+
+
+def test_radial_goes_through_every_point() -> None:
+    points = (*CORNERS, ("e", (0.01, 0.015, 0.005)), ("f", (0.02, 0.01, 0.02)))
+    part = Prescribed("base", BASE, points, "radial")
+    seen = np.random.default_rng(1).standard_normal(18)
+    assert part.columns(at(points)) @ seen == pytest.approx(seen, abs=1e-9)
+    two = Prescribed("base", BASE, points[:2], "radial")
+    assert two.columns(at(points)).reshape(6, 3, 2, 3).sum(axis=2) == pytest.approx(
+        np.broadcast_to(np.eye(3), (6, 3, 3))
+    )
+
+
+def test_in_two_dimensions_two_points_turn_a_set() -> None:
+    part = Prescribed("base", "x0", (("a", (0.0, 0.0)), ("b", (0.0, 0.02))))
+    assert part.inputs == ("base.a.x", "base.a.y", "base.b.x", "base.b.y")
+    turned = part.columns(np.array([[0.01, 0.01]])) @ np.array([0.001, 0.0, -0.001, 0.0])
+    assert turned == pytest.approx([0.0, 0.001])
+
+
+def scene(law: LawName = "linear", covariance: Floats | None = None) -> Scene:
+    """A block whose base follows three points, a weak pull at its end, a probe there."""
+    P = None if covariance is None else tuple(map(tuple, covariance.tolist()))
+    return Scene(
+        box(SIZE, (3, 2, 2)),
+        Material(1e4, 0.3, law),
+        loads=(Load("pull", "x1", (0.0, 0.0, 1.0)),),
+        probes=(Probe("tip", (0.03, 0.01, 0.01)),),
+        tracked=(Prescribed("base", BASE, CORNERS[:3], covariance=P),),
+    )
+
+
+def run(scheme: Scheme | SceneSolver, body: Scene, seen: Floats, pull: float = 0.0) -> Run:
+    return run_scheme("r", scheme, body, np.zeros(1), np.append(seen, pull)[None], LAST)
+
+
+def test_a_body_without_load_moves_with_its_base() -> None:
+    """A small rigid motion of the base is one of the whole, without force, to rounding."""
+    body = scene()
+    assert body.inputs[:4] == ("base.a.x", "base.a.y", "base.a.z", "base.b.x")
+    moved = run(QuasiStatic(), body, affine(at(CORNERS[:3]), TURN).ravel())
+    assert moved.u[0] == pytest.approx(affine(body.mesh.nodes, TURN), abs=1e-12)
+    assert abs(moved.traces["base.force.z"].y[0]) < 1e-10
+    assert moved.traces["base.a.x.displacement"].y[0] == pytest.approx(SHIFT[0])
+
+
+def test_an_affine_set_strains_a_body_evenly() -> None:
+    """Every node of the surface follows: the patch test, with the inner ones free."""
+    mesh = box(SIZE, (3, 2, 2))
+    skin = OnPlane(SIZE, (1.0, 0.0, 0.0), tolerance=1.0).faces
+    body = Scene(mesh, Material(1e4, 0.3), tracked=(Prescribed("skin", skin, CORNERS, "affine"),))
+    seen = affine(at(CORNERS), STRAIN).ravel()
+    moved = run_scheme("r", QuasiStatic(), body, np.zeros(1), seen[None], LAST)
+    assert moved.u[0] == pytest.approx(affine(mesh.nodes, STRAIN), abs=1e-12)
+
+
+@pytest.mark.parametrize("law", ["linear", "neo_hooke"])
+def test_the_base_bears_what_pulls(law: LawName) -> None:
+    scheme = QuasiStatic() if law == "linear" else StaticNewton()
+    pulled = run(scheme, scene(law), np.zeros(9), 0.01)
+    assert pulled.traces["base.force.z"].y[0] == pytest.approx(-0.01, rel=1e-6)
+    assert pulled.traces["base.force.z"].unit == "N"
+    assert abs(pulled.traces["base.force.x"].y[0]) < 1e-8
+
+
+def covariance() -> Floats:
+    """Points with noise of their own and one that all share along x."""
+    P = np.diag(np.linspace(1e-5, 9e-5, 9) ** 2)
+    shared = np.tile([5e-5, 0.0, 0.0], 3)
+    return np.asarray(P + np.outer(shared, shared))
+
+
+def test_covariance_is_carried_as_J_P_J() -> None:
+    """Field and probe by the columns of the system; draws agree within their own scatter."""
+    body, P = scene(covariance=covariance()), covariance()
+    told = run(Propagated(), body, np.zeros(9), 0.01)
+    plain = run(QuasiStatic(), body, np.zeros(9), 0.01)
+    assert told.u == pytest.approx(plain.u)
+    stepper = QuasiStatic().prepare(build(body))
+    J = stepper.columns[:, :9]  # type: ignore[attr-defined]
+    assert told.sd is not None
+    assert told.sd[0].ravel() ** 2 == pytest.approx(np.diag(J @ P @ J.T), rel=1e-9)
+    draws = np.random.default_rng(0).multivariate_normal(np.zeros(9), P, 4000) @ J.T
+    assert told.sd[0].ravel() == pytest.approx(draws.std(axis=0), rel=0.06)
+    (tip,) = np.flatnonzero((body.mesh.nodes == [0.03, 0.01, 0.01]).all(axis=1))
+    assert told.traces["tip.x.sd"].y[0] == pytest.approx(told.sd[0, tip, 0])
+    assert told.traces["base.a.x.displacement.sd"].y[0] == pytest.approx(np.sqrt(P[0, 0]))
+
+
+def test_forces_have_it_too() -> None:
+    """Held at its other end, a rod's force has the scatter of its length: E A/L on both."""
+    end = InBox((0.03, 0.0, 0.0), SIZE).points
+    noise = tuple(map(tuple, (np.diag([1.0, 0.0, 0.0] * 4) * 1e-10).tolist()))
+    far = tuple(
+        (label, (0.03, *place[1:])) for label, place in (*CORNERS[:3], ("d", (0, 0.02, 0.02)))
+    )
+    body = replace(
+        scene(),
+        material=Material(1e4, 0.0),
+        tracked=(
+            Prescribed("base", BASE, CORNERS[:3]),
+            Prescribed("end", end, far, "rigid", noise),
+        ),
+    )
+    told = run_scheme("r", Propagated(), body, np.zeros(1), np.zeros((1, len(body.inputs))), LAST)
+    stiffness = 1e4 * 4e-4 / 0.03
+    # The mean of four corners' x: turns of the end pull on one side and push on the other.
+    assert told.traces["end.force.x.sd"].y[0] == pytest.approx(stiffness * 1e-5 / 2, rel=1e-6)
+    assert told.traces["base.force.x.sd"].y[0] == pytest.approx(stiffness * 1e-5 / 2, rel=1e-6)
+
+
+def test_at_large_strain_it_is_the_tangents() -> None:
+    """Small noise about a small load: what a linear body shows, to the strain."""
+    P = covariance()
+    told = run(Propagated(StaticNewton()), scene("neo_hooke", P), np.zeros(9), 1e-4)
+    linear = run(Propagated(), scene(covariance=P), np.zeros(9), 1e-4)
+    assert told.sd is not None
+    assert linear.sd is not None
+    assert told.sd == pytest.approx(linear.sd, rel=0.02, abs=1e-7)
+
+
+def test_a_deviation_that_fails_says_so() -> None:
+    huge = np.eye(9) * 0.05**2
+    told = run(Propagated(StaticNewton(max_cuts=0)), scene("neo_hooke", huge), np.zeros(9), 0.0)
+    assert told.outcome.state in ("not_converged", "invalid")
+    assert told.outcome.why.startswith("with deviation")
+    assert len(told.t) == len(told.u) == 0
+
+
+def test_what_cannot_be_carried_is_refused() -> None:
+    with pytest.raises(SceneError, match="1 sets follow tracked points, none with a covariance"):
+        run(Propagated(), scene(), np.zeros(9))
+    with pytest.raises(SceneError, match="Newmark marches in time"):
+        run(Propagated(Newmark()), scene(covariance=covariance()), np.zeros(9))
+
+
+def test_points_that_say_too_little_are_refused() -> None:
+    line = tuple((str(i), (0.0, 0.01 * i, 0.0)) for i in range(4))
+    with pytest.raises(SceneError, match="points determine 5 of the 6 numbers of a rigid"):
+        Prescribed("base", BASE, line)
+    with pytest.raises(SceneError, match=r"3 tracked points determine 3 of the 4 .* affine"):
+        Prescribed("base", BASE, CORNERS[:3], "affine")
+    with pytest.raises(SceneError, match="each needs a label"):
+        Prescribed("base", BASE, (*CORNERS, CORNERS[0]))
+    with pytest.raises(SceneError, match=r"shape \(3, 3\), expected \(9, 9\)"):
+        Prescribed("base", BASE, CORNERS[:3], covariance=((1.0, 0.0, 0.0),) * 3)
+    negative = tuple(map(tuple, (-np.eye(9)).tolist()))
+    with pytest.raises(SceneError, match="eigenvalues of at least 0, the least is -1 "):
+        Prescribed("base", BASE, CORNERS[:3], covariance=negative)
+    with pytest.raises(SceneError, match=r"tracked points of \[2, 3\] coordinates"):
+        Prescribed("base", BASE, (CORNERS[0], ("x", (0.0, 1.0))))
+    flat = Prescribed("base", "x0", (("a", (0.0, 0.0)), ("b", (0.0, 0.02))))
+    with pytest.raises(SceneError, match="points of 2 coordinates in 3 dimensions"):
+        build(replace(scene(), tracked=(flat,)))
+
+
+def test_replacing_a_scene_keeps_one_drive_a_component() -> None:
+    body = scene()
+    again = replace(body, material=Material(2e4, 0.3))
+    assert again.inputs == body.inputs
+    assert len(again.drives) == 9
+    assert replace(again, tracked=()).drives == ()
