@@ -11,6 +11,8 @@ from report_samples import small_result
 
 from validate.parameters import Changed
 from validate.report.environment import environment
+from validate.report.exhibits import draw_all
+from validate.report.html import page
 from validate.report.made import Commit, Made, UsedFile, commit_of, made
 from validate.report.provenance import how
 from validate.report.store import document, schema
@@ -95,6 +97,15 @@ def test_the_file_and_the_page_say_it() -> None:
     assert ("commit", "aaaaaaaaaa, with changes") in code.rows
     assert files.rows == (("mesh", "cube.npz", 12, "c" * 64),)
     assert how(small_result(), Made()).tables[0].note == "None differs."
+
+
+def test_a_column_without_heading_is_on_the_page() -> None:
+    result = small_result()
+    text = page(
+        result, draw_all(result, (how(result, Made("validate run cube")),)), CREATED, ("", "")
+    )
+    assert ">command</td>" in text
+    assert ">validate run cube</td>" in text
 
 
 def test_the_machine_is_described() -> None:

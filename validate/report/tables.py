@@ -39,7 +39,7 @@ def word_columns(table: NumberTable) -> tuple[int, ...]:
 
 def across(table: NumberTable) -> tuple[int, ...]:
     """The columns beside each other: all but the one whose texts stand below the rows."""
-    return tuple(i for i, heading in enumerate(table.headings) if heading != table.below)
+    return tuple(i for i, h in enumerate(table.headings) if not table.below or h != table.below)
 
 
 def caption(table: NumberTable) -> str:
