@@ -9,7 +9,7 @@ Departures: noise intensities are variances in m^2 (the paper's .001, .1, .001 r
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -40,7 +40,7 @@ class NodeEKF:
     variances beyond 1e300 m^2 the run stops, or they are held there and counted.
     """
 
-    handles: ClassVar[Handles] = LARGE_DYNAMICS
+    handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, viscous=False)
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")

@@ -13,7 +13,7 @@ Departures: paper 003 filters node by node (`NodeEKF`), where no measurement rea
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -44,7 +44,7 @@ class ReducedEKF:
     found before the run, or the steady gain from the start.
     """
 
-    handles: ClassVar[Handles] = LARGE_DYNAMICS
+    handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, viscous=False)
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")

@@ -16,6 +16,7 @@ linear springs at any displacement; membranes are known at small strain only and
 """
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,7 @@ from validate.fem.nodal_mean import NodalMean
 from validate.fem.pattern import NodePattern
 from validate.fem.surface import foundation_stiffness
 from validate.fem.tensors import green_strain, volume_change
+from validate.fem.viscous import Branches, Lagged, Remembered, second_stress
 from validate.scene.mesh import require_positive_cells
 from validate.scene.scene import Scene
 
@@ -80,6 +82,7 @@ class Body:
         self.mean = None
         if scene.dilatation == "nodal_mean":
             self.mean = NodalMean(mesh, *self.parts[0][1:])
+        self.lag: tuple[Floats, Floats] | None = None
         springs = [foundation_stiffness(mesh, f) for f in scene.foundations]
         self.springs: sparse.csr_array | None = sum(springs[1:], springs[0]) if springs else None
         self.pattern = NodePattern(mesh.cells, len(mesh.nodes))
@@ -88,6 +91,20 @@ class Body:
         spread *= moduli[:, None, None]
         #: N, norm of the nodal forces that a stress of kappa + mu in every cell would add up to.
         self.unit_force = float(np.linalg.norm(self._nodal(spread.sum(1))))
+
+    def after(self, branches: Branches, memory: Remembered, dt: float) -> "Body":
+        """The body at the end of a step of dt s, with what its branches remember at its points."""
+        lagged = copy(self)
+        lagged.lag = branches.lag(memory, dt)
+        return lagged
+
+    def isochoric(self, u: Floats) -> Floats:
+        """The second Piola-Kirchhoff stress (e, q, 3, 3) Pa of the relaxed isochoric law."""
+        S = np.empty((*self.weights.shape, 3, 3))
+        for b in self._blocks(u):
+            law = b.law.law if isinstance(b.law, Lagged) else b.law
+            S[b.cells] = second_stress(law, b.H)
+        return S
 
     @property
     def most_stretch(self) -> float:
@@ -231,6 +248,8 @@ class Body:
         nodal = u.reshape(-1, 3)
         for part, law, kappa in self.parts:
             local = np.swapaxes(nodal[self.mesh.cells[part]], 1, 2)
+            if self.lag is not None:
+                law = Lagged(law, self.lag[0][part], self.lag[1][part])
             yield _Block(part, law, kappa, local[:, None] @ self.gradients[part])
 
     def _cell_gradient(self, u: Floats) -> Floats:

@@ -21,6 +21,7 @@ from validate.fem.ogden import Ogden
 from validate.fem.polynomial import Polynomial
 from validate.fem.tensors import EYE, green_strain, outer, trace
 from validate.scene.laws import LAWS, law_kind, ogden_terms
+from validate.scene.prony import Prony
 from validate.scene.scene import Material
 from validate.scene.stability import coupled_lambda
 
@@ -148,9 +149,28 @@ def parts_of(material: Material, *, averaged: bool) -> tuple[Law, float]:
     """
     law, kappa = law_of(material), material.bulk_modulus
     if averaged or material.coefficients.volumetric == "split":
-        return law_of(material, isochoric=True), kappa
+        return law_of(instant(material), isochoric=True), kappa
     bulk = coupled_lambda(material.coefficients, law.mu, kappa)
     if isinstance(law, Ogden):
         return replace(law, kappa=2 * law.mu / 3), bulk
     assert isinstance(law, Polynomial)
     return replace(law, bulk=0.0), bulk
+
+
+def instant(material: Material) -> Material:
+    """The material whose isochoric part is that of statics: the relaxed one, or with all branches
+    of its Prony series taut."""
+    if material.prony.statics == "relaxed":
+        return material
+    return stiffened(material, material.prony.instant)
+
+
+def stiffened(material: Material, factor: float) -> Material:
+    """Another shear modulus and coefficients by a factor, at the same bulk modulus."""
+    c, mu, kappa = material.coefficients, factor * material.shear_modulus, material.bulk_modulus
+    scaled = replace(
+        c, C01=factor * c.C01, C20=factor * c.C20, C30=factor * c.C30,
+        ogden_mu=tuple(factor * m for m in c.ogden_mu),
+    )  # fmt: skip
+    E, nu = 9 * kappa * mu / (3 * kappa + mu), (3 * kappa - 2 * mu) / (2 * (3 * kappa + mu))
+    return replace(material, E=E, nu=nu, coefficients=scaled, prony=Prony())

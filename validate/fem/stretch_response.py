@@ -10,9 +10,11 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import SceneError
-from validate.fem.laws import Law, law_of
+from validate.fem.laws import Law, instant, law_of
 from validate.fem.tensors import volume_change
+from validate.fem.viscous import Lagged, branches_of, second_stress
 from validate.scene.material_point import MaterialPoint, StretchMode
+from validate.scene.scene import Material
 
 _ITERATIONS = 50
 _SETTLED = 1e-14  # of the free stretch; Newton squares its error, so that one more step is rounding
@@ -26,15 +28,20 @@ _MOVES: Mapping[StretchMode, tuple[Floats, Floats]] = {
 }
 
 
-def response(point: MaterialPoint, stretches: Floats) -> dict[str, Floats]:
+def response(point: MaterialPoint, stretches: Floats, t: Floats | None = None) -> dict[str, Floats]:
     """What the point answers to stretches (nt,): each (nt,), by name.
+
+    With a Prony series the stress depends on the times t (nt,) s, and without them is the limit
+    that its `statics` says. Before the first one the point was at rest, the first stretch is a
+    jump; between times the isochoric stress is linear, so that a course wants times as fine as the
+    shortest relaxation that matters.
 
     "nominal_stress" Pa, force over the area at rest, tension positive; "free_stretch" -, of the
     third direction; "volume_ratio" -. Raises `SceneError` for a law without large strain, a stretch
     below the law's least, and where no free stretch is without stress (St. Venant-Kirchhoff pulled
     far).
     """
-    law = law_of(point.material)
+    law = law_of(instant(point.material))
     stretch = checked(stretches, "stretches", (None,), error=SceneError)
     for value in (stretch.min(), stretch.max()) if len(stretch) else ():
         if not law.least_stretch < value <= law.most_stretch:
@@ -45,10 +52,30 @@ def response(point: MaterialPoint, stretches: Floats) -> dict[str, Floats]:
             )
     drive, free = _MOVES[point.mode]
     driven = (stretch - 1)[:, None, None] * drive
-    h = _free_strain(law, driven, free, _first_guess(point, stretch))
-    H = driven + h[:, None, None] * free
-    stress = np.asarray(law.stress(H)[:, 0, 0])
+    guess = _first_guess(point, stretch)
+    if t is not None and point.material.prony.g:
+        h, stress = _relaxing(point.material, driven, free, guess, t)
+    else:
+        h = _free_strain(law, driven, free, guess)
+        stress = law.stress(driven + h[:, None, None] * free)
+    H, stress = driven + h[:, None, None] * free, np.asarray(stress[:, 0, 0])
     return {"nominal_stress": stress, "free_stretch": 1 + h, "volume_ratio": 1 + volume_change(H)}
+
+
+def _relaxing(
+    material: Material, driven: Floats, free: Floats, guess: Floats, t: Floats
+) -> tuple[Floats, Floats]:
+    """h (nt,) and P (nt, 3, 3) Pa, time after time; the first one is a jump from rest."""
+    law, shape = law_of(material), law_of(material, isochoric=True)
+    branches = branches_of(material)
+    memory, h, P = branches.at_rest((1,)), guess.copy(), np.empty_like(driven)
+    for k, dt in enumerate(np.diff(t, prepend=t[0])):
+        lagged = Lagged(shape, *branches.lag(memory, dt), law)
+        h[k : k + 1] = _free_strain(lagged, driven[k : k + 1], free, h[max(k - 1, 0)][None])
+        H = driven[k : k + 1] + h[k] * free
+        P[k] = lagged.stress(H)[0]
+        memory = branches.advanced(memory, second_stress(shape, H), dt)
+    return h, P
 
 
 def _first_guess(point: MaterialPoint, stretch: Floats) -> Floats:

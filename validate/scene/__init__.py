@@ -21,6 +21,7 @@ _HOMES = {
         "Weight",
     ),
     "laws": ("Coefficients",),
+    "prony": ("Prony",),
     "rubber": ("mooney_rivlin", "ogden", "yeoh"),
     "material_point": ("MaterialPoint",),
     "box": ("grid",),

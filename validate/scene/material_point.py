@@ -33,6 +33,10 @@ class MaterialPoint:
     mode: StretchMode
 
     @property
+    def materials(self) -> tuple[Material, ...]:
+        return (self.material,)
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what a step is given: as `Scene.inputs`."""
         return ("stretch",)

@@ -12,6 +12,7 @@ from validate.parameters import part, quantity
 from validate.scene.contact import RigidContact, require_clear
 from validate.scene.laws import Coefficients, law_kind
 from validate.scene.mesh import Mesh
+from validate.scene.prony import Prony
 from validate.scene.select import Place, kind_of, nodes_of
 from validate.scene.stability import require_stable
 from validate.scene.tracked import Prescribed
@@ -26,7 +27,8 @@ class Material:
     """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws`).
 
     Every law has this E and nu at small strain, which is all that the linear schemes use;
-    `coefficients` are what the law has beyond them. Dynamic schemes need rho kg/m^3; Rayleigh
+    `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
+    whose isochoric stress comes late. Dynamic schemes need rho kg/m^3; Rayleigh
     damping is C = mass_damping M + stiffness_damping K, in 1/s and s (the alpha_0 and alpha_1 of
     paper 001, eq 7). Raises `SceneError` for values out of range, coefficients that the law does
     not know, and those that lose positive energy, with the stretch.
@@ -39,6 +41,7 @@ class Material:
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
     stiffness_damping: float = quantity(0.0, "s", "Rayleigh's beta")
     coefficients: Coefficients = part(Coefficients(), "what the law has beyond E and nu")
+    prony: Prony = quantity(Prony(), "1", "how the isochoric stress relaxes")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.E) and self.E > 0):
@@ -54,12 +57,24 @@ class Material:
             if not (np.isfinite(value) and value >= 0):
                 raise SceneError(f"{name} damping {value:g}: a number >= 0")
         self.coefficients.require_known(self.law)
+        if self.prony != Prony() and not self._relaxes(self.law):
+            form = self.coefficients.volumetric
+            raise SceneError(
+                f"law '{self.law}' ({form}) has no isochoric part that could relax: drop the Prony "
+                "series, or take neo_hooke, mooney_rivlin, yeoh or ogden with volumetric 'split'"
+            )
         if law_kind(self.law).ranged:
             require_stable(self.law, self.coefficients, self.shear_modulus, self.bulk_modulus)
 
     def of_law(self, law: LawName) -> "Material":
         """The same at small strain, with another law and what it knows of the coefficients."""
-        return replace(self, law=law, coefficients=self.coefficients.known_to(law))
+        prony = self.prony if self._relaxes(law) else Prony()
+        return replace(self, law=law, coefficients=self.coefficients.known_to(law), prony=prony)
+
+    def _relaxes(self, law: str) -> bool:
+        """An isochoric part of its own is what a Prony series acts on."""
+        split = self.coefficients.known_to(law).volumetric == "split"
+        return split and "split" in law_kind(law).volumetric
 
     @property
     def shear_modulus(self) -> float:
@@ -327,6 +342,11 @@ class Scene:
     def movers(self) -> tuple[RigidContact, ...]:
         """The rigid bodies that an input moves."""
         return tuple(c for c in self.contacts if c.direction is not None)
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The body's, then those of its regions."""
+        return self.material, *(region.material for region in self.regions)
 
     def per_cell(self, value: Callable[[Material], float]) -> Floats:
         """A number of every cell's material (e,)."""

@@ -47,7 +47,9 @@ class CentralDifference:
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
 
-    handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, contact=("foundations", "rigid"))
+    handles: ClassVar[Handles] = replace(
+        LARGE_DYNAMICS, contact=("foundations", "rigid"), viscous=False
+    )
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")

@@ -19,7 +19,7 @@ class Handles:
     """`law`: the laws it solves; `contact`: what may be glued to facets, or touch them ("rigid").
 
     `inertia` says that it marches in time with masses; the others which parts a scene may have.
-    `mesh` is False for what solves a material point.
+    `mesh` is False for what solves a material point; `viscous`: that stress may relax.
     """
 
     law: tuple[LawName, ...]
@@ -29,14 +29,15 @@ class Handles:
     loads: bool = True
     contact: tuple[ContactName, ...] = ("foundations",)
     mesh: bool = True
+    viscous: bool = False
 
     def covers(self, scene: Scene | MaterialPoint) -> bool:
         return not _refused(self, scene)
 
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
-LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False)
-LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True)
+LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False, viscous=True)
+LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, viscous=True)
 
 
 class Handling(Protocol):
@@ -51,6 +52,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "point": ("StretchTest",),
     "linear": ("ExactPressure", "Newmark"),
     **dict.fromkeys(LARGE, ("StaticNewton", "NewtonDynamics")),
+    "viscous": ("StaticNewton", "NewtonDynamics"),
     "cavities": ("ExactPressure", "StaticNewton"),
     "loads": ("QuasiStatic", "NewtonDynamics"),
     "drives": ("KfFem", "ModalKf"),
@@ -78,6 +80,8 @@ def _refused(handles: Handles, scene: Scene | MaterialPoint) -> tuple[str, str] 
         return ("point", "needs a mesh") if point else ("mesh", "solves a material point alone")
     if law not in handles.law:
         return law, f"cannot solve the law '{law}', only {', '.join(handles.law)}"
+    if any(m.prony.g for m in scene.materials) and not handles.viscous:
+        return "viscous", "remembers no stress: it takes no Prony series"
     if isinstance(scene, MaterialPoint):
         return None
     if scene.cavities and not handles.cavities:

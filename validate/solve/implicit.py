@@ -5,6 +5,9 @@ R(u) + C v + M a = f at the end of every step, with the rates of the rule: the t
 every iteration: this is the reference of the explicit schemes, and what paper 003's rates for the
 plain finite elements correspond to.
 
+A viscoelastic body (`fem.viscous`) remembers the stress of the last step. Its strain energy is that
+of the relaxed law: what branches hold and take is not in it.
+
 Departures: stiffness damping is that of the body at rest, not of K(U).
 """
 
@@ -21,6 +24,7 @@ from validate.fem.assemble import stiffness_damping
 from validate.fem.factor import elimination_order, factorise_indefinite
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System
+from validate.fem.viscous import Branches, Remembered, cell_branches, relaxed
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central import lumped_damping
@@ -62,10 +66,10 @@ class NewtonDynamics:
             C = sparse.csr_array(C + stiffness_damping(scene))
         else:
             M, C = system.M, system.C
-        body, free = Body(scene), system.free
+        body, free = Body(relaxed(scene)), system.free
         K = body.tangent(np.zeros(N))[free][:, free]
         order = elimination_order(K, free // 3, scene.mesh.nodes)
-        return ImplicitStepper(self, system, body, M, C, order)
+        return ImplicitStepper(self, system, body, M, C, order, cell_branches(scene))
 
 
 @dataclass(frozen=True)
@@ -86,11 +90,13 @@ class Settled:
     v: Floats
     a: Floats
     inputs: Floats
+    memory: Remembered | None = None
 
 
 @dataclass(frozen=True)
 class ImplicitStepper:
-    """`M` kg and `C` N s/m are (N, N); `order` (free,) is that of elimination."""
+    """`M` kg and `C` N s/m are (N, N); `order` (free,) is that of elimination; `branches` are those
+    of a viscoelastic body."""
 
     settings: NewtonDynamics
     system: System
@@ -98,6 +104,7 @@ class ImplicitStepper:
     M: sparse.csr_array
     C: sparse.csr_array
     order: Ints
+    branches: Branches | None = None
 
     @property
     def scene(self) -> Scene:
@@ -110,15 +117,31 @@ class ImplicitStepper:
 
     def rest(self) -> State:
         u, inputs = np.zeros(len(self.system.moves)), np.zeros(len(self.scene.inputs))
-        return State(0, Settled(u, u, u, inputs), numbers=self._numbers(u, u, u, inputs))
+        memory = self.branches.at_rest(self.body.weights.shape) if self.branches else None
+        return State(0, Settled(u, u, u, inputs, memory), numbers=self._numbers(u, u, u, inputs))
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
+        memory: Remembered | None = state.inner.memory
+        if self.branches and memory:
+            return self._relaxing(state, self.branches, memory, inputs)
         new = self._solved(state, inputs)
         if new.failure is None:
             return replace(new, k=state.k + 1)
         ending, why = new.failure
         return replace(state, failure=(ending, f"step {state.k + 1}: {why}; take a smaller dt"))
+
+    def _relaxing(
+        self, state: State, branches: Branches, memory: Remembered, inputs: Floats
+    ) -> State:
+        """A step of the body as its branches will leave it, and what they remember then."""
+        dt, before = self.settings.dt, replace(state.inner, memory=None)
+        body = self.body.after(branches, memory, dt)
+        new = replace(self, body=body).step(replace(state, inner=before), inputs)
+        if new.failure:
+            return replace(state, failure=new.failure)
+        after = branches.advanced(memory, body.isochoric(new.inner.u), dt)
+        return replace(new, inner=replace(new.inner, memory=after))
 
     def _solved(self, state: State, inputs: Floats) -> State:
         """A step by Newton from the state's displacements, every correction taken whole

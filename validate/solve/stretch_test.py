@@ -20,18 +20,19 @@ class StretchTest:
     """Settings: there are none. A point has no nodes, so a run has traces alone."""
 
     handles: ClassVar[Handles] = Handles(
-        LARGE, inertia=False, cavities=False, loads=False, contact=(), mesh=False
+        LARGE, inertia=False, cavities=False, loads=False, contact=(), mesh=False, viscous=True
     )
 
     def solve(self, scene: MaterialPoint, t: Floats, inputs: Floats) -> Run:
-        """Under stretches (nt, 1); refused, with the reason, where one of them has no stress.
+        """Under stretches (nt, 1) at t (nt,) s, at rest until then; refused, with the reason, where
+        one of them has no stress.
 
         Raises `SceneError` for a scene that is no material point, and the linear law.
         """
         require_handled(scene, self)
         stretch = inputs[:, 0]
         try:
-            found, outcome = response(scene, stretch), Outcome("finished", len(t))
+            found, outcome = response(scene, stretch, t), Outcome("finished", len(t))
         except SceneError as none:
             t, stretch, outcome = t[:0], stretch[:0], Outcome("refused", 0, str(none))
             found = dict.fromkeys(_UNITS, stretch)

@@ -1,0 +1,136 @@
+"""Viscoelastic bodies in time: the curve of the material point, and a swing that dies away."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from explicit_scenes import pressed, pulled, ran, rise
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.estimate.node_ekf import NodeEKF
+from validate.fem.assemble import stiffness
+from validate.fem.laws import stiffened
+from validate.fem.stretch_response import response
+from validate.fem.system import System, build
+from validate.scene.material_point import MaterialPoint
+from validate.scene.mesh import quadratic
+from validate.scene.prony import Prony
+from validate.scene.scene import Dilatation, Support
+from validate.solve.handles import require_handled
+from validate.solve.implicit import NewtonDynamics
+from validate.solve.march import march
+from validate.solve.newton import StaticNewton
+from validate.solve.types import Scheme
+
+SERIES = Prony((0.8, 0.4), (0.05, 1.0))
+SIDE = 0.1
+
+
+def relaxing(system: System, series: Prony = SERIES, rho: float | None = None) -> System:
+    material = system.scene.material
+    return build(
+        replace(
+            system.scene,
+            material=replace(material, prony=series, rho=material.rho if rho is None else rho),
+        )
+    )
+
+
+CASES: list[tuple[str, Dilatation]] = [
+    ("neo_hooke", "nodal_mean"),
+    ("mooney_rivlin", "pointwise"),
+    ("yeoh", "mixed"),
+    ("ogden", "pointwise"),
+]
+
+
+@pytest.mark.parametrize(("law", "dilatation"), CASES)
+def test_a_light_body_follows_the_material_point(law: str, dilatation: Dilatation) -> None:
+    """Uniaxial compression in 25 steps: no inertia to speak of, the same recursion, one curve."""
+    scene = pressed(law).scene
+    mesh = quadratic(scene.mesh) if dilatation == "mixed" else scene.mesh
+    system = relaxing(build(replace(scene, mesh=mesh, dilatation=dilatation)), rho=1e-6)
+    dt, depths = 0.02, rise(25, 0.02)
+    scheme = NewtonDynamics(dt, "backward_euler", "consistent")
+    force = ran(scheme, system, depths, dt).traces["plate.force"].y
+    stretch = 1 - np.concatenate([[0.0], depths]) / SIDE
+    point = MaterialPoint(system.scene.material, "uniaxial")
+    exact = -(SIDE**2) * response(point, stretch, dt * np.arange(26))["nominal_stress"]
+    assert force == pytest.approx(exact[1:], rel=1e-6, abs=1e-6 * exact.max())
+
+
+def test_statics_are_the_limit_that_the_series_says() -> None:
+    forces = {}
+    for limit in ("relaxed", "instantaneous"):
+        system = relaxing(pressed("yeoh"), replace(SERIES, statics=limit))
+        exact = MaterialPoint(system.scene.material, "uniaxial")
+        stress = response(exact, np.array([0.8]))["nominal_stress"][0]
+        found = ran(StaticNewton(), system, np.array([0.01, 0.02]), 0.01).traces["plate.force"].y
+        assert found[-1] == pytest.approx(-(SIDE**2) * stress, rel=1e-7)
+        forces[limit] = found[-1]
+    assert forces["instantaneous"] / forces["relaxed"] == pytest.approx(2.2, rel=0.1)
+
+
+def test_a_step_is_the_same_whoever_stepped_before() -> None:
+    """What branches remember is in the state, not in the scheme."""
+    stepper = NewtonDynamics(0.01).prepare(relaxing(pressed("neo_hooke")))
+    first = stepper.step(stepper.rest(), np.array([0.005]))
+    once = stepper.step(first, np.array([0.01]))
+    stepper.step(once, np.array([0.02]))
+    again = stepper.step(first, np.array([0.01]))
+    assert np.array_equal(stepper.field(again), stepper.field(once))
+    assert again.numbers == once.numbers
+
+
+def swing(system: System, series: Prony) -> tuple[complex, Floats]:
+    """s 1/s of the mode that the load excites most, for which s^2 M + K + K_iso sum g s tau/(1 +
+    s tau) is singular, and what a field (free,) m has of it."""
+    scene, free, masses = system.scene, system.free, system.masses[system.free]
+    K = stiffness(scene).toarray()[np.ix_(free, free)]
+    more = stiffened(scene.material, 2.0)
+    Ki = stiffness(replace(scene, material=more)).toarray()[np.ix_(free, free)] - K
+    K, Ki = (A / np.sqrt(np.outer(masses, masses)) for A in (K, Ki))
+    squares, modes = np.linalg.eigh(K)
+    at = np.argmax((modes.T @ (system.loads[free, 0] / np.sqrt(masses))) ** 2 / squares**2)
+    s, mode = 1j * np.sqrt(squares[at]), modes[:, at] + 0j
+    for _ in range(30):
+        lag = sum(g * s * tau / (1 + s * tau) for g, tau in zip(series.g, series.tau, strict=True))
+        found, vectors = np.linalg.eig(-(K + lag * Ki))
+        same = np.argmax(np.abs(mode @ vectors) / np.linalg.norm(vectors, axis=0))
+        s, mode = np.sqrt(found[same] + 0j), vectors[:, same]
+        s = s if s.imag > 0 else -s
+    return complex(s), np.asarray(modes[:, at] * np.sqrt(masses))
+
+
+RING = Prony((0.3,), (0.02,))
+
+
+def ring_down(scheme: Scheme, dt: float, n: int) -> tuple[complex, complex]:
+    """Predicted and seen s of a cube on slip planes whose small load is dropped."""
+    supports = tuple(Support(f"{axis}0", (i,)) for i, axis in enumerate("xyz"))
+    system = relaxing(build(replace(pulled("neo_hooke", 1).scene, supports=supports)), RING)
+    (exact, mode), up, t = swing(system, RING), n // 4, dt * np.arange(1, n + 1)
+    load = np.concatenate([rise(up, 0.01), np.zeros(n - up)])[:, None]
+    run = march("ring", scheme.prepare(system), t, load, np.arange(n), 0.0)
+    late = run.u.reshape(n, -1)[up + n // 8 :, system.free] @ mode
+    # A pair of exponentials: x'' = a x' + b x at instants a quarter of a period apart.
+    k = int(np.pi / 2 / exact.imag / dt)
+    A = np.stack([late[k:-k], late[: -2 * k]], axis=1)
+    (a, b), *_ = np.linalg.lstsq(A, late[2 * k :], rcond=None)
+    roots = np.roots([1, -a, -b])
+    return exact, complex(np.log(roots[np.argmax(roots.imag)]) / (k * dt))
+
+
+def test_a_swing_dies_away_as_the_loss_factor_says() -> None:
+    exact, seen = ring_down(NewtonDynamics(1e-3), 1e-3, 400)
+    assert seen.imag == pytest.approx(exact.imag, rel=0.005)
+    assert seen.real == pytest.approx(exact.real, rel=0.02)
+    assert exact.real < -0.02 * exact.imag
+
+
+def test_schemes_that_remember_nothing_refuse_a_series() -> None:
+    system = relaxing(pulled("neo_hooke", 2))
+    with pytest.raises(SceneError, match=r"NodeEKF remembers no stress: .* use StaticNewton or"):
+        require_handled(system.scene, NodeEKF())
+    assert NewtonDynamics.handles.covers(system.scene)

@@ -1,0 +1,43 @@
+"""Viscoelasticity as a Prony series: how the isochoric stress of a law relaxes."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from validate.errors import SceneError
+from validate.parameters import quantity
+
+
+@dataclass(frozen=True)
+class Prony:
+    """G(t) = G (1 + sum g_i exp(-t/tau_i)): the material's E and law are the relaxed ones.
+
+    Codes whose series is of the instantaneous modulus, G_0 (1 - sum h_i (1 - exp(-t/tau_i))), print
+    h_i = g_i/(1 + sum g), and E_0 = (1 + sum g) E of an incompressible body. `statics` says which
+    limit schemes without time stand for; those with time walk through both.
+    """
+
+    g: tuple[float, ...] = quantity((), "1", "moduli of the branches over the relaxed one")
+    tau: tuple[float, ...] = quantity((), "s", "relaxation times of the branches")
+    statics: Literal["relaxed", "instantaneous"] = quantity(
+        "relaxed", "1", "the limit that statics stand for: after long, or at once"
+    )
+
+    def __post_init__(self) -> None:
+        numbers = np.array([*self.g, *self.tau])
+        if len(self.g) != len(self.tau):
+            raise SceneError(
+                f"Prony series of {len(self.g)} moduli and {len(self.tau)} times: one of each a "
+                "branch"
+            )
+        if not (np.isfinite(numbers).all() and (numbers > 0).all()):
+            raise SceneError(
+                f"Prony series g = {self.g}, tau = {self.tau} s: all must be positive, or a branch "
+                "gives energy"
+            )
+
+    @property
+    def instant(self) -> float:
+        """Instantaneous over relaxed modulus."""
+        return 1 + sum(self.g)
