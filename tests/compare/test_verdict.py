@@ -210,3 +210,16 @@ def test_result_that_checked_nothing_has_failed() -> None:
     nothing = Result("n", "t", "s", "", (), (), (), (), (), ())
     assert nothing.checks == ()
     assert not nothing.passed
+
+
+# Limits that nothing could fail
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(9.9, "agrees"), (10.0, "cannot decide")])
+def test_a_limit_as_wide_as_what_was_measured_decides_nothing(limit: float, verdict: str) -> None:
+    near = replace(scalar(0.5), scale=10.0)
+    check = judge(near, limit, Numerical(), [])
+    assert check.verdict == verdict
+    assert ("as wide as the largest that was measured, 10" in check.why) == (limit == 10.0)
+    assert judge(replace(near, scale=None), 1e9, Numerical(), []).verdict == "agrees"
+    assert judge(replace(scalar(9.0), scale=10.0), 1e9, Numerical(), []).verdict == "differs"

@@ -204,6 +204,15 @@ def looks(t: Floats, z: Floats, *groups: Together) -> MarkerObservation:
 UP = Together("up", (2,), "along z")
 
 
+def test_what_was_measured_at_most_is_kept_beside_its_deviation() -> None:
+    (every,) = signal().deviations(HALVES, EVERYTHING)
+    assert every.scale == 4.0
+    (up,) = looks(T, -1e-3 * T, UP).deviations(still(), Selection("1s", T[1:2]))
+    assert up.scale == pytest.approx(2e-3)  # of all looks, not of the hold alone
+    (a,) = markers().deviations(still("a"), EVERYTHING)
+    assert a.scale == pytest.approx(2e-3)
+
+
 def test_jittered_looks_are_interpolated_onto_the_fields_and_the_error_counts() -> None:
     """Frames at 0, 1 and 2 s; the nearest look to 1 s is 0.3 s off."""
     t = np.array([0.0, 0.7, 1.4, 2.0])

@@ -150,7 +150,7 @@ def test_data_that_served_to_identify_are_fitted(name: str) -> None:
 
 def test_a_marker_given_to_a_filter_is_fitted() -> None:
     methods = {"kf": TINY.methods["kf"]}
-    accept = tuple(Accept(m, 1.0, "ours") for m in ("node_A", "node_B"))
+    accept = tuple(Accept(m, 1e-4, "ours") for m in ("node_A", "node_B"))
     experiment = replace(TINY, methods=methods, accepted=("kf",), accept=accept, cases=())
     found = {c.name: c.verdict for c in compare(experiment, Options({})).checks}
     assert methods["kf"].markers == ("node_A",)

@@ -24,7 +24,8 @@ class Residual:
     `sd` is the measurement's standard deviation per component, independent between points;
     `systematic` the part that all points share (registration), per component. `simulated` and
     `measured` are kept for scalar quantities. `role` says whether the observation validates.
-    `freedom` counts the numbers in which noise is independent; None: all of them.
+    `freedom` counts the numbers in which noise is independent; None: all of them. `scale` is the
+    largest that was measured of what has a zero.
     """
 
     quantity: str
@@ -38,6 +39,7 @@ class Residual:
     measured: float | None = None
     role: Role = "validates"
     freedom: int | None = None
+    scale: float | None = None
 
     def __post_init__(self) -> None:
         values = checked(self.values, f"residual {self.name}", (None, None), error=ComparisonError)
@@ -119,7 +121,7 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
 def _of(d: Deviation, selection: Selection, role: Role) -> Residual:
     return Residual(
         d.quantity, selection.label, d.values, d.sd, d.systematic, d.unit, d.definition,
-        d.simulated, d.measured, role, d.freedom,
+        d.simulated, d.measured, role, d.freedom, d.scale,
     )  # fmt: skip
 
 

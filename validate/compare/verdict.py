@@ -1,7 +1,8 @@
 """Verdicts after ASME V&V 20: is the error within the uncertainty of the comparison?
 
 E = simulation - measurement, u_val^2 = u_D^2 + u_num^2 + u_input^2 (standard uncertainties).
-|E| > 2 u_val: differs; else 2 u_val above the accepted limit: cannot decide; else agrees.
+|E| > 2 u_val: differs; else 2 u_val above the accepted limit: cannot decide; else agrees. A limit
+as wide as all that was measured decides nothing either.
 
 An rms over many noisy points is not zero for a perfect model. E is then the part that noise does
 not explain, sqrt(rms^2 - noise^2), and u_D half of the smallest such part that noise alone reaches
@@ -129,6 +130,14 @@ def judge(
     u_val = float(np.sqrt(u_D**2 + u_num**2 + u_input**2))
     named = {"measurement": u_D} | dict(numerical.parts) | parts
     verdict, why = _verdict(E, u_val, limit, named, numerical)
+    if verdict == "agrees" and residual.scale is not None and limit >= residual.scale:
+        verdict, why = (
+            "cannot decide",
+            (
+                f"the limit {limit:.3g} is as wide as the largest that was measured, "
+                f"{residual.scale:.3g}: nothing could fail it; accept a tighter one"
+            ),
+        )
     name = residual.name if _scalar(residual) else f"{residual.quantity}.rms@{residual.load}"
     return Check(
         name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why,

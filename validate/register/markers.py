@@ -117,6 +117,7 @@ class MarkerObservation:
             Deviation(
                 g.quantity, off[:, list(g.axes)], "m",
                 float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
+                scale=_largest((self.x - self.rest)[..., list(g.axes)]),
             )
             for g in self.together
         )  # fmt: skip
@@ -152,7 +153,8 @@ class MarkerObservation:
         probe = [selection.read(run.t, run.traces[f"{name}.{c}"].y, t) for c in axes]
         words = "estimate less measured displacement of the marker, at the times it was seen"
         off = (np.stack(probe, axis=1) - moved[samples])[seen]
-        found = Deviation(name, off, "m", self.along(range(len(axes))), float(self.tre[j]), words)
+        found = Deviation(name, off, "m", self.along(range(len(axes))), float(self.tre[j]), words,
+                          scale=_largest(moved))  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         return with_clock(found, sd_t, self._speed(j, samples, sd_t)) if sd_t > 0 else found
 
@@ -161,6 +163,12 @@ class MarkerObservation:
         x = self.x[:, which]
         flat = slopes(self.t, x.reshape(len(x), -1), samples, sd_t)
         return flat.reshape(len(samples), *x.shape[1:])
+
+
+def _largest(moved: Floats) -> float | None:
+    """The longest displacement m of (..., d) that was seen."""
+    lengths = np.linalg.norm(moved, axis=-1)
+    return float(np.nanmax(lengths)) if np.isfinite(lengths).any() else None
 
 
 def observe_markers(

@@ -93,7 +93,8 @@ class Deviation:
 
     `sd` is the measurement's standard deviation per component, independent between points;
     `systematic` what all points share (registration), per component. `freedom` counts the numbers
-    in which noise is independent (None: all). `simulated` and `measured` are kept of scalars.
+    in which noise is independent (None: all). `scale` is the largest that was measured of what has
+    a zero, in `unit`. `simulated` and `measured` are kept of scalars.
     """
 
     quantity: str
@@ -105,6 +106,7 @@ class Deviation:
     simulated: float | None = None
     measured: float | None = None
     freedom: int | None = None
+    scale: float | None = None
 
 
 class Observation(Protocol):

@@ -61,7 +61,10 @@ class SignalObservation:
         words = f"{self.quantity}, {selection.words or 'simulated less measured at every sample'}"
         one = (float(simulated[0]), float(measured[0])) if len(at) == 1 else (None, None)
         off = (simulated - measured)[:, None]
-        found = Deviation(self.quantity, off, self.unit, self.sd, 0.0, words, *one)
+        scale = float(np.abs(self.y[:, 0]).max())
+        found = Deviation(
+            self.quantity, off, self.unit, self.sd, 0.0, words, one[0], one[1], scale=scale
+        )
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         if sd_t > 0:
             found = with_clock(found, sd_t, slopes(self.t, self.y[:, :1], at, sd_t))
