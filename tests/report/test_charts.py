@@ -104,6 +104,8 @@ def test_jagged_lines_have_axes_of_their_own(result: Result) -> None:
     x, rng = np.linspace(0, 1, 1000), np.random.default_rng(0)
     rough = [Series(name, x, rng.standard_normal(1000)) for name in ("a", "b")]
     assert panels(chart(*rough)) == ("a", "b")
+    swings = [Series(name, x, np.sin(f * x)) for name, f in (("a", 40.0), ("b", 30.0))]
+    assert panels(chart(*swings)) == ()
     smooth = [Series("first", x, x), Series("smooth", x, 2 * x), rough[0]]
     (ax,) = drawn(result, chart(*smooth)).axes
     assert [line.get_linestyle() for line in ax.get_lines()] == ["-", "--", "-"]

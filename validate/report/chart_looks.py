@@ -10,7 +10,7 @@ from validate.compare.result import Result
 from validate.report.style import ACCEPTED, MEASURED, NOISE, PALETTE, Style, free_look, looks
 
 TOGETHER = 5  # lines that are followed on one axes; more have one each
-_MANY = 40  # points of a line that may be jagged
+_TURNS = 20  # of a line that is jagged, at least
 _SHADES = (MEASURED, "#5F5F5F", "#8C8C8C", "#AFAFAF", "#C6C6C6")  # of several recordings
 _OTHER = PALETTE[1]  # a model that is not the judged one, alone on its axes
 
@@ -135,4 +135,4 @@ def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
 def is_jagged(series: Series) -> bool:
     """A line that turns so often that dashes could not be told from its turns."""
     turns = np.count_nonzero(np.diff(np.sign(np.diff(series.y))))
-    return bool(len(series.y) > _MANY and turns > 0.1 * len(series.y))
+    return bool(turns > max(_TURNS, 0.1 * len(series.y)))

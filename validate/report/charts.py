@@ -11,6 +11,7 @@ from textwrap import fill
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from validate.compare.exhibit import Chart, Picture, Series
 from validate.compare.result import Result
@@ -31,6 +32,7 @@ Drawing = tuple[Callable[[Figure], None], float, float]
 _HEIGHT = 3.3  # inches of one axes without the legend
 _PANEL = 1.45  # inches of one of several
 _ROOM = 0.75  # inches of titles and labels about several axes
+_SEEN = 4.5  # points: a sign of the legend that can be seen
 _FEW = 8  # panels that stand in two columns
 _WIDE, _NARROW = 36, 24  # letters of a panel's title in one line, in two columns or three
 _TITLE = 66  # letters of a title in one line
@@ -107,8 +109,11 @@ def _legend(figure: Figure, axes: Iterable[Axes], names: Sequence[str]) -> None:
         found |= dict(zip(labels, handles, strict=True))
     shown = [name for name in names if name in found]
     broken = _broken(shown)
-    figure.legend([found[name] for name in shown], broken, loc="outside lower center",
-                  ncols=legend_columns(broken))  # fmt: skip
+    made = figure.legend([found[name] for name in shown], broken, loc="outside lower center",
+                         ncols=legend_columns(broken))  # fmt: skip
+    for handle in made.legend_handles:
+        if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
+            handle.set_markersize(max(handle.get_markersize(), _SEEN))
 
 
 def _broken(names: Sequence[str]) -> list[str]:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Picture
 from validate.report.body import ShownBody
-from validate.report.style import draw
+from validate.report.style import WIDTH, draw
 
 _MM = 1e3
 
@@ -19,7 +19,7 @@ def cut(body: ShownBody, normal: Floats) -> Picture:
         f"{body.label} at {body.load}: cut through {body.cut}, deformed true to scale, coloured by "
         f"the displacement magnitude in mm.{pressure}{body.part}"
     )
-    pixels = draw(lambda f: _axes(f, body, normal), 6.0, 5.4)
+    pixels = draw(lambda f: _axes(f, body, normal), WIDTH, 5.0)
     return Picture("cut", words, "Section: " + words, pixels, photo=True)
 
 

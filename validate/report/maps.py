@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import NodeMap, Picture
 from validate.report.numbers import scale, shown_unit
-from validate.report.style import draw
+from validate.report.style import WIDTH, draw
 from validate.scene.mesh import Mesh, boundary_facets
 
 Range = tuple[float, float]
@@ -85,7 +85,7 @@ def bar_title(shown: NodeMap) -> str:
 
 def drawn(shown: NodeMap, span: Range) -> Picture:
     """The map by matplotlib: a planar mesh as it is, a body's surface seen from one corner."""
-    pixels = draw(lambda f: _axes(f, shown, span), 7.4, 5.2)
+    pixels = draw(lambda f: _axes(f, shown, span), WIDTH, 4.3)
     said = words(shown, span)
     return Picture(f"map_{shown.name}", said, "Map: " + said, pixels, photo=True)
 
