@@ -1,8 +1,8 @@
-"""Which rows of an export hold units."""
+"""Which rows of an export hold units, and which numbers."""
 
 import pytest
 
-from validate.recording.exports.cells import is_unit_row
+from validate.recording.exports.cells import is_data, is_row, is_unit_row
 
 
 @pytest.mark.parametrize(
@@ -21,3 +21,20 @@ from validate.recording.exports.cells import is_unit_row
 )
 def test_a_row_of_units(cells: tuple[str, ...], units: bool) -> None:
     assert is_unit_row(cells) == units
+
+
+@pytest.mark.parametrize(
+    ("cells", "row", "data"),
+    [
+        (("0.1", "2.5"), True, True),
+        (("0.1", "2.5", "3.0"), True, True),
+        (("Width", "25"), True, False),  # a line of a header block
+        (("0.1", ""), True, False),
+        (("0.1", "2.5", "a", "b"), True, True),  # half of them
+        (("0.1", "2.5", "a", "b", "c"), False, False),
+        (("0.1",), False, False),
+        (("a", "b"), False, False),
+    ],
+)
+def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None:
+    assert (is_row(cells), is_data(cells)) == (row, data)

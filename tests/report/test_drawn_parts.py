@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from report_samples import small_result
 
 from validate.compare.effects import Change, Effect
-from validate.report import cut, markers, outlines
+from validate.report import curves, cut, markers, outlines
 from validate.report.body import shown_body
 from validate.report.discrimination import _budget
 from validate.report.provenance import _points
@@ -141,3 +141,21 @@ def test_a_budget_has_the_quantities_of_its_load() -> None:
 
 def test_a_result_without_methods_has_no_registration_to_show() -> None:
     assert _residuals(Made(recordings=(Made(name="a"),), registered=())).rows == ()
+
+
+def test_lines_hide_each_other_within_a_share_of_the_largest_range(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    method = Made(name="soft", label="soft")
+    logs = [(0, None, Made(y=np.array([0.0, 2.0]))), (1, None, Made(y=np.array([1.0, 11.0])))]
+    line = Made(method=method, y=(np.zeros(2),))
+    within: list[float] = []
+    for name, value in {
+        "finished": lambda result: [method],
+        "_line": lambda method, quantity: line,
+        "_logs": lambda method, quantity: logs,
+        "distinct": lambda pairs, size: within.append(size) or {},
+    }.items():
+        monkeypatch.setattr(curves, name, value)
+    assert curves._lines(Made(methods=(method,)), "force") == ([line], [])
+    assert within == [pytest.approx(0.1)]

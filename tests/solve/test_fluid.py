@@ -246,3 +246,30 @@ def test_root_past_a_turning_point_is_not_taken_for_a_solution(phantom: Response
     failure = stepped(ExactPressure(), phantom, 0.2).failure
     assert failure is not None
     assert "spurious root" in failure[1]
+
+
+def _straight(r: Responses, slope: float, squeezed: float) -> Responses:
+    """Volumes V = 1 + slope P - squeezed q of every cavity alone."""
+    count = len(r.volumes)
+    forms = np.zeros((count, 2 + count, 2 + count, 2 + count))
+    for i in range(count):
+        p = 2 + i
+        forms[i, 0, 0, 0] = 1.0
+        for at in ((0, 0, p), (0, p, 0), (p, 0, 0)):
+            forms[(i, *at)] = slope / 3
+        for at in ((0, 0, 1), (0, 1, 0), (1, 0, 0)):
+            forms[(i, *at)] = -squeezed / 3
+    return replace(r, volumes=forms)
+
+
+def test_a_straight_line_takes_one_update_and_rounding_one_more(
+    phantom: Responses, two_cavities: Responses
+) -> None:
+    for r in (phantom, two_cavities):
+        counts = set()
+        for q in (0.7, 0.9, 1.3, 1.7):
+            state = stepped(ExactPressure(), _straight(r, 0.3, 1000.0), q)
+            assert state.failure is None
+            assert pressures(state) == pytest.approx(1000.0 * q / 0.3, rel=1e-12)
+            counts.add(state.updates)
+        assert counts == {1, 2}

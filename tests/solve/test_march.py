@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -9,9 +10,11 @@ from phantoms import COARSE_GRID, phantom_responses
 
 from validate.errors import ComparisonError, ValidateError
 from validate.fem.system import Responses
-from validate.scene.scene import Scene
+from validate.scene.box import box
+from validate.scene.scene import Drive, Material, Scene, Support
+from validate.solve import march as march_module
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
-from validate.solve.march import march
+from validate.solve.march import march, run_scheme
 from validate.solve.types import Run, State, Stepper, Trace
 
 STEPS = 60
@@ -156,3 +159,15 @@ def test_run_and_traces_are_read_only_and_checked(coarse: Responses) -> None:
         Trace(np.array([0.0, np.nan]), "1")
     with pytest.raises(ValidateError, match=r"run u \[m\]: shape \(4, \d+, 3\), expected \(2,"):
         Run("m", run.t, AT[:2], run.u, run.traces, run.outcome, 0.0, None)
+
+
+def test_set_up_is_timed_from_the_scene_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a clock that moves on by a second at every look."""
+    monkeypatch.setattr(march_module, "perf_counter", count(100.0).__next__)
+    scene = Scene(
+        box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), (Support("z0", (0, 1, 2)),),
+        drives=(Drive("press", "z1", (0.0, 0.0, -1.0)),),
+    )  # fmt: skip
+    t = np.array([1.0, 2.0])
+    run = run_scheme("x", NoFluid(), scene, t, np.zeros((2, 1)), np.array([1]))
+    assert run.setup_s == 1.0

@@ -14,7 +14,7 @@ from validate.study.filter_exhibits import (
     _ranking_exhibit,
 )
 from validate.study.stability import points
-from validate.study.stability_exhibits import _map, _marks
+from validate.study.stability_exhibits import _cost, _map, _marks
 from validate.study.still_page import _cells
 from validate.study.still_page import _map as gain_map
 
@@ -95,6 +95,14 @@ def test_a_map_has_a_row_a_variant_that_was_run(monkeypatch: pytest.MonkeyPatch)
     assert regimes == ["stable", "unstable"]
     monkeypatch.setattr(stability_exhibits, "_rows", lambda study, name: rows[1:])
     assert _map(study, "E") is None  # one row is no map
+
+
+def test_what_cells_cost_stands_in_the_order_of_its_headings() -> None:
+    rounding = Made(static=1e-6, positions=2e-6, velocities=3e-6)
+    r = Made(rounding=rounding, conditions={"K": 10.0, "J": 3.0}, locking=0.1, warning="locks")
+    assert _cost(r) == (10.0, None, 3.0, 0.1, 1e-6, 2e-6, 3e-6, "locks")
+    bare = Made(rounding=None, conditions={}, locking=None, warning="")
+    assert _cost(bare) == (None,) * 8
 
 
 def test_a_paper_lies_between_the_moduli_of_the_rows_by_its_logarithm() -> None:

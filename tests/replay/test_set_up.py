@@ -1,0 +1,30 @@
+"""What a method's set-up costs: the scene, its assembly and the preparation, by a clock by hand."""
+
+from itertools import count
+from types import SimpleNamespace
+
+import pytest
+
+from validate.replay import ladder_default, solved
+from validate.scene.box import box
+
+
+def test_set_up_is_the_scene_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solved, "perf_counter", count(100.0).__next__)
+    monkeypatch.setattr(solved, "build_system", lambda scene: "system")
+    scene = SimpleNamespace(mesh=box((1.0, 1.0, 1.0), (1, 1, 1)))
+    method = SimpleNamespace(markers=(), prepare=lambda system, seen, given: f"on {system}")
+    runs = solved._Runs(None, "x", method, None, scene, 0.25, lambda words: None)
+    assert runs._stepper(scene, None, {}) == ("on system", 1.25)
+    assert runs._stepper(scene, None, {}) == ("on system", 1.25)  # made once
+
+
+def test_points_of_a_ladder_lie_in_every_mesh() -> None:
+    """A finer mesh that is shorter leaves out the coarse centroids beyond its end."""
+    levels = {1: box((1.0, 1.0, 1.0), (4, 1, 1)), 2: box((0.5, 1.0, 1.0), (4, 2, 2))}
+    own = SimpleNamespace(
+        at=lambda level: SimpleNamespace(mesh=levels[level]), scene=SimpleNamespace(probes=())
+    )
+    points = ladder_default._points(own, {"P1": (1, 2)}, ("P1", 2))
+    assert len(points) > 2
+    assert (points[:, 0] < 0.5).all()
