@@ -115,6 +115,8 @@ def test_an_error_beside_no_claimed_doubt_at_all_is_over_confidence() -> None:
     nees = nees_of(followed(dof, dof, error, sd))["tip"]
     assert (nees.verdict, nees.samples, nees.dof) == ("over-confident", 20, 20)
     assert "does not hold" in nees.alarm
+    error[::2] = 0.0  # right at times is not held
+    assert nees_of(followed(dof, dof, error, sd))["tip"].dof == 20
 
 
 def test_nees_reads_the_truth_at_the_times_of_the_frames() -> None:

@@ -1,5 +1,6 @@
 """What pictures and tables of a report are drawn from, by hand: no renderer, no page."""
 
+from dataclasses import replace
 from types import SimpleNamespace as Made
 from typing import Any
 
@@ -45,11 +46,12 @@ def test_a_cut_takes_the_plates_with_it_and_rest_is_rest() -> None:
     assert len(plates) == len(found.plates) == 2
     assert np.asarray(body.points).min(axis=0) == pytest.approx(nodes.min(axis=0))
     for plate, told in zip(plates, found.plates, strict=True):
-        x0, x1, y0, y1, *_ = plate.bounds
-        assert (x1 - x0) == pytest.approx(told.sizes[0], rel=1e-6)
-        assert (x0 + x1) / 2 == pytest.approx(told.centre[0], rel=1e-6)
-        whole = found.normal is None or abs(found.normal[1]) < 0.5
-        assert (y1 - y0) == pytest.approx(told.sizes[1] if whole else told.sizes[1] / 2, rel=1e-6)
+        assert np.subtract(plate.bounds[1::2], plate.bounds[::2]) == pytest.approx(told.sizes)
+        assert plate.center == pytest.approx(told.centre)
+    opened = filled(replace(found, normal=np.array([0.0, 1.0, 0.0])), _View(scale=0.0)).meshes
+    for plate, told in zip(opened, (None, *found.plates), strict=True):
+        assert plate.bounds[3] == pytest.approx(10.0)  # what lies beyond the cut is gone
+        assert plate.bounds[2] == pytest.approx(0.0 if told is None else -1.2)
     moved = filled(found, _View()).meshes
     drives = max(found.plates, key=lambda p: float(np.linalg.norm(p.shift)))
     k = found.plates.index(drives)

@@ -19,5 +19,21 @@ def test_an_outline_scatters_along_its_normal() -> None:
     assert np.linalg.norm(quiet, axis=1) == pytest.approx(np.full(400, 0.01), rel=1e-5)
     radius = np.linalg.norm(noisy, axis=1)
     assert (radius - 0.01).std() == pytest.approx(1e-4, rel=0.1)
-    turned = np.sum(quiet * noisy, axis=1) / (np.linalg.norm(quiet, axis=1) * radius)
-    assert turned == pytest.approx(np.ones(400), abs=1e-6)
+    moved = noisy - quiet
+    across = moved[:, 0] * quiet[:, 1] - moved[:, 1] * quiet[:, 0]
+    assert np.abs(across).max() < 0.01 * 0.01 * np.abs(radius - 0.01).max()
+
+
+def test_at_a_corner_the_normal_is_that_of_the_neighbouring_points() -> None:
+    """Of a square, points within a step of a corner move across both sides, the others one."""
+    square = 0.01 * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+    def seen(sd: float) -> np.ndarray:
+        return OutlineSensor(np.eye(4), 40, sd, "block")._segmented(
+            square, np.random.default_rng(3)
+        )
+
+    moved = np.abs(seen(1e-4) - seen(0.0))
+    both = moved.min(axis=1) > 0.1 * moved.max(axis=1)
+    assert 4 <= both.sum() <= 8  # on either side of each corner
+    assert moved[~both].min(axis=1) == pytest.approx(0.0, abs=1e-12)
