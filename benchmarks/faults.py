@@ -20,7 +20,7 @@ from pathlib import Path
 from time import perf_counter
 
 import click
-from faults_drawn import drawn
+from faults_drawn import candidates, drawn
 from faults_tests import Bench
 
 EQUIVALENT = Path(__file__).with_name("faults_equivalent.toml")
@@ -46,6 +46,10 @@ def main(
     bench, told, spent = Bench(folder), Counter[str](), 0.0
     done = _found(log)
     faults = drawn(bench.copy, count, seed, only)
+    lines, every = (len(candidates(bench.copy, only, *q)) for q in ((), (frozenset(),)))
+    click.echo(
+        f"{lines} lines hold something to break; {every - lines} more only guard or decorate"
+    )
     for i, fault in enumerate(faults, start=1):
         begin, by = perf_counter(), ""
         if dry:

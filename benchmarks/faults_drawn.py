@@ -15,6 +15,12 @@ _COMBINED = {"+": "-", "-": "+", "*": "/", "/": "*", "@": "+", "//": "*", "**": 
 _NAMES = {"min": "max", "max": "min", "sin": "cos", "cos": "sin", "all": "any", "any": "all",
           "minimum": "maximum", "maximum": "minimum", "argmin": "argmax", "argmax": "argmin",
           "floor": "ceil", "ceil": "floor", "rms": "mean"}  # fmt: skip
+# Arguments that guard or decorate: they change no number and no word.
+_QUIET = frozenset((
+    "strict", "check_finite", "alpha", "ambient", "fontsize", "headlength", "headwidth",
+    "linewidth", "linewidths", "line_width", "lw", "markersize", "ms", "ncols", "pad",
+    "rotation", "shrink", "zorder",
+))  # fmt: skip
 _WORDS = (ast.JoinedStr, ast.Raise, ast.Import, ast.ImportFrom)  # what only speaks
 
 
@@ -39,12 +45,12 @@ class Fault:
         return f"{self.path}: {self.before.strip()} -> {self.after.strip()}"
 
 
-def faults_of(root: Path, path: Path) -> list[Fault]:
-    """Every fault of a file; words, annotations and imports are left alone."""
+def faults_of(root: Path, path: Path, quiet: frozenset[str] = _QUIET) -> list[Fault]:
+    """Every fault of a file; words, annotations, imports and `quiet` arguments are left alone."""
     source = path.read_text(encoding="utf-8")
     lines, told = source.splitlines(), str(path.relative_to(root))
     found = []
-    for start, end, text, kind in _edits(ast.parse(source), lines):
+    for start, end, text, kind in _edits(ast.parse(source), lines, quiet):
         (line, a), (last, b) = start, end
         if line == last and lines[line - 1].isascii():
             found.append(Fault(told, line, a, b, text, lines[line - 1], kind))
@@ -55,8 +61,8 @@ Place = tuple[int, int]
 Edit = tuple[Place, Place, str, str]
 
 
-def _edits(tree: ast.AST, lines: list[str]) -> Iterator[Edit]:
-    for node in _code(tree):
+def _edits(tree: ast.AST, lines: list[str], quiet: frozenset[str]) -> Iterator[Edit]:
+    for node in _code(tree, quiet):
         if isinstance(node, ast.BinOp):
             yield from _between(node.left, node.right, _COMBINED, "operator", lines)
             if isinstance(node.op, ast.Add | ast.Sub):
@@ -81,15 +87,17 @@ def _edits(tree: ast.AST, lines: list[str]) -> Iterator[Edit]:
                                 "/=": "*=", "|=": "="}, "operator", lines)  # fmt: skip
 
 
-def _code(tree: ast.AST) -> Iterator[ast.AST]:
+def _code(tree: ast.AST, quiet: frozenset[str]) -> Iterator[ast.AST]:
     """The nodes that compute."""
     for name, value in ast.iter_fields(tree):
         if name in ("annotation", "returns", "decorator_list"):
             continue
         for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.keyword) and child.arg in quiet:
+                continue
             if isinstance(child, ast.AST) and not isinstance(child, _WORDS):
                 yield child
-                yield from _code(child)
+                yield from _code(child, quiet)
 
 
 def _other(value: float) -> str:
@@ -122,14 +130,22 @@ def _end(node: ast.expr) -> Place:
     return node.end_lineno or node.lineno, node.end_col_offset or node.col_offset
 
 
-def drawn(root: Path, count: int, seed: int, only: str) -> list[Fault]:
-    """Lines drawn by seed, one fault on each."""
-    by_line: dict[tuple[str, int], list[Fault]] = {}
+Lines = dict[tuple[str, int], list[Fault]]
+
+
+def candidates(root: Path, only: str, quiet: frozenset[str] = _QUIET) -> Lines:
+    """The lines that hold something to break, with their faults."""
+    by_line: Lines = {}
     for path in sorted((root / "validate").rglob("*.py")):
         if only in str(path.relative_to(root)):
-            for fault in faults_of(root, path):
+            for fault in faults_of(root, path, quiet):
                 by_line.setdefault((fault.path, fault.line), []).append(fault)
-    chance = random.Random(seed)
+    return by_line
+
+
+def drawn(root: Path, count: int, seed: int, only: str) -> list[Fault]:
+    """Lines drawn by seed, one fault on each."""
+    by_line, chance = candidates(root, only), random.Random(seed)
     lines = chance.sample(sorted(by_line), min(count, len(by_line)))
     return [f for line in lines if (f := _one(root, by_line[line], chance))]
 

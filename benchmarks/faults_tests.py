@@ -128,16 +128,23 @@ class Bench:
                     found.setdefault(word, []).append((path, n))
         return found
 
+    def _saying(self, name: str, path: str) -> list[Place]:
+        """Where a name of the file `path` is said: a private one in that file only."""
+        private = name.startswith("_")
+        return [p for p in self._said.get(name, ()) if p[0] == path or not private]
+
     def nearest(self, fault: Fault) -> list[tuple[Tests, set[str]]]:
-        """The tests that execute a line, by file: same name first, then quickest. What is
-        evaluated at import is also read, by those that execute nothing: they come second."""
-        places, own = self._places(fault), f"test_{Path(fault.path).stem}.py"
+        """The tests that execute a line, by file: same name first, then what only reads the source
+        (for a line that is evaluated at import), then the package's own, then the quickest."""
+        places, module = self._places(fault), Path(fault.path)
+        own, beside = f"test_{module.stem}.py", f"tests/{module.parent.name}/"
         found = [(t, ids) for t in self.tests if (ids := t.of(places))]
         if self._sources[fault.path].reached_by(fault.line)[0]:
             found += [(t, set(t.seconds)) for t in self.tests if t.reads]
-        return sorted(
-            found, key=lambda f: (not f[0].name.endswith(own), not f[0].reads, f[0].cost(f[1]))
-        )
+        return sorted(found, key=lambda f: (
+            not f[0].name.endswith(own), not f[0].reads, not f[0].name.startswith(beside),
+            f[0].cost(f[1]),
+        ))  # fmt: skip
 
     def _places(self, fault: Fault) -> set[Place]:
         """Lines whose execution executes this one: its own statement; for what is evaluated at
@@ -150,7 +157,7 @@ class Bench:
                 source = self._sources[path]
                 names, inner = source.reached_by(line)
                 found |= {(path, n) for n in (*source.statement(line), *inner)}
-                beyond |= {p for name in {*names} - asked for p in self._said.get(name, ())}
+                beyond |= {p for name in {*names} - asked for p in self._saying(name, path)}
                 asked |= {*names}
             ring = beyond - found
         return found | ring

@@ -30,6 +30,11 @@ def one_file(tmp_path: Path) -> Path:
         ("y += a", {"y -= a"}),
         ("raise E(f'{1 + 2} is wrong')", set()),
         ("from a import b", set()),
+        ("zip(a, b, strict=True)", set()),
+        (
+            "ax.plot(x, 2 * y, alpha=0.3)",
+            {"ax.plot(x, 2 / y, alpha=0.3)", "ax.plot(x, 3 * y, alpha=0.3)"},
+        ),
     ],
 )
 def test_faults_of_a_line(one_file: Path, line: str, expected: set[str]) -> None:
