@@ -21,6 +21,7 @@ _QUIET = frozenset((
     "linewidth", "linewidths", "line_width", "lw", "markersize", "ms", "ncols", "pad",
     "rotation", "shrink", "zorder",
 ))  # fmt: skip
+_DRAWING = "validate/report/"  # what its modules name at their top is how a page looks
 _WORDS = (ast.JoinedStr, ast.Raise, ast.Import, ast.ImportFrom)  # what only speaks
 
 
@@ -46,15 +47,23 @@ class Fault:
 
 
 def faults_of(root: Path, path: Path, quiet: frozenset[str] = _QUIET) -> list[Fault]:
-    """Every fault of a file; words, annotations, imports and `quiet` arguments are left alone."""
+    """Every fault of a file; words, annotations, imports, `quiet` arguments and
+    the sizes of drawings are left alone."""
     source = path.read_text(encoding="utf-8")
-    lines, told = source.splitlines(), str(path.relative_to(root))
+    lines, told, tree = source.splitlines(), str(path.relative_to(root)), ast.parse(source)
+    left = _sizes(tree) if quiet and told.startswith(_DRAWING) else set()
     found = []
-    for start, end, text, kind in _edits(ast.parse(source), lines, quiet):
+    for start, end, text, kind in _edits(tree, lines, quiet):
         (line, a), (last, b) = start, end
-        if line == last and lines[line - 1].isascii():
+        if line == last and line not in left and lines[line - 1].isascii():
             found.append(Fault(told, line, a, b, text, lines[line - 1], kind))
     return found
+
+
+def _sizes(tree: ast.Module) -> set[int]:
+    """Lines of what a drawing module names at its top: sizes, styles, counts of panels."""
+    named = (n for n in tree.body if isinstance(n, ast.Assign | ast.AnnAssign))
+    return {line for n in named for line in range(n.lineno, (n.end_lineno or 0) + 1)}
 
 
 Place = tuple[int, int]

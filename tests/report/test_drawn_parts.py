@@ -120,15 +120,16 @@ def test_every_load_shows_the_section_of_the_judged_method(
     shown: list[Any] = []
     for name, value in {
         "shown_method": lambda result: judged,
-        "outline_seen": lambda method: Made(corners=(), measured=lambda t: t),
+        "outline_seen": lambda method: Made(name="o", corners=(), measured=lambda t: t),
         "holds": lambda registered: (Made(t=0.0), Made(t=1.0)),
         "_drawn": lambda result, measured: [Made(method=rival), Made(method=judged)],
         "moving_outline": lambda method: (),
         "_at_last": lambda measured, drawn: None,
         "_by_load": lambda measured, first, drawn: shown.append(first.method),
+        "outline_images": lambda recording, topic, holds: (),
     }.items():
         monkeypatch.setattr(outlines, name, value)
-    assert outlines.outlines(Made()) is not None
+    assert outlines.outlines(Made(recordings=(None,))) is not None
     assert shown == [judged]
 
 
