@@ -52,6 +52,12 @@ def test_a_run_made_otherwise_leaves_its_line(tmp_path: Path) -> None:
     assert [r.created for r in history(tmp_path, "cube")] == [DAYS[1], DAYS[2], DAYS[4]]
 
 
+def test_runs_whose_code_is_unknown_are_never_alike(tmp_path: Path) -> None:
+    wrote(tmp_path / "cube", 0, Made())
+    wrote(tmp_path / "cube", 1, Made())
+    assert [r.created for r in history(tmp_path, "cube")] == DAYS[:2]
+
+
 def test_a_report_of_before_has_a_history_too(tmp_path: Path) -> None:
     folder = wrote(tmp_path / "cube", 0, made("a"))
     content = json.loads((folder / MARK).read_text("utf-8"))

@@ -48,6 +48,16 @@ def test_the_commit_and_whether_the_files_are_as_it_has_them(clone: Path) -> Non
     assert str(Commit("0123456789abcdef", dirty=True)) == "0123456789, with changes"
 
 
+def test_a_hook_of_git_does_not_send_it_elsewhere(
+    clone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A commit hook runs with GIT_DIR set."""
+    here = commit_of([clone / "gel.py"])
+    monkeypatch.setenv("GIT_DIR", str(tmp_path))
+    assert here is not None
+    assert commit_of([clone / "gel.py"]) == here
+
+
 def test_files_that_no_clone_has_have_no_commit(clone: Path, tmp_path: Path) -> None:
     (clone / "new.py").write_text("", "utf-8")
     (tmp_path / "loose.py").write_text("", "utf-8")
@@ -64,11 +74,22 @@ def test_a_machine_without_git_knows_no_commit(
 
 
 def test_command_and_files_without_the_folders_of_the_machine(clone: Path) -> None:
-    arguments = ["run", "gel", "--set", f"data={clone}", "--out", str(clone), "--set", "a=b/c d"]
+    arguments = [
+        "run",
+        "gel",
+        "--set",
+        f"data={clone}",
+        "--out",
+        str(clone),
+        "--set",
+        "a=b/c d",
+        f"a={clone}=x",
+    ]
     found = made(arguments, [clone / "gel.py"], [clone / "gel.py"])
     where = "'…/mein Gel ü'"
     assert found.command == (
-        f"validate run gel --set 'data=…/mein Gel ü' --out {where} --set 'a=b/c d'"
+        f"validate run gel --set 'data=…/mein Gel ü' --out {where} --set 'a=b/c d' "
+        "'a=…/mein Gel ü=x'"
     )
     hashed = hashlib.sha256(b"E = 1\n").hexdigest()
     assert found.files == (

@@ -25,6 +25,7 @@ def test_values_carry_units_and_are_numbers_in_the_first_one() -> None:
     assert spaced.values == ("1e-06mm2", "1e-05mm2", "0.0001mm2")
     assert axis("a=lin:1kPa:3000Pa:3").numbers == (1.0, 2.0, 3.0)
     assert axis("a=10kPa,20").numbers is None  # a bare number is SI: not the same axis
+    assert axis("a=20,10kPa").numbers is None
     assert axis("a=10kPa,5mm").numbers is None
     assert (axis("a=1,2").numbers, axis("a=1,2").label) == ((1.0, 2.0), "a")
 

@@ -69,7 +69,8 @@ def made(
 
 def _told(argument: str) -> str:
     """An argument without the folders of an absolute path, alone or behind its `=`."""
-    key, sign, value = argument.rpartition("=")
+    before, equals, after = argument.partition("=")
+    key, sign, value = (before, equals, after) if equals else ("", "", argument)
     short = str(without_folder(value))
     return argument if short == value else f"{key}{sign}{_LEFT_OUT}{short}"
 
