@@ -235,7 +235,7 @@ def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -
         reference="fast",
     )  # fmt: skip
     check = compare(experiment, Options({})).checks[-1]
-    assert sorted(built) == [("fast", 3), ("fast", 6), ("fast", 9), ("slow", 3)]
+    assert sorted(set(built)) == [("fast", 3), ("fast", 6), ("fast", 9), ("slow", 3)]
     assert check.numerical.endswith("by fast in its place")
     name = "force@0.3mm" if road is AT_HOLDS else "node_B@all"
     own = declared(road)

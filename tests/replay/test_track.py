@@ -337,15 +337,19 @@ def test_unknown_methods_name_the_nearest() -> None:
         run(TINY, "femm")
 
 
-def test_progress_counts_every_run_once() -> None:
+def test_progress_names_every_run_once_and_counts_the_time_they_take() -> None:
     calls: list[tuple[int, int, str]] = []
-    compare(TINY, Options({}, ("fem", "kf", "timed")), lambda *call: calls.append(call))
-    done = [d for d, _, _ in calls]
+    compare(TINY, Options({}, ("fem", "kf", "timed")), lambda *told: calls.append(told))
+    runs = [what.split(":")[0] for _, _, what in calls if what.endswith(": mesh")]
+    cases = ["fem on stiff", "kf on stiff", "kf on missing"]
+    assert runs == ["fem", "kf", "timed", *cases]
+    first = next(i for i, call in enumerate(calls) if call[2].startswith("kf"))
+    assert {call[:2] for call in calls[:first]} == {(0, 1)}  # nothing was timed yet
+    done = [d for d, _, _ in calls[first:]]
     assert done == sorted(done)
-    assert all(0 <= d <= n for d, n, _ in calls)
-    named = list(dict.fromkeys(text.partition(":")[0] for _, _, text in calls))
-    runs = [n for n in named if n.split()[0] in ("fem", "kf", "timed")]
-    assert len(runs) == 3 + 2 + 1  # three methods, and those of the cases
+    assert all(0 < d <= n for d, n, _ in calls[first:])
+    steps = [what for _, _, what in calls if "unknowns, step" in what]
+    assert len(steps) > 6
 
 
 def test_maps_compare_equal_times_only() -> None:

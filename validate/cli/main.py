@@ -56,6 +56,9 @@ def run(argv: list[str]) -> int:
         else:
             place = Path(error.filename)
             complain(f"{place}: {why_not(error, place)}; make room there, or use another place")
+    except MemoryError as error:
+        said = f" ({error})" if str(error) else ""
+        complain(f"out of memory{said}: take a coarser mesh or fewer steps")
     except Exception:
         return _bug()
     return BAD_INPUT

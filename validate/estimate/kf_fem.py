@@ -34,12 +34,15 @@ from validate.estimate.observable import observed
 from validate.fem.modes import modes_of
 from validate.fem.once import once
 from validate.fem.system import System
+from validate.memory import require_memory
 from validate.parameters import quantity
 from validate.solve.dynamic import reactions
 from validate.solve.excitation import Excitation, StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.newmark_rule import Rule, RuleName, per_mode, propagation, rule_of
 from validate.solve.types import Stepper
+
+_DENSE = 8  # matrices of all unknowns that the printed recursion holds at once
 
 Gains = Literal["every_step", "shared"]
 
@@ -99,6 +102,8 @@ class KfFem(DisplacementNoise):
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
 
     def _dense(self, system: System, measurements: Measurements, nodal: Nodal) -> Covariance:
+        n = len(system.free)
+        require_memory(_DENSE * 8 * n**2, f"covariances of {n} unknowns, dense as printed")
         H, R = measurements.free(system.free), measurements.variances(self.R)
         noise = noise_shape(self, system, nodal, H)
         A = nodal.propagation.transition()

@@ -8,6 +8,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.fill import require_factor
 from validate.fem.frontal import Fronts, fronts
 from validate.fem.ordering import Dissection, nested_dissection
 
@@ -34,9 +35,11 @@ class Factor:
 def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor | Fronts:
     """Factorises A (m, m); unknown i belongs to mesh node `node[i]` at `places[node[i]]` m.
 
-    Raises `SceneError` when A is not positive definite: SuperLU itself would go on silently.
+    Raises `MemoryShortError` before memory is taken that is not there, and `SceneError` when A is
+    not positive definite: SuperLU itself would go on silently.
     Without pivoting U's diagonal holds the pivots, whose signs are the inertia of A.
     """
+    require_factor(len(node), places.shape[1])
     dissection = _dissected(A, node, places)
     if len(node) > FRONTAL:
         found = fronts(A, dissection.order, dissection.stops, dissection.children)
@@ -89,7 +92,11 @@ def _factorised(A: sparse.csr_array, order: Ints) -> tuple[Factor, Floats]:
 
 
 def elimination_order(A: sparse.csr_array, node: Ints, places: Floats) -> Ints:
-    """Nested dissection of the unknowns (m,) by their nodes; holds for every A of one pattern."""
+    """Nested dissection of the unknowns (m,) by their nodes; holds for every A of one pattern.
+
+    Raises `MemoryShortError` where tangents in that order would not fit.
+    """
+    require_factor(len(node), places.shape[1], indefinite=True)
     return _dissected(A, node, places).order
 
 

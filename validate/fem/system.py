@@ -18,6 +18,7 @@ from validate.errors import SceneError
 from validate.fem.assemble import lumped, mass, stiffness, stiffness_damping
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
 from validate.fem.factor import Factor, factorise
+from validate.fem.fill import require_assembly
 from validate.fem.frontal import Fronts
 from validate.fem.loads import hung_masses, load_columns
 from validate.scene.mesh import Mesh
@@ -41,10 +42,12 @@ class System:
 
     @cached_property
     def K(self) -> sparse.csr_array:
+        self._require_room()
         return stiffness(self.scene)
 
     @cached_property
     def M(self) -> sparse.csr_array:
+        self._require_room()
         body = mass(self.scene)
         if not self.scene.masses:
             return body
@@ -60,12 +63,16 @@ class System:
     @cached_property
     def C(self) -> sparse.csr_array:
         """Rayleigh damping of every cell, alpha M_e + beta K_e (paper 001, eq 7)."""
+        self._require_room()
         C = mass(self.scene, damping=True) + stiffness_damping(self.scene)
         return sparse.csr_array(C)
 
     @cached_property
     def loads(self) -> Floats:
         return load_columns(self.scene)
+
+    def _require_room(self) -> None:
+        require_assembly(self.scene.mesh.nodes.size, self.scene.mesh.dimension)
 
     @property
     def held(self) -> Ints:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
-from typing import Any, cast
+from typing import Any, Protocol, cast, runtime_checkable
 
 from validate.errors import UsageError
 from validate.estimate.measurements import measurements
@@ -13,6 +13,14 @@ from validate.solve.types import Stepper
 
 # Filters whose loads walk: the history of their defaults does not say what they were chosen on.
 WALK_UNRECORDED = "not recorded whether the load's walk was chosen on this twin"
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """Settings of an explicit scheme: a limit to its step stands where others have a factor."""
+
+    @property
+    def beyond_limit(self) -> str: ...
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.fem.locking import locking_notes
+from validate.memory import MemoryShortError
 from validate.parameters import Changed, Parameter, changed, describe
 from validate.register.markers import MarkerObservation
 from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
@@ -26,6 +27,7 @@ from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, configure
 from validate.replay.origins import Opened, marked, opened
 from validate.replay.plausible import doubts
+from validate.replay.room import coarser, require_room
 from validate.replay.runs import Road
 from validate.replay.sentence import figures_sentence, verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
@@ -39,6 +41,15 @@ _AGAINST: Mapping[Kind, str] = {
 
 def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
     """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
+    try:
+        return _compared(experiment, options, report)
+    except MemoryShortError as short:
+        parameters, _ = configure(experiment, options)
+        step = coarser(experiment.name, parameters, short.share)
+        raise MemoryShortError(f"{short}, {step}", short.share) from short
+
+
+def _compared(experiment: Experiment, options: Options, report: Report | None) -> Result:
     start = perf_counter()
     parameters, methods = configure(experiment, options)
     found = opened(experiment, parameters)
@@ -46,6 +57,9 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
     differing = changed(declared, _settings(parameters, methods))
     experiment = _following(experiment, found, differing)
     shipped, parameters = found.recordings, found.parameters
+    if report:
+        report(0, 1, "asks for memory")
+    require_room(experiment, methods, parameters, shipped[0], quick=options.quick)
     identified = None
     if experiment.identify:
         if report:

@@ -7,14 +7,16 @@ from typing import Any
 
 from validate.compare.result import Kind
 from validate.errors import ComparisonError
+from validate.fem.fill import next_to_nothing, require_solvable
 from validate.recording.types import Recording
 from validate.replay.experiment import Case, Change, Experiment, Variant, unchanged
 from validate.replay.followed import MAIN, Followed, Truth
-from validate.replay.method import Method
+from validate.replay.method import Limited, Method
 from validate.replay.options import Report, folder_of
 from validate.replay.pace import Pace
 from validate.replay.remade import made_by, require_known, synthetic
 from validate.replay.solved import solve
+from validate.scene.material_point import MaterialPoint
 
 
 class Road:
@@ -46,6 +48,7 @@ class Road:
         self._report = report
         self._done: dict[tuple[Any, ...], Followed] = {}
         self._truths: dict[str, Truth] = {}
+        self._finest: dict[str, float] = {}  # how many times as fine, by method
         self._pace = Pace(perf_counter() if since is None else since)
         for case in self.cases:
             for name in _of_case(methods, case):
@@ -55,15 +58,31 @@ class Road:
         """Says what will be asked for on the experiment's own recordings, for the time left."""
         for v in variants:
             key = self._key(MAIN, v, self.parameters)
-            self._pace.expect(key, v.method, self._cells(v), v.split)
+            finer = self._finer(v)
+            self._pace.expect(key, v.method, finer**3, v.split)
+            self._finest[v.method] = max(finer, self._finest.get(v.method, 1.0))
 
-    def _cells(self, variant: Variant) -> float:
-        """How many times the cells of the experiment's own mesh, as its ladder of meshes has it."""
+    def require_room(self, recording: Recording) -> None:
+        """Raises `MemoryShortError`, before anything is solved, for a method whose finest mesh will
+        not fit; where the first one takes next to nothing the others are not asked."""
+        for name, method in self.methods.items():
+            scene = self.experiment.build(recording, self.parameters, method.scene)
+            if isinstance(scene, MaterialPoint):
+                continue
+            d = scene.mesh.dimension
+            unknowns = self._finest.get(name, 1.0) ** d * scene.mesh.nodes.size
+            if next_to_nothing(unknowns, d):
+                return
+            if not isinstance(method.settings, Limited):
+                require_solvable(unknowns, d, name)
+
+    def _finer(self, variant: Variant) -> float:
+        """How many times as fine as the experiment's own mesh, as its ladder of meshes has it."""
         uncertainty = self.experiment.uncertainty
         if uncertainty is None or uncertainty.mesh is None:
             return 1.0
         size = uncertainty.mesh.size
-        return (size(self.parameters) / size(variant.change(self.parameters))) ** 3
+        return size(self.parameters) / size(variant.change(self.parameters))
 
     def start(self, shipped: tuple[Recording, ...]) -> tuple[str, ...]:
         """Takes the recordings, made anew where the user changed their twin; what to say of it."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells
+from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_nodes
 from validate.scene.shape_functions import CORNERS
 
 
@@ -40,6 +40,7 @@ def grid(size: tuple[float, ...], cells: tuple[int, ...]) -> Mesh:
 def _nodes(size: tuple[float, ...], cells: tuple[int, ...]) -> Floats:
     if len(size) != len(cells) or min(size) <= 0 or min(cells) < 1:
         raise SceneError(f"box of {size} m in {cells} cells: sizes and counts must be positive")
+    require_nodes(tuple(n + 1 for n in cells))
     lines = [np.linspace(0.0, s, n + 1) for s, n in zip(size, cells, strict=True)]
     planes = np.meshgrid(*reversed(lines), indexing="ij")
     return np.stack([g.ravel() for g in reversed(planes)], axis=1)

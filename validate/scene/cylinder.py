@@ -4,7 +4,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_positive_cells
+from validate.scene.mesh import (
+    Mesh,
+    boundary_facets,
+    kuhn_cells,
+    require_nodes,
+    require_positive_cells,
+)
 
 
 def quarter_cylinder(
@@ -32,6 +38,7 @@ def quarter_cylinder(
             f"cylinder {1e3 * diameter:g} x {1e3 * height:g} mm with {radial} x {axial} elements: "
             "all must be positive"
         )
+    require_nodes((radial + 1, radial + 1, axial + 1))
     i, j, k = np.meshgrid(
         np.arange(radial + 1), np.arange(radial + 1), np.arange(axial + 1), indexing="ij"
     )

@@ -6,6 +6,7 @@ local order of `EDGES`; hex27 has nodes in the middles of faces and cells, too (
 Corners of quad4, hex8 and hex27 run as in `scene.shape_functions`.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +18,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, checked, checked_indices
 from validate.errors import SceneError
+from validate.memory import require_memory
 from validate.scene.shape_functions import (
     CORNERS,
     EDGES,
@@ -26,6 +28,7 @@ from validate.scene.shape_functions import (
     gauss_points,
 )
 
+_NODE_BYTES = {1: 1e3, 2: 1e3, 3: 4e3}  # at the peak while a grid is made: 712, 3 400 to 3 700
 Kind = Literal["tri3", "tri6", "tet4", "tet10", "quad4", "hex8", "hex27"]
 DIMENSION: Mapping[str, int] = {
     "tri3": 2, "tri6": 2, "tet4": 3, "tet10": 3, "quad4": 2, "hex8": 3, "hex27": 3,
@@ -177,9 +180,19 @@ def _least_volumes(mesh: Mesh) -> Floats:
     return np.asarray(np.linalg.det(at_corners.jacobians(mesh.nodes[mesh.corners])).min(axis=1))
 
 
+def require_nodes(shape: tuple[int, ...]) -> None:
+    """Raises `MemoryShortError` where a mesh of a grid of `shape` nodes has no room."""
+    count = math.prod(shape)
+    require_memory(_NODE_BYTES[len(shape)] * count, f"mesh of {count:.4g} nodes")
+
+
 def kuhn_cells(shape: tuple[int, ...]) -> Ints:
     """Simplices of a structured grid of `shape` nodes, all along one diagonal: 2 triangles or
-    6 tetrahedra per box (Kuhn's split), node (i, j, k) numbered with the last index fastest."""
+    6 tetrahedra per box (Kuhn's split), node (i, j, k) numbered with the last index fastest.
+
+    Raises `MemoryShortError` for more than fit.
+    """
+    require_nodes(shape)
     numbers = np.arange(np.prod(shape)).reshape(shape)
     base = numbers[tuple(slice(0, -1) for _ in shape)].ravel()
     strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
