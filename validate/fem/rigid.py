@@ -2,34 +2,33 @@
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.system import System
 from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
 from validate.scene.select import nodes_of
 
-_FREE = 1e-8  # singular value, of the largest, of a motion that nothing holds
+_FREE = 1e-14  # square of the rows, of the largest, under a motion that nothing holds
 _SHOWN = 0.3  # share of a motion's largest component from which it is named
 
 
-def require_held(system: System, more: Floats | None = None, hint: str = "") -> None:
-    """Raises `SceneError` that names the rigid motions that supports, pins, drives, foundations and
-    the rows `more` (m, N) leave free."""
-    mesh = system.scene.mesh
+def require_held(scene: Scene, held: Ints, more: Floats | None = None, hint: str = "") -> None:
+    """Raises `SceneError` that names the rigid motions that the unknowns `held` (h,), foundations
+    and the rows `more` (m, N) leave free."""
+    mesh = scene.mesh
     modes, words = rigid_motions(mesh)
-    rows = [modes[system.held], modes[_bedded(system)]]
+    rows = [modes[held], modes[_bedded(scene)]]
     if more is not None:
         rows.append(more @ modes)
-    held = np.vstack([*rows, np.zeros((1, len(words)))])
-    _, sizes, motions = np.linalg.svd(held, full_matrices=True)
-    sizes = np.concatenate([sizes, np.zeros(len(words) - len(sizes))])
+    every = np.vstack([*rows, np.zeros((1, len(words)))])
+    _, sizes, motions = np.linalg.svd(every.T @ every)
     loose = motions[sizes <= _FREE * max(float(sizes.max()), 1e-300)]
     if len(loose):
         share = np.abs(loose).max(axis=0)
         named = ", ".join(w for w, s in zip(words, share, strict=True) if s > _SHOWN * share.max())
         raise SceneError(
             f"the body can move rigidly in {len(loose)} of {len(words)} ways ({named}): "
-            f"{len(system.held)} unknowns are held and its stiffness matrix is not positive "
+            f"{len(held)} unknowns are held and its stiffness matrix is not positive "
             f"definite; add a support or pin{hint}"
         )
 
@@ -49,12 +48,12 @@ def rigid_motions(mesh: Mesh) -> tuple[Floats, tuple[str, ...]]:
     return modes.reshape(n * d, -1), words
 
 
-def _bedded(system: System) -> list[int]:
+def _bedded(scene: Scene) -> list[int]:
     """Unknowns that foundations bind to the ground."""
-    mesh = system.scene.mesh
+    mesh = scene.mesh
     return [
         int(node) * mesh.dimension + c
-        for f in system.scene.foundations
+        for f in scene.foundations
         if f.stiffness > 0
         for node in nodes_of(mesh, f.facets)
         for c in f.components

@@ -21,6 +21,7 @@ from validate.fem.factor import Factor, factorise
 from validate.fem.fill import require_assembly
 from validate.fem.frontal import Fronts
 from validate.fem.loads import hung_masses, load_columns
+from validate.fem.rigid import require_held
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Scene
 from validate.scene.select import Place, nodes_of
@@ -80,7 +81,9 @@ class System:
         return np.setdiff1d(np.arange(len(self.moves)), self.free)
 
     def factor(self) -> Factor | Fronts:
-        """Factorisation of K over the free unknowns; `SceneError` if not positive definite."""
+        """Factorisation of K over the free unknowns; `SceneError` if not positive definite, with
+        the rigid motions that nothing holds."""
+        require_held(self.scene, self.held)
         d = self.scene.mesh.dimension
         free = self.K[self.free][:, self.free]
         return factorise(free, self.free // d, self.scene.mesh.nodes)

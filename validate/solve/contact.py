@@ -84,7 +84,9 @@ class ContactNewton:
         parts = candidates(system)
         masses, C = np.zeros(N), sparse.csr_array((N, N))
         if self.rule == "static":
-            require_held(system, _touched_rows(parts, scene), ", or let it touch at rest")
+            require_held(
+                scene, system.held, _touched_rows(parts, scene), ", or let it touch at rest"
+            )
         else:
             masses = system.masses
             C = sparse.csr_array(sparse.diags_array(lumped_damping(system)))

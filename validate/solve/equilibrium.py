@@ -21,6 +21,7 @@ from validate.fem.cavity import pressure_load, volume_of
 from validate.fem.factor import Factor, elimination_order, factorise_indefinite
 from validate.fem.follower import volume_hessian
 from validate.fem.hyperelastic import Body
+from validate.fem.rigid import require_held
 from validate.fem.system import System
 
 
@@ -159,6 +160,7 @@ class Equilibrium:
 def equilibrium(system: System, constrained: bool) -> Equilibrium:
     """Prepares the body and the elimination order, which holds for every tangent."""
     mesh, free = system.scene.mesh, system.free
+    require_held(system.scene, system.held)
     body = Body(system.scene)
     K = system.K[free][:, free]
     order = elimination_order(sparse.csr_array(K), free // 3, mesh.nodes)
