@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from validate.errors import SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System
-from validate.solve.central import CentralDifference, CentralStepper
+from validate.solve.central import CentralDifference, CentralStepper, Damping
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.newton import StaticNewton
 from validate.solve.types import State
@@ -215,3 +215,19 @@ def test_settings_that_make_no_sense_are_refused() -> None:
     with pytest.raises(SceneError, match="damping='lagged'"):
         CentralDifference().prepare(pulled(stiffness_damping=1e-3))
     assert CentralDifference(damping="none").prepare(pulled(stiffness_damping=1e-3))
+
+
+@pytest.mark.parametrize("damping", ["mass", "lagged"])
+def test_what_rests_damped_under_its_load_has_balanced_energies(damping: Damping) -> None:
+    """Half the load's work is stored, damping took the rest, however long it hangs there."""
+    beta = 1e-3 if damping == "lagged" else 0.0
+    system = pulled("neo_hooke", 2, mass_damping=40.0, stiffness_damping=beta)
+    stepper = CentralDifference(dt=5e-4, damping=damping).prepare(system)
+    state, sums = stepper.rest(), []
+    for k in range(1, 1201):
+        state = stepper.step(state, np.array([0.5 * min(k / 200, 1.0)]))
+        assert state.failure is None
+        n = state.numbers
+        sums.append(n["energy.strain"] + n["energy.kinetic"] + n["energy.damped"])
+    assert sums[-1] == pytest.approx(state.numbers["energy.external"], rel=0.01)
+    assert sums[-1] == pytest.approx(sums[600], rel=1e-3)

@@ -745,7 +745,9 @@ def advance(
     damped = lag > 0 or bool((keep[gain > 0] < 1).any())
     for s in range(substeps):
         for j in range(loaded.size):
-            work += _input(loads, j, begin, end, s / substeps, k) * d[loaded[j]] / 2
+            i = loaded[j]
+            work += _input(loads, j, begin, end, s / substeps, k) * d[i] / 2
+            v[i], a[i] = d[i], lag * (r[i] - old[i])
         for j in range(held.size):
             work += r[held[j]] * d[held[j]] / 2
         if damped:
@@ -754,9 +756,13 @@ def advance(
             _moved(u, d, r, keep, gain)
         for j in range(loaded.size):
             i, f = loaded[j], _input(loads, j, begin, end, s / substeps, k)
+            way, drag = (v[i] + d[i]) / 2, (1 - keep[i]) / gain[i]
             d[i] += gain[i] * f
             u[i] += gain[i] * f
             work += f * d[i] / 2
+            if damped:  # what it took was reckoned without the load
+                more = gain[i] * f / 2
+                taken += drag * more * (2 * way + more) + a[i] * more
         for j in range(held.size):
             i = held[j]
             d[i] = _input(moves, j, begin, end, (s + 1) / substeps, 0) - u[i]
