@@ -100,6 +100,17 @@ def test_lines_of_several_recordings_are_told_apart(result: Result) -> None:
     assert names == [f"log {i}" for i in range(5)]
 
 
+def test_zigzags_of_several_recordings_keep_their_dashes(result: Result) -> None:
+    x, rng = np.linspace(0, 1, 1000), np.random.default_rng(0)
+    lines = [
+        Series(m.label, x, rng.standard_normal(1000), of=f"log {i}")
+        for m in result.methods[:2]
+        for i in range(3)
+    ]
+    for ax in drawn(result, chart(*lines)).axes:
+        assert [line.get_linestyle() for line in ax.get_lines()] == ["-", "--", "--"]
+
+
 def test_jagged_lines_have_axes_of_their_own(result: Result) -> None:
     x, rng = np.linspace(0, 1, 1000), np.random.default_rng(0)
     rough = [Series(name, x, rng.standard_normal(1000)) for name in ("a", "b")]

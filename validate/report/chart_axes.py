@@ -77,7 +77,8 @@ def _draw_one(ax: Axes, drawn: Drawn, floor: float) -> None:
                 label=s.name)  # fmt: skip
     else:
         marker = look.point if len(s.x) <= _FEW else ""
-        dash, width = ("-", min(look.width, 0.9)) if is_jagged(s) else (look.dash, look.width)
+        thin = is_jagged(s) and not drawn.one_of
+        dash, width = ("-", min(look.width, 0.9)) if thin else (look.dash, look.width)
         ax.plot(s.x, y, color=look.colour, ls=dash, lw=width, marker=marker, ms=4.5,
                 label=s.name)  # fmt: skip
 

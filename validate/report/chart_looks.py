@@ -17,11 +17,15 @@ _OTHER = PALETTE[1]  # a model that is not the judged one, alone on its axes
 
 @dataclass(frozen=True)
 class Drawn:
-    """A series, how it looks, and its place in the order of points series (0: a filled sign)."""
+    """A series, how it looks, and its place in the order of points series (0: a filled sign).
+
+    `one_of` several lines of one label: its dash tells it apart, however jagged it is.
+    """
 
     series: Series
     look: Style
     number: int = 0
+    one_of: bool = False
 
 
 def panels(chart: Chart) -> tuple[str, ...]:
@@ -65,7 +69,7 @@ def alone(result: Result, series: Sequence[Series], label: str) -> list[Drawn]:
     first = next(iter(own.values()), free_look(0, MEASURED))
     others = {id(d.series): d for d in styled(result, [s for s in series if id(s) not in own])}
     return [
-        Drawn(s, own[id(s)]) if id(s) in own
+        Drawn(s, own[id(s)], one_of=len(own) > 1) if id(s) in own
         else Drawn(s, first) if _band_of(s, (label,)) else others[id(s)]
         for s in series
     ]  # fmt: skip
