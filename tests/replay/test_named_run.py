@@ -5,9 +5,11 @@ from pathlib import Path
 import pytest
 
 from validate.errors import UsageError
+from validate.parameters import with_values
 from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
 from validate.replay.named_run import run_folder, run_name, tag
-from validate.replay.options import Options
+from validate.replay.options import Options, mesh_files
 
 
 def name(experiment: Experiment, *, quick: bool = False, methods: str = "", **values: str) -> str:
@@ -61,3 +63,10 @@ def test_many_words_are_counted_and_odd_signs_replaced() -> None:
     assert len(long) < 90
     assert tag(["a b/ü"], 1).startswith("+a_b_ü-")
     assert tag([], "x") == ""
+
+
+def test_meshes_that_parameters_name(project_root: Path, tmp_path: Path) -> None:
+    cube = load_file(project_root / "experiments" / "ekf_cube.py")
+    assert [f.name for f in mesh_files(cube.parameters)] == ["cube.npz"]
+    gone = with_values(cube.parameters, {"mesh.file": str(tmp_path / "gone.npz")})
+    assert mesh_files(gone) == ()

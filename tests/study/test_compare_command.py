@@ -83,6 +83,17 @@ def test_a_closed_place_costs_the_pictures_only(
     assert here("compare", *runs, "--out", str(tmp_path / "x"), cwd=tmp_path)[0] == 2
 
 
+def test_a_change_of_rounding_is_none(tmp_path: Path) -> None:
+    runs = [
+        str(stored(tmp_path / n, methods=method("kf", score("a", v), score("b", w))))
+        for n, v, w in (("one", 1.0, 1.0), ("other", 1.0 + 5e-10, 1.0 + 2e-9))
+    ]
+    rows = {line.split()[1]: line for line in here("compare", *runs)[1].splitlines()
+            if line.startswith("kf ")}  # fmt: skip
+    assert "rounding" in rows["a"]
+    assert "+2" in rows["b"]
+
+
 def test_json_is_one_document_and_writes_nothing_unasked(tmp_path: Path) -> None:
     runs = two(tmp_path, 2)
     options = ("--method", "kf*", "--score", "node_*", "--sort", "score", "--json")

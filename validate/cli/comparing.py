@@ -20,6 +20,7 @@ from validate.study.stored import Pair, Row, SideBySide, pairs, read_run, side_b
 
 _LINES = 40  # of the whole output
 _LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
+_ROUNDING = 1e-9  # relative: the same computation in another order
 _PARAMETERS = 8  # rows of parameters that differ
 
 
@@ -129,8 +130,8 @@ def _row(row: Row) -> list[str]:
     difference, change = row.differences[1] or 0.0, row.changes[1]
     sign = "+" if difference > 0 else ""
     apart = f"{significant(100 * change)} %" if change else text(difference, row.unit)
-    return [row.score, text(one, row.unit), text(other, row.unit), f"{sign}{apart}",
-            shown_unit(row.unit)]  # fmt: skip
+    shown = "rounding" if change and abs(change) < _ROUNDING else f"{sign}{apart}"
+    return [row.score, text(one, row.unit), text(other, row.unit), shown, shown_unit(row.unit)]
 
 
 def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[str]:
