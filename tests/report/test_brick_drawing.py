@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from validate.papers.accuracy.rod import bending_rod
+from validate.report import gl
 from validate.report.body import ShownBody
 from validate.report.cut import _polygons
 from validate.report.skin import skins
+from validate.scene.shape_functions import LATTICE
 
 ROD = bending_rod(3)
 
@@ -43,3 +45,15 @@ def test_a_cut_shows_the_whole_section() -> None:
     for x, y in (p.T for p in polygons):
         area += abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
     assert area == pytest.approx(500.0 * 250.0)
+
+
+def test_quadratic_hexahedra_are_listed_as_vtk_does() -> None:
+    """Its own local coordinates of the 27 nodes, in its order, are the places of ours."""
+    if not gl.available():
+        pytest.skip(gl.HOW_TO_GET)
+    from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
+
+    from validate.report.renders import vtk_order
+
+    theirs = vtkTriQuadraticHexahedron().GetParametricCoords()
+    assert LATTICE[3][vtk_order()] == pytest.approx(np.array(theirs[: 3 * 27]).reshape(27, 3))

@@ -10,13 +10,17 @@ import pyvista as pv
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Picture, Pixels
 from validate.report.body import ShownBody
-from validate.scene.shape_functions import EDGES
+from validate.scene.shape_functions import EDGES, LATTICE
 
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
 )
 _SIZE = (880, 640)
-_CELL = {4: 10, 8: 12, 10: 24}  # VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA: local order as ours
+# VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA (local order as ours), _TRIQUADRATIC_HEXAHEDRON.
+_CELL = {4: 10, 8: 12, 10: 24, 27: 29}
+# Twice the places of the nodes that VTK lists behind the corners of a quadratic hexahedron: middles
+# of edges, then of faces, then of the cell.
+_BEHIND = "100 210 120 010 102 212 122 012 001 201 221 021 011 211 101 121 110 112 111"
 BAR: dict[str, Any] = {
     "vertical": True,
     "height": 0.62,
@@ -119,9 +123,17 @@ def _fill(plotter: Any, body: ShownBody, view: _View) -> None:
     _aim(plotter, body, view.oblique)
 
 
+def vtk_order() -> list[int]:
+    """Our local number of each node of a quadratic hexahedron as VTK lists them."""
+    ours = (2 * LATTICE[3]).astype(int).tolist()
+    behind = [ours.index([int(c) for c in place]) for place in _BEHIND.split()]
+    return [*range(8), *behind]
+
+
 def _add_body(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
     count = body.mesh.cells.shape[1]
-    packed = np.hstack([np.full((len(body.mesh.cells), 1), count), body.mesh.cells]).ravel()
+    cells = body.mesh.cells[:, vtk_order()] if count == 27 else body.mesh.cells
+    packed = np.hstack([np.full((len(cells), 1), count), cells]).ravel()
     kinds = np.full(len(body.mesh.cells), _CELL[count], dtype=np.uint8)
     grid = pv.UnstructuredGrid(packed, kinds, 1e3 * body.mesh.nodes)
     grid.point_data["u"] = body.u
