@@ -179,7 +179,11 @@ def test_rounding_is_named_and_not_drawn(result: Result) -> None:
     assert beneath(made) == ("exact",)
     (ax,) = drawn(result, made).axes
     assert ax.get_ylim()[0] >= 1e-9
-    assert "Not drawn, below 1e−9 mm (rounding): exact" in charts.picture(result, made).caption
+    assert [t.get_text() for t in ax.texts] == ["below 1e−9 mm: exact"]
+    assert (
+        "Not drawn, below 1e−9 mm, a billionth of the scale: exact"
+        in charts.picture(result, made).caption
+    )
 
 
 def test_a_chart_of_rounding_alone_draws_no_structure(result: Result) -> None:

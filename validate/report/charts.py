@@ -58,9 +58,10 @@ def _sentence(words: str) -> str:
 
 
 def _undrawn(chart: Chart) -> str:
-    """What lies below rounding, in words."""
-    lost = beneath(chart)
-    return f"Not drawn, below {_floor(chart)} (rounding): {'; '.join(lost)}" if lost else ""
+    """What lies below the floor, in words."""
+    lost, floor = beneath(chart), _floor(chart)
+    words = f"Not drawn, below {floor}, a billionth of the scale: {'; '.join(lost)}"
+    return words if lost else ""
 
 
 def _floor(chart: Chart) -> str:
@@ -87,6 +88,9 @@ def _together(figure: Figure, chart: Chart, drawn: list[Drawn]) -> None:
     readable(ax, chart)
     name_levels(ax, chart)
     _title(figure, chart)
+    if lost := beneath(chart):
+        words = fill(f"below {_floor(chart)}: {', '.join(lost)}", _TITLE)
+        ax.text(0.02, 0.03, words, transform=ax.transAxes, fontsize=8.5)
     names = _drawn_names(chart, drawn)
     if len(names) > 1:
         _legend(figure, [ax], names)
