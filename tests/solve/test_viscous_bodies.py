@@ -5,18 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from explicit_scenes import pressed, pulled, ran, rise
+from law_samples import SPLIT
 
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.node_ekf import NodeEKF
 from validate.fem.assemble import stiffness
+from validate.fem.hyperelastic import Body
 from validate.fem.laws import stiffened
 from validate.fem.stretch_response import response
 from validate.fem.system import System, build
+from validate.fem.viscous import cell_branches
+from validate.scene.box import grid
+from validate.scene.contact import RigidContact, RigidPlane
 from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import quadratic
 from validate.scene.prony import Prony
-from validate.scene.scene import Dilatation, Support
+from validate.scene.scene import Dilatation, Region, Support
+from validate.solve.central import CentralDifference
 from validate.solve.handles import require_handled
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march
@@ -72,13 +78,15 @@ def test_statics_are_the_limit_that_the_series_says() -> None:
     assert forces["instantaneous"] / forces["relaxed"] == pytest.approx(2.2, rel=0.1)
 
 
-def test_a_step_is_the_same_whoever_stepped_before() -> None:
+@pytest.mark.parametrize("scheme", [NewtonDynamics(1e-3), CentralDifference(1e-3)])
+def test_a_step_is_the_same_whoever_stepped_before(scheme: Scheme) -> None:
     """What branches remember is in the state, not in the scheme."""
-    stepper = NewtonDynamics(0.01).prepare(relaxing(pressed("neo_hooke")))
-    first = stepper.step(stepper.rest(), np.array([0.005]))
-    once = stepper.step(first, np.array([0.01]))
-    stepper.step(once, np.array([0.02]))
-    again = stepper.step(first, np.array([0.01]))
+    stepper = scheme.prepare(relaxing(pressed("neo_hooke")))
+    first = stepper.step(stepper.rest(), np.array([0.0005]))
+    once = stepper.step(first, np.array([0.001]))
+    stepper.step(once, np.array([0.002]))
+    again = stepper.step(first, np.array([0.001]))
+    assert once.failure is None
     assert np.array_equal(stepper.field(again), stepper.field(once))
     assert again.numbers == once.numbers
 
@@ -122,11 +130,75 @@ def ring_down(scheme: Scheme, dt: float, n: int) -> tuple[complex, complex]:
     return exact, complex(np.log(roots[np.argmax(roots.imag)]) / (k * dt))
 
 
-def test_a_swing_dies_away_as_the_loss_factor_says() -> None:
-    exact, seen = ring_down(NewtonDynamics(1e-3), 1e-3, 400)
+@pytest.mark.parametrize("scheme", [NewtonDynamics(1e-3), CentralDifference(1e-3)])
+def test_a_swing_dies_away_as_the_loss_factor_says(scheme: Scheme) -> None:
+    exact, seen = ring_down(scheme, 1e-3, 400)
     assert seen.imag == pytest.approx(exact.imag, rel=0.005)
     assert seen.real == pytest.approx(exact.real, rel=0.02)
     assert exact.real < -0.02 * exact.imag
+
+
+@pytest.mark.parametrize(
+    "law",
+    ["neo_hooke", *(pytest.param(n, marks=pytest.mark.slow) for n in SPLIT[2:])],
+)
+def test_explicit_forces_are_those_of_the_numpy_body(law: str) -> None:
+    """Steps of a body with two regions, its memory followed beside it: to rounding."""
+    whole = relaxing(pulled(law, 2)).scene
+    other = replace(whole.material, prony=Prony((0.5,), (0.3,)))
+    scene = replace(whole, regions=(Region("other", np.arange(10, 30), other),))
+    system, dt = build(scene), 1e-3
+    stepper = CentralDifference(dt).prepare(system)
+    body, branches = Body(scene), cell_branches(scene)
+    assert branches is not None
+    memory, state = branches.at_rest(body.weights.shape), stepper.rest()
+    for force in (30.0, 60.0, 60.0, 60.0):
+        state = stepper.step(state, np.array([force]))
+        assert state.failure is None
+        u = stepper.field(state).ravel()
+        exact = body.after(branches, memory, dt).force(u)
+        memory = branches.advanced(memory, body.isochoric(u), dt)
+        found = state.inner.motion["r"]
+        assert np.abs(found - exact).max() < 1e-13 * body.unit_force
+    assert np.abs(found - body.force(u)).max() > 0.1 * np.abs(exact).max()
+
+
+def test_explicit_steps_converge_to_implicit_ones_with_order_two() -> None:
+    system, T = relaxing(pulled("neo_hooke", 2), Prony((0.8,), (0.01,))), 0.02
+    exact = ran(NewtonDynamics(T / 160), system, rise(160, 15.0), T / 160).u[0]
+    errors = []
+    for n in (10, 20):
+        run = ran(CentralDifference(T / n), system, rise(n, 15.0), T / n)
+        assert run.finished
+        errors.append(float(np.abs(run.u[0] - exact).max()))
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.25)
+
+
+def test_the_critical_step_is_that_of_the_instantaneous_moduli() -> None:
+    soft = pulled("neo_hooke", 2)
+    hard = replace(soft.scene, material=stiffened(soft.scene.material, SERIES.instant))
+    limits = [
+        CentralDifference().prepare(system).rest().numbers["critical_step"]
+        for system in (relaxing(soft), build(hard))
+    ]
+    assert limits[0] == pytest.approx(limits[1], rel=1e-12)
+    slow = relaxing(soft, Prony(SERIES.g, (1.0, 2.0)))
+    for share, ending in ((0.95, "finished"), (1.2, "diverged")):
+        dt = share * limits[0]
+        scheme = CentralDifference(dt, beyond_limit="run", margin=0.0)
+        assert ran(scheme, slow, np.full(600, 0.1), dt).outcome.state == ending
+
+
+def test_what_explicit_branches_do_not_have_is_refused() -> None:
+    system = relaxing(pulled("neo_hooke", 2))
+    with pytest.raises(SceneError, match="2 threads: a viscoelastic body has one"):
+        CentralDifference(threads=2).prepare(system)
+    bricks = grid((SIDE, SIDE, SIDE), (2, 2, 2))
+    with pytest.raises(SceneError, match="explicit hexahedra remember no stress"):
+        CentralDifference().prepare(build(replace(system.scene, mesh=bricks, dilatation="mixed")))
+    floor = RigidContact("floor", "x1", RigidPlane((2 * SIDE, 0.0, 0.0), (-1.0, 0.0, 0.0)))
+    with pytest.raises(SceneError, match="explicit contact knows no Prony series"):
+        CentralDifference().prepare(build(replace(system.scene, contacts=(floor,))))
 
 
 def test_schemes_that_remember_nothing_refuse_a_series() -> None:

@@ -22,8 +22,9 @@ from validate.fem.assemble import shape_gradients
 from validate.fem.brick_packing import packed_bricks, require_bricks
 from validate.fem.explicit_kernels import LANES, NEO_HOOKE, ROWS, SVK
 from validate.fem.surface import foundation_stiffness
+from validate.fem.viscous import cell_branches, taut
 from validate.scene.laws import ogden_terms
-from validate.scene.mesh import cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Material, Scene
 from validate.scene.stability import coupled_lambda
 
@@ -61,6 +62,8 @@ class ExplicitMotion:
     """Rows (6, N): u m, last increment d m, forces r at u and `old` one step before N, v, a."""
 
     rows: Floats
+    #: What the branches of a viscoelastic body remember; None at rest, and where there are none.
+    memory: Floats | None = None
 
     def __getitem__(self, name: RowName) -> Floats:
         row: Floats = self.rows[_ROWS.index(name)]
@@ -92,7 +95,8 @@ class ExplicitBody:
     object serves one caller at a time: its workspace is its own. `threads` above 1 share the cells
     of `force` and `advance`, with the same results to rounding: two are 1.8 times as fast at 8640
     tets where the cores are idle, and several times slower than one where they are not. Without
-    OpenMP numba bears only one caller a process with threads.
+    OpenMP numba bears only one caller a process with threads. `force` of a viscoelastic body is the
+    relaxed one; in `advance` its branches act.
     """
 
     def __init__(self, scene: Scene, threads: int = 1) -> None:
@@ -102,6 +106,11 @@ class ExplicitBody:
         mesh = scene.mesh
         self.scene, self.law, self.size = scene, _code(scene.material), mesh.nodes.size
         self.geometry, self.cells = packed_bricks(scene) if mesh.bricks else _packed(scene)
+        self.branches = cell_branches(scene)
+        self._taut = self.geometry
+        if self.branches:
+            _require_one_caller(mesh, threads)
+            self._taut = _packed(taut(scene))[0]
         self.work = np.zeros(kernels.WORK + kernels.WIDE * len(mesh.nodes))
         self._parts = self.work
         if threads > 1:
@@ -135,13 +144,14 @@ class ExplicitBody:
         return f, d.reshape(-1, 6)
 
     def tangent_product(self, u: Floats, v: Floats) -> Floats:
-        """K_t(u) v (N,) N; of hexahedra by a central difference, good to 7 digits."""
+        """K_t(u) v (N,) N; of hexahedra by a central difference, good to 7 digits, of viscoelastic
+        bodies with the instantaneous moduli."""
         if self.scene.mesh.bricks:
             size = float(np.ptp(self.scene.mesh.nodes)) * _DIFFERENCE
             h = size / max(float(np.abs(v).max()), np.finfo(float).tiny)
             return (self.force(u + h * v) - self.force(u - h * v)) / (2 * h)
         f = self._pull(v)
-        kernels.add_products(self.law, self.geometry, self.cells, _own(u), _own(v), f, self.work)
+        kernels.add_products(self.law, self._taut, self.cells, _own(u), _own(v), f, self.work)
         return f
 
     def look(self, u: Floats) -> BodyLook:
@@ -162,14 +172,27 @@ class ExplicitBody:
         """
         rows = np.empty((6, self.size))
         rows[:4] = motion.rows[:4]
+        memory, series = self._remembered(motion, rule.dt)
         work, taken, size = kernels.advance(
             self.law, self.geometry, self.cells, self._rows, rows,
             rule.keep, rule.gain, rule.lag, rule.dt,
             rule.held, rule.moves, rule.loaded, rule.loads, _own(begin), _own(end), substeps,
-            self._parts,
+            self._parts, memory, series,
         )  # fmt: skip
         rows.setflags(write=False)
-        return ExplicitMotion(rows), work, taken, math.isfinite(size)
+        return ExplicitMotion(rows, memory), work, taken, math.isfinite(size)
+
+    def _remembered(self, motion: ExplicitMotion, dt: float) -> tuple[Floats | None, Floats | None]:
+        """The memory to go on from, as a copy, and the series of steps of dt s."""
+        if self.branches is None:
+            return None, None
+        blocks, k = len(self.cells), 2 * len(self.branches.g)
+        series, factors = np.zeros((k, blocks * LANES)), np.stack(self.branches.factors(dt), 1)
+        series[:, : len(self.scene.mesh.cells)] = factors.reshape(k, -1)
+        lanes = np.ascontiguousarray(series.reshape(k, blocks, LANES).swapaxes(0, 1))
+        if motion.memory is None:
+            return np.zeros((blocks, 6 + 3 * k, LANES)), lanes
+        return motion.memory.copy(), lanes
 
     def _pull(self, u: Floats) -> Floats:
         """Forces (N,) N of the springs alone."""
@@ -179,6 +202,16 @@ class ExplicitBody:
         if self.scene.mesh.bricks:
             raise SceneError("filters of single nodes are for tetrahedra; use box()")
         kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, _own(u), f, d, self.work)
+
+
+def _require_one_caller(mesh: Mesh, threads: int) -> None:
+    if mesh.bricks:
+        raise SceneError(
+            "explicit hexahedra remember no stress: drop the Prony series, or take tet4 or "
+            "NewtonDynamics"
+        )
+    if threads > 1:
+        raise SceneError(f"{threads} threads: a viscoelastic body has one; take threads=1")
 
 
 def _own(x: Floats) -> Floats:

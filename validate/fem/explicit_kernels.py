@@ -45,6 +45,7 @@ from validate.fem.kernel_tensors import (
     dot,
     inlined,
     inner,
+    inverse,
     inverse_cube_root,
     product,
     strain,
@@ -271,6 +272,61 @@ def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w
             _forces_svk(w)
         else:
             _forces_neo_hooke(w)
+        _scatter(w, cells, block, f)
+
+
+@inlined
+def _pulled_back(P: Nine, G: Nine) -> Six:
+    """F^-1 P of a symmetric result, G = F^-T: xx, yy, zz, xy, xz, yz."""
+    S = product(transposed(G), P)
+    return S[0], S[4], S[8], S[1], S[2], S[5]
+
+
+@inlined
+def _late(memory: Floats, series: Floats, block: int, l: int, S: Six) -> Nine:
+    """V times the sum of the branches' stresses after a step that ends at V S; remembers both."""
+    x, y, z, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(series.shape[1] // 2):
+        decay, gain, o = series[block, 2 * k, l], series[block, 2 * k + 1, l], 6 * (k + 1)
+        for i in range(6):
+            change = gain * (S[i] - memory[block, i, l])
+            memory[block, o + i, l] = decay * memory[block, o + i, l] + change
+        x += memory[block, o, l]
+        y += memory[block, o + 1, l]
+        z += memory[block, o + 2, l]
+        xy += memory[block, o + 3, l]
+        xz += memory[block, o + 4, l]
+        yz += memory[block, o + 5, l]
+    for i in range(6):
+        memory[block, i, l] = S[i]
+    return x, xy, xz, xy, y, yz, xz, yz, z
+
+
+@_compiled
+def add_late_forces(
+    law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w: Floats, memory: Floats,
+    series: Floats,
+) -> None:  # fmt: skip
+    """`add_forces` of a viscoelastic body in a split form, at the end of a step (`fem.viscous`).
+
+    `memory` (blocks, 6 + 6 k, 16) is V S of the isochoric law and V Q of the k branches, as xx, yy,
+    zz, xy, xz, yz, after the step before: overwritten; `series` (blocks, 2 k, 16) exp(-x) and
+    g (1 - exp(-x))/x of each branch.
+    """
+    for block in range(cells.shape[0]):
+        _load(w, geometry, block)
+        _gather(w, _U, cells, block, u)
+        for l in range(LANES):
+            G, a, b = _matrix(w, l), w[144 + l], w[160 + l]
+            H = product(_matrix(w, _U + l), G)
+            if geometry.ndim == 3:
+                P = _first_carded(law, H, 0.0, b, _card(geometry, block, l))
+            else:
+                P = _first_neo_hooke(H, 0.0, b)
+            X, dJ = inverse(H)
+            late = product(deformation(H), _late(memory, series, block, l, _pulled_back(P, X)))
+            P = combined(1.0, combined(1.0, P, 1.0, late), 0.5 * a * dJ * (dJ + 2), X)
+            _put_forces(w, l, P, G)
         _scatter(w, cells, block, f)
 
 
@@ -727,6 +783,8 @@ def advance(
     end: Floats,
     substeps: int,
     w: Floats,
+    memory: Floats | None,
+    series: Floats | None,
 ) -> tuple[float, float, float]:
     """`substeps` steps of central difference (paper 003, eq 18) in increments d = u - u_before.
 
@@ -737,7 +795,7 @@ def advance(
     (loaded, l) times the others; inputs go linearly from `begin` to `end` (k + l,). Returns the
     work J of loads and prescribed motion and what damping took, up to half a step before the last
     time, and the sum of d^2, not finite where any unknown is not. `w` is a workspace (WORK,) or the
-    parts of `add_forces_in_parts`.
+    parts of `add_forces_in_parts`. `memory` and `series` are those of `add_late_forces`.
     """
     u, d, r, old, v, a = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
     k = moves.shape[1]
@@ -769,7 +827,10 @@ def advance(
             u[i] += d[i]
             work += r[i] * d[i] / 2
         _pull(springs, u, r)
-        if w.ndim == 2:  # known to the compiler: one thread has no part in the threads' code
+        # What follows is known to the compiler: each kind of body has its own code alone.
+        if memory is not None and series is not None:
+            add_late_forces(law, geometry, cells, u, r, w, memory, series)
+        elif w.ndim == 2:
             add_forces_in_parts(law, geometry, cells, u, r, w)
         else:
             add_forces(law, geometry, cells, u, r, w)

@@ -127,3 +127,11 @@ def strain(H: Nine) -> Six:
         H[2] + H[6] + H[0] * H[2] + H[3] * H[5] + H[6] * H[8],
         H[5] + H[7] + H[1] * H[2] + H[4] * H[5] + H[7] * H[8],
     )
+
+
+@inlined
+def inverse(H: Nine) -> tuple[Nine, float]:
+    """F^-T and J - 1; the first not finite where det F <= 0, where no law has a state."""
+    dJ, K = volume(H)
+    y = inverse_cube_root(1 + dJ)
+    return combined(y * y * y, deformation(K), 0.0, H), dJ

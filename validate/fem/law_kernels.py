@@ -19,6 +19,7 @@ from validate.fem.kernel_tensors import (
     deformation,
     inlined,
     inner,
+    inverse,
     inverse_cube_root,
     product,
     strain,
@@ -38,13 +39,6 @@ def _left(H: Nine) -> Nine:
 
 
 @inlined
-def _inverse(H: Nine, dJ: float, K: Nine) -> Nine:
-    """F^-T; not finite where det F <= 0, where no law has a state."""
-    y = inverse_cube_root(1 + dJ)
-    return combined(y * y * y, deformation(K), 0.0, H)
-
-
-@inlined
 def _plus_trace(A: Nine, a: float) -> Nine:
     return A[0] + a, A[1], A[2], A[3], A[4] + a, A[5], A[6], A[7], A[8] + a
 
@@ -52,8 +46,7 @@ def _plus_trace(A: Nine, a: float) -> Nine:
 @inlined
 def first_invariants(coupled: bool, H: Nine, a: float, c: Four) -> Nine:
     """V P of C10 V, C01 V, C20 V, C30 V, and `a` the bulk modulus times V."""
-    dJ, K = volume(H)
-    B, G = _left(H), _inverse(H, dJ, K)
+    (G, dJ), B = inverse(H), _left(H)
     t = B[0] + B[4] + B[8]
     BB = product(B, B)
     if coupled:
@@ -80,8 +73,7 @@ def first_of_four(coupled: bool, H: Nine, a: float, c: Four) -> Nine:
 @called
 def product_invariants(coupled: bool, H: Nine, D: Nine, a: float, c: Four) -> Nine:
     """V dP along D, by the derivatives of W(I1, I2, ln J)."""
-    dJ, K = volume(H)
-    F, G = deformation(H), _inverse(H, dJ, K)
+    (G, dJ), F = inverse(H), deformation(H)
     C = product(transposed(F), F)
     I1 = C[0] + C[4] + C[8]
     d2 = combined(2 * I1, F, -2.0, product(F, C))

@@ -11,13 +11,14 @@ At finite strain this linear evolution is known to dissipate for proportional st
 tested on closed cycles; it is not proven for all.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.laws import Law
+from validate.fem.laws import Law, stiffened
 from validate.fem.tensors import EYE, cofactor, outer, volume_change
 from validate.scene.scene import Material, Scene
 
@@ -86,12 +87,17 @@ def _time(i: int, m: Material) -> float:
 
 def relaxed(scene: Scene) -> Scene:
     """The scene whose statics are the relaxed limit: what branches are added to."""
+    return _made(scene, lambda m: replace(m, prony=replace(m.prony, statics="relaxed")))
 
-    def rest(m: Material) -> Material:
-        return replace(m, prony=replace(m.prony, statics="relaxed"))
 
-    regions = tuple(replace(r, material=rest(r.material)) for r in scene.regions)
-    return replace(scene, material=rest(scene.material), regions=regions)
+def taut(scene: Scene) -> Scene:
+    """The scene with all branches taut: its instantaneous moduli."""
+    return _made(scene, lambda m: stiffened(m, m.prony.instant))
+
+
+def _made(scene: Scene, of: Callable[[Material], Material]) -> Scene:
+    regions = tuple(replace(r, material=of(r.material)) for r in scene.regions)
+    return replace(scene, material=of(scene.material), regions=regions)
 
 
 def second_stress(law: Law, H: Floats) -> Floats:

@@ -5,7 +5,8 @@ keeps its digits where steps are small. Loads act at the start of a step, drives
 
 Departures: eq 15 prints one U too many. Eq 16 is no bound on the step: the limit is 2/omega_max by
 Lanczos, taken anew as the body deforms. Stiffness damping (beta K of eq 18) would need a solve; it
-is taken at the last half step ("lagged"), which costs no solve and lowers the limit.
+is taken at the last half step ("lagged"), which costs no solve and lowers the limit. A viscoelastic
+body's strain energy is that of its relaxed law, and what its branches take is in no trace.
 """
 
 from collections.abc import Mapping
@@ -47,9 +48,7 @@ class CentralDifference:
     `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
     """
 
-    handles: ClassVar[Handles] = replace(
-        LARGE_DYNAMICS, contact=("foundations", "rigid"), viscous=False
-    )
+    handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, contact=("foundations", "rigid"))
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")
@@ -83,6 +82,11 @@ class CentralDifference:
         plates = system.moves[system.held]
         feels_loads = bool(system.loads[system.held].any())
         body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
+        if body.branches and system.scene.contacts:
+            raise SceneError(
+                "explicit contact knows no Prony series: drop one of them, or take NewtonDynamics "
+                "without contact"
+            )
         rule = self._rule(system, beta)
         stepper = CentralStepper(
             self, system, body, rule, beta, system.held, plates, feels_loads, masses, past,
@@ -251,7 +255,8 @@ class CentralStepper:
         stable runs can have, (dt/critical step)^2 times the kinetic energy, and none beyond it.
         """
         u, d = motion["u"], motion["d"]
-        whole = free = float(d @ (motion["r"] - self.body.force(u - d))) / 8
+        r = self.body.force(u) if self.body.branches else motion["r"]
+        whole = free = float(d @ (r - self.body.force(u - d))) / 8
         if self.scene.drives:
             alone = d.copy()
             alone[self.held] = 0.0
