@@ -223,11 +223,12 @@ def test_what_rests_damped_under_its_load_has_balanced_energies(damping: Damping
     beta = 1e-3 if damping == "lagged" else 0.0
     system = pulled("neo_hooke", 2, mass_damping=40.0, stiffness_damping=beta)
     stepper = CentralDifference(dt=5e-4, damping=damping).prepare(system)
-    state, sums = stepper.rest(), []
-    for k in range(1, 1201):
+    state, left = stepper.rest(), []
+    for k in range(1, 601):
         state = stepper.step(state, np.array([0.5 * min(k / 200, 1.0)]))
         assert state.failure is None
         n = state.numbers
-        sums.append(n["energy.strain"] + n["energy.kinetic"] + n["energy.damped"])
-    assert sums[-1] == pytest.approx(state.numbers["energy.external"], rel=0.01)
-    assert sums[-1] == pytest.approx(sums[600], rel=1e-3)
+        stored = n["energy.strain"] + n["energy.kinetic"]
+        left.append(n["energy.external"] - stored - n["energy.damped"])
+    assert abs(left[-1]) < 0.01 * state.numbers["energy.external"]
+    assert left[-1] == pytest.approx(left[450], abs=1e-4 * state.numbers["energy.external"])
