@@ -5,13 +5,14 @@ import io
 import os
 import pty
 import struct
+import sys
 import termios
 
 import pytest
 from commands import here
 
-from validate.cli.display import width
-from validate.cli.layout import laid, wrapped
+from validate.cli.arguments import complain
+from validate.cli.layout import laid, width, wrapped
 
 HEAD = ("name", "value", "why it is so")
 ROWS = (
@@ -76,3 +77,24 @@ def test_lists_keep_to_the_columns(command: list[str], columns: int) -> None:
     long = [line for line in out.splitlines() if len(line) > columns and " " in line.strip()]
     assert long == []
     assert [line for line in out.splitlines() if line != line.rstrip()] == []
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_complaint_is_one_line_in_a_pipe_and_breaks_between_words_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "30")
+    message = "unknown experiment 'fluid_phatom'; nearest: fluid_phantom"
+    shown = []
+    for stream in (io.StringIO(), Terminal()):
+        monkeypatch.setattr(sys, "stderr", stream)
+        complain(message)
+        shown.append(stream.getvalue().splitlines())
+    assert shown[0] == [f"validate: {message}"]
+    assert shown[1] == [
+        "validate: unknown experiment", "  'fluid_phatom'; nearest:", "  fluid_phantom",
+    ]  # fmt: skip

@@ -1,7 +1,10 @@
 """What the commands share: exit codes, and texts of the form PATH=VALUE."""
 
+import sys
+
 import click
 
+from validate.cli.layout import width, wrapped
 from validate.errors import UsageError
 
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
@@ -14,8 +17,10 @@ def command_line() -> tuple[str, ...]:
 
 
 def complain(message: str) -> None:
-    """One line on standard error."""
-    click.echo("validate: " + " ".join(message.split()), err=True)
+    """One line on standard error; on a terminal broken between words, not where it ends."""
+    line = "validate: " + " ".join(message.split())
+    seen = wrapped(line, width(sys.stderr), "  ") if sys.stderr.isatty() else [line]
+    click.echo("\n".join(seen), err=True)
 
 
 def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:

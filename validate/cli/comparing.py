@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.arguments import complain
-from validate.cli.display import relative, say, warn, width
-from validate.cli.layout import laid, wrapped
+from validate.cli.display import relative, say, warn
+from validate.cli.layout import laid, width, wrapped
 from validate.errors import UsageError
 from validate.report.folder import try_results
 from validate.report.numbers import shown_unit, significant, text

@@ -4,25 +4,12 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from rich.console import Console
 
-from validate.cli.layout import laid, wrapped
+from validate.cli.layout import laid, width, wrapped
 from validate.report.numbers import duration, significant, with_unit
-
-_WIDTH = 80  # columns where neither COLUMNS nor a terminal says how many there are
-
-
-def width(stream: TextIO) -> int:
-    """COLUMNS, else those of the terminal that the stream is, else 80."""
-    given = os.environ.get("COLUMNS", "")
-    if given.isdigit() and int(given) > 0:
-        return int(given)
-    try:
-        return os.get_terminal_size(stream.fileno()).columns or _WIDTH
-    except (OSError, ValueError):  # a pipe, a file, no stream of the system
-        return _WIDTH
 
 
 def console(*, error: bool = False) -> Console:

@@ -1,11 +1,25 @@
 """Tables and sentences in a given width: words stay whole, lines end where their text does."""
 
+import os
 from collections.abc import Iterator, Sequence
 from textwrap import wrap
+from typing import TextIO
 
+_WIDTH = 80  # columns where neither COLUMNS nor a terminal says how many there are
 _GAP = "  "
-_LEAST = 24  # characters of a column of sentences: a narrower one is a ribbon
+_LEAST = 28  # characters of a column of sentences: a narrower one is a ribbon
 _BELOW = "    "  # before what has no room beside the rest of its row
+
+
+def width(stream: TextIO) -> int:
+    """COLUMNS, else those of the terminal that the stream is, else 80."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isdigit() and int(given) > 0:
+        return int(given)
+    try:
+        return os.get_terminal_size(stream.fileno()).columns or _WIDTH
+    except (OSError, ValueError):  # a pipe, a file, no stream of the system
+        return _WIDTH
 
 
 def wrapped(text: str, width: int, indent: str = "") -> list[str]:

@@ -1,6 +1,6 @@
 """`validate study filters|stability|tradeoff|choose`: runs, writes the folder, prints."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import Any
 
 from validate.cli.arguments import FAILED, OK, command_line, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import relative, say, table, warn
+from validate.cli.display import fits, relative, say, table, warn
 from validate.cli.progress import progress
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
@@ -38,6 +38,8 @@ _PLACES = 10  # of every ranking on the terminal
 _COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
             "against #1", "NIS per dof / 1", "filter is", "step / ms",
             "gains repeat from step")  # fmt: skip
+# Where those have no room: the report has all.
+_FEW = ("place", "method", "settings", "error / mm", "± 95 % / mm", "against #1")
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,8 @@ def _end(done: Finished[Any], page: Path) -> None:
 def _show_filters(found: FilterStudy) -> None:
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        table(f"Ranking by {found.by}{under}", _COLUMNS, _places(ranking))
+        columns = _COLUMNS if fits(_COLUMNS, _places(ranking, _COLUMNS)) else _FEW
+        table(f"Ranking by {found.by}{under}", columns, _places(ranking, columns))
     failed = [pair for r in found.rankings for pair in r.failed]
     for cell, why in failed[:_PLACES]:
         say(f"failed: {cell.method} ({named(cell.values)}): {why}", indent="  ")
@@ -224,8 +227,8 @@ def _show_filters(found: FilterStudy) -> None:
         say(best.line, indent="  ")
 
 
-def _places(ranking: Ranking) -> list[list[str]]:
-    pick = [RANKING.index(c) for c in _COLUMNS]
+def _places(ranking: Ranking, columns: Sequence[str]) -> list[list[str]]:
+    pick = [RANKING.index(c) for c in columns]
     rows = [ranking_row(r) for r in ranking.rows[:_PLACES]]
     return [[_text(row[i]) for i in pick] for row in rows]
 
