@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from tiny import TINY, Card, record, scene
 
+from validate.cli.running import _summary
 from validate.cli.running import run as run_command
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
@@ -174,6 +175,14 @@ def test_the_terminals_first_line_says_what_was_judged(
         "tiny: no evidence; evidence: 0 of 1 checks; same model, the recording and the judged "
         "model are one"
     )
+
+
+@pytest.mark.parametrize(("doubts", "word"), [((), "agrees;"), (("50 m?",), "agrees, in doubt;")])
+def test_the_first_line_doubts_what_the_warnings_doubt(
+    doubts: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _summary(replace(judged(other_model()), warnings=doubts), Path("report.html"), 1.0)
+    assert capsys.readouterr().out.startswith(f"tiny: {word} evidence: 1 of 1 checks")
 
 
 def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(

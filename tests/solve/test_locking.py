@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
+from validate.fem.locking import locking_warning
 from validate.scene.box import box, centroids
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
@@ -65,3 +66,15 @@ def test_what_it_cannot_judge_is_refused() -> None:
     low = replace(scene, probes=(Probe("low", (0.05, 0.05, 0.0)),))
     with pytest.raises(SceneError, match="it does not move"):
         locking_factor(low, "low")
+
+
+@pytest.mark.parametrize(
+    ("nu", "cells", "warned"),
+    [(0.49, 4, True), (0.4999, 2, True), (0.48, 2, False), (0.49, 5, False)],
+)
+def test_few_cells_of_mean_dilatation_are_warned_of(nu: float, cells: int, warned: bool) -> None:
+    """Two across a bonded cylinder at nu .4999 show 32 times the force of quadratic ones."""
+    mesh = box((1.0, 1.0, 1.0), (cells,) * 3)
+    body = Scene(mesh, Material(1e4, nu), (Support("z0", (0, 1, 2)),), dilatation="nodal_mean")
+    found = locking_warning(body) or ""
+    assert (f"{cells}.0 linear tetrahedra of nodal mean dilatation across" in found) == warned

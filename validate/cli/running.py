@@ -91,7 +91,8 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
 
 def _summary(result: Result, page: Path, seconds: float) -> None:
     found = result.overall
-    say(f"{result.name}: {found.word}; {found.counted}; {KINDS[result.kind]}", indent="  ")
+    doubt = ", in doubt" if result.warnings and found.word == "agrees" else ""
+    say(f"{result.name}: {found.word}{doubt}; {found.counted}; {KINDS[result.kind]}", indent="  ")
     locked = locking_notes((m.label, m.scene) for m in result.methods)
     for warning in (*result.warnings, *locked):
         warn(warning)

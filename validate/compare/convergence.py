@@ -10,6 +10,9 @@ believed: that one extrapolates, from the judged size, those finer and the next 
 
 Not asymptotic: p below 0.5, or a trend hidden by scatter. Nothing bounds the error then.
 
+Measured: for linear tetrahedra the band was short in 7 of 15 cases, by a factor of at most 1.36.
+The rule is kept as published, not tuned to them.
+
 Departures: answers may be arrays; one order then serves all components, and rms stands for the
 absolute value. Where Eca & Hoekstra enlarge the band of a bad fit, nothing is decided here.
 """
