@@ -135,6 +135,13 @@ def test_methods_keep_their_colour_and_measured_points_are_black(result: Result)
     assert len({looks[k] for k in looks}) == len(looks)
 
 
+def test_points_that_are_not_measured_are_not_black(result: Result) -> None:
+    """One method's cells beside their Pareto front, which may be one of them."""
+    cells, front = styled(result, [Series("kf", X, X, "points"), Series("front", X[:1], X[:1])])
+    assert MEASURED not in {cells.look.colour, front.look.colour}
+    assert cells.look.colour != front.look.colour
+
+
 def test_alone_the_judged_method_is_blue_and_another_is_not(result: Result) -> None:
     for label, judged in (("Kalman filter", True), ("open loop", False)):
         (found,) = alone(result, [Series(label, X, X)], label)

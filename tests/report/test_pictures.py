@@ -1,6 +1,7 @@
 """Pictures that are no charts: registration, errors over noise, images with what was found."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,6 +120,28 @@ def test_images_are_shown_with_the_outline_found_and_the_circle(recording: Recor
     assert (there[:, 2] - there[:, 0] > 60).sum() > 200  # blue
     speckle = (there >= 85).all(axis=1) & (there <= 165).all(axis=1)
     assert speckle.mean() > 0.3
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_images_leave_room_for_their_labels(
+    recording: Recording, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tall images, in one row and in two."""
+    tall = Frames(np.array([0.0, 1.0, 2.0]), 3 * (np.zeros((310, 200), np.uint8),), (2e-4, 2e-4),
+                  np.eye(4), "body")  # fmt: skip
+    ring = 0.02 + 0.01 * np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 6, 20)])
+    found = Contours(tall.t, 3 * (ring,), 1e-4, np.eye(4), "body", "b_mode")
+    made = replace(recording, frames={"b_mode": tall}, contours={"outline": found})
+    seen: list[Figure] = []
+
+    def kept(*drawing: Any) -> Any:
+        seen.append(painted(*drawing))
+        return np.zeros((1, 1, 3), np.uint8)
+
+    monkeypatch.setattr("validate.report.outline_images.draw", kept)
+    holds = tuple(Held(f"{i}mm", 1e-3 * i, "m", float(i)) for i in range(count))
+    assert len(outline_images(made, "outline", holds)) == 1
+    assert faults(seen[0]) == []
 
 
 def test_outlines_recorded_as_such_show_no_images(recording: Recording) -> None:

@@ -79,8 +79,8 @@ def _draw_one(ax: Axes, drawn: Drawn, floor: float) -> None:
         marker = look.point if len(s.x) <= _FEW else ""
         thin = is_jagged(s) and not drawn.one_of
         dash, width = ("-", min(look.width, 0.9)) if thin else (look.dash, look.width)
-        ax.plot(s.x, y, color=look.colour, ls=dash, lw=width, marker=marker, ms=4.5,
-                label=s.name)  # fmt: skip
+        ring: dict[str, Any] = {"mfc": "none", "ms": 9} if len(s.x) == 1 else {"ms": 4.5}
+        ax.plot(s.x, y, color=look.colour, ls=dash, lw=width, marker=marker, label=s.name, **ring)
 
 
 def _upper(band: Series) -> Any:

@@ -30,7 +30,7 @@ class Drawn:
 
 def panels(chart: Chart) -> tuple[str, ...]:
     """The labels that get axes of their own; none where one axes shows all lines apart."""
-    lines = [s for s in chart.series if s.style == "line" and not is_given(s, chart.series)]
+    lines = [s for s in chart.series if s.style == "line" and not is_given(s)]
     labels = tuple(dict.fromkeys(s.label for s in lines))
     jagged = sum(is_jagged(s) for s in lines)
     apart = len(labels) > TOGETHER or jagged > 1 or len(lines) > len(labels)
@@ -77,13 +77,13 @@ def alone(result: Result, series: Sequence[Series], label: str) -> list[Drawn]:
 
 def _of_lines(result: Result, series: Sequence[Series]) -> list[Drawn]:
     known = _known(result)
-    unknown = [s for s in series if s.label not in known and not is_given(s, series)]
+    unknown = [s for s in series if s.label not in known and not is_given(s)]
     mine = _apart([(s.label, known[s.label]) for s in series if s.label in known])
     taken = {look.colour for look in mine.values()}
     free = [c for c in PALETTE if c not in taken] or list(PALETTE)
     others = {id(s): free_look(i, free[i % len(free)]) for i, s in enumerate(unknown)}
     signs = {id(s): i + 1 for i, s in enumerate(unknown)} if len(unknown) > len(free) else {}
-    logs = (s for s in series if s.style == "points" and is_given(s, series))
+    logs = (s for s in series if s.style == "points" and is_given(s))
     shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
     return [
         Drawn(
@@ -123,12 +123,11 @@ def _known(result: Result) -> Mapping[str, Style]:
     return {**styles, **{m.label: styles[m.name] for m in result.methods}}
 
 
-def is_given(one: Series, series: Sequence[Series]) -> bool:
-    """A line named a reference; points that say measured, or the only points beside lines."""
+def is_given(one: Series) -> bool:
+    """A line named a reference; points that say measured."""
     if one.style == "line":
         return one.label.lower().startswith("reference")
-    alone = sum(s.style == "points" for s in series) == 1 and len(series) > 1
-    return one.style == "points" and (alone or "measured" in one.label.lower())
+    return one.style == "points" and "measured" in one.label.lower()
 
 
 def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:

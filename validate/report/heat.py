@@ -76,10 +76,18 @@ def _texts(ax: Axes, heat: Heat) -> None:
     for axis, texts in ((ax.xaxis, heat.columns), (ax.yaxis, heat.rows)):
         every = -(-len(texts) // _TICKS)
         at = list(range(0, len(texts), every))
-        axis.set_ticks(at, [texts[i] for i in at])
-    if max(map(len, heat.columns)) > 6:
+        axis.set_ticks(at, [_short(texts[i]) for i in at])
+    if max(len(_short(text)) for text in heat.columns) > 6:
         ax.tick_params(axis="x", rotation=30)
     ax.set(xlabel=heat.x, ylabel=heat.y)
+
+
+def _short(text: str) -> str:
+    """A number in three digits, any other text as it is."""
+    try:
+        return f"{float(text):.3g}"
+    except ValueError:
+        return text
 
 
 def _numbers(ax: Axes, values: Floats, shown: mpl.cm.ScalarMappable) -> None:

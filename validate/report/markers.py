@@ -41,7 +41,7 @@ _MM = 1e3
 _WIDE: Mapping[str, Any] = {"color": ACCEPTED, "alpha": 0.45, "width": 0.014, "headwidth": 2.2,
                             "headlength": 2.2, "headaxislength": 2.2}  # fmt: skip
 _THIN: Mapping[str, Any] = {"color": MEASURED, "width": 0.005, "headwidth": 3.5, "headlength": 4}
-_PANEL = 2.9  # inches of a row of panels
+_PANEL, _ROOM = 2.9, 1.2  # inches of a row of panels, of labels and legend
 _BANDS = 7  # groups of neighbours that a line joins
 
 
@@ -94,7 +94,7 @@ def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
         "the simulated ones as dots. About four dots in ten fall inside their circle when the "
         "model is right.",
         f"Marker displacement vectors and positions for {count} loads, measured and simulated.",
-        draw(lambda f: _panels(f, seen, judged), WIDTH, _PANEL * count + 0.7),
+        draw(lambda f: _panels(f, seen, judged), WIDTH, _PANEL * count + _ROOM),
     )
 
 

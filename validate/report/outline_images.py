@@ -19,6 +19,7 @@ from validate.report.style import WIDTH, draw, legend_columns
 
 _MM = 1e3
 _COLUMNS = 2
+_ROOM = 1.1  # inches of labels and legend
 _FOUND, _FITTED = "#F0E442", "#56B4E9"  # light, on dark images
 _DASH = (0, (4, 3))
 
@@ -44,7 +45,7 @@ def outline_images(
         f"of that circle and rms distance of the outline from it: {told}. The circle at rest "
         "places the inclusion; the outlines are what runs are compared with.",
         f"{len(holds)} images with the outline found in each and the circle fitted to it.",
-        draw(lambda f: _panels(f, frames, contours, holds, circles), WIDTH, panel * rows + 0.6),
+        draw(lambda f: _panels(f, frames, contours, holds, circles), WIDTH, panel * rows + _ROOM),
         photo=True,
     )
     return (made,)
