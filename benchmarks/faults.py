@@ -11,6 +11,9 @@ finds has survived, and so has one in a line that no test executes. `faults_equi
 faults that change nothing that anyone can see, with the reason (at most 5 %). Exit code 1 where
 fewer than 95 % of the others are found.
 With --log the results are kept and what was found is not tried again.
+
+Measured at c5b8453, 200 --seed 1: 137 found at first (68 %), 2186 s on a busy core. With the tests
+written for the others 183 of 190 (96 %), 10 equivalent; five of the seven only guard or decorate.
 """
 
 import json
