@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from validate.replay import ladder_default, solved
-from validate.scene.box import box
+from validate.scene.box import box, centroids
 
 
 def test_set_up_is_the_scene_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,3 +28,16 @@ def test_points_of_a_ladder_lie_in_every_mesh() -> None:
     points = ladder_default._points(own, {"P1": (1, 2)}, ("P1", 2))
     assert len(points) > 2
     assert (points[:, 0] < 0.5).all()
+
+
+@pytest.mark.parametrize(("off", "kept"), [(5e-7, True), (5e-6, False)])
+def test_a_point_within_rounding_of_a_face_is_inside(off: float, kept: bool) -> None:
+    """Of a body of 1 km rounding is a micrometre."""
+    coarse = box((1000.0, 1.0, 1.0), (1, 1, 1))
+    last = float(centroids(coarse)[:, 0].max())
+    levels = {1: coarse, 2: box((last - off, 1.0, 1.0), (1, 1, 1))}
+    own = SimpleNamespace(
+        at=lambda level: SimpleNamespace(mesh=levels[level]), scene=SimpleNamespace(probes=())
+    )
+    points = ladder_default._points(own, {"P1": (1,)}, ("P1", 2))
+    assert (points[:, 0].max() == last) == kept
