@@ -25,6 +25,8 @@ from validate.scene.scene import (
     Support,
     Weight,
 )
+from validate.solve.implicit import NewtonDynamics
+from validate.solve.march import march
 from validate.solve.newton import StaticNewton
 from validate.solve.types import State
 
@@ -148,3 +150,16 @@ def test_what_finds_no_equilibrium_names_the_load_and_what_helps() -> None:
 def test_a_loose_body_is_refused() -> None:
     with pytest.raises(SceneError, match="not positive definite"):
         StaticNewton().prepare(build(replace(pulled().scene, supports=())))
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.01])
+def test_a_swing_near_nu_one_half_takes_steps_of_ten_milliseconds(dt: float) -> None:
+    """The first half swing of 62 ms goes twice as deep as the beam hangs at rest."""
+    system = beam("hex8", "mixed")
+    steps = round(0.06 / dt)
+    t, inputs = dt * np.arange(1, steps + 1), np.tile([G, 0.0], (steps, 1))
+    stepper = NewtonDynamics(dt, max_iterations=6).prepare(system)
+    run = march("swing", stepper, t, inputs, np.array([steps - 1]), 0.0)
+    assert run.finished, run.outcome.why
+    deepest = 1e3 * run.u[0][system.scene.mesh.facet_nodes("x1"), 2].mean()
+    assert deepest == pytest.approx(2 * loaded(system, G, 0.0)[1], rel=0.1)
