@@ -129,6 +129,13 @@ def test_a_column_without_heading_is_on_the_page() -> None:
     assert ">validate run cube</td>" in text
 
 
+def test_the_page_says_at_once_that_something_was_changed() -> None:
+    changed = replace(small_result(), changed=(Changed("material.E", 1e4, 1.4e4, "Pa"),))
+    said = "1 parameter not as the experiment declares: material.E; "
+    assert said in page(changed, (), CREATED, ("", ""))
+    assert 'id="changed"' not in page(small_result(), (), CREATED, ("", ""))
+
+
 def test_the_machine_is_described() -> None:
     found = environment()
     assert {"cpu", "cpu_count", "memory", "os", "python", "numpy", "scipy", "numba"} <= set(found)

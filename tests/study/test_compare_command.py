@@ -34,7 +34,11 @@ def two(folder: Path, count: int = 60) -> tuple[str, str]:
     return str(made[0]), str(made[1])
 
 
-def test_forty_lines_of_80_columns_and_the_largest_change_first(tmp_path: Path) -> None:
+def test_forty_lines_of_80_columns_and_the_largest_change_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = "validate.cli.comparing.write_comparison"  # has a test of its own
+    monkeypatch.setattr(page, lambda found, document, folder: folder / "report.html")
     runs = two(tmp_path / "Läufe hier")
     code, out, err = here("compare", *runs, cwd=tmp_path, COLUMNS="80")
     assert (code, err) == (0, "")
