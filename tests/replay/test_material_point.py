@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.errors import SceneError
 from validate.parameters import quantity
@@ -19,6 +20,8 @@ from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.report.write import write_report
 from validate.scene.material_point import MaterialPoint
+from validate.scene.prony import Prony
+from validate.scene.rubber import mooney_rivlin, ogden, yeoh
 from validate.scene.scene import Material
 from validate.solve.fluid import NoFluid
 from validate.solve.stretch_test import StretchTest
@@ -73,6 +76,65 @@ def test_stress_against_stretch_is_predicted_without_a_mesh(tmp_path: Path) -> N
     assert wrong.checks[0].verdict == "differs"
     page = write_report(result, tmp_path / "rubber", created="2026-01-01T00:00:00+00:00")
     assert "stress" in page.read_text("utf-8")
+
+
+def held(stress: Floats, t: Floats, stretch: Floats) -> Recording:
+    noise = np.random.default_rng(4).normal(0, 200.0, len(t))
+    signals = {
+        "stretch": Signal(t, stretch[:, None], "1", 0.0, "machine"),
+        "stress": Signal(t, (stress + noise)[:, None], "Pa", 200.0, "machine"),
+    }
+    return Recording("held", Source("x", "", 0, "x"), 0, signals=MappingProxyType(signals))
+
+
+# Incompressible uniaxial tension: P of every law by its published coefficients.
+CURVES = {
+    "mooney_rivlin": (
+        mooney_rivlin(12e3, 3e3, NU),
+        2 * (STRETCH - STRETCH**-2) * (12e3 + 3e3 / STRETCH),
+    ),
+    "yeoh": (
+        yeoh(15e3, 800.0, 100.0, NU),
+        2 * (STRETCH - STRETCH**-2)
+        * (15e3 + 1600.0 * (I1 := STRETCH**2 + 2 / STRETCH - 3) + 300.0 * I1**2),
+    ),
+    "ogden": (
+        ogden((20e3, 500.0), (1.3, 5.0), NU),
+        20e3 * (STRETCH**0.3 - STRETCH**-1.65) + 500.0 * (STRETCH**4 - STRETCH**-3.5),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("law", CURVES)
+def test_every_law_walks_the_road(law: str) -> None:
+    material, curve = CURVES[law]
+    recording = held(curve, np.arange(len(STRETCH), dtype=float), STRETCH)
+    made = replace(
+        POINT,
+        load=lambda card, folder: (recording,),
+        build=lambda recording, card, model: MaterialPoint(material, "uniaxial"),
+    )
+    (check,) = compare(made, Options({})).checks
+    assert (check.count, check.verdict) == (len(STRETCH), "agrees")
+
+
+def test_a_stretch_that_is_held_relaxes_on_the_road() -> None:
+    """P = mu (l - 1/l^2) (1 + g exp(-t/tau)) after a jump; without the series it differs."""
+    t, series = np.linspace(0.0, 3.0, 61), Prony((0.6,), (0.7,))
+    stress = MU * (1.5 - 1.5**-2) * (1 + 0.6 * np.exp(-t / 0.7))
+    recording = held(stress, t, np.full(len(t), 1.5))
+
+    def made(prony: Prony) -> str:
+        material = Material(2 * MU * (1 + NU), NU, "neo_hooke", prony=prony)
+        experiment = replace(
+            POINT,
+            load=lambda card, folder: (recording,),
+            build=lambda recording, card, model: MaterialPoint(material, "uniaxial"),
+        )
+        return compare(experiment, Options({})).checks[0].verdict
+
+    assert made(series) == "agrees"
+    assert made(Prony()) == "differs"
 
 
 def test_a_scheme_of_meshes_is_refused_on_a_point() -> None:

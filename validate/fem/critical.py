@@ -16,7 +16,8 @@ from scipy import sparse
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assemble import lame_constants, shape_gradients
-from validate.fem.system import System
+from validate.fem.system import System, build
+from validate.fem.viscous import taut
 from validate.scene.scene import Material, Scene
 
 MatVec = Callable[[Floats], Floats]
@@ -67,10 +68,12 @@ class CriticalStep:
 def critical_step(
     system: System, *, products: int = PRODUCTS, margin: float = MARGIN
 ) -> CriticalStep:
-    """All limits of a system at rest, by its K and lumped masses.
+    """All limits of a system at rest, by its K and lumped masses, a viscoelastic one all taut.
 
     Raises `SceneError` for a missing density or settings out of range.
     """
+    if any(m.prony.g for m in system.scene.materials):
+        system = build(taut(system.scene))
     scene, free = system.scene, system.free
     K, masses = sparse.csr_array(system.K[free][:, free]), system.masses[free]
     found = lanczos_step(lambda x: K @ x, masses, products=products, margin=margin)
