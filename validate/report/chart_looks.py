@@ -112,9 +112,9 @@ def _apart(named: Sequence[tuple[str, Style]]) -> dict[str, Style]:
 
 
 def _given(series: Series, shade: str) -> Style:
-    """A reference is a wide grey line under the others, what was measured dark points."""
+    """A reference is a wide pale line under the others, what was measured dark points."""
     if series.style == "line":
-        return Style("#9A9A9A", "-", "o", 3.6)
+        return Style("#C0C0C0", "-", "o", 3.6)
     return Style(shade, "-", "o", 1.2)
 
 
