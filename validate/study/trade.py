@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from validate.arrays import Floats, rms
+from validate.compare.convergence import Richardson, richardson
 from validate.errors import ComparisonError
 from validate.fem.locking import locking_notes
 from validate.replay.experiment import Experiment
@@ -17,7 +18,6 @@ from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_default import trial_of
 from validate.replay.options import Report
 from validate.solve.types import StepTimes
-from validate.study.convergence import Convergence, convergence
 from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.job import Job, Plan, Where, job_of
 from validate.study.ranking import dominator
@@ -84,7 +84,7 @@ class Refinement:
     what: str
     sizes: tuple[float, ...]
     unit: str
-    found: Convergence
+    found: Richardson
 
 
 @dataclass(frozen=True)
@@ -309,9 +309,7 @@ def _over_meshes(trial: Trial, answers: Answers) -> Iterator[Refinement]:
         falling = [n for n in known[::-1] if (element, n) in answers]
         sizes = tuple(trial.size(level) for level in falling)
         if len(falling) > 1:
-            found = convergence(
-                sizes, [answers[element, n] for n in falling], trial.orders[element]
-            )
+            found = richardson(sizes, [answers[element, n] for n in falling], trial.orders[element])
             yield Refinement(f"meshes of {element}", sizes, "m", found)
 
 
@@ -330,5 +328,5 @@ def _over_steps(
         if len(rising) > 1:
             dts = tuple(dt for dt, _ in rising)
             us = [u for _, i in rising if (u := record.value.strides[i].u) is not None]
-            found = convergence(dts, us, solver.order)
+            found = richardson(dts, us, solver.order)
             yield Refinement(f"steps of {solver.name}, {element} mesh {level}", dts, "s", found)
