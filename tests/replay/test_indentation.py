@@ -1,6 +1,7 @@
 """A ball pressed into a gel, from its recording to the report: contact walks the road."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from validate.register.registered import Registered
 from validate.register.signals import driving, validating
 from validate.replay import compare
 from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.ladder_default import body_of, trial_of
 from validate.replay.method import Method
 from validate.report.write import write_report
 from validate.scene.box import grid
@@ -137,3 +139,11 @@ def test_what_is_wrong_with_contact_is_one_line() -> None:
         UsageError, match=r"unknown parameter 'contact.frictoin'; nearest: contact."
     ):
         compare(EXPERIMENT, {"contact.frictoin": ".3"}, quick=True)
+
+
+@pytest.mark.parametrize("ladder", [lambda e: trial_of(e, quick=True), body_of])
+def test_a_study_says_that_it_does_not_know_contact(ladder: Callable[[Experiment], object]) -> None:
+    with pytest.raises(
+        SceneError, match=r"touches 1 rigid bodies, .*; run the experiment, or declare"
+    ):
+        ladder(EXPERIMENT)

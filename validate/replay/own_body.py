@@ -109,9 +109,15 @@ def own_body(experiment: Experiment) -> OwnBody:
 
 
 def meshed(scene: AnyScene) -> Scene:
-    """The scene; raises `SceneError` for a material point, in which nothing can be refined."""
+    """The scene; raises `SceneError` for a material point, in which nothing can be refined, and for
+    rigid bodies that touch, which the schemes of a derived ladder do not know."""
     if isinstance(scene, MaterialPoint):
         raise SceneError("a material point has no mesh and no steps: it enters no study")
+    if scene.contacts:
+        raise SceneError(
+            f"the scene touches {len(scene.contacts)} rigid bodies, which the ladder that a study "
+            "derives does not know; run the experiment, or declare its ladder"
+        )
     return scene
 
 
