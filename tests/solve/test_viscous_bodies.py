@@ -23,7 +23,7 @@ from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import quadratic
 from validate.scene.prony import Prony
 from validate.scene.scene import Dilatation, Region, Support
-from validate.solve.central import CentralDifference
+from validate.solve.central import CentralDifference, CentralStepper
 from validate.solve.handles import require_handled
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march
@@ -189,6 +189,20 @@ def test_the_critical_step_is_that_of_the_instantaneous_moduli() -> None:
         dt = share * limits[0]
         scheme = CentralDifference(dt, beyond_limit="run", margin=0.0)
         assert ran(scheme, slow, np.full(600, 0.1), dt).outcome.state == ending
+
+
+def test_what_an_increment_holds_is_of_the_relaxed_body() -> None:
+    """The look at divergence compares with energies of the relaxed law, so its d K d/8 is, too."""
+    system, dt = relaxing(pressed("neo_hooke"), Prony((5.0,), (10.0,))), 5e-4
+    stepper = CentralDifference(dt).prepare(system)
+    assert isinstance(stepper, CentralStepper)
+    state = stepper.rest()
+    for depth in (0.001, 0.002, 0.003):
+        state = stepper.step(state, np.array([depth]))
+    motion, body = state.inner.motion, Body(system.scene)
+    u, d = motion["u"], motion["d"]
+    exact = float(d @ (body.force(u) - body.force(u - d))) / 8
+    assert stepper._increment_energy(motion, 0.5, np.inf) == pytest.approx(exact, rel=1e-9)
 
 
 def test_what_explicit_branches_do_not_have_is_refused() -> None:
