@@ -59,6 +59,16 @@ def test_lumped_masses_and_weight_have_what_hangs() -> None:
     assert system.C.toarray() == pytest.approx(build(rod(0.0)).C.toarray())
 
 
+def test_lumping_leaves_what_hangs_where_it_hangs() -> None:
+    """Quadratic cells scale their diagonal to the body's mass: the hanging one is no part of it."""
+    scene = beam(HUNG)
+    bare, hung = (build(replace(scene, masses=m)).masses for m in ((), scene.masses))
+    more = (hung - bare).reshape(-1, 2)
+    tip = scene.mesh.nearest_node(np.array([1.0, 0.025]))
+    assert more[tip] == pytest.approx([HUNG, HUNG])
+    assert np.abs(np.delete(more, tip, axis=0)).max() < 1e-12
+
+
 def soft(law: str = "linear") -> System:
     """A held block of quadratic cells, a mass at one node of its top, lighter than the block."""
     return build(
