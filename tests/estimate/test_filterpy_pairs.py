@@ -1,5 +1,6 @@
 """filterpy as oracle and as guest: exact pairs, shape checks in front."""
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -8,7 +9,9 @@ import pytest
 from cubes import case
 
 from validate.errors import ComparisonError
-from validate.estimate.filterpy_guest import GUESTS, Guest, kalman
+from validate.estimate import filterpy_oracle
+from validate.estimate.filterpy_guest import GUESTS, Guest, ensemble, kalman
+from validate.estimate.filterpy_names import drawing
 from validate.estimate.filterpy_oracle import OracleRow, oracle_table
 from validate.estimate.kalman import Gaussian
 from validate.estimate.linear_model import LinearModel
@@ -25,6 +28,30 @@ from validate.estimate.sampled_kalman import (
 def test_our_filters_are_filterpys_to_rounding(row: OracleRow) -> None:
     assert row.steps == 60
     assert row.largest < 1e-12
+
+
+@pytest.mark.parametrize("pair", ["_kalman_pair", "_extended_pair", "_unscented_pair"])
+def test_the_oracle_tells_the_largest_difference(
+    monkeypatch: pytest.MonkeyPatch, pair: str
+) -> None:
+    apart = iter((1.0, 5.0, 3.0))
+    monkeypatch.setattr(filterpy_oracle, "_apart", lambda ours, guest: next(apart))
+    assert getattr(filterpy_oracle, pair)(3, np.random.default_rng(0)).largest == 5.0
+
+
+def test_a_copy_of_an_ensemble_walks_alone() -> None:
+    one = np.eye(1)
+    model = LinearModel(0.5 * one, one, one, 0.1 * one, 0.1 * one, np.array([1.0]), one)
+    with drawing(np.random.default_rng(0).multivariate_normal):
+        guest = ensemble(model)
+        before = guest.sigmas.copy()
+        other = copy.deepcopy(guest)
+        assert other.sigmas is not guest.sigmas
+        assert np.array_equal(other.sigmas, before)
+        other.predict(np.array([100.0]))
+        assert np.array_equal(guest.sigmas, before)
+        assert guest.loads == pytest.approx([0.0])
+    assert other.sigmas.mean() == pytest.approx(100.0, abs=2.0)
 
 
 def test_a_guest_is_our_own_filter_to_rounding() -> None:
