@@ -14,7 +14,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.fem.locate import standing_rows
-from validate.parameters import Ranges, quantity
+from validate.parameters import Ranges, part, quantity
 from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording
 from validate.register.fitting import MarkerFit
@@ -23,6 +23,7 @@ from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.box import grid
+from validate.scene.laws import Coefficients
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import LawName, Mass, Material, Probe, Scene, Support, Weight
 from validate.scene.select import Chosen, OnPlane
@@ -56,6 +57,7 @@ class BeamSilicone:
     E: float = quantity(263_824.0, "Pa", "modulus that the data set declares")
     nu: float = quantity(0.499, "1", "Poisson ratio that the data set declares")
     rho: float = quantity(1070.0, "kg/m3", "density that the data set declares")
+    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
 
 
 @dataclass(frozen=True)
@@ -197,7 +199,13 @@ def build(recording: Recording, parameters: ReleasedBeam, model: BeamModel) -> S
     hung = (Mass("load", _upper_edge(s), p.load.mass),) if p.load.mass else ()
     return Scene(
         _mesh(p, model),
-        Material(p.material.E, p.material.nu, model.law, p.material.rho),
+        Material(
+            p.material.E,
+            p.material.nu,
+            model.law,
+            p.material.rho,
+            coefficients=p.material.coefficients.known_to(model.law),
+        ),
         (Support("x0", (0, 1, 2)),),
         loads=(Weight("gravity", (0.0, 0.0, -1.0)),),
         masses=hung,
