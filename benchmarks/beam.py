@@ -15,6 +15,7 @@ import argparse
 import json
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -151,8 +152,11 @@ def swing_rows(truth: Floats) -> Iterator[Row]:
 
 def peer(python: str, *arguments: str) -> dict[str, object] | None:
     """What a peer printed, or None with the reason on standard error."""
-    script = str(Path(__file__).with_name("beam_peers.py"))
-    done = subprocess.run([python, script, *arguments], capture_output=True, text=True, check=False)
+    script = str(Path(__file__).resolve().with_name("beam_peers.py"))
+    with tempfile.TemporaryDirectory() as folder:  # MuJoCo leaves a log where it runs
+        done = subprocess.run(
+            [python, script, *arguments], capture_output=True, text=True, check=False, cwd=folder
+        )
     if done.returncode:
         print(f"{arguments[0]}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
         return None

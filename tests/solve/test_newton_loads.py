@@ -163,3 +163,27 @@ def test_a_swing_near_nu_one_half_takes_steps_of_ten_milliseconds(dt: float) -> 
     assert run.finished, run.outcome.why
     deepest = 1e3 * run.u[0][system.scene.mesh.facet_nodes("x1"), 2].mean()
     assert deepest == pytest.approx(2 * loaded(system, G, 0.0)[1], rel=0.1)
+
+
+def test_a_swing_ten_times_as_hard_takes_a_few_iterations_a_step() -> None:
+    """With the pressures of the displacements themselves it ends in the third step."""
+    stepper = NewtonDynamics(0.01, max_iterations=6).prepare(beam("hex8", "mixed", 0.4999))
+    t, inputs = 0.01 * np.arange(1, 4), np.tile([10 * G, 0.0], (3, 1))
+    assert march("swing", stepper, t, inputs, np.array([2]), 0.0).finished
+
+
+def test_a_column_does_not_stand_beyond_the_load_of_euler() -> None:
+    """Straight it stays in balance, but pi^2 E I/(4 L^2) = 20.6 mN is where it ceases to be stable;
+    two cells of hex8 across are a tenth and more too stiff in bending."""
+    scene = Scene(
+        grid((0.1, 0.01, 0.01), (10, 2, 2)),
+        Material(1e5, 0.499, "neo_hooke"),
+        (Support("x0", (0, 1, 2)),),
+        loads=(Load("press", "x1", (-1.0, 0.0, 0.0)),),
+        dilatation="mixed",
+    )
+    run = ran(StaticNewton(), build(scene), np.array([0.05]), 1.0)
+    assert run.outcome.state == "not_converged"
+    reached = re.search(r"beyond (\d+\.\d+) N .* the equilibrium is unstable", run.outcome.why)
+    assert reached is not None
+    assert 0.0195 < float(reached.group(1)) < 0.028
