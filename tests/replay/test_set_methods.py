@@ -56,8 +56,8 @@ def value_at(method: Any, part: str, path: str) -> Any:
     return value
 
 
-def test_there_are_nine() -> None:
-    assert len(FILES) == 9
+def test_there_are_ten() -> None:
+    assert len(FILES) == 10
 
 
 def test_a_field_is_set_by_its_short_path_and_by_the_whole_one(experiment: Experiment) -> None:

@@ -146,7 +146,7 @@ def test_runs_without_a_shared_method_fit_a_terminal(
     names = [[f"{kind}_filter_{i}" for i in range(14)] for kind in ("first", "second")]
     runs = many(tmp_path / "one", "kf", *names[0]), many(tmp_path / "other", "ekf", *names[1])
     lines = printed(monkeypatch, capsys, *runs)
-    assert max(map(len, lines)) <= 100
+    assert not [line for line in lines if len(line) > 100 and not line.endswith("/report.html")]
     heads = [line.strip() for line in lines if line.startswith("One:")]
     assert heads == [f"One: one: first_filter_{i}; other: other: second_filter_{i}"
                      for i in (12, 13)]  # fmt: skip
@@ -163,7 +163,7 @@ def test_runs_that_share_methods_fit_a_terminal(
 ) -> None:
     runs = [many(tmp_path / n, n, "shared_filter", f"of_{n}") for n in ("kf", "ekf", "other")]
     lines = printed(monkeypatch, capsys, *runs)
-    assert max(map(len, lines)) <= 100
+    assert not [line for line in lines if len(line) > 100 and not line.endswith("/report.html")]
     assert [x.strip() for x in lines if x.startswith("One:")] == [
         "One: kf; other: ekf", "One: kf; other: other",
     ]  # fmt: skip

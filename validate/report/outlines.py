@@ -107,7 +107,7 @@ def _off(drawn: _Sections, measured: _Outlines) -> Floats:
 def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> Picture:
     rows = -(-len(measured.holds) // _COLUMNS)
     names = ["measured at rest", "measured", *(d.method.label for d in drawn)]
-    height = _PANEL * rows + 0.4 + legend_height(names)
+    height = _PANEL * rows + 0.7 + legend_height(names)
     label, loads = judged.method.label, measured.loads
     ringed = "".join(
         f" Ringed: the image angle {np.rad2deg(c.angle):.0f}°, {c.quantity}; its displacement "
