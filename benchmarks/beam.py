@@ -28,8 +28,9 @@ from validate.arrays import Floats
 from validate.compare.convergence import convergence
 from validate.fem.system import System, build
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Dilatation, Material, Scene, Support, Weight
+from validate.scene.scene import Dilatation, Scene, Support, Weight
 from validate.solve.central import CentralDifference
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.newton import StaticNewton

@@ -20,7 +20,8 @@ from validate.fem.explicit import ExplicitBody
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import LawName, Load, Material, Scene, Support
+from validate.scene.material import LawName, Material
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.central import CentralDifference, CentralStepper
 
 FLOP = 228  # of one tet of St. Venant-Kirchhoff

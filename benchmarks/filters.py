@@ -23,7 +23,8 @@ from validate.estimate.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.haptic import RealTime
 from validate.solve.types import State, Stepper

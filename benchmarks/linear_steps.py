@@ -16,7 +16,8 @@ import numpy as np
 
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic

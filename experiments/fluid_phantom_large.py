@@ -11,7 +11,7 @@ from validate.compare.verdict import Accept
 from validate.replay.experiment import EffectSpec, Variant
 from validate.replay.find import load_file
 from validate.replay.method import Method
-from validate.scene.scene import LawName
+from validate.scene.material import LawName
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 

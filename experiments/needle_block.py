@@ -27,7 +27,8 @@ from validate.papers.accuracy.needle_exhibits import tell
 from validate.replay.cards import TimeSteps, changed, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
-from validate.scene.scene import Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 from validate.solve.modal import Modal
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "needle_block.mcap"

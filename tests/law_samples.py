@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from validate.scene.laws import Coefficients
-from validate.scene.scene import LawName, Material
+from validate.scene.material import LawName, Material
 
 #: Law, and its coefficients in units of the shear modulus.
 _FORMS: dict[str, tuple[LawName, Coefficients]] = {

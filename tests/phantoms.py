@@ -7,8 +7,9 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import Responses, build, responses
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.material import Material
 from validate.scene.mesh import Kind, Mesh, boundary_facets, kuhn_cells, quadratic
-from validate.scene.scene import Cavity, Dilatation, Drive, Material, Pin, Scene, Support
+from validate.scene.scene import Cavity, Dilatation, Drive, Pin, Scene, Support
 
 BLOCK = Block(0.060, 0.045, 0.070)
 CAPSULE = Capsule((0.030, 0.0225, 0.035), 0.0085, 0.028)

@@ -21,7 +21,8 @@ from validate.replay.followed import Truth
 from validate.replay.method import Method
 from validate.replay.remade import stamped
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked

@@ -27,7 +27,8 @@ from validate.replay.road import compare
 from validate.replay.room import coarser
 from validate.scene.box import box, grid
 from validate.scene.cylinder import quarter_cylinder
-from validate.scene.scene import Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support
 
 
 def written(root: Path, **files: str) -> None:

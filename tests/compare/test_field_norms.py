@@ -11,8 +11,9 @@ from validate.compare.pair import Field, FieldPair, pair
 from validate.compare.two_fields import compare_fields
 from validate.fem.assemble import mass
 from validate.scene.box import box, grid
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Material, Region, Scene
+from validate.scene.scene import Scene
 
 SOFT = Material(1e4, 0.3, rho=1000.0)
 

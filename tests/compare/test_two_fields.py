@@ -15,8 +15,9 @@ from validate.compare.shape_error import BOUNDARY_METRICS
 from validate.compare.two_fields import METRICS_OF_FIELDS, compare_fields, compared
 from validate.errors import ComparisonError
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Scene
 
 PLANE, SOLID = ((1.0, 0.8), (4, 3)), ((1.0, 0.8, 0.6), (3, 2, 2))
 MESHES = {

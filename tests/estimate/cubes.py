@@ -10,7 +10,8 @@ from validate.arrays import Floats
 from validate.estimate.measurements import Measurements
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.solve.types import Run, Stepper

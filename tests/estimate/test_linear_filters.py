@@ -25,7 +25,8 @@ from validate.estimate.reduced_kf import ReducedKf, dense_covariance, steady
 from validate.estimate.reduced_linear import LoadDoubt, reduced_model
 from validate.estimate.small_state import CoreStepper
 from validate.fem.system import build
-from validate.scene.scene import Drive, Region
+from validate.scene.material import Region
+from validate.scene.scene import Drive
 from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import propagation, rule_of

@@ -11,8 +11,9 @@ from scipy.sparse.linalg import spsolve
 from validate.arrays import Floats, Ints
 from validate.fem.system import build
 from validate.scene.box import grid
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Scene
 
 INNER, OUTER = 1.0, 3.0
 STEEL = Material(200.0, 0.3)

@@ -22,8 +22,9 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from validate.errors import SceneError
 from validate.fem.assemble import divergence, library_mesh, shape_gradients, stiffness
 from validate.scene.box import box
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
-from validate.scene.scene import Dilatation, Material, Scene
+from validate.scene.scene import Dilatation, Scene
 from validate.scene.shape_functions import EDGES
 
 KINDS = [("linear", 1, "pointwise"), ("nodal_mean", 1, "nodal_mean"), ("quadratic", 2, "pointwise")]

@@ -26,8 +26,9 @@ from validate.fem.system import build
 from validate.papers.accuracy.needle import needle_block
 from validate.papers.accuracy.rod import GRAVITY, bending_rod
 from validate.scene.box import grid
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Material, Pin, PlaneState, Region, Scene, Support, Weight
+from validate.scene.scene import Load, Pin, PlaneState, Scene, Support, Weight
 
 E, NU, RHO = 200.0, 0.3, 50.0
 STEEL = Material(E, NU, rho=RHO, mass_damping=2.0, stiffness_damping=0.1)

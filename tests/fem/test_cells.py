@@ -13,8 +13,9 @@ from validate.fem.cells import (
     volumes_at,
 )
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Scene
 
 PLANE, SOLID = ((1.0, 0.8), (3, 2)), ((1.0, 0.8, 0.6), (2, 2, 1))
 MESHES = {

@@ -17,8 +17,9 @@ from validate.fem.critical import (
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.box import box
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
-from validate.scene.scene import Material, Region, Scene, Support
+from validate.scene.scene import Scene, Support
 
 GEL = Material(3e4, 0.49, rho=1000.0)
 HELD = (Support("z0", (0, 1, 2)),)

@@ -7,7 +7,8 @@ from scipy.sparse.linalg import spsolve
 
 from validate.fem.assemble import stiffness
 from validate.fem.system import Responses
-from validate.scene.scene import Dilatation, Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Dilatation, Scene
 
 
 def cantilever_tip(order: int, dilatation: Dilatation, nu: float) -> float:

@@ -14,9 +14,10 @@ from validate.fem.kernel_tensors import inverse_cube_root
 from validate.fem.law_kernels import principal
 from validate.fem.system import build
 from validate.scene.box import box
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.rubber import ogden
-from validate.scene.scene import Foundation, Material, Region, Scene
+from validate.scene.scene import Foundation, Scene
 
 STRETCH = np.array([[0.2, 0.3, 0.0], [-0.2, -0.3, 0.1], [0.1, 0.0, 0.4]])
 

@@ -13,8 +13,9 @@ from validate.fem.explicit import ExplicitBody
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.box import grid
+from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Load, Material, Region, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march

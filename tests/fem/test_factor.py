@@ -17,7 +17,8 @@ from validate.fem.factor import Factor, factorise
 from validate.fem.frontal import Fronts
 from validate.fem.ordering import nested_dissection
 from validate.fem.system import build
-from validate.scene.scene import Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support
 
 
 def random_spd(seed: int, nodes: int, per_node: int) -> sparse.csr_array:

@@ -16,8 +16,9 @@ from validate.fem.follower import volume_hessian
 from validate.fem.hyperelastic import Body
 from validate.fem.laws import SaintVenantKirchhoff, law_of
 from validate.fem.neo_hooke import NeoHooke
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Dilatation, Foundation, Material, Membrane, Scene
+from validate.scene.scene import Dilatation, Foundation, Membrane, Scene
 
 MATERIAL = Material(15_200.0, 0.485)
 ELEMENTS: list[tuple[int, Dilatation]] = [(1, "pointwise"), (1, "nodal_mean"), (2, "pointwise")]

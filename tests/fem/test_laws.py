@@ -12,9 +12,9 @@ from validate.arrays import Floats
 from validate.fem.laws import law_of
 from validate.fem.stretch_response import response
 from validate.scene.laws import LAWS, Coefficients, VolumetricName, ogden_terms
+from validate.scene.material import LawName, Material
 from validate.scene.material_point import MaterialPoint, StretchMode
 from validate.scene.rubber import mooney_rivlin, ogden, yeoh
-from validate.scene.scene import LawName, Material
 
 every = pytest.mark.parametrize("name", NAMES)
 EYE = np.eye(3)

@@ -13,8 +13,9 @@ from validate.fem.loads import facet_integrals
 from validate.fem.locking import locking_warning
 from validate.fem.system import System, build
 from validate.scene.box import box, centroids
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Load, Material, Region, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 
 SOFT = Material(1e4, 0.3, rho=1000.0, mass_damping=2.0, stiffness_damping=0.1)
 HARD = Material(3e4, 0.4, rho=1500.0, mass_damping=5.0, stiffness_damping=0.02)

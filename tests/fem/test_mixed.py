@@ -12,8 +12,9 @@ from validate.fem.system import build
 from validate.papers.accuracy.needle import MP2, needle_block
 from validate.papers.accuracy.rod import GRAVITY, bending_rod
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Load, Material, Pin, Scene, Support
+from validate.scene.scene import Load, Pin, Scene, Support
 
 
 def compliance(scene: Scene) -> float:

@@ -17,8 +17,9 @@ from validate.fem.laws import law_of
 from validate.fem.mean_dilatation import projections
 from validate.fem.system import build
 from validate.scene.box import box, grid
+from validate.scene.material import LawName, Material, Region
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Dilatation, LawName, Load, Material, Region, Scene, Support
+from validate.scene.scene import Dilatation, Load, Scene, Support
 
 SOFT = Material(15_200.0, 0.49)
 KINDS = ("hex8", "hex27", "tet10")

@@ -6,7 +6,8 @@ from phantoms import grid_mesh
 
 from validate.fem.once import once
 from validate.fem.system import build
-from validate.scene.scene import Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support
 
 
 def test_made_once_for_each_key_and_system() -> None:

@@ -12,8 +12,9 @@ import pytest
 from validate.arrays import Floats
 from validate.fem.system import build
 from validate.scene.box import box
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 
 SIZE, CELLS = (0.004, 0.004, 0.007), (4, 4, 7)  # the block of paper 001
 E, NU, TRACTION = 1e4, 0.47, 3000.0

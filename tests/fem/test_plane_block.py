@@ -7,8 +7,9 @@ from validate.errors import SceneError
 from validate.fem.cavity import cavity_surface, pressure_load, volume_of
 from validate.fem.system import Responses, build, responses
 from validate.papers.fluid_inclusion.square import square_with_hole
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Cavity, Drive, Material, Scene, Support
+from validate.scene.scene import Cavity, Drive, Scene, Support
 from validate.solve.fluid import pressure_at_volume, tuned_gain
 
 

@@ -7,8 +7,8 @@ from law_samples import NAMES, sample
 from validate.errors import SceneError
 from validate.fem.laws import law_of
 from validate.fem.stretch_response import response
+from validate.scene.material import LawName, Material
 from validate.scene.material_point import MaterialPoint, StretchMode
-from validate.scene.scene import LawName, Material
 
 E, NU = 12_000.0, 0.4
 STRETCHES = np.array([0.6, 0.8, 1.0, 1.2, 1.5])

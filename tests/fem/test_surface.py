@@ -7,8 +7,9 @@ from phantoms import grid_mesh
 from validate.errors import SceneError
 from validate.fem.assemble import stiffness
 from validate.fem.surface import foundation_stiffness, membrane_stiffness
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Foundation, Material, Membrane, Scene
+from validate.scene.scene import Foundation, Membrane, Scene
 
 LATEX = Material(1.2e6, 0.45)
 

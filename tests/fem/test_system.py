@@ -10,8 +10,9 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
 from validate.scene.box import box
 from validate.scene.cylinder import quarter_cylinder
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
-from validate.scene.scene import Cavity, Dilatation, Drive, Material, Pin, Scene, Support
+from validate.scene.scene import Cavity, Dilatation, Drive, Pin, Scene, Support
 
 SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)), Support("lower_plate", (2,)))
 BONDED = (Support("lower_plate", (0, 1)), Support("upper_plate", (0, 1)))

@@ -12,9 +12,9 @@ from validate.fem.laws import law_of, parts_of, stiffened
 from validate.fem.stretch_response import response
 from validate.fem.viscous import Lagged, branches_of, second_stress
 from validate.scene.laws import Coefficients
+from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint, StretchMode
 from validate.scene.prony import Prony
-from validate.scene.scene import Material
 
 LAWS = [n for n in SPLIT if n != "svk"]
 SERIES = Prony((0.8, 0.4), (0.05, 1.0))

@@ -13,7 +13,7 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.scene.inclusion import Block
-from validate.scene.scene import Material
+from validate.scene.material import Material
 from validate.twin.sensors import StageProfile, streams
 
 COARSE = PhantomTwin(nodes_x=7, nodes_y=8, nodes_z=11)

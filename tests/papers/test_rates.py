@@ -8,7 +8,8 @@ from validate.fem.critical import critical_step
 from validate.fem.system import build
 from validate.papers.ekf_nfem.rates import Integrator, Rate, cells_at, measured_rates, rates_exhibit
 from validate.scene.box import box
-from validate.scene.scene import Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.haptic import RealTime
 

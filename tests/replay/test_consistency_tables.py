@@ -12,7 +12,8 @@ from validate.register.signals import SignalObservation
 from validate.replay.consistency import consistency_exhibit, consistency_scores, nees_of, nis_of
 from validate.replay.followed import Followed, Truth
 from validate.scene.box import box
-from validate.scene.scene import Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Probe, Scene, Support
 from validate.solve.types import Outcome, Run, Trace
 
 STEPS, DT = 40, 0.1

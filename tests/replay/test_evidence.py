@@ -19,7 +19,8 @@ from validate.replay.experiment import Experiment, Identified, MeshLadder, Twin,
 from validate.replay.options import Options
 from validate.replay.remade import stamped
 from validate.replay.road import compare
-from validate.scene.scene import Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 FEM = {"fem": TINY.methods["fem"]}

@@ -23,7 +23,8 @@ from validate.replay.method import Method
 from validate.report.write import write_report
 from validate.scene.box import grid
 from validate.scene.contact import RigidContact, RigidSphere
-from validate.scene.scene import Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support
 from validate.scene.select import OnPlane
 from validate.solve.contact import ContactNewton
 

@@ -19,10 +19,10 @@ from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.report.write import write_report
+from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint
 from validate.scene.prony import Prony
 from validate.scene.rubber import mooney_rivlin, ogden, yeoh
-from validate.scene.scene import Material
 from validate.solve.fluid import NoFluid
 from validate.solve.stretch_test import StretchTest
 

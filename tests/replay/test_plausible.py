@@ -12,7 +12,8 @@ from validate.register.signals import SignalObservation
 from validate.replay.followed import Followed
 from validate.replay.plausible import doubts
 from validate.scene.box import box
-from validate.scene.scene import Drive, Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene
 
 SIDE, T = 0.1, np.arange(5.0)  # m: a cube's
 SCENE = Scene(

@@ -22,7 +22,8 @@ from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
 from validate.replay.remade import stamped
 from validate.scene.box import box
-from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Load, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.newmark import Newmark

@@ -16,8 +16,9 @@ from validate.recording.types import Clock, Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells
-from validate.scene.scene import Drive, Material, Scene, Support
+from validate.scene.scene import Drive, Scene, Support
 from validate.solve.types import Outcome, Run, StepTimes, Trace
 
 SIDE, PRESS = 0.02, 0.002  # m

@@ -6,8 +6,9 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from report_samples import scene as cube_scene
 
 from validate.report.skin import SurfacePart, skins
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Scene
 
 
 def edges(skin: SurfacePart) -> dict[tuple[int, int], int]:

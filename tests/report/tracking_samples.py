@@ -16,7 +16,8 @@ from validate.register.markers import observe_markers
 from validate.register.registered import Registered
 from validate.register.signals import driving
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.types import Ending, Outcome, Run, StepTimes, Trace
 
 SIDE, PEAK = 0.1, 0.004  # m

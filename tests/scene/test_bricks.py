@@ -9,6 +9,7 @@ from validate.errors import SceneError
 from validate.papers.accuracy.needle import needle_block
 from validate.papers.accuracy.rod import bending_rod
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import (
     Mesh,
     boundary_facets,
@@ -17,7 +18,7 @@ from validate.scene.mesh import (
     require_positive_cells,
 )
 from validate.scene.refine import linear, refined
-from validate.scene.scene import Cavity, Drive, Foundation, Material, Scene, Weight
+from validate.scene.scene import Cavity, Drive, Foundation, Scene, Weight
 from validate.scene.shape_functions import CORNERS
 
 BLOCKS = [((3.0, 2.0, 1.0), (2, 3, 4)), ((3.0, 2.0), (2, 3)), ((1.0, 1.0), (1, 1))]

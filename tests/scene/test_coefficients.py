@@ -8,9 +8,9 @@ from validate.errors import SceneError
 from validate.fem.stretch_response import response
 from validate.parameters import describe, with_values
 from validate.scene.laws import LAWS, Coefficients
+from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint
 from validate.scene.rubber import mooney_rivlin, ogden, yeoh
-from validate.scene.scene import Material
 
 
 def test_coefficients_that_the_law_would_not_use_are_refused() -> None:

@@ -5,8 +5,9 @@ import pytest
 
 from validate.fem.system import build
 from validate.scene.box import box
+from validate.scene.material import Material
 from validate.scene.plates import Contact, Plates, between_plates
-from validate.scene.scene import Drive, Material, Scene, Support
+from validate.scene.scene import Drive, Scene, Support
 
 ALONG_X = Plates(Drive("press", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
 ALONG_Z = Plates(Drive("press", "z0", (0.0, 0.0, 1.0)), "z1", Support("x1", (0,)))

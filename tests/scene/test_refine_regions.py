@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from validate.scene.box import box
+from validate.scene.material import Material, Region
 from validate.scene.mesh import cell_volumes
 from validate.scene.refine import refined
-from validate.scene.scene import Material, Region, Scene
+from validate.scene.scene import Scene
 
 
 def test_a_region_keeps_its_volume_and_place() -> None:

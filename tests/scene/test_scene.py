@@ -6,8 +6,9 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
+from validate.scene.material import Material
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Cavity, Drive, Material, Scene, Support
+from validate.scene.scene import Cavity, Drive, Scene, Support
 
 
 @pytest.mark.parametrize("E", [0.0, -1.0, math.nan, math.inf])

@@ -10,9 +10,10 @@ from validate.errors import SceneError
 from validate.fem.loads import uniform_shares
 from validate.fem.system import build
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.refine import refined
-from validate.scene.scene import Foundation, Load, Mass, Material, Scene, Support
+from validate.scene.scene import Foundation, Load, Mass, Scene, Support
 from validate.scene.select import InBox, Labelled, Nearest, OnPlane, Site, facets_of, nodes_of
 
 SIZE = (0.03, 0.02, 0.01)

@@ -4,7 +4,8 @@ import pytest
 from phantoms import grid_mesh, phantom_responses
 
 from validate.fem.system import Responses, build, responses
-from validate.scene.scene import Cavity, Drive, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Cavity, Drive, Scene, Support
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,9 @@ from validate.arrays import Floats
 from validate.fem.system import System, build
 from validate.scene.box import grid
 from validate.scene.contact import RigidContact, RigidPlane, Shape
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import LawName, Material, Scene, Support, Weight
+from validate.scene.scene import Scene, Support, Weight
 from validate.scene.select import InBox
 from validate.solve.types import Scheme, State
 

@@ -9,7 +9,8 @@ from validate.arrays import Floats
 from validate.fem.matrices import MassName, damping_of, mass_of
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Load, Probe, Scene, Support
 
 TOTAL = 3000 * 16e-6  # N, of 3 kPa on the block's top (paper 001, Table 1)
 

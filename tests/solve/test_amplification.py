@@ -11,7 +11,7 @@ from validate.errors import SceneError
 from validate.fem.system import System, build
 from validate.papers.accuracy.needle import needle_block
 from validate.papers.accuracy.rod import bending_rod
-from validate.scene.scene import Region
+from validate.scene.material import Region
 from validate.solve.amplification import (
     amplification,
     explicit_maps,

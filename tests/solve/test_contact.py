@@ -29,8 +29,9 @@ from validate.scene.contact import (
     RigidSphere,
     Shape,
 )
+from validate.scene.material import Material
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Drive, Load, Material, Pin, Scene, Support
+from validate.scene.scene import Drive, Load, Pin, Scene, Support
 from validate.scene.select import OnPlane
 from validate.solve.contact import ContactNewton, ContactStepper
 from validate.solve.march import march

@@ -20,7 +20,8 @@ from validate.arrays import Floats
 from validate.fem.system import System, build
 from validate.scene.box import box, grid
 from validate.scene.contact import RigidContact, RigidSphere
-from validate.scene.scene import LawName, Material, Scene, Support
+from validate.scene.material import LawName, Material
+from validate.scene.scene import Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.contact import ContactNewton
 from validate.solve.types import Scheme, State

@@ -11,7 +11,8 @@ from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_responses, ph
 
 from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
-from validate.scene.scene import Drive, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
 from validate.solve.fluid import (
     ExactPressure,
     NoFluid,

@@ -8,8 +8,9 @@ import pytest
 from validate.fem.system import build
 from validate.scene.box import grid
 from validate.scene.laws import Coefficients
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Material, Scene, Support, Weight
+from validate.scene.scene import Scene, Support, Weight
 from validate.scene.select import OnPlane
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton

@@ -9,8 +9,9 @@ import pytest
 from validate.fem.modes import modes_of
 from validate.fem.system import System, build
 from validate.scene.box import box, grid
+from validate.scene.material import Material
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Load, Mass, Material, Scene, Support, Weight
+from validate.scene.scene import Load, Mass, Scene, Support, Weight
 from validate.scene.select import InBox, Nearest, OnPlane
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear

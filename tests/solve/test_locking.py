@@ -8,8 +8,9 @@ import pytest
 from validate.errors import SceneError
 from validate.fem.locking import locking_warning
 from validate.scene.box import box, centroids, grid
+from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.locking import locking_factor
 
 MESH = box((0.1, 0.1, 0.1), (3, 3, 3))

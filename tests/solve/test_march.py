@@ -11,7 +11,8 @@ from phantoms import COARSE_GRID, phantom_responses
 from validate.errors import ComparisonError, ValidateError
 from validate.fem.system import Responses
 from validate.scene.box import box
-from validate.scene.scene import Drive, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
 from validate.solve import march as march_module
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
 from validate.solve.march import march, run_scheme

@@ -13,8 +13,9 @@ from validate.errors import SceneError
 from validate.fem.modes import modes_of
 from validate.fem.system import System, build
 from validate.scene.box import box, centroids
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Material, Region, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.march import march
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark

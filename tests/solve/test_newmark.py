@@ -11,7 +11,8 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, build, responses
 from validate.scene.box import box
-from validate.scene.scene import Drive, Load, Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Load, Scene
 from validate.solve.excitation import excitation
 from validate.solve.linear_solvers import SolverName, solver_of
 from validate.solve.march import march

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 from validate.errors import SceneError
 from validate.fem.laws import law_of
 from validate.fem.system import build
+from validate.scene.material import Material
 from validate.scene.rubber import mooney_rivlin
-from validate.scene.scene import Dilatation, Material
+from validate.scene.scene import Dilatation
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.march import march
 from validate.solve.newton import NewtonStepper, StaticNewton

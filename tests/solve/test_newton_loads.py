@@ -13,18 +13,9 @@ from validate.errors import SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.box import box, grid
+from validate.scene.material import LawName, Material, Region
 from validate.scene.mesh import quadratic
-from validate.scene.scene import (
-    Dilatation,
-    Drive,
-    LawName,
-    Load,
-    Material,
-    Region,
-    Scene,
-    Support,
-    Weight,
-)
+from validate.scene.scene import Dilatation, Drive, Load, Scene, Support, Weight
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton

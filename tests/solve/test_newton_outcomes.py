@@ -10,7 +10,8 @@ from scipy.linalg import null_space
 
 from validate.fem.follower import volume_hessian
 from validate.fem.system import build
-from validate.scene.scene import Cavity, Drive, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Cavity, Drive, Scene, Support
 from validate.solve.equilibrium import equilibrium
 from validate.solve.march import march
 from validate.solve.newton import NewtonStepper, StaticNewton

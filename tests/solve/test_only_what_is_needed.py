@@ -16,8 +16,9 @@ import validate.solve.equilibrium as equilibrium_module
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.box import box
+from validate.scene.material import Material
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ExactPressure, NoFluid

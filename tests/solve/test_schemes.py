@@ -12,7 +12,8 @@ from validate.fem.system import System, build
 from validate.parameters import with_values
 from validate.scene.box import box
 from validate.scene.contact import RigidContact, RigidPlane
-from validate.scene.scene import Drive, LawName, Load, Material, Scene, Support
+from validate.scene.material import LawName, Material
+from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton

@@ -9,8 +9,9 @@ import pytest
 from validate.errors import SceneError
 from validate.fem.stretch_response import response
 from validate.scene.box import box
+from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.march import run_scheme
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.schemes import SOLVERS

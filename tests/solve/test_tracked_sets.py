@@ -9,7 +9,8 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
 from validate.scene.box import box
-from validate.scene.scene import LawName, Load, Material, Probe, Scene
+from validate.scene.material import LawName, Material
+from validate.scene.scene import Load, Probe, Scene
 from validate.scene.select import InBox, OnPlane
 from validate.scene.tracked import Prescribed
 from validate.solve.march import run_scheme

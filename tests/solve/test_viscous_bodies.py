@@ -19,10 +19,11 @@ from validate.fem.system import System, build
 from validate.fem.viscous import cell_branches
 from validate.scene.box import grid
 from validate.scene.contact import RigidContact, RigidPlane
+from validate.scene.material import Region
 from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import quadratic
 from validate.scene.prony import Prony
-from validate.scene.scene import Dilatation, Region, Support
+from validate.scene.scene import Dilatation, Support
 from validate.solve.central import CentralDifference, CentralStepper
 from validate.solve.handles import require_handled
 from validate.solve.implicit import NewtonDynamics

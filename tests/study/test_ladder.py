@@ -19,10 +19,11 @@ from validate.replay.ladder import LARGEST, Rival, StabilityBody, Turned
 from validate.replay.ladder_default import body_of, trial_of
 from validate.replay.own_body import OwnBody, own_body
 from validate.scene.box import box
+from validate.scene.material import Material, Region
 from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import boundary_facets, cell_volumes
 from validate.scene.refine import linear, of_element, refined
-from validate.scene.scene import Material, Region, Scene, Support
+from validate.scene.scene import Scene, Support
 from validate.solve.quasi_static import QuasiStatic
 from validate.study.gain import DECADES, GainBench, GainCell, run_cell
 from validate.study.stability import stability

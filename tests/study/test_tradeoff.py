@@ -17,8 +17,9 @@ from validate.fem.system import build
 from validate.replay.experiment import Experiment
 from validate.replay.ladder import RUNGS, LawPair, Rival, Rung, Trial
 from validate.scene.box import box
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
-from validate.scene.scene import LawName, Load, Material, Scene, Support
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal

@@ -7,7 +7,8 @@ import pytest
 
 from validate.arrays import Floats
 from validate.scene.box import box
-from validate.scene.scene import Drive, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.types import Scheme
 from validate.twin.stepped import SteppedTwin

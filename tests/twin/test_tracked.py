@@ -14,7 +14,8 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.register.markers import placed_markers
 from validate.scene.box import box
-from validate.scene.scene import Drive, Material, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.march import march
 from validate.solve.types import Outcome

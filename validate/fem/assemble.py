@@ -33,8 +33,9 @@ from validate.errors import SceneError
 from validate.fem.cells import rule, values_at, volumes_at
 from validate.fem.mean_dilatation import projections
 from validate.fem.surface import surface_stiffness
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Scene
 from validate.scene.shape_functions import simplex_slopes, symmetric_points
 
 # The library's mesh and element, and the degree that a mass is integrated to.

@@ -9,7 +9,8 @@ from validate.errors import SceneError
 from validate.fem.assemble import stiffness_points
 from validate.fem.brick_kernels import CORNERS, LANES, POINTS, ROWS
 from validate.fem.explicit_kernels import Cells
-from validate.scene.scene import Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 
 _LAWS = ("neo_hooke", "mooney_rivlin", "yeoh")
 

@@ -18,7 +18,8 @@ from validate.errors import SceneError
 from validate.fem.assemble import lame_constants, shape_gradients
 from validate.fem.system import System, build
 from validate.fem.viscous import taut
-from validate.scene.scene import Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 
 MatVec = Callable[[Floats], Floats]
 

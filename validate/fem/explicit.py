@@ -24,8 +24,9 @@ from validate.fem.explicit_kernels import LANES, NEO_HOOKE, ROWS, SVK
 from validate.fem.surface import foundation_stiffness
 from validate.fem.viscous import cell_branches, taut
 from validate.scene.laws import ogden_terms
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
-from validate.scene.scene import Material, Scene
+from validate.scene.scene import Scene
 from validate.scene.stability import coupled_lambda
 
 RowName = Literal["u", "d", "r", "old", "v", "a"]

@@ -21,8 +21,8 @@ from validate.fem.ogden import Ogden
 from validate.fem.polynomial import Polynomial
 from validate.fem.tensors import EYE, green_strain, outer, trace
 from validate.scene.laws import LAWS, law_kind, ogden_terms
+from validate.scene.material import Material
 from validate.scene.prony import Prony
-from validate.scene.scene import Material
 from validate.scene.stability import coupled_lambda
 
 

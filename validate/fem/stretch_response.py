@@ -13,8 +13,8 @@ from validate.errors import SceneError
 from validate.fem.laws import Law, instant, law_of
 from validate.fem.tensors import volume_change
 from validate.fem.viscous import Lagged, branches_of, second_stress
+from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint, StretchMode
-from validate.scene.scene import Material
 
 _ITERATIONS = 50
 _SETTLED = 1e-14  # of the free stretch; Newton squares its error, so that one more step is rounding

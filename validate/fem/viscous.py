@@ -20,7 +20,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.laws import Law, stiffened
 from validate.fem.tensors import EYE, cofactor, outer, volume_change
-from validate.scene.scene import Material, Scene
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from validate.replay.ladder import Trial
 from validate.replay.ladder_solvers import ORDERS, exact_in_time, swinging, swinging_pair
 from validate.replay.own_body import with_law
 from validate.scene.box import box, grid
+from validate.scene.material import LawName
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import LawName, Scene
+from validate.scene.scene import Scene
 
 _SMALL, _MEDIUM = 2, 4  # finest meshes of baselines that solve anew every step
 

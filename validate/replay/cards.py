@@ -12,8 +12,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.replay.experiment import Change, MeshLadder
 from validate.scene.laws import Coefficients
+from validate.scene.material import LawName, Material
 from validate.scene.plates import plates_of_share, rubbing_share
-from validate.scene.scene import LawName, Material
 from validate.twin.tracked import Camera, require_noise
 
 

@@ -38,11 +38,12 @@ from validate.replay.method import Method
 from validate.replay.pressed import pressed_log
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.laws import Coefficients
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element, refined
-from validate.scene.scene import Drive, LawName, Material, Pin, Scene, Support
+from validate.scene.scene import Drive, Pin, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated

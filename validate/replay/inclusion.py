@@ -28,9 +28,10 @@ from validate.replay.cards import COARSER, beside, moved, rubbed
 from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
 from validate.replay.method import Method
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.plates import Contact, Plates, between_plates
-from validate.scene.scene import Cavity, Dilatation, Drive, Material, Scene, Support
+from validate.scene.scene import Cavity, Dilatation, Drive, Scene, Support
 from validate.solve.fluid import ExactPressure, NoFluid
 
 # The stage presses towards the fixed plate; the block stands on a table.

@@ -13,8 +13,9 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.recording.types import Recording
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import LawName, Load, Material, Scene
+from validate.scene.scene import Load, Scene
 from validate.solve.types import Scheme
 
 LARGEST = 1000  # unknowns of a body whose stability is mapped: all its modes are taken many times

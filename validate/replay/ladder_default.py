@@ -37,9 +37,10 @@ from validate.replay.ladder_solvers import (
 from validate.replay.options import folder_of
 from validate.replay.own_body import OwnBody, own_body, with_law
 from validate.scene.box import centroids
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.refine import linear, of_element
-from validate.scene.scene import LawName, Load, Material, Scene
+from validate.scene.scene import Load, Scene
 
 _LEVELS = (400, 300, 200, 150, 125, 100, 75, 50, 35, 25, 18, 12)  # of a hundred: own mesh
 _COARSER = (0.5, 0.7, 1.0)  # of the reference's level

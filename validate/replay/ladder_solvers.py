@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from validate.replay.ladder import LawPair, Rival
-from validate.scene.scene import LawName
+from validate.scene.material import LawName
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop

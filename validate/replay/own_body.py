@@ -17,10 +17,11 @@ from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.origins import opened
+from validate.scene.material import LawName
 from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.refine import refined
-from validate.scene.scene import LawName, Scene
+from validate.scene.scene import Scene
 
 _SAME = 0.02  # relative: extents and volume of a body with curved faces on two meshes
 

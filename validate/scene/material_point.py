@@ -5,18 +5,9 @@ from typing import Literal
 
 import numpy as np
 
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import (
-    Cavity,
-    Drive,
-    Load,
-    Material,
-    Probe,
-    Region,
-    Scene,
-    Support,
-    Weight,
-)
+from validate.scene.scene import Cavity, Drive, Load, Probe, Scene, Support, Weight
 
 StretchMode = Literal["uniaxial", "equibiaxial", "pure_shear"]
 

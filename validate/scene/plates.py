@@ -5,13 +5,13 @@ from typing import Literal
 
 import numpy as np
 
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import (
     Cavity,
     Dilatation,
     Drive,
     Foundation,
-    Material,
     Membrane,
     Pin,
     Scene,

@@ -8,7 +8,7 @@ from typing import Any
 
 from validate.errors import SceneError
 from validate.scene.laws import Coefficients, VolumetricName
-from validate.scene.scene import LawName, Material
+from validate.scene.material import LawName, Material
 
 
 def mooney_rivlin(

@@ -6,8 +6,9 @@ from typing import ClassVar, Literal, Protocol, cast
 
 from validate.errors import SceneError
 from validate.scene.laws import LAWS
+from validate.scene.material import LawName
 from validate.scene.material_point import MaterialPoint
-from validate.scene.scene import LawName, Scene
+from validate.scene.scene import Scene
 
 ContactName = Literal["foundations", "membranes", "rigid"]
 LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS))

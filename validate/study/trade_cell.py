@@ -18,7 +18,7 @@ from validate.fem.locate import barycentric_rows
 from validate.fem.system import System, build
 from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_default import trial_of
-from validate.scene.scene import LawName
+from validate.scene.material import LawName
 from validate.solve.march import march
 from validate.solve.types import Run, Scheme, Stepper, StepTimes
 from validate.study.held import held_bytes

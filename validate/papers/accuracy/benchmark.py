@@ -20,7 +20,8 @@ from validate.replay.cards import DampedTissue, TimeSteps
 from validate.replay.experiment import Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.scene.scene import Material, PlaneState, Scene
+from validate.scene.material import Material
+from validate.scene.scene import PlaneState, Scene
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark

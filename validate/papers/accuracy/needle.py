@@ -12,7 +12,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.scene.box import grid
-from validate.scene.scene import Drive, Material, PlaneState, Probe, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Drive, PlaneState, Probe, Scene, Support
 
 MP1 = Material(200.0, 0.47, rho=2000.0, mass_damping=1.0, stiffness_damping=0.1)
 MP2 = Material(60e3, 0.495, rho=1140.0, mass_damping=1.0, stiffness_damping=0.1)

@@ -37,8 +37,9 @@ from validate.papers.accuracy.needle import MP1, MP2, needle_block, needle_depth
 from validate.papers.accuracy.rules import rules_exhibit
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Material, PlaneState, Scene
+from validate.scene.scene import Load, PlaneState, Scene
 from validate.solve.dynamic import elastic_forces
 from validate.solve.march import march, output_frames
 from validate.solve.types import Run

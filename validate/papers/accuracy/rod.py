@@ -5,7 +5,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.scene.box import grid
-from validate.scene.scene import Material, Probe, Scene, Support, Weight
+from validate.scene.material import Material
+from validate.scene.scene import Probe, Scene, Support, Weight
 
 MP3 = Material(7000.0, 0.2, rho=10_000.0, mass_damping=1.0, stiffness_damping=0.1)
 SIZE = (0.5, 0.25, 0.25)  # m

@@ -18,9 +18,10 @@ from validate.replay.cards import QuarterGrid
 from validate.replay.compression import STAGE, SYMMETRY, between, size_of
 from validate.replay.pressed import pressed_log
 from validate.scene.cylinder import quarter_cylinder
+from validate.scene.material import LawName, Material
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element
-from validate.scene.scene import LawName, Material, Scene
+from validate.scene.scene import Scene
 
 DATA_SET = "abubakardawood/tissue-phantom-material-database (CC BY 4.0)"
 FOLDER = "force/ecoflex-compression"

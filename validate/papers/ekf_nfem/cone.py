@@ -26,9 +26,10 @@ from validate.register.signals import SignalObservation, driving
 from validate.replay.cards import QuarterGrid, moved, quarter_meshes
 from validate.replay.experiment import Input, Progress, Uncertainty
 from validate.replay.followed import Truth
+from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.mesh_file import read_mesh
-from validate.scene.scene import Drive, Load, Material, Probe, Scene, Support
+from validate.scene.scene import Drive, Load, Probe, Scene, Support
 
 REACH = ConeTwin().force
 SHEAR = {"paper": 22_081.0, "cylinders_slip": 31_200.0, "cylinders_bonded": 18_500.0}  # Pa

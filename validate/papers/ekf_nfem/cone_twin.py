@@ -23,8 +23,9 @@ from validate.fem.system import build
 from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.parameters import quantity
 from validate.recording.types import Record, Recording
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Drive, Material, Scene, Support
+from validate.scene.scene import Drive, Scene, Support
 from validate.solve.newton import StaticNewton
 from validate.solve.types import Stepper
 from validate.twin.tracked import Camera, Origin, Points, Reading, record_tracked

@@ -17,9 +17,10 @@ from validate.replay.cards import TimeSteps, TrackedTwin
 from validate.replay.experiment import Progress
 from validate.replay.followed import Truth, truth_of
 from validate.scene.box import box
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import read_mesh
-from validate.scene.scene import LawName, Load, Material, Probe, Scene, Support
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.central import CentralDifference
 from validate.solve.march import output_frames
 from validate.twin.stepped import SteppedTwin

@@ -5,7 +5,8 @@ from dataclasses import replace
 from validate.papers.ekf_nfem.cube import SIDE
 from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, Turned
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Scene, Support
 
 
 def _cube(n: int, material: Material) -> Scene:

@@ -18,7 +18,8 @@ from validate.estimate.measurements import Measurements
 from validate.fem.critical import lanczos_step
 from validate.fem.system import System, build
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Scene, Support
 from validate.solve.haptic import HAPTIC_HZ, VISUAL_HZ, RealTime
 from validate.solve.types import Stepper
 

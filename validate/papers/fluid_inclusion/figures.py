@@ -15,8 +15,9 @@ from validate.fem.system import Responses, build, responses
 from validate.papers.fluid_inclusion.square import square_with_hole
 from validate.replay.inclusion import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.material import Material
 from validate.scene.plates import between_plates
-from validate.scene.scene import Cavity, Material, Scene, Support
+from validate.scene.scene import Cavity, Scene, Support
 from validate.solve.fluid import PressureLoop, pressure_at_volume, tuned_gain
 
 _OTHER = "another phantom: the paper prints neither its block nor its inclusion nor plate contact"

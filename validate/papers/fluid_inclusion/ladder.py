@@ -11,8 +11,9 @@ from validate.papers.fluid_inclusion.phantom import PhantomModel, build
 from validate.recording.types import Recording
 from validate.replay.ladder import Ladder, Trial, marker_noise
 from validate.replay.ladder_solvers import ORDERS, still, still_best, still_pair
+from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
-from validate.scene.scene import LawName, Scene
+from validate.scene.scene import Scene
 
 GRIDS = {7: (7, 8, 11), 9: (9, 10, 15), 11: (11, 13, 19)}  # nodes along x, y, z by level
 _DEEPEST = 0.009  # m, the last load of the experiment

@@ -31,8 +31,9 @@ from validate.replay.inclusion import (
     pressed_block,
 )
 from validate.scene.inclusion import Capsule, block_with_inclusion
+from validate.scene.material import LawName, Material
 from validate.scene.plates import Contact
-from validate.scene.scene import Dilatation, LawName, Material, Membrane, Scene
+from validate.scene.scene import Dilatation, Membrane, Scene
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from validate.recording.types import Frames, Recording, Source
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
 from validate.replay.inclusion import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
 from validate.scene.plates import between_plates
-from validate.scene.scene import LawName, Material
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton

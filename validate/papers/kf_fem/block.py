@@ -20,8 +20,9 @@ from validate.replay.cards import DampedTissue, TimeSteps, TrackedTwin
 from validate.replay.experiment import Progress
 from validate.replay.followed import Truth, truth_of
 from validate.scene.box import box, centroids
+from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Material, Probe, Region, Scene, Support
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark

@@ -15,7 +15,8 @@ from validate.replay.ladder import (
     marker_noise,
 )
 from validate.scene.box import box
-from validate.scene.scene import Load, Material, Scene, Support
+from validate.scene.material import Material
+from validate.scene.scene import Load, Scene, Support
 
 
 def _block(n: int, material: Material) -> Scene:

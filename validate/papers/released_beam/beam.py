@@ -24,8 +24,9 @@ from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.box import grid
 from validate.scene.laws import Coefficients
+from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import LawName, Mass, Material, Probe, Scene, Support, Weight
+from validate.scene.scene import Mass, Probe, Scene, Support, Weight
 from validate.scene.select import Chosen, OnPlane
 
 DATA_SET = "srl-ethz/diffPD_sim2real 825e7b7 (MIT)"

@@ -1,0 +1,89 @@
+"""What a body is made of: isotropic elasticity, damping, density, and the law at large strain."""
+
+from dataclasses import MISSING, dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Ints
+from validate.errors import SceneError
+from validate.parameters import part, quantity
+from validate.scene.laws import Coefficients, law_kind
+from validate.scene.prony import Prony
+from validate.scene.stability import require_stable
+
+LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws`).
+
+    Every law has this E and nu at small strain, which is all that the linear schemes use;
+    `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
+    whose isochoric stress comes late. Dynamic schemes need rho kg/m^3; Rayleigh
+    damping is C = mass_damping M + stiffness_damping K, in 1/s and s (the alpha_0 and alpha_1 of
+    paper 001, eq 7). Raises `SceneError` for values out of range, coefficients that the law does
+    not know, and those that lose positive energy, with the stretch.
+    """
+
+    E: float = quantity(MISSING, "Pa", "Young's modulus at small strain")
+    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain")
+    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
+    rho: float | None = quantity(None, "kg/m^3", "density")
+    mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
+    stiffness_damping: float = quantity(0.0, "s", "Rayleigh's beta")
+    coefficients: Coefficients = part(Coefficients(), "what the law has beyond E and nu")
+    prony: Prony = quantity(Prony(), "1", "how the isochoric stress relaxes")
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.E) and self.E > 0):
+            raise SceneError(f"modulus E = {self.E:g} Pa: it must be positive")
+        if not -1 < self.nu < 0.5:
+            raise SceneError(
+                f"Poisson ratio nu = {self.nu:g}: displacement elements need -1 < nu < 0.5 "
+                "(1/(1 - 2 nu) is infinite at 0.5); use at most 0.4999"
+            )
+        if self.rho is not None and not (np.isfinite(self.rho) and self.rho > 0):
+            raise SceneError(f"density rho = {self.rho:g} kg/m3: it must be positive")
+        for name, value in (("mass", self.mass_damping), ("stiffness", self.stiffness_damping)):
+            if not (np.isfinite(value) and value >= 0):
+                raise SceneError(f"{name} damping {value:g}: a number >= 0")
+        self.coefficients.require_known(self.law)
+        if self.prony != Prony() and not self._relaxes(self.law):
+            form = self.coefficients.volumetric
+            raise SceneError(
+                f"law '{self.law}' ({form}) has no isochoric part that could relax: drop the Prony "
+                "series, or take neo_hooke, mooney_rivlin, yeoh or ogden with volumetric 'split'"
+            )
+        if law_kind(self.law).ranged:
+            require_stable(self.law, self.coefficients, self.shear_modulus, self.bulk_modulus)
+
+    def of_law(self, law: LawName) -> "Material":
+        """The same at small strain, with another law and what it knows of the coefficients."""
+        prony = self.prony if self._relaxes(law) else Prony()
+        return replace(self, law=law, coefficients=self.coefficients.known_to(law), prony=prony)
+
+    def _relaxes(self, law: str) -> bool:
+        """An isochoric part of its own is what a Prony series acts on."""
+        split = self.coefficients.known_to(law).volumetric == "split"
+        return split and "split" in law_kind(law).volumetric
+
+    @property
+    def shear_modulus(self) -> float:
+        """mu Pa."""
+        return self.E / (2 * (1 + self.nu))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """kappa Pa."""
+        return self.E / (3 * (1 - 2 * self.nu))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Cells (k,) of another material than the scene's: both linear, or both at large strain."""
+
+    name: str
+    cells: Ints
+    material: Material
