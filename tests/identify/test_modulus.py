@@ -122,6 +122,13 @@ def test_a_force_that_falls_is_refused() -> None:
         fit_modulus(log(d, -force))
 
 
+def test_noise_alone_is_no_contact() -> None:
+    d, _ = linear()
+    force = np.random.default_rng(1).normal(0, 0.02, len(d))
+    with pytest.raises(RecordingError, match="no contact in 200 samples"):
+        fit_modulus(log(d, force))
+
+
 def test_an_approach_before_contact_is_found() -> None:
     slack = 40.5 * SPEED * 0.1
     fit = fit_modulus(log(*linear(slack=slack, offset=0.3)))

@@ -222,10 +222,16 @@ def _zero(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, fl
 
     With an unloaded approach the offset is its mean and contact where the line through the toe
     (m) behind it meets that mean. Without one the first displacement is contact, and the offset the
-    value there of a parabola through the toe.
+    value there of a parabola through the toe. Raises `RecordingError` where nothing was loaded.
     """
     loaded = np.flatnonzero(np.abs(force - np.median(force[:PLATEAU])) > _threshold(force, noise))
-    start = int(loaded[0]) if len(loaded) else len(d)
+    if len(loaded) == 0:
+        raise RecordingError(
+            f"no contact in {len(force)} samples: no force is {_threshold(force, noise):.3g} N "
+            f"(5 sd of the noise) off the unloaded one, and all lie within {np.ptp(force):.3g} N; "
+            "check the load cell's channel, unit and range"
+        )
+    start = int(loaded[0])
     if start < 2 * PLATEAU:
         return _parabola_start(d, force, toe), float(d[0])
     offset = float(force[: start - 1].mean())
