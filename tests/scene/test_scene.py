@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
-from validate.scene.material import Material
+from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Cavity, Drive, Scene, Support
 
@@ -47,3 +48,10 @@ def test_sets_that_the_mesh_lacks_are_refused(parts: dict[str, tuple[object, ...
 def test_nodal_mean_dilatation_needs_linear_elements() -> None:
     with pytest.raises(SceneError, match="use order 1"):
         phantom_scene(quadratic(phantom_mesh(COARSE_GRID)), dilatation="nodal_mean")
+
+
+@pytest.mark.parametrize("cell", [-1, 10**6])
+def test_a_regions_cells_are_those_of_the_mesh(cell: int) -> None:
+    stiff = Region("stiff", np.array([0, cell]), Material(1e4, 0.3))
+    with pytest.raises(SceneError, match=f"region 'stiff' has cell {cell}, the mesh "):
+        Scene(phantom_mesh(COARSE_GRID), Material(1.0, 0.3), regions=(stiff,))

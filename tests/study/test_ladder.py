@@ -1,7 +1,9 @@
 """Ladders derived from a scene: which meshes, steps, solvers and points, and a gain's limit."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from validate.papers.accuracy.ladders import NEEDLE_LADDER
 from validate.papers.accuracy.needle import MP1, MP2
 from validate.papers.kf_fem.block import PulledBlock
 from validate.papers.kf_fem.ladders import PRINTED_LADDER
+from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.ladder import LARGEST, Rival, StabilityBody, Turned
@@ -127,6 +130,26 @@ def test_a_body_that_cannot_be_coarsened_says_what_to_do(
     monkeypatch.setattr("validate.replay.ladder_default.LARGEST", 50)
     with pytest.raises(UsageError, match="number of cells as a parameter"):
         body_of(pulled)
+
+
+def _at_one_instant(experiment: Experiment) -> Experiment:
+    """Its drives as one sample, as of a body that has come to rest."""
+
+    def place(*given: Any) -> Registered:
+        seen = experiment.place(*given)
+        return replace(
+            seen, observations=tuple(replace(d, t=d.t[:1], y=d.y[:1]) for d in seen.drives)
+        )
+
+    return replace(experiment, place=place)
+
+
+@pytest.mark.parametrize("ladder", [lambda e: trial_of(e, quick=True), body_of])
+def test_one_instant_says_no_time_step(
+    pulled: Experiment, ladder: Callable[[Experiment], object]
+) -> None:
+    with pytest.raises(UsageError, match="driven at 1 instant, which says no time step"):
+        ladder(_at_one_instant(pulled))
 
 
 # --- the gain of a loop ---------------------------------------------------------------------------

@@ -64,7 +64,10 @@ def body_of(experiment: Experiment) -> StabilityBody | None:
     if experiment.ladder and experiment.ladder.body:
         return experiment.ladder.body
     own = own_body(experiment)
-    return None if own.scene.material.rho is None else _body(own)
+    if own.scene.material.rho is None:
+        return None
+    _require_instants(own)
+    return _body(own)
 
 
 # --- error against time ---------------------------------------------------------------------------
@@ -146,6 +149,8 @@ def _meshes(
 def _loading(own: OwnBody) -> _Loading:
     """With inertia the recorded inputs, else a ramp to the largest of them."""
     seen, dynamic = own.seen, own.scene.material.rho is not None
+    if dynamic:
+        _require_instants(own)
     steps = np.diff(seen.t)
     dt = float(np.median(steps)) if len(steps) else 1.0
     t, size = seen.t - seen.t[0] + dt, np.abs(seen.inputs).sum(axis=1)
@@ -156,6 +161,15 @@ def _loading(own: OwnBody) -> _Loading:
         return _Loading(t, seen.inputs, 0.0 if reached == 0 else float(t[reached]), dynamic=True)
     rise, peak = float(t[reached]), seen.inputs[int(np.argmax(size))]
     return _Loading(np.array([0.0, rise]), np.array([0 * peak, peak]), rise, dynamic=False)
+
+
+def _require_instants(own: OwnBody) -> None:
+    """A step in time is the recording's: raises `UsageError` where it has none."""
+    if len(own.seen.t) < 2:
+        raise UsageError(
+            f"'{own.experiment.name}' is driven at {len(own.seen.t)} instant, which says no time "
+            "step to study; run the experiment, or declare its ladder"
+        )
 
 
 def _steps_and_frames(loading: _Loading, quick: bool) -> tuple[tuple[float, ...], Floats]:

@@ -207,6 +207,7 @@ class Scene:
         if self.dilatation == "nodal_mean" and self.regions:
             raise SceneError("nodal mean dilatation is for one material; drop the regions")
         for region in self.regions:
+            self._check_region(region)
             if (region.material.law == "linear") != (self.material.law == "linear"):
                 raise SceneError(
                     f"region '{region.name}' has law '{region.material.law}', the body "
@@ -231,6 +232,16 @@ class Scene:
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)
         require_clear(self.contacts, self.mesh)
+
+    def _check_region(self, region: Region) -> None:
+        """Its cells are those of the mesh."""
+        known = range(len(self.mesh.cells))
+        odd = [c for c in np.ravel(region.cells).tolist() if c not in known]
+        if odd:
+            raise SceneError(
+                f"region '{region.name}' has cell {odd[0]}, the mesh {len(known)} from 0 on; "
+                "choose its cells in this mesh"
+            )
 
     def _check_cells(self) -> None:
         """What bricks cannot have, and plane state and thickness, which are for 2-D meshes."""
