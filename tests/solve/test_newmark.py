@@ -300,3 +300,8 @@ def test_a_body_without_supports_is_refused_by_statics() -> None:
     scene = replace(small().scene, supports=(), loads=(Load("p", "z1", (1.0, 0.0, 0.0)),))
     with pytest.raises(SceneError, match="the body can move rigidly"):
         QuasiStatic().prepare(build(scene))
+
+
+def test_a_step_whose_square_vanishes_is_refused() -> None:
+    with pytest.raises(SceneError, match="time step 1e-300 s: its square"):
+        rule_of("average", 1e-300)

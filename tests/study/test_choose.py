@@ -9,7 +9,7 @@ from validate.errors import RecordingError, UsageError
 from validate.replay.ladder import Rival
 from validate.solve.newmark import Newmark
 from validate.solve.types import StepTimes
-from validate.study.choose import Wanted, meeting, misses, nearest, wanted
+from validate.study.choose import Wanted, left_out, meeting, misses, nearest, wanted
 from validate.study.trade import TradeRow
 
 WANTED = Wanted(0.5e-3, 1000.0)
@@ -86,3 +86,8 @@ def test_what_is_no_quantity_is_refused_in_one_line(error: str, rate: str) -> No
 def test_a_unit_of_something_else_is_refused() -> None:
     with pytest.raises(RecordingError, match="no unit of length"):
         wanted("0.5N", "1000Hz")
+
+
+def test_large_strain_is_left_out_for_the_reason_that_holds() -> None:
+    assert left_out(False, "quad4") == "left out: large strain was not solved (quad4)"
+    assert "--declared-law" in left_out(True, "quad4")

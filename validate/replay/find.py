@@ -6,6 +6,7 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from types import ModuleType
 
 from validate.catalogue import card, experiment_files
@@ -61,7 +62,7 @@ def _executed(path: Path) -> ModuleType:
         del sys.modules[name]
         raise UsageError(
             f"{path}{_place(error, path)}: {type(error).__name__}: {error}; "
-            f"mend the file (`python {path}` shows the whole way there)"
+            f"mend the file (`python {quote(str(path))}` shows the whole way there)"
         ) from error
     return module
 

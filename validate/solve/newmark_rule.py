@@ -55,9 +55,11 @@ class Rule:
 
 
 def rule_of(name: RuleName, dt: float, rho_inf: float = 0.8) -> Rule:
-    """The rule by name; raises `SceneError` for dt <= 0 or rho_inf outside 0..1."""
+    """The rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside 0..1."""
     if not (np.isfinite(dt) and dt > 0):
         raise SceneError(f"time step {dt:g} s: it must be positive")
+    if dt * dt < np.finfo(float).tiny:  # the step's matrix divides by it
+        raise SceneError(f"time step {dt:g} s: its square is beyond a double; take at least 1e-150")
     if not 0 <= rho_inf <= 1:
         raise SceneError(f"rho_inf = {rho_inf:g}: the spectral radius must lie in 0..1")
     if name == "average":

@@ -22,8 +22,6 @@ from validate.units import si_factor
 _TRIES = 4  # cells that are run again at the rate's own step
 _QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
 
-_LEFT_OUT = "left out: --declared-law judges the linear law only"
-
 Again = Callable[[Trade, TradeRow, float], TradeRow]
 Meets = Literal[
     "meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran", "not climbed"
@@ -150,8 +148,9 @@ def choose(
     if trade is None:
         raise UsageError("no rung of the ladder has a cell for this scene; see 'study tradeoff'")
     by, rows = _by(trade, declared_law), _judged(trade, declared_law)
+    unsolved = left_out(declared_law, trade.law_words)
     ladder = tuple(
-        _climbed(trade, rung, rows, want, by) if pick is None or rung in climbed
+        _climbed(trade, rung, rows, want, by, unsolved) if pick is None or rung in climbed
         else Climbed(rung, 0, 0, None, "not climbed", f"skipped: '{climbed[-1]}' meets both")
         for rung in RUNGS
     )  # fmt: skip
@@ -204,7 +203,16 @@ def _refusal(row: TradeRow, by: str) -> str:
     )
 
 
-def _climbed(trade: Trade, rung: Rung, rows: Sequence[TradeRow], want: Wanted, by: str) -> Climbed:
+def left_out(declared_law: bool, reason: str) -> str:
+    """Why a rung at large strain has no cell: asked for, or `reason` kept it from being solved."""
+    if declared_law:
+        return "left out: --declared-law judges the linear law only"
+    return f"left out: large strain was not solved ({reason})"
+
+
+def _climbed(
+    trade: Trade, rung: Rung, rows: Sequence[TradeRow], want: Wanted, by: str, unsolved: str
+) -> Climbed:
     dynamic = trade.trial.dynamic
     mine = [r for r in rows if r.solver.rung == rung]
     scored = [r for r in mine if error_of(r, by) is not None]
@@ -212,7 +220,7 @@ def _climbed(trade: Trade, rung: Rung, rows: Sequence[TradeRow], want: Wanted, b
         left = by == "error" and any(
             s.rung == rung and s.law != "linear" for s in trade.trial.solvers
         )
-        why = _LEFT_OUT if left else _why_not(mine, dynamic)
+        why = unsolved if left else _why_not(mine, dynamic)
         return Climbed(rung, len(mine), 0, None, "nothing ran", why)
     lacks = scored[0].solver.lacks
     if lacks:
