@@ -108,3 +108,10 @@ def test_of_all_each_ends_for_itself(own: Path, monkeypatch: pytest.MonkeyPatch)
         assert len(err.splitlines()) == len(compared) + len(broken)
         assert all(f"experiments/{name}.py" in err for name in broken)
     assert "helper" not in executed(own)
+
+
+def test_the_command_that_shows_a_broken_file_takes_spaces(tmp_path: Path) -> None:
+    file = tmp_path / "my folder" / "experiments" / "falls.py"
+    file.parent.mkdir(parents=True)
+    file.write_text(RUNS.format(then="undefined_name"), "utf-8")
+    assert f"`python '{file}'`" in refused("run", "falls", cwd=file.parent.parent)
