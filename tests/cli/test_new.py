@@ -257,3 +257,13 @@ def test_two_records_make_an_inclusions_experiment() -> None:
     del records["inclusion"]
     with pytest.raises(UsageError, match="records 'inclusion' and 'marker_layout'"):
         _kind(seen)  # type: ignore[arg-type]
+
+
+def test_a_prediction_of_a_few_samples_is_no_evidence(tmp_path: Path) -> None:
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    in_folder(tmp_path, "new", "sliver", "--from", "gel.mcap")
+    sets = ("--set", "fit_to=0.05", "--set", "limit=0.0502")
+    code, output = in_folder(tmp_path, "run", "sliver", *sets, "--methods", "slip", "--quick")
+    assert code == 2
+    assert "window 'beyond'" in output
+    assert "10 are needed to judge a prediction" in output

@@ -82,7 +82,9 @@ def test_no_static_solution_beyond_a_load() -> None:
     assert state.failure is not None
     ending, why = state.failure
     assert ending == "not_converged"
-    assert why.startswith(f"no static solution beyond {1e3 * state.inner.inputs[0]:.4g} mm (")
+    assert why.startswith(
+        f"no static solution was found beyond {1e3 * state.inner.inputs[0]:.4g} mm ("
+    )
     assert "% of the step): tangent not positive definite" in why
     assert "negative pivots" in why
     assert why.endswith("if the body snaps there, go on with NewtonDynamics")

@@ -15,9 +15,11 @@ from typing import Any, Literal
 import numpy as np
 
 from validate.compare.verdict import Accept
+from validate.errors import ComparisonError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
 from validate.identify.modulus import (
+    MIN_SAMPLES,
     Cylinder,
     fit_modulus,
     identify_modulus,
@@ -269,7 +271,14 @@ def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
     fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to))
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
-    return pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise)
+    seen = pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise)
+    for window in seen.selections:
+        if window.t is not None and len(window.t) < MIN_SAMPLES:
+            raise ComparisonError(
+                f"window '{window.label}': {len(window.t)} samples of {recording.name}, "
+                f"{MIN_SAMPLES} are needed to judge a prediction; widen fit_from, fit_to or limit"
+            )
+    return seen
 
 
 def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:

@@ -4,6 +4,7 @@ A choice is a rule, not a list of numbers: it holds on a finer mesh, too. Rules 
 and are asked for what they choose: `(OnPlane(a, x) & OnPlane(a, z)).edges`.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,12 +25,12 @@ _MIDDLES = [
 _SLACK = 1e-6  # of the body's size: rounding of coordinates
 
 
-class Site:
+class Site(ABC):
     """Base of the rules: `away` says how far from being chosen faces, edges or points are."""
 
+    @abstractmethod
     def away(self, mesh: Mesh, entities: Ints) -> Floats:
         """(k,) m for entities (k, m) of node numbers; zero where chosen."""
-        raise NotImplementedError
 
     def __and__(self, other: "Site") -> "Site":
         return Both(self, other)

@@ -310,7 +310,7 @@ def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:
         return failed.ending, f"{failed.why}; last good load {reached}; take a law for such strains"
     if failed.negative:
         words = f"tangent not positive definite ({failed.negative} negative pivots)"
-        why = f"no static solution beyond {reached}: {words}; {failed.why}"
+        why = f"no static solution was found beyond {reached}: {words}; {failed.why}"
         return "not_converged", f"{why}; if the body snaps there, go on with NewtonDynamics"
     helps = "more cuts or smaller steps"
     if failed.ending == "invalid":
