@@ -17,17 +17,15 @@ from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.recording.types import Recording
 from validate.register.registered import Registered
+from validate.replay.calibration import Calibration
+from validate.replay.calibration import Change as Change
+from validate.replay.calibration import unchanged as unchanged
 from validate.replay.followed import Cases, Truth
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
 from validate.scene.material_point import AnyScene
 
-Change = Callable[[Any], Any]
 Progress = Callable[[str], None]
-
-
-def unchanged(parameters: Any) -> Any:
-    return parameters
 
 
 @dataclass(frozen=True)
@@ -198,7 +196,8 @@ class Experiment:
     recording in that scene. `sets` are settings that the experiment itself gives every method that
     has them, from the parameters and the registered recording: a time step, say. `stated` is
     what a recording itself says of parameters, by path: it stands where none are set. `identify`
-    finds parameters from the recordings, by the methods as the user set them. `exhibits` adds
+    finds parameters from the recordings, by the methods as the user set them; `calibrations` says
+    which parameters that stand open (None) are identified, on which residuals. `exhibits` adds
     what this experiment shows besides, from all runs by case ("" is the recorded one) and method.
     `band` is the relative standard uncertainty of the force that the modulus brings. `axis` is the
     component that displacement charts follow, `reference` the method that speeds are compared with.
@@ -221,6 +220,7 @@ class Experiment:
     sets: Callable[[Any, Registered], Mapping[str, Any]] = _sets_nothing
     stated: Callable[[Recording], Mapping[str, float]] = _states_nothing
     identify: Callable[[Sequence[Recording], Any, Mapping[str, Method]], Identified] | None = None
+    calibrations: tuple[Calibration, ...] = ()
     uncertainty: Uncertainty | None = None
     twin: Twin | None = None
     cases: tuple[Case, ...] = ()
