@@ -183,8 +183,10 @@ def test_inspect_and_import(tmp_path: Path, project_root: Path, shared_data: Pat
     assert {p.name for p in tmp_path.iterdir()} == {"a.mcap"}
 
 
-def test_a_missing_data_folder_names_the_public_data_set(tmp_path: Path) -> None:
-    line = refused("run", "ecoflex_cylinder", VALIDATE_SHARED_DATA=str(tmp_path))
+def test_a_missing_data_folder_names_the_command_that_brings_it(tmp_path: Path) -> None:
+    elsewhere = {"VALIDATE_SHARED_DATA": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    line = refused("run", "ecoflex_cylinder", **elsewhere)
+    assert "`validate data get ecoflex-compression`" in line
     assert "tissue-phantom-material-database" in line
     assert "--set data=FOLDER" in line
 

@@ -1,11 +1,11 @@
 """The cylinders of Dawood et al. (2026): parameters, logs, scene and registration."""
 
-import os
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
+from validate.datasets.home import found
 from validate.errors import RecordingError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
@@ -94,21 +94,11 @@ def _limits(p: LoggedCylinder) -> tuple[float, float, float]:
 
 
 def load(parameters: LoggedCylinder, folder: Path) -> tuple[Recording, ...]:
-    where = _data_folder(parameters, folder)
+    where = found(FOLDER, None, folder, parameters.data)
     files = sorted(where.glob(parameters.logs))
     if not files:
-        raise RecordingError(
-            f"no logs '{parameters.logs}' in {where}: get {DATA_SET} and pass --set data=FOLDER "
-            "and --set logs=PATTERN, or set VALIDATE_SHARED_DATA to the folder above force/"
-        )
+        raise RecordingError(f"no logs '{parameters.logs}' in {where}; pass --set logs=PATTERN")
     return tuple(read_instron(f) for f in files)
-
-
-def _data_folder(parameters: LoggedCylinder, folder: Path) -> Path:
-    if parameters.data:
-        return Path(parameters.data)
-    shared = os.environ.get("VALIDATE_SHARED_DATA")
-    return (Path(shared) if shared else folder.parents[1] / "shared" / "data") / FOLDER
 
 
 def build(recording: Recording, parameters: LoggedCylinder, model: CylinderModel) -> Scene:

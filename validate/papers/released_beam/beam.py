@@ -4,7 +4,6 @@
 its free end. Three markers stand 6 mm off that end. What is compared is where they come to rest.
 """
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.arrays import Floats
+from validate.datasets.home import found
 from validate.errors import RecordingError, UsageError
 from validate.fem.locate import standing_rows
 from validate.parameters import Ranges, part, quantity
@@ -29,7 +29,6 @@ from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
 from validate.scene.select import Chosen, OnPlane
 
-DATA_SET = "srl-ethz/diffPD_sim2real 825e7b7 (MIT)"
 FOLDER = "markers/silicone-beam"
 G = 9.80709  # m/s2, as the data set declares it
 _STANDS = 0.012  # m: how far off the beam a marker of the layout may stand, and then some
@@ -121,21 +120,8 @@ class BeamModel:
 
 def load(parameters: ReleasedBeam, folder: Path) -> tuple[Recording, ...]:
     """The recording as two instants: before the beam is let go, and when it has come to rest."""
-    path = _file(parameters, folder)
-    if not path.is_file():
-        raise RecordingError(
-            f"no recording {path}: get {DATA_SET} and pass --set recording=FILE.c3d, or set "
-            "VALIDATE_SHARED_DATA to the folder above markers/"
-        )
+    path = found(FOLDER, "beam_gravity_V2_b.c3d", folder, parameters.recording)
     return (rest_to_rest(recognised(path).read(path, {})),)
-
-
-def _file(p: ReleasedBeam, folder: Path) -> Path:
-    if p.recording:
-        return Path(p.recording)
-    shared = os.environ.get("VALIDATE_SHARED_DATA")
-    base = Path(shared) if shared else folder.parents[1] / "shared" / "data"
-    return base / FOLDER / "beam_gravity_V2_b.c3d"
 
 
 def rest_to_rest(recording: Recording) -> Recording:

@@ -1,0 +1,119 @@
+"""Where files of data sets are looked for, and what is said where they are not."""
+
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from validate.datasets import home
+from validate.datasets.home import found, whole
+from validate.datasets.registry import DataFile, DataSet, data_sets, named
+from validate.errors import RecordingError, UsageError
+
+FOLDER, FILE = "markers/silicone-beam", "beam_gravity_V2_b.c3d"
+
+
+@pytest.fixture(autouse=True)
+def _nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv(home.SHARED, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def put(path: Path, content: bytes = b"x") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+def test_every_data_set_of_the_folder_is_registered_with_its_hashes(shared_data: Path) -> None:
+    listed = {(s.folder, f.name): f for s in data_sets() for f in s.files}
+    there = {
+        (folder.relative_to(shared_data).as_posix(), f.relative_to(folder).as_posix())
+        for folder in (shared_data / s.folder for s in data_sets())
+        for f in folder.rglob("*")
+        if f.is_file() and f.name != "SOURCE.txt"
+    }
+    assert there == listed.keys()
+    assert len({s.folder.split("/")[0] for s in data_sets()}) == len(
+        [p for p in shared_data.iterdir() if p.is_dir()]
+    )
+    broken = [at for at, f in listed.items() if not whole(shared_data.joinpath(*at), f)]
+    assert broken == []
+
+
+def test_a_set_has_all_that_is_needed_to_bring_and_to_cite_it() -> None:
+    for theirs in data_sets():
+        assert theirs.title
+        assert theirs.citation
+        assert theirs.licence
+        assert len(theirs.commit) >= 7
+        assert theirs.brought or theirs.made, theirs.name
+        assert all(f.source for f in theirs.files) or theirs.made, theirs.name
+    assert len({s.name for s in data_sets()}) == len(data_sets())
+    beam = named("silicone_beam")
+    assert beam is named("markers/silicone-beam/")
+    assert beam.address(next(f for f in beam.files if f.name == FILE)) == (
+        f"https://raw.githubusercontent.com/srl-ethz/diffPD_sim2real/{beam.commit}"
+        f"/python/realbeam_experiments/Measurement_data/{FILE}"
+    )
+    with pytest.raises(UsageError, match=r"'silicon-bean'; nearest: silicone-beam"):
+        named("silicon-bean")
+
+
+def test_what_is_absent_names_the_command(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError) as caught:
+        found(FOLDER, FILE, tmp_path / "p" / "experiments")
+    assert str(caught.value) == (
+        f"{FOLDER}/{FILE} is not here: `validate data get silicone-beam` brings it "
+        "(srl-ethz/diffPD_sim2real 825e7b7, MIT); or pass --set recording=FILE, or set "
+        "VALIDATE_SHARED_DATA to a folder that holds it"
+    )
+    with pytest.raises(RecordingError, match=r"get skin-pads`.*--set data=FOLDER"):
+        found("force/skin-pads", None, tmp_path / "p" / "experiments")
+
+
+def test_the_named_folder_goes_first_then_the_neighbour(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    experiments = tmp_path / "project" / "experiments"
+    near = put(tmp_path / "shared" / "data" / FOLDER / FILE)
+    assert found(FOLDER, FILE, experiments) == near
+    assert found(FOLDER, None, experiments) == near.parent
+    monkeypatch.setenv(home.SHARED, str(tmp_path / "elsewhere"))
+    with pytest.raises(RecordingError):
+        found(FOLDER, FILE, experiments)
+    there = put(tmp_path / "elsewhere" / FOLDER / FILE)
+    assert found(FOLDER, FILE, experiments) == there
+
+
+def test_an_empty_folder_is_none(tmp_path: Path) -> None:
+    (tmp_path / "shared" / "data" / FOLDER).mkdir(parents=True)
+    with pytest.raises(RecordingError):
+        found(FOLDER, None, tmp_path / "project" / "experiments")
+
+
+def test_the_cache_counts_only_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    rows = [(FILE, b"measured"), ("LICENSE", b"free")]
+    files = tuple(DataFile(n, n, sha256(b).hexdigest(), len(b)) for n, b in rows)
+    beam = DataSet("silicone-beam", FOLDER, "t", "a/b", "0" * 40, "MIT", "c", files)
+    monkeypatch.setattr(home, "named", lambda _: beam)
+    monkeypatch.setenv(home.SHARED, str(tmp_path / "without"))
+    path = put(home.cache_folder() / FOLDER / FILE, b"measured")
+    assert found(FOLDER, FILE, tmp_path / "p" / "experiments") == path
+    with pytest.raises(RecordingError):
+        found(FOLDER, None, tmp_path / "p" / "experiments")
+    put(path.parent / "LICENSE", b"free")
+    assert found(FOLDER, None, tmp_path / "p" / "experiments") == path.parent
+    put(path, b"Measured")
+    with pytest.raises(RecordingError):
+        found(FOLDER, FILE, tmp_path / "p" / "experiments")
+
+
+def test_a_file_of_ones_own_is_taken_or_refused(tmp_path: Path) -> None:
+    own = put(tmp_path / "own.c3d")
+    assert found(FOLDER, FILE, tmp_path, str(own)) == own
+    assert found(FOLDER, None, tmp_path, str(tmp_path)) == tmp_path
+    with pytest.raises(RecordingError, match=r"^no file .*nowhere\.c3d$"):
+        found(FOLDER, FILE, tmp_path, str(tmp_path / "nowhere.c3d"))
+    with pytest.raises(RecordingError, match=r"^no folder .*own\.c3d$"):
+        found(FOLDER, None, tmp_path, str(own))

@@ -1,0 +1,11 @@
+"""Recordings made by others: where their files are here, and how they come here."""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "registry": ("DataFile", "DataSet", "data_sets", "named"),
+    "home": ("cache_folder", "found", "searched"),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

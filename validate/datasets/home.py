@@ -1,0 +1,72 @@
+"""Where the files of a data set are here: a shared folder, the project's neighbour, the cache."""
+
+import os
+from hashlib import sha256
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from validate.datasets.registry import DataFile, named
+from validate.errors import RecordingError
+
+SHARED = "VALIDATE_SHARED_DATA"
+
+
+def found(folder: str, name: str | None, beside: Path, own: str | None = None) -> Path:
+    """A file of a data set, or its folder where `name` is None.
+
+    `folder` is the data set's, as in `markers/silicone-beam`; `beside` the folder of the experiment
+    that asks, for a shared folder that lies next to its project; `own` a path that its user gave,
+    which is taken as it is. The places are looked through in order; what lies in the cache counts
+    where its hash is the registered one. Raises `RecordingError` naming the command that brings it.
+    """
+    if own:
+        return _own(Path(own), name)
+    for place in searched(beside):
+        if _has(place, folder, name):
+            return place / folder / name if name else place / folder
+    raise RecordingError(_absent(folder, name))
+
+
+def searched(beside: Path) -> tuple[Path, ...]:
+    """The folders that may hold data sets, first the one that the environment names."""
+    shared = os.environ.get(SHARED)
+    return (Path(shared) if shared else beside.parent.parent / "shared" / "data", cache_folder())
+
+
+def cache_folder() -> Path:
+    """Where `validate data get` brings files to."""
+    return user_cache_path("validate") / "data"
+
+
+def whole(path: Path, file: DataFile) -> bool:
+    """Whether a file is there to its last byte: size and hash are the registered ones."""
+    if not path.is_file() or path.stat().st_size != file.size:
+        return False
+    return sha256(path.read_bytes()).hexdigest() == file.sha256
+
+
+def _own(path: Path, name: str | None) -> Path:
+    if not (path.is_file() if name else path.is_dir()):
+        raise RecordingError(f"no {'file' if name else 'folder'} {path}")
+    return path
+
+
+def _has(place: Path, folder: str, name: str | None) -> bool:
+    """A folder counts where it holds anything: which files of it are wanted, its user knows."""
+    if place != cache_folder():
+        path = place / folder
+        return (path / name).is_file() if name else path.is_dir() and any(path.iterdir())
+    files = [f for f in named(folder).files if name in (None, f.name)]
+    return bool(files) and all(whole(place / folder / f.name, f) for f in files)
+
+
+def _absent(folder: str, name: str | None) -> str:
+    theirs = named(folder)
+    what = f"{folder}/{name}" if name else f"{folder}/"
+    own = "--set recording=FILE" if name else "--set data=FOLDER"
+    return (
+        f"{what} is not here: `validate data get {theirs.name}` brings it ({theirs.repository} "
+        f"{theirs.commit[:7]}, {theirs.licence}); or pass {own}, or set {SHARED} to a folder that "
+        "holds it"
+    )

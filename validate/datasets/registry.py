@@ -1,0 +1,80 @@
+"""The table of data sets: addresses by commit, licences, citations, hashes. No file of theirs."""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from validate.errors import UsageError
+from validate.parameters import nearest_names
+
+RAW = "https://raw.githubusercontent.com"
+_TABLE = Path(__file__).with_name("registry.toml")
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """One file: `name` below its set's folder, `source` below its repository.
+
+    An empty source: the file was made from what lies there and cannot be brought as it is.
+    """
+
+    name: str
+    source: str
+    sha256: str
+    size: int  # bytes
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """Recordings of one origin; `made` says what its files without a source were made from."""
+
+    name: str
+    folder: str
+    title: str
+    repository: str
+    commit: str
+    licence: str
+    citation: str
+    files: tuple[DataFile, ...]
+    made: str = ""
+
+    @property
+    def page(self) -> str:
+        """Where people look at it."""
+        return f"https://github.com/{self.repository}/tree/{self.commit}"
+
+    @property
+    def brought(self) -> tuple[DataFile, ...]:
+        """The files that are brought as they are."""
+        return tuple(file for file in self.files if file.source)
+
+    @property
+    def size(self) -> int:
+        """Bytes of all files."""
+        return sum(file.size for file in self.files)
+
+    def address(self, file: DataFile, base: str = RAW) -> str:
+        """Of a file at its commit."""
+        return f"{base}/{self.repository}/{self.commit}/{file.source}"
+
+
+@cache
+def data_sets() -> tuple[DataSet, ...]:
+    """All that are registered, as the table lists them."""
+    return tuple(_data_set(entry) for entry in tomllib.loads(_TABLE.read_text("utf-8"))["set"])
+
+
+def _data_set(entry: dict[str, Any]) -> DataSet:
+    return DataSet(**entry | {"files": tuple(DataFile(*row) for row in entry["files"])})
+
+
+def named(name: str) -> DataSet:
+    """The data set of that name or folder; `UsageError` naming the nearest where there is none."""
+    plain = name.strip("/").replace("_", "-")
+    for found in data_sets():
+        if plain in (found.name, found.folder):
+            return found
+    known = {found.name for found in data_sets()}
+    raise UsageError(f"unknown data set '{name}'; {nearest_names(plain, known)}")
