@@ -9,6 +9,7 @@ from validate.fem.laws import law_of
 from validate.fem.stretch_response import response
 from validate.scene.material import LawName, Material
 from validate.scene.material_point import MaterialPoint, StretchMode
+from validate.scene.rubber import mooney_rivlin
 
 E, NU = 12_000.0, 0.4
 STRETCHES = np.array([0.6, 0.8, 1.0, 1.2, 1.5])
@@ -92,3 +93,35 @@ def test_states_that_a_law_does_not_have_are_refused() -> None:
         response(point("uniaxial", "svk"), np.array([1.1, 2.0]))
     with pytest.raises(SceneError, match="stretches: 1 of 1 values not finite"):
         response(point("uniaxial", "svk"), np.array([np.nan]))
+
+
+def test_two_stretches_have_the_incompressible_stresses() -> None:
+    """P1 = 2 (l1 - l3^2/l1) (C10 + C01 l2^2), P2 with the indices changed, l3 = 1/(l1 l2)."""
+    pairs = np.array([[1.1, 1.0], [1.6, 1.18], [2.2, 0.82], [0.8, 1.3]])
+    (l1, l2), C10, C01 = pairs.T, 12e3, 3e3
+    found = response(MaterialPoint(mooney_rivlin(C10, C01, 0.499999), "biaxial"), pairs)
+    free = 1 / (l1 * l2)
+    first = 2 * (l1 - free**2 / l1) * (C10 + C01 * l2**2)
+    second = 2 * (l2 - free**2 / l2) * (C10 + C01 * l1**2)
+    assert found["nominal_stress"] == pytest.approx(first, rel=1e-4)
+    assert found["second_stress"] == pytest.approx(second, rel=1e-4, abs=2.0)
+    assert found["free_stretch"] == pytest.approx(free, rel=1e-5)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_every_mode_is_a_pair_of_stretches(mode: StretchMode) -> None:
+    """The second stretch of the mode given as an input: the same stresses."""
+    material = sample("yeoh", E, NU)
+    one = response(MaterialPoint(material, mode), STRETCHES)
+    beside = {"uniaxial": one["free_stretch"], "equibiaxial": STRETCHES}
+    second = beside.get(mode, np.ones(len(STRETCHES)))
+    both = response(MaterialPoint(material, "biaxial"), np.stack([STRETCHES, second], axis=1))
+    for name in one:
+        assert both[name] == pytest.approx(one[name], rel=1e-9, abs=1e-9 * E)
+
+
+def test_each_input_has_its_stretch() -> None:
+    two = point("biaxial", "neo_hooke")
+    assert two.inputs == ("stretch", "second")
+    with pytest.raises(SceneError, match=r"stretches: .*\(3, 1\)"):
+        response(two, np.array([1.0, 1.1, 1.2]))

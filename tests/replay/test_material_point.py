@@ -141,3 +141,27 @@ def test_a_scheme_of_meshes_is_refused_on_a_point() -> None:
     methods = {"neo": Method("linear", NoFluid())}
     with pytest.raises(SceneError, match="mesh"):
         compare(replace(POINT, methods=methods), Options({}))
+
+
+def test_every_recording_of_one_material_has_its_own_mode() -> None:
+    """P = mu (l - l^-2), mu (l - l^-5): the second recording is judged in its own mode."""
+    t, powers = np.arange(len(STRETCH), dtype=float), {"uniaxial": -2, "equibiaxial": -5}
+    curves = {mode: MU * (STRETCH - STRETCH**power) for mode, power in powers.items()}
+    recordings = tuple(replace(held(y, t, STRETCH), name=mode) for mode, y in curves.items())
+
+    def mode_of(recording: Recording, card: Rubber, model: None) -> MaterialPoint:
+        return MaterialPoint(Material(2 * card.mu * (1 + NU), NU, "neo_hooke"), recording.name)  # type: ignore[arg-type]
+
+    def by_mode(recording: Recording, card: Rubber, scene: MaterialPoint) -> Registered:
+        assert scene.mode == recording.name
+        stress = validating(recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress")
+        return Registered((driving(recording, "stretch", "1"), stress))
+
+    accept = tuple(Accept(mode, 9e3, "a tenth of the stress") for mode in powers)
+    both = replace(
+        POINT, load=lambda card, folder: recordings, build=mode_of, place=by_mode, accept=accept
+    )
+    checks = compare(both, Options({})).checks
+    assert [(c.name, c.verdict) for c in checks] == [
+        ("uniaxial.rms@all", "agrees"), ("equibiaxial.rms@all", "agrees"),
+    ]  # fmt: skip

@@ -7,10 +7,13 @@ from law_samples import NAMES, sample
 from validate.errors import SceneError
 from validate.fem.stretch_response import response
 from validate.parameters import describe, with_values
+from validate.scene.box import box
 from validate.scene.laws import LAWS, Coefficients
 from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint
 from validate.scene.rubber import mooney_rivlin, ogden, yeoh
+from validate.scene.scene import Scene
+from validate.scene.stability import lost_stability
 
 
 def test_coefficients_that_the_law_would_not_use_are_refused() -> None:
@@ -94,3 +97,17 @@ def test_coefficients_are_reached_by_the_paths_of_the_material() -> None:
     }  # fmt: skip
     known = {name for kind in LAWS for name in kind.coefficients}
     assert known <= set(units)
+
+
+def test_a_fit_may_pass_through_unstable_coefficients_and_a_body_may_not() -> None:
+    """C10 1200, C01 -200 Pa: equal pulls lose their stiffness at (200/1200)^(1/4)."""
+    c = Coefficients(C01=-200.0, stability="open")
+    card = Material(2 * 1000 * 2 * 1.45, 0.45, "mooney_rivlin", coefficients=c)
+    lost = lost_stability(card.law, c, card.shear_modulus)
+    assert lost is not None
+    assert (lost.mode, lost.stretch) == ("equibiaxial", pytest.approx(6**-0.25, rel=2e-3))
+    assert lost_stability("yeoh", Coefficients(C20=10.0), 1000.0) is None
+    pulled = response(MaterialPoint(card, "uniaxial"), np.array([1.0, 2.0]))["nominal_stress"]
+    assert pulled[1] > 0
+    with pytest.raises(SceneError, match="loses positive energy at stretch"):
+        Scene(box((0.02, 0.02, 0.02), (1, 1, 1)), card)

@@ -75,3 +75,11 @@ def test_every_solver_of_whole_scenes_is_in_the_tuple(project_root: Path) -> Non
                 found[node.name] = names
     written = {name for name, has in found.items() if {"solve", "handles"} <= has}
     assert written == {solver.__name__ for solver in SOLVERS}
+
+
+def test_two_stretches_are_two_inputs() -> None:
+    both = MaterialPoint(Material(3e4, 0.45, "neo_hooke"), "biaxial")
+    pairs = np.hstack([STRETCHES, np.linspace(1.0, 1.2, 10)[:, None]])
+    run = run_scheme("m", StretchTest(), both, T, pairs, np.array([9]))
+    assert run.traces["second"].y.tolist() == pairs[:, 1].tolist()
+    assert np.array_equal(run.traces["second_stress"].y, response(both, pairs)["second_stress"])

@@ -19,30 +19,33 @@ from validate.scene.material_point import MaterialPoint, StretchMode
 _ITERATIONS = 50
 _SETTLED = 1e-14  # of the free stretch; Newton squares its error, so that one more step is rounding
 _COLLAPSED = 1e-6  # a free stretch on its way to none
-_TWO, _THREE = np.diag([0.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
-# What the stretch and the free stretch move of H.
-_MOVES: Mapping[StretchMode, tuple[Floats, Floats]] = {
-    "uniaxial": (np.diag([1.0, 0.0, 0.0]), _TWO + _THREE),
-    "equibiaxial": (np.diag([1.0, 1.0, 0.0]), _THREE),
-    "pure_shear": (np.diag([1.0, 0.0, 0.0]), _THREE),
+_ONE, _TWO, _THREE = (np.diag(row) for row in np.eye(3))
+# What each stretch that is given, and the free stretch, move of H.
+_MOVES: Mapping[StretchMode, tuple[tuple[Floats, ...], Floats]] = {
+    "uniaxial": ((_ONE,), _TWO + _THREE),
+    "equibiaxial": ((_ONE + _TWO,), _THREE),
+    "pure_shear": ((_ONE,), _THREE),
+    "biaxial": ((_ONE, _TWO), _THREE),
 }
 
 
 def response(point: MaterialPoint, stretches: Floats, t: Floats | None = None) -> dict[str, Floats]:
-    """What the point answers to stretches (nt,): each (nt,), by name.
+    """What the point answers to stretches (nt,), or (nt, k) of its k inputs: each (nt,), by name.
 
     With a Prony series the stress depends on the times t (nt,) s, and without them is the limit
     that its `statics` says. Before the first one the point was at rest, the first stretch is a
     jump; between times the isochoric stress is linear, so that a course wants times as fine as the
     shortest relaxation that matters.
 
-    "nominal_stress" Pa, force over the area at rest, tension positive; "free_stretch" -, of the
-    third direction; "volume_ratio" -. Raises `SceneError` for a law without large strain, a stretch
-    below the law's least, and where no free stretch is without stress (St. Venant-Kirchhoff pulled
-    far).
+    "nominal_stress" Pa, force over the area at rest, tension positive; "second_stress" Pa, that of
+    the second direction; "free_stretch" -, of the third; "volume_ratio" -. Raises `SceneError` for
+    a law without large strain, a stretch below the law's least, and where no free stretch is
+    without stress (St. Venant-Kirchhoff pulled far).
     """
     law = law_of(instant(point.material))
-    stretch = checked(stretches, "stretches", (None,), error=SceneError)
+    moves, free = _MOVES[point.mode]
+    each = np.asarray(stretches).reshape(len(stretches), -1)
+    stretch = checked(each, "stretches", (None, len(moves)), error=SceneError)
     for value in (stretch.min(), stretch.max()) if len(stretch) else ():
         if not law.least_stretch < value <= law.most_stretch:
             ends = f"above {law.least_stretch:.4g}"
@@ -50,16 +53,19 @@ def response(point: MaterialPoint, stretches: Floats, t: Floats | None = None) -
             raise SceneError(
                 f"stretch {value:.4g}: the law '{point.material.law}' has sense {ends}"
             )
-    drive, free = _MOVES[point.mode]
-    driven = (stretch - 1)[:, None, None] * drive
+    driven = np.einsum("nk,kiJ->niJ", stretch - 1, np.stack(moves))
     guess = _first_guess(point, stretch)
     if t is not None and point.material.prony.g:
         h, stress = _relaxing(point.material, driven, free, guess, t)
     else:
         h = _free_strain(law, driven, free, guess)
         stress = law.stress(driven + h[:, None, None] * free)
-    H, stress = driven + h[:, None, None] * free, np.asarray(stress[:, 0, 0])
-    return {"nominal_stress": stress, "free_stretch": 1 + h, "volume_ratio": 1 + volume_change(H)}
+    ratio = 1 + volume_change(driven + h[:, None, None] * free)
+    first, second = (np.asarray(stress[:, i, i]) for i in range(2))
+    return {
+        "nominal_stress": first, "second_stress": second, "free_stretch": 1 + h,
+        "volume_ratio": ratio,
+    }  # fmt: skip
 
 
 def _relaxing(
@@ -81,8 +87,9 @@ def _relaxing(
 def _first_guess(point: MaterialPoint, stretch: Floats) -> Floats:
     """h of logarithmic strains that are as in small strain."""
     nu = point.material.nu
-    ratio = {"uniaxial": nu, "equibiaxial": 2 * nu / (1 - nu), "pure_shear": nu / (1 - nu)}
-    return np.expm1(-ratio[point.mode] * np.log(stretch))
+    each = nu / (1 - nu)
+    ratio = {"uniaxial": nu, "equibiaxial": 2 * each, "pure_shear": each, "biaxial": each}
+    return np.asarray(np.expm1(-ratio[point.mode] * np.log(stretch).sum(axis=1)))
 
 
 def _free_strain(law: Law, driven: Floats, free: Floats, h: Floats) -> Floats:

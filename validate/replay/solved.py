@@ -36,13 +36,26 @@ def solve(
     """
     start = perf_counter()
     tell("mesh")
-    scene = experiment.build(recordings[0], parameters, method.scene)
-    built = perf_counter() - start
-    seen = tuple(experiment.place(r, parameters, scene) for r in recordings)
+    scenes = _scenes(experiment, recordings, method, parameters)
+    built, scene = perf_counter() - start, scenes[0]
+    pairs = zip(recordings, scenes, strict=True)
+    seen = tuple(experiment.place(r, parameters, s) for r, s in pairs)
     runs = _Runs(experiment, name, method, parameters, scene, built, tell)
-    done = tuple(runs.on(r) for r in seen)
+    done = tuple(runs.on(*pair) for pair in zip(seen, scenes, strict=True))
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
     return Followed(name, _label(method, scene), case, scene, seen, done, stacked(found))
+
+
+def _scenes(
+    experiment: Experiment, recordings: tuple[Recording, ...], method: Method, parameters: Any
+) -> tuple[AnyScene, ...]:
+    """One scene for all recordings; a material point of its own for each, since every test of one
+    material may be in another mode."""
+    first = experiment.build(recordings[0], parameters, method.scene)
+    if not isinstance(first, MaterialPoint):
+        return (first,) * len(recordings)
+    others = (experiment.build(r, parameters, method.scene) for r in recordings[1:])
+    return (first, *others)
 
 
 class _Runs:
@@ -64,11 +77,11 @@ class _Runs:
         unknowns = f"{scene.mesh.nodes.size} unknowns"
         self._tell: Tell = lambda what: tell(f"{unknowns}, {what}")
         self._experiment, self._name, self._method = experiment, name, method
-        self._parameters, self._scene, self._built = parameters, scene, built
+        self._parameters, self._built = parameters, built
         self._system: System | None = None
         self._prepared: tuple[Stepper, float] | None = None
 
-    def on(self, seen: Registered) -> Run:
+    def on(self, seen: Registered, scene: AnyScene) -> Run:
         """The run through the recorded inputs, as many of them as the method takes."""
         method = self._method
         every = slice(method.stride - 1, None, method.stride)
@@ -78,10 +91,10 @@ class _Runs:
         at = seen.frames(t, self._experiment.frames)
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
-        if isinstance(method.settings, SceneSolver) or isinstance(self._scene, MaterialPoint):
+        if isinstance(method.settings, SceneSolver) or isinstance(scene, MaterialPoint):
             settings = method.given(given)
-            return run_scheme(self._name, settings, self._scene, t, inputs, at, self._tell)
-        stepper, setup = self._stepper(self._scene, seen, given)
+            return run_scheme(self._name, settings, scene, t, inputs, at, self._tell)
+        stepper, setup = self._stepper(scene, seen, given)
         return march(self._name, stepper, t, inputs, at, setup, self._tell)
 
     def _stepper(

@@ -15,6 +15,7 @@ from validate.errors import SceneError
 from validate.parameters import quantity
 
 VolumetricName = Literal["split", "coupled"]
+StabilityRule = Literal["required", "open"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Coefficients:
 
     `ogden_mu` are those of the terms after the first. `volumetric` "split" is an isochoric part of
     J^(-1/3) F and kappa/4 (J^2 - 1 - 2 ln J), "coupled" the whole of F, - mu ln J and ln^2 J.
+    An "open" `stability` is for fits, which must be able to pass through unstable coefficients
+    (`scene.stability.lost_stability` says which): a simulation requires it.
     """
 
     C01: float = quantity(0.0, "Pa", "Mooney-Rivlin: of I2 - 3")
@@ -56,6 +59,9 @@ class Coefficients:
     volumetric: VolumetricName = quantity("split", "1", "volumetric form: split, or coupled (ln J)")
     stretches: tuple[float, ...] = quantity(
         (0.2, 5.0), "1", "principal stretches between which the law is checked and used"
+    )
+    stability: StabilityRule = quantity(
+        "required", "1", "open: a law that loses positive energy there is made all the same"
     )
 
     def __post_init__(self) -> None:
@@ -78,7 +84,7 @@ class Coefficients:
     def known_to(self, law: str) -> "Coefficients":
         """Those that this law knows, the others as at default."""
         kind = law_kind(law)
-        keep = (*kind.coefficients, *(("stretches",) if kind.ranged else ()))
+        keep = (*kind.coefficients, *(("stretches", "stability") if kind.ranged else ()))
         known = {name: getattr(self, name) for name in keep}
         if self.volumetric in kind.volumetric:
             known["volumetric"] = self.volumetric

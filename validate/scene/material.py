@@ -56,6 +56,11 @@ class Material:
                 f"law '{self.law}' ({form}) has no isochoric part that could relax: drop the Prony "
                 "series, or take neo_hooke, mooney_rivlin, yeoh or ogden with volumetric 'split'"
             )
+        if self.coefficients.stability == "required":
+            self.require_stable()
+
+    def require_stable(self) -> None:
+        """Raises `SceneError` for coefficients that lose positive energy, with the stretch."""
         if law_kind(self.law).ranged:
             require_stable(self.law, self.coefficients, self.shear_modulus, self.bulk_modulus)
 

@@ -9,15 +9,16 @@ from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Cavity, Drive, Load, Probe, Scene, Support, Weight
 
-StretchMode = Literal["uniaxial", "equibiaxial", "pure_shear"]
+StretchMode = Literal["uniaxial", "equibiaxial", "pure_shear", "biaxial"]
 
 
 @dataclass(frozen=True)
 class MaterialPoint:
-    """A point whose one input is the stretch (1 at rest); the third direction is free of stress.
+    """A point whose input is the stretch (1 at rest); the third direction is free of stress.
 
     "uniaxial": the second direction is free as well; "equibiaxial": it has the same stretch;
-    "pure_shear" (planar tension): it keeps its length.
+    "pure_shear" (planar tension): it keeps its length; "biaxial": its stretch is an input of its
+    own.
     """
 
     material: Material
@@ -30,7 +31,7 @@ class MaterialPoint:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what a step is given: as `Scene.inputs`."""
-        return ("stretch",)
+        return ("stretch", "second") if self.mode == "biaxial" else ("stretch",)
 
     # What a report, a score or a probe asks of any scene: a point has none of it.
 

@@ -213,6 +213,8 @@ class Scene:
                     f"region '{region.name}' has law '{region.material.law}', the body "
                     f"'{self.material.law}': take linear laws alone, or none"
                 )
+        for material in self.materials:
+            material.require_stable()
         if self.copies < 1:
             raise SceneError(f"{self.copies} copies of the mesh: at least 1")
         self._check_places()

@@ -6,6 +6,8 @@ planar stretch. From the state of rest on, that makes the energy positive, the s
 stretch and the larger stress go with the larger stretch (Baker & Ericksen 1954).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from validate.arrays import Floats
@@ -17,12 +19,21 @@ _POINTS = 801  # in the logarithm of the stretch, to either side
 _MODES = {"uniaxial": (1.0, -0.5), "equibiaxial": (1.0, 1.0), "planar": (1.0, 0.0)}
 
 
-def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
-    """Raises `SceneError` at the stretch nearest to 1 where stiffness is lost, and says in which
-    stretch; mu, kappa Pa."""
+@dataclass(frozen=True)
+class Lost:
+    """Where a law loses positive energy: the stretch nearest to 1, in which mode, and the stiffness
+    Pa there."""
+
+    stretch: float
+    mode: str
+    stiffness: float
+
+
+def lost_stability(law: str, c: Coefficients, mu: float) -> Lost | None:
+    """Where stiffness is lost between the coefficients' `stretches`; None: nowhere. mu Pa."""
     low, high = (np.log(s) for s in c.stretches)
     logs = np.concatenate([np.linspace(0, end, _POINTS) for end in (low, high)])
-    lost: list[tuple[float, str, float]] = []
+    lost = []
     for mode, (first, second) in _MODES.items():
         strains = np.multiply.outer([first, second, -first - second], logs)
         inside = ((strains >= low - 1e-12) & (strains <= high + 1e-12)).all(axis=0)
@@ -30,13 +41,19 @@ def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
         bad = np.flatnonzero(inside & ~(stiffness > 0))
         if len(bad):
             worst = bad[np.argmin(np.abs(logs[bad]))]
-            lost.append((float(logs[worst]), mode, float(stiffness[worst])))
+            lost.append(Lost(float(np.exp(logs[worst])), mode, float(stiffness[worst])))
+    return min(lost, key=lambda one: abs(np.log(one.stretch)), default=None)
+
+
+def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
+    """Raises `SceneError` at the stretch nearest to 1 where stiffness is lost, and says in which
+    stretch; mu, kappa Pa."""
+    lost = lost_stability(law, c, mu)
     if lost:
-        log, mode, value = min(lost, key=lambda one: abs(one[0]))
         raise SceneError(
             f"law '{law}' with {_words(law, c, mu)} loses positive energy at stretch "
-            f"{np.exp(log):.4g} ({mode}): stiffness {value:.3g} Pa there; take other coefficients, "
-            "or say with `stretches` between which ones it is used"
+            f"{lost.stretch:.4g} ({lost.mode}): stiffness {lost.stiffness:.3g} Pa there; take "
+            "other coefficients, or say with `stretches` between which ones it is used"
         )
     if c.volumetric == "coupled":
         _require_stiff_volume(law, c, mu, kappa)

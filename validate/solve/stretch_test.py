@@ -12,7 +12,9 @@ from validate.scene.material_point import MaterialPoint
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Outcome, Run, Trace
 
-_UNITS = {"nominal_stress": "Pa", "free_stretch": "1", "volume_ratio": "1"}
+_UNITS = {
+    "nominal_stress": "Pa", "second_stress": "Pa", "free_stretch": "1", "volume_ratio": "1",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -24,19 +26,19 @@ class StretchTest:
     )
 
     def solve(self, scene: MaterialPoint, t: Floats, inputs: Floats) -> Run:
-        """Under stretches (nt, 1) at t (nt,) s, at rest until then; refused, with the reason, where
-        one of them has no stress.
+        """Under stretches (nt, 1), biaxial (nt, 2), at t (nt,) s, at rest until then; refused, with
+        the reason, where one of them has no stress.
 
         Raises `SceneError` for a scene that is no material point, and the linear law.
         """
         require_handled(scene, self)
-        stretch = inputs[:, 0]
         try:
-            found, outcome = response(scene, stretch, t), Outcome("finished", len(t))
+            found, outcome = response(scene, inputs, t), Outcome("finished", len(t))
         except SceneError as none:
-            t, stretch, outcome = t[:0], stretch[:0], Outcome("refused", 0, str(none))
-            found = dict.fromkeys(_UNITS, stretch)
+            t, inputs, outcome = t[:0], inputs[:0], Outcome("refused", 0, str(none))
+            found = dict.fromkeys(_UNITS, t)
         traces = {name: Trace(y, _UNITS[name]) for name, y in found.items()}
-        traces[scene.inputs[0]] = Trace(stretch, "1")
+        given = zip(scene.inputs, inputs.T, strict=True)
+        traces |= {name: Trace(stretch, "1") for name, stretch in given}
         traces["updates"] = Trace(np.zeros(len(t)), "1")
         return Run("", t, np.arange(len(t)), np.zeros((len(t), 0, 3)), traces, outcome, 0.0, None)
