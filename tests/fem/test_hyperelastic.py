@@ -216,9 +216,6 @@ def test_what_has_no_large_strain_form_is_refused() -> None:
     membrane = Membrane("cavity", 1e-4, Material(1e6, 0.45))
     with pytest.raises(SceneError, match="membranes are linear only"):
         Body(replace(scene, membranes=(membrane,)))
-    flat = Mesh(np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]), "tri3")
-    with pytest.raises(SceneError, match="kind tri3 have no hyperelastic form"):
-        Body(Scene(flat, Material(1.0, 0.3, "svk")))
     tet = Mesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1, 3]]), "tet4")
     with pytest.raises(SceneError, match="1 of 1 elements inverted"):
         Body(Scene(tet, Material(1.0, 0.3, "svk")))

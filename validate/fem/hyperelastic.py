@@ -10,6 +10,9 @@ p' = U'(theta(u)) + U''(theta(u)) dtheta (`extrapolated`): the pressure that a s
 at its end, kappa d^2 too large, then stiffens or softens nothing (Magisano, Leonetti & Garcea 2017
 for stresses at points). At a solution both are one.
 
+In two dimensions H is completed: by nothing in plane strain, in plane stress by the stretch that
+leaves no stress across (`fem.plane_laws`). Forces are those of the scene's thickness.
+
 Departures: four points per quadratic tetrahedron (degree 2) integrate the stiffness at rest
 exactly; at large strain they are what the order of convergence needs, not exact. Foundations act as
 linear springs at any displacement; membranes are known at small strain only and are refused.
@@ -29,14 +32,15 @@ from validate.fem.laws import Law, parts_of
 from validate.fem.mean_dilatation import projections
 from validate.fem.nodal_mean import NodalMean
 from validate.fem.pattern import NodePattern
+from validate.fem.plane_laws import PlaneStress
 from validate.fem.surface import foundation_stiffness
 from validate.fem.tensors import green_strain, volume_change
 from validate.fem.viscous import Branches, Lagged, Remembered, second_stress
+from validate.scene.material import Material
 from validate.scene.mesh import require_positive_cells
 from validate.scene.scene import Scene
 
 _BLOCK = 2048  # cells at a time: bounds the memory of the kernel's temporaries
-_KINDS = ("tet4", "tet10", "hex8", "hex27")
 
 
 @dataclass(frozen=True)
@@ -61,21 +65,21 @@ class _Block:
 class Body:
     """A scene's mesh and laws, prepared once; displacements u (N,) m, node-major.
 
-    Raises `SceneError` for other elements than tetrahedra and hexahedra, inverted cells, a linear
-    law, a membrane.
+    Raises `SceneError` for inverted cells, a linear law, a membrane, and a Prony series in 2-D.
     """
 
     def __init__(self, scene: Scene) -> None:
         mesh = scene.mesh
-        if mesh.kind not in _KINDS:
-            raise SceneError(f"elements of kind {mesh.kind} have no hyperelastic form; use tet4")
         if scene.membranes:
             raise SceneError("membranes are linear only: drop them, or take the linear law")
+        if mesh.dimension == 2 and any(m.prony.g for m in scene.materials):
+            raise SceneError("a Prony series is for bodies in 3-D: drop it, or take a 3-D mesh")
         require_positive_cells(mesh)
         self.mesh = mesh
         self.parts = tuple(_parts(scene))
         points = stiffness_points(mesh)
-        self.gradients, self.weights = points.slopes, points.weights
+        self.gradients = np.pad(points.slopes, [(0, 0)] * 3 + [(0, 3 - mesh.dimension)])
+        self.weights = scene.thickness * points.weights
         self.projections = None
         if scene.dilatation == "mixed":
             self.projections = projections(mesh, points.places, points.weights)
@@ -85,7 +89,7 @@ class Body:
         self.lag: tuple[Floats, Floats] | None = None
         springs = [foundation_stiffness(mesh, f) for f in scene.foundations]
         self.springs: sparse.csr_array | None = sum(springs[1:], springs[0]) if springs else None
-        self.pattern = NodePattern(mesh.cells, len(mesh.nodes))
+        self.pattern = NodePattern(mesh.cells, len(mesh.nodes), mesh.dimension)
         moduli = scene.per_cell(lambda m: m.bulk_modulus + m.shear_modulus)
         spread = np.linalg.norm(self.gradients, axis=-1) * self.weights[..., None]
         spread *= moduli[:, None, None]
@@ -132,7 +136,8 @@ class Body:
             P = b.law.stress(b.H) + p[..., None, None] * slope
             weighted = np.swapaxes(self.weights[b.cells][..., None, None] * P, -1, -2)
             nodal[b.cells] = (self.gradients[b.cells] @ weighted).sum(axis=1)
-        force = np.stack([self._nodal(nodal[..., i]) for i in range(3)], axis=1).ravel()
+        components = [self._nodal(nodal[..., i]) for i in range(self.mesh.dimension)]
+        force = np.stack(components, axis=1).ravel()
         return force if self.springs is None else force + self.springs @ u
 
     def tangent(self, u: Floats, pressures: Floats | None = None) -> sparse.csr_array:
@@ -245,12 +250,14 @@ class Body:
 
     def _blocks(self, u: Floats) -> Iterator[_Block]:
         """The cells, material by material, block by block."""
-        nodal = u.reshape(-1, 3)
+        d = self.mesh.dimension
+        nodal = np.pad(u.reshape(-1, d), [(0, 0), (0, 3 - d)])
         for part, law, kappa in self.parts:
             local = np.swapaxes(nodal[self.mesh.cells[part]], 1, 2)
             if self.lag is not None:
                 law = Lagged(law, self.lag[0][part], self.lag[1][part])
-            yield _Block(part, law, kappa, local[:, None] @ self.gradients[part])
+            H = local[:, None] @ self.gradients[part]
+            yield _Block(part, law, kappa, law.completed(H) if isinstance(law, PlaneStress) else H)
 
     def _cell_gradient(self, u: Floats) -> Floats:
         """H (e, 3, 3) of linear cells."""
@@ -264,10 +271,9 @@ class Body:
 
 def _parts(scene: Scene) -> Iterator[tuple[slice | Ints, Law, float]]:
     """Cells by material, in blocks; a body of one material is cut in slices, which copy nothing."""
-    averaged = scene.dilatation != "pointwise"
     if not scene.regions:
         for start in range(0, len(scene.mesh.cells), _BLOCK):
-            yield slice(start, start + _BLOCK), *parts_of(scene.material, averaged=averaged)
+            yield slice(start, start + _BLOCK), *_law(scene, scene.material)
         return
     own = np.zeros(len(scene.mesh.cells), dtype=np.int64)
     for i, region in enumerate(scene.regions, start=1):
@@ -275,4 +281,10 @@ def _parts(scene: Scene) -> Iterator[tuple[slice | Ints, Law, float]]:
     for i, material in enumerate((scene.material, *(r.material for r in scene.regions))):
         cells = np.flatnonzero(own == i)
         for start in range(0, len(cells), _BLOCK):
-            yield cells[start : start + _BLOCK], *parts_of(material, averaged=averaged)
+            yield cells[start : start + _BLOCK], *_law(scene, material)
+
+
+def _law(scene: Scene, material: Material) -> tuple[Law, float]:
+    """The isochoric law and kappa Pa; in plane stress both as one, with no volumetric part left."""
+    law, kappa = parts_of(material, averaged=scene.dilatation != "pointwise")
+    return (PlaneStress(law, kappa), 0.0) if scene.plane == "stress" else (law, kappa)

@@ -90,7 +90,7 @@ class Equilibrium:
     ) -> Balance:
         """The forces at u, P and the inputs, with volumes asked for as ratios `target` (c,)."""
         cavities = self.system.cavities
-        x = self.system.scene.mesh.nodes + u.reshape(-1, 3)
+        x = self._places(u)
         ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
         loads = np.array([pressure_load(c, x).ravel() for c in cavities]).reshape(-1, len(u))
         inner = self.body.force(u)
@@ -122,11 +122,16 @@ class Equilibrium:
 
     def _matrix(self, at: Balance) -> sparse.csr_array:
         A = self.body.tangent(at.u, at.stresses)
-        x = self.system.scene.mesh.nodes + at.u.reshape(-1, 3)
+        x = self._places(at.u)
         for P, cavity in zip(at.pressures, self.system.cavities, strict=True):
             if P:
                 A = sparse.csr_array(A - P * volume_hessian(cavity, x))
         return A
+
+    def _places(self, u: Floats) -> Floats:
+        """Nodes (n, d) m of the deformed mesh."""
+        nodes = self.system.scene.mesh.nodes
+        return np.asarray(nodes + u.reshape(nodes.shape))
 
     def _solved(self, factor: Factor, rows: Floats) -> Floats:
         """Fields (k, N) of the right-hand sides (k, N), zero where held."""
@@ -163,6 +168,6 @@ def equilibrium(system: System, constrained: bool) -> Equilibrium:
     require_held(system.scene, system.held)
     body = Body(system.scene)
     K = system.K[free][:, free]
-    order = elimination_order(sparse.csr_array(K), free // 3, mesh.nodes)
+    order = elimination_order(sparse.csr_array(K), free // mesh.dimension, mesh.nodes)
     volumes = np.array([volume_of(c, mesh.nodes) for c in system.cavities])
     return Equilibrium(body, system, constrained, volumes, order)

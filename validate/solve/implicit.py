@@ -68,7 +68,7 @@ class NewtonDynamics:
             M, C = system.M, system.C
         body, free = Body(relaxed(scene)), system.free
         K = body.tangent(np.zeros(N))[free][:, free]
-        order = elimination_order(K, free // 3, scene.mesh.nodes)
+        order = elimination_order(K, free // scene.mesh.dimension, scene.mesh.nodes)
         return ImplicitStepper(self, system, body, M, C, order, cell_branches(scene))
 
 
@@ -236,6 +236,6 @@ class ImplicitStepper:
         return numbers | {"energy.kinetic": float(v @ (self.M @ v)) / 2}
 
     def field(self, state: State) -> Floats:
-        """Displacements (n, 3) m of all nodes."""
+        """Displacements (n, d) m of all nodes."""
         u: Floats = state.inner.u
-        return u.reshape(-1, 3)
+        return u.reshape(self.scene.mesh.nodes.shape)

@@ -289,9 +289,9 @@ class NewtonStepper:
         return State(k, Loaded(at.u, at.pressures, at.inputs), failure, found.iterations, named)
 
     def field(self, state: State) -> Floats:
-        """Displacements (n, 3) m of all nodes."""
+        """Displacements (n, d) m of all nodes."""
         u: Floats = state.inner.u
-        return u.reshape(-1, 3)
+        return u.reshape(self.scene.mesh.nodes.shape)
 
 
 def _added(before: Found, found: Found) -> Found:
