@@ -20,7 +20,8 @@ from validate.papers.fluid_inclusion.phantom import PhantomModel as Model
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified, Twin
 from validate.replay.method import Method
-from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.fluid import ExactPressure, NoFluid
+from validate.solve.pressure_loop import PressureLoop
 
 PARAMETERS = Phantom()
 MEAN_DILATATION = Model(dilatation="nodal_mean")

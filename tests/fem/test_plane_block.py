@@ -10,7 +10,7 @@ from validate.papers.fluid_inclusion.square import square_with_hole
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Cavity, Drive, Scene, Support
-from validate.solve.fluid import pressure_at_volume, tuned_gain
+from validate.solve.pressure_curve import pressure_at_volume, tuned_gain
 
 
 def block(n: int, order: int = 1) -> Responses:

@@ -14,8 +14,9 @@ from validate.scene.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve import march as march_module
-from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.march import march, run_scheme
+from validate.solve.pressure_loop import PressureLoop
 from validate.solve.types import Run, State, Stepper, Trace
 
 STEPS = 60

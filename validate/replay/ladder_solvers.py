@@ -7,11 +7,12 @@ from validate.replay.ladder import LawPair, Rival
 from validate.scene.material import LawName
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
+from validate.solve.pressure_loop import PressureLoop
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme

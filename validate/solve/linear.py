@@ -62,7 +62,7 @@ class LinearStepper:
             ratios = self.ratios(z)
         moved, plates = self.rows @ z[1:], len(self.rows) - drives
         found = (*moved[plates:].tolist(), *z[drives + 1 :].tolist(), *ratios.tolist())
-        numbers = dict(zip(self.units, found, strict=True))
+        numbers = dict(zip(self.units, found, strict=False))  # a stepper may add its own
         return State(k, Superposed(z[1:], moved[:plates]), failure, updates, numbers)
 
     def ratios(self, z: Floats) -> Floats:

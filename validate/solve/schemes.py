@@ -5,13 +5,15 @@ from collections.abc import Callable
 from validate.solve.central import CentralDifference
 from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.fluid import ExactPressure, NoFluid, PressureLoop
+from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.handles import Handles
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
+from validate.solve.pressure_loop import PressureLoop
 from validate.solve.propagated import Propagated
+from validate.solve.pulse import PulsePressure
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
@@ -21,6 +23,8 @@ SCHEMES: tuple[type[Scheme], ...] = (
     NoFluid,
     ExactPressure,
     PressureLoop,
+    ElasticPressure,
+    PulsePressure,
     StaticNewton,
     Tabulated,
     QuasiStatic,

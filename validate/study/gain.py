@@ -17,7 +17,9 @@ from validate.fem.system import Responses, build, responses
 from validate.replay.experiment import Experiment
 from validate.replay.options import Report
 from validate.replay.own_body import own_body, with_law
-from validate.solve.fluid import ExactPressure, PressureLoop, tuned_gain
+from validate.solve.fluid import ExactPressure
+from validate.solve.pressure_curve import tuned_gain
+from validate.solve.pressure_loop import PressureLoop
 from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.job import Job, Plan, Where, job_of
 from validate.study.stability_cell import measured_limit

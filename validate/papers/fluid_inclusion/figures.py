@@ -18,7 +18,8 @@ from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.plates import between_plates
 from validate.scene.scene import Cavity, Scene, Support
-from validate.solve.fluid import PressureLoop, pressure_at_volume, tuned_gain
+from validate.solve.pressure_curve import pressure_at_volume, tuned_gain
+from validate.solve.pressure_loop import PressureLoop
 
 _OTHER = "another phantom: the paper prints neither its block nor its inclusion nor plate contact"
 _SIZED = "a count of our own mesh, of sizes that we assumed so that it comes out"
