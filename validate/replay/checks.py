@@ -1,7 +1,7 @@
 """Verdicts of the accepted methods: u_num from meshes and steps, u_input from declared inputs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,41 +47,67 @@ def variants_of(road: Road) -> list[Variant]:
     return wanted + [v for e in shown_effects(road) for v in (e.one, e.other)]
 
 
+@dataclass(frozen=True)
+class Terms:
+    """What a residual is judged with: the accepted limit, u_num, and the parts of u_input.
+
+    `fitted` says why its data are no evidence; "" where they are.
+    """
+
+    limit: float
+    numerical: Numerical
+    inputs: tuple[Sensitivity, ...]
+    fitted: str = ""
+
+    def judge(self, residual: Residual) -> Check:
+        check = judge(residual, self.limit, self.numerical, self.inputs)
+        return as_fitted(check, self.fitted) if self.fitted else check
+
+
 def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
     """The verdict on everything that the experiment accepts; what compared nothing has failed.
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
-    refined = _refined(road, mine.method)
-    inputs, own = _sensitivities(road), _own_doubt(mine)
     found: list[Check] = []
-    for accept in road.experiment.accept:
-        keys = [k for k, r in mine.residuals.items() if _accepts(accept, r)]
-        found += [
-            _classed(
-                road,
-                mine,
-                mine.residuals[key],
-                judge(
-                    mine.residuals[key],
-                    accept.limit,
-                    refined.numerical(mine.residuals[key], accept.limit)
-                    if refined
-                    else Numerical(),
-                    inputs.get(key, []) + own.get(key, []),
-                ),
-            )
-            for key in keys
-        ] or [_nothing(accept, mine)]
+    for accept, terms in terms_of(road, mine):
+        found += [_classed(road, own.judge(mine.residuals[key])) for key, own in terms.items()] or [
+            _nothing(accept, mine)
+        ]
     return tuple(found)
 
 
-def _classed(road: Road, mine: Followed, residual: Residual, check: Check) -> Check:
-    """The check as what it is: fitted, a model that repeats itself, or evidence."""
+def terms_of(road: Road, mine: Followed) -> list[tuple[Accept, dict[str, Terms]]]:
+    """What every residual that is accepted is judged with, by its name.
+
+    Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
+    """
+    refined = _refined(road, mine.method)
+    inputs, own = _sensitivities(road), _own_doubt(mine)
+
+    def terms(key: str, limit: float) -> Terms:
+        residual = mine.residuals[key]
+        numerical = refined.numerical(residual, limit) if refined else Numerical()
+        parts = (*inputs.get(key, []), *own.get(key, []))
+        return Terms(limit, numerical, parts, _served(road, mine, residual))
+
+    return [
+        (a, {k: terms(k, a.limit) for k, r in mine.residuals.items() if _accepts(a, r)})
+        for a in road.experiment.accept
+    ]
+
+
+def _served(road: Road, mine: Followed, residual: Residual) -> str:
+    """What the data of a residual served for, so that they are no evidence; else ""."""
     if residual.role == "calibrates" or {residual.name, residual.quantity} & set(road.calibrated):
-        return as_fitted(check, "these data served to identify")
+        return "these data served to identify"
     if residual.quantity in road.settings[mine.method].markers:
-        return as_fitted(check, "this marker was given to the filter")
+        return "this marker was given to the filter"
+    return ""
+
+
+def _classed(road: Road, check: Check) -> Check:
+    """The check as what it is: a model that repeats itself, or evidence."""
     if road.remade:
         return as_repeated(check, "the recording was made again from this run's own parameters")
     if road.kind == "same model":

@@ -4,7 +4,7 @@ One for every experiment, at holds or over time, with a twin's truth beside or w
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -49,8 +49,24 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
         raise MemoryShortError(f"{short}, {step}", short.share) from short
 
 
-def _compared(experiment: Experiment, options: Options, report: Report | None) -> Result:
-    start = perf_counter()
+@dataclass(frozen=True)
+class SetOut:
+    """An experiment as its recordings have it, and its road with nothing run on it yet.
+
+    `differing` parameters are not as the experiment declares them.
+    """
+
+    experiment: Experiment
+    road: Road
+    found: Opened
+    identified: Identified | None
+    differing: tuple[Changed, ...]
+
+
+def set_out(
+    experiment: Experiment, options: Options, report: Report | None = None, *, since: float = 0.0
+) -> SetOut:
+    """Loads, asks for memory and identifies. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
     found = opened(experiment, parameters)
     declared = _settings(experiment.parameters, experiment.methods)
@@ -69,10 +85,17 @@ def _compared(experiment: Experiment, options: Options, report: Report | None) -
     calibrated = identified.calibrated if identified else ()
     road = Road(
         experiment, methods, used, report,
-        quick=options.quick, calibrated=calibrated, since=start,
+        quick=options.quick, calibrated=calibrated, since=since or perf_counter(),
     )  # fmt: skip
+    return SetOut(experiment, road, found, identified, differing)
+
+
+def _compared(experiment: Experiment, options: Options, report: Report | None) -> Result:
+    out = set_out(experiment, options, report, since=perf_counter())
+    experiment, road, found, identified = out.experiment, out.road, out.found, out.identified
+    methods = road.methods
     road.expect(variants_of(road))
-    remade = road.start(shipped)
+    remade = road.start(found.recordings)
     main = {name: road.main(Variant(name)) for name in methods}
     others = {case.name: road.other(case) for case in road.cases}
     told = _told(road, {MAIN: main, **others})
@@ -80,8 +103,8 @@ def _compared(experiment: Experiment, options: Options, report: Report | None) -
     effects = effects_of(road, results)
     published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
-    parameters_used = marked(experiment, options, found, _settings(used, methods))
-    warnings = doubts(parameters_used, found.stated, shipped, first)
+    parameters_used = marked(experiment, options, found, _settings(road.parameters, methods))
+    warnings = doubts(parameters_used, found.stated, found.recordings, first)
     return Result(
         name=experiment.name,
         title=experiment.title,
@@ -109,7 +132,7 @@ def _compared(experiment: Experiment, options: Options, report: Report | None) -
             captioned(exhibit, experiment.captions)
             for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
         ),
-        changed=differing,
+        changed=out.differing,
     )
 
 
