@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from exports import rows
 from mcap_samples import sample_recording
+from scipy.io import savemat
 
 from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.digest import digest
@@ -51,10 +52,15 @@ def make_c3d(path: Path) -> None:
     Path(f"{path}.c3d").unlink()
 
 
+def make_matlab(path: Path) -> None:
+    savemat(path, {"points": np.arange(30.0).reshape(10, 3)}, appendmat=False)
+
+
 MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "mcap": (make_mcap, {}),
     "c3d": (make_c3d, {}),
     "instron": (make_export, {}),
+    "matlab": (make_matlab, {"unit": "0.4um"}),
     "png-stack": (make_stack, {"m_per_px": "1e-4", "rate": "10"}),
 }
 EACH = pytest.mark.parametrize("reader", READERS, ids=lambda r: r.name)
@@ -146,7 +152,9 @@ def test_a_folder_without_images_is_no_stack(tmp_path: Path) -> None:
 
 def test_what_no_reader_recognises_names_them_all(tmp_path: Path) -> None:
     (tmp_path / "x").write_bytes(bytes(range(32)))
-    with pytest.raises(UsageError, match=r"not recognised .* mcap .* c3d .* instron .* png-stack"):
+    with pytest.raises(
+        UsageError, match=r"not recognised .* mcap .* c3d .* instron .* matlab .* png-stack"
+    ):
         recognised(tmp_path / "x")
     with pytest.raises(UsageError, match="no such file"):
         recognised(tmp_path / "absent")

@@ -253,7 +253,7 @@ def inspect(file: Path, as_json: bool) -> None:
 @cli.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "--as", "kind", metavar="KIND", help="c3d, instron, mcap or png-stack; else as it shows."
+    "--as", "kind", metavar="KIND", help="c3d, instron, matlab, mcap or png-stack; else as shown."
 )
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option(
@@ -261,7 +261,7 @@ def inspect(file: Path, as_json: bool) -> None:
     "mapping",
     multiple=True,
     metavar="ROLE=COLUMN[:UNIT][:-]",
-    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; c3d: unit=mm.",
+    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; unit=mm.",
 )
 @click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
 @click.option("--rate", type=float, help="png-stack: images a second, Hz.")
@@ -269,7 +269,7 @@ def inspect(file: Path, as_json: bool) -> None:
 def import_(
     file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
 ) -> None:
-    """Turn a testing machine's export, a C3D or a folder of PNG images into a recording."""
+    """Turn a testing machine's export, C3D, MATLAB 5 or a folder of PNG images into a recording."""
     from validate.cli import recordings
 
     recordings.import_file(file, kind, out, mapping, given)
