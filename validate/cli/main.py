@@ -313,3 +313,23 @@ def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...
     from validate.cli import making
 
     making.record(name, out, values, named)
+
+
+@cli.group("data", invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.pass_context
+def data_(context: click.Context, as_json: bool) -> None:
+    """Public recordings by name: which there are, and which of them are here."""
+    if context.invoked_subcommand is None:
+        from validate.cli import data
+
+        data.show(as_json)
+
+
+@data_.command("get")
+@click.argument("name")
+def get_(name: str) -> None:
+    """Bring one into the user's cache, checked against its registered hashes."""
+    from validate.cli import data
+
+    data.get(name)

@@ -4,6 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "registry": ("DataFile", "DataSet", "data_sets", "named"),
+    "bring": ("bring",),
     "home": ("cache_folder", "found", "searched"),
 }
 

@@ -50,14 +50,9 @@ class DataSet:
         """The files that are brought as they are."""
         return tuple(file for file in self.files if file.source)
 
-    @property
-    def size(self) -> int:
-        """Bytes of all files."""
-        return sum(file.size for file in self.files)
-
-    def address(self, file: DataFile, base: str = RAW) -> str:
+    def address(self, file: DataFile) -> str:
         """Of a file at its commit."""
-        return f"{base}/{self.repository}/{self.commit}/{file.source}"
+        return f"{RAW}/{self.repository}/{self.commit}/{file.source}"
 
 
 @cache
