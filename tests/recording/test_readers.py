@@ -5,11 +5,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import ezc3d
+import nrrd
 import numpy as np
 import pytest
 from exports import rows
 from mcap_samples import sample_recording
 from scipy.io import savemat
+from sequences import tracked
 
 from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.digest import digest
@@ -56,9 +58,23 @@ def make_matlab(path: Path) -> None:
     savemat(path, {"points": np.arange(30.0).reshape(10, 3)}, appendmat=False)
 
 
+def make_metaimage(path: Path) -> None:
+    path.write_bytes(tracked())
+
+
+def make_nrrd(path: Path) -> None:
+    own = {f"Seq_Frame000{i}_Timestamp": f"{0.1 * i}" for i in range(3)}
+    pixels = np.random.default_rng(0).integers(0, 255, (5, 4, 3)).astype(np.uint8)
+    nrrd.write(f"{path}.nrrd", pixels, {"spacings": [0.1, 0.1, 1.0], "kinds": KINDS, **own})
+    Path(f"{path}.nrrd").rename(path)
+
+
+KINDS = ["domain", "domain", "list"]
 MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "mcap": (make_mcap, {}),
     "c3d": (make_c3d, {}),
+    "metaimage": (make_metaimage, {}),
+    "nrrd": (make_nrrd, {}),
     "instron": (make_export, {}),
     "matlab": (make_matlab, {"unit": "0.4um"}),
     "png-stack": (make_stack, {"m_per_px": "1e-4", "rate": "10"}),

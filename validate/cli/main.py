@@ -253,7 +253,10 @@ def inspect(file: Path, as_json: bool) -> None:
 @cli.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "--as", "kind", metavar="KIND", help="c3d, instron, matlab, mcap or png-stack; else as shown."
+    "--as",
+    "kind",
+    metavar="KIND",
+    help="c3d, instron, matlab, mcap, metaimage, nrrd or png-stack; else as shown.",
 )
 @click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
 @click.option(

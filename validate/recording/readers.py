@@ -7,11 +7,13 @@ from validate.parameters import nearest_names
 from validate.recording.exports.instron import INSTRON
 from validate.recording.formats.c3d import C3D
 from validate.recording.formats.matlab import MATLAB
+from validate.recording.formats.metaimage import METAIMAGE
+from validate.recording.formats.nrrd import NRRD
 from validate.recording.images.png_stack import PNG_STACK
 from validate.recording.mcap.read import MCAP
 from validate.recording.reader import Reader
 
-READERS: tuple[Reader, ...] = (MCAP, C3D, INSTRON, MATLAB, PNG_STACK)
+READERS: tuple[Reader, ...] = (MCAP, C3D, METAIMAGE, NRRD, INSTRON, MATLAB, PNG_STACK)
 
 
 def named(kind: str) -> Reader:

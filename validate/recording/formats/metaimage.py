@@ -1,0 +1,137 @@
+"""MetaImage (.mha, .mhd) with the frames of the PLUS toolkit in its header.
+
+ITK's own reader, the library for this format, refuses sequences of transforms without images
+(DimSize 0 0 n) and knows nothing of frames: the header is text, and it is read as such, without a
+limit to a line, within one to the whole. Pixels are raw or one zlib stream.
+"""
+
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import RecordingError
+from validate.recording.formats.sequence import MAX_PIXELS, Sequence, by_frame, recorded
+from validate.recording.reader import Options, Reader, head
+from validate.recording.types import Recording
+
+_HEADER = 128 * 2**20  # bytes: some 200 000 frames of two tools
+_LAST = "ElementDataFile"
+_KNOWN = ("ObjectType", "NDims", "Comment", "ObjectSubType", "DimSize")
+
+
+def read_metaimage(path: Path, options: Options) -> Recording:
+    """Transforms and images of a sequence, as `sequence.recorded` has them.
+
+    Raises `RecordingError` for a file that is cut, damaged, too large, or of other pixels than
+    8-bit grey, and a .mhd whose pixels do not lie beside it; `UsageError` as `recorded`.
+    """
+    fields, after = _header(path)
+    images = _images(path, fields, after)
+    kind = "MetaImage sequence"
+    return recorded(
+        path, Sequence(by_frame(fields.items()), images, _spacing(path, fields), kind), options
+    )
+
+
+def _header(path: Path) -> tuple[dict[str, str], int]:
+    """Texts by key, and where the header ends; the name of the pixels' file is its last line."""
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+    text = head(path, _HEADER)
+    at = text.find(f"\n{_LAST}".encode()) + 1
+    end = text.find(b"\n", at) + 1
+    if not at or not end or not _recognises(path):
+        raise RecordingError(
+            f"{path.name}: no MetaImage, or its header does not end with '{_LAST} = ...' within "
+            f"{min(len(text), _HEADER)} bytes: cut or damaged"
+        )
+    lines = text[:end].decode("utf-8", "replace").splitlines()
+    pairs = (line.partition("=") for line in lines)
+    return {key.strip(): value.strip() for key, sign, value in pairs if sign}, end
+
+
+def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[np.uint8], ...]:
+    """Images n x (h, w); none where the sequence has transforms alone."""
+    sizes = _whole(path, fields, "DimSize")
+    if len(sizes) not in (2, 3) or min(sizes) < 0:
+        raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2 or 3 numbers")
+    width, height, count = (*sizes, 1)[:3]
+    if not width * height * count:
+        return ()
+    kind, channels = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
+    if kind != "MET_UCHAR" or channels != "1":
+        raise RecordingError(
+            f"{path.name}: pixels {kind or 'of no type'} x {channels}; save as 8-bit grey"
+        )
+    size = width * height * count
+    if size > MAX_PIXELS:
+        raise RecordingError(f"{path.name}: {size} bytes of pixels, limit {MAX_PIXELS}; split it")
+    data = _unpacked(path, fields, _packed(path, fields, after, size), size)
+    return tuple(np.frombuffer(data, dtype=np.uint8).reshape(count, height, width))
+
+
+def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
+    """The bytes of the pixels as they lie in the file, or in one of that name beside it."""
+    name = fields[_LAST]
+    local = name.upper() == "LOCAL"
+    if not local and (Path(name).name != name or name in ("", ".", "..") or "%" in name):
+        raise RecordingError(
+            f"{path.name}: its pixels lie in '{name[:60]}'; one file beside it is read"
+        )
+    held = path if local else path.with_name(name)
+    try:
+        with held.open("rb") as stream:
+            stream.seek(after if local else 0)
+            return stream.read(2 * size + 4096)
+    except OSError as error:
+        raise RecordingError(
+            f"{path.name}: its pixels in '{name[:60]}' cannot be read ({error.strerror})"
+        ) from error
+
+
+def _unpacked(path: Path, fields: dict[str, str], packed: bytes, size: int) -> bytes:
+    data, whole = packed[:size], len(packed) >= size
+    if fields.get("CompressedData", "False").lower() == "true":
+        unpacker = zlib.decompressobj()
+        try:
+            data = unpacker.decompress(packed, size + 1)
+        except zlib.error as error:
+            raise RecordingError(
+                f"{path.name}: damaged: its pixels cannot be unpacked ({error})"
+            ) from None
+        whole = len(data) == size and unpacker.eof
+    if not whole:
+        raise RecordingError(
+            f"{path.name}: {len(data)} bytes of pixels, its header needs {size}: cut or damaged"
+        )
+    return data
+
+
+def _spacing(path: Path, fields: dict[str, str]) -> tuple[float, float]:
+    """Sides of a pixel as the file states them; 1 1 where it does not."""
+    text = fields.get("ElementSpacing", "1 1").split()
+    try:
+        x, y = float(text[0]), float(text[1])
+    except (ValueError, IndexError):
+        x = y = 0.0
+    if not (0 < x < np.inf and 0 < y < np.inf):
+        raise RecordingError(f"{path.name}: ElementSpacing '{' '.join(text)[:60]}' is no size")
+    return x, y
+
+
+def _whole(path: Path, fields: dict[str, str], key: str) -> list[int]:
+    try:
+        return [int(word) for word in fields.get(key, "").split()]
+    except ValueError:
+        raise RecordingError(f"{path.name}: {key} '{fields[key][:60]}': no numbers") from None
+
+
+def _recognises(path: Path) -> bool:
+    first = head(path, 256).partition(b"\n")[0].decode("ascii", "replace")
+    key, sign, _ = first.partition("=")
+    return bool(sign) and key.strip() in _KNOWN
+
+
+METAIMAGE = Reader("metaimage", "tracked sequence (MetaImage)", _recognises, read_metaimage)

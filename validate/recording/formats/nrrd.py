@@ -1,0 +1,52 @@
+"""NRRD with the frames of the PLUS toolkit: the same sequence as a MetaImage holds."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import RecordingError
+from validate.recording.formats.apart import decoded
+from validate.recording.formats.sequence import MAX_PIXELS, Sequence, by_frame, recorded
+from validate.recording.reader import Options, Reader, head
+from validate.recording.types import Recording
+
+_MAGIC = b"NRRD000"
+
+
+def read_nrrd(path: Path, options: Options) -> Recording:
+    """Transforms and images of a sequence, as `sequence.recorded` has them.
+
+    Raises `RecordingError` for a file that is cut, damaged, no NRRD, or of other pixels than 8-bit
+    grey; `UsageError` without the library, and as `recorded`.
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+    if not _recognises(path):
+        raise RecordingError(f"{path.name}: no NRRD file, or one cut in its first bytes")
+    found = decoded("nrrd_arrays", path, "nrrd")
+    keys, texts = found["keys"].tolist(), found["texts"].tolist()
+    x, y = found["spacing"].tolist()
+    fields = by_frame(zip(keys, texts, strict=True))
+    return recorded(path, Sequence(fields, _images(path, found["pixels"]), (x, y), "NRRD"), options)
+
+
+def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[np.uint8], ...]:
+    """Images n x (h, w) of pixels (w, h, n) or (w, h), x first."""
+    if not pixels.size:
+        return ()
+    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.size > MAX_PIXELS:
+        raise RecordingError(
+            f"{path.name}: pixels {pixels.shape} {pixels.dtype}; images of 8-bit grey up to "
+            f"{MAX_PIXELS} bytes are read"
+        )
+    whole = pixels if pixels.ndim == 3 else pixels[..., None]
+    return tuple(np.ascontiguousarray(image.T) for image in np.moveaxis(whole, 2, 0))
+
+
+def _recognises(path: Path) -> bool:
+    return head(path, len(_MAGIC)) == _MAGIC
+
+
+NRRD = Reader("nrrd", "tracked sequence (NRRD)", _recognises, read_nrrd)

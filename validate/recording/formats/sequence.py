@@ -1,0 +1,186 @@
+"""Tracked sequences: images and 4 x 4 transforms of tools, frame by frame, as the PLUS toolkit
+writes them into MetaImage and NRRD alike.
+
+Every frame has fields `Seq_Frame0007_<Tool>To<Frame>Transform`, its `...Status`, `Timestamp` (s)
+and `ImageStatus`. Only what is OK enters the recording: a tool that was not seen has no sample.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.clocks import clock_of
+from validate.recording.reader import Options, require_known, source_of
+from validate.recording.types import Frames, Recording, Signal, Stream, by_kind
+from validate.units import in_si, split
+
+IMAGES = "images"
+ROTATION, TRANSLATION = "rotation", "translation"
+MAX_PIXELS = 400 * 2**20  # bytes of all images of one sequence
+_MM = 1e-3  # m: PLUS writes millimetres
+_FIELD = re.compile(r"Seq_Frame(\d{1,9})_(\w+)")
+_TOOL = re.compile(r"(\w+To\w+)Transform")
+_OPTIONS = ("m_per_px", "rate", "images")
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """What a file holds: texts by frame and field, images n x (h, w) uint8 or none, `spacing` (2,)
+    as the file states it, `kind` in words."""
+
+    fields: Mapping[int, Mapping[str, str]]
+    images: tuple[NDArray[np.uint8], ...]
+    spacing: tuple[float, float]
+    kind: str
+
+
+def by_frame(pairs: Iterable[tuple[str, str]]) -> dict[int, dict[str, str]]:
+    """The fields of every frame by their own names, from keys and texts of a header."""
+    found: dict[int, dict[str, str]] = {}
+    for key, text in pairs:
+        named = _FIELD.fullmatch(key)
+        if named:
+            found.setdefault(int(named[1]), {})[named[2]] = text.strip()
+    return found
+
+
+def recorded(path: Path, held: Sequence, options: Options) -> Recording:
+    """The sequence as a recording: of a transform XToY two signals, `XToY/rotation` (nt, 9), the
+    linear part row by row, and `XToY/translation` (nt, 3) m; images as `images`.
+
+    Options: `m_per_px`, which a spacing of 1 (pixels, not mm) needs; `images=no` leaves them out;
+    `rate` (Hz) for frames without times. Raises `UsageError` where one of them is needed,
+    `RecordingError` for a field that is none, and a file in which nothing was seen.
+    """
+    require_known(options, _OPTIONS)
+    t = _times(path, held, options)
+    streams: dict[str, Stream] = {}
+    never = []
+    keys = {key for fields in held.fields.values() for key in fields}
+    for tool in sorted(m[1] for key in keys if (m := _TOOL.fullmatch(key))):
+        found = _tool(path, held, tool, t)
+        streams |= found
+        never += [] if found else [tool]
+    if held.images and options.get("images") != "no":
+        streams |= _images(path, held, t, options)
+    if not streams:
+        raise RecordingError(
+            f"{path.name}: {len(t)} frames, no image and no transform in them is OK; "
+            f"never seen: {', '.join(never) or 'none'}"
+        )
+    begin = min(float(s.t[0]) for s in streams.values())
+    streams = {name: replace(s, t=s.t - begin) for name, s in streams.items()}
+    ns = {name: np.rint(1e9 * s.t).astype(np.int64) for name, s in streams.items()}
+    told = {
+        "kind": held.kind,
+        "frames": str(len(t)),
+        "not_seen": "; ".join(
+            f"{n}: {len(t) - len(s.t)}" for n, s in streams.items() if len(s.t) < len(t)
+        ),
+    }
+    return Recording(
+        name=path.name.partition(".")[0],
+        source=source_of(path, f"{held.kind} keeps no checksum: integrity not provable"),
+        t0_ns=0,
+        clock={name: clock_of(name, None, times, times) for name, times in ns.items()},
+        metadata={"provenance": told},
+        unread=dict.fromkeys(never, "never seen"),
+        **by_kind(streams),
+    )
+
+
+def _times(path: Path, held: Sequence, options: Options) -> Floats:
+    """Seconds (n,) of every frame from the first."""
+    count = max(len(held.images), max(held.fields, default=-1) + 1)
+    stamped = [i for i in range(count) if "Timestamp" in held.fields.get(i, {})]
+    if not count:
+        raise RecordingError(f"{path.name}: no frame, neither an image nor fields Seq_Frame0000_*")
+    if not stamped or "rate" in options:
+        return np.asarray(np.rint(1e9 * np.arange(count) / _rate(path, options)) / 1e9)
+    if len(stamped) < count:
+        first = next(i for i in range(count) if i not in set(stamped))
+        raise RecordingError(
+            f"{path.name}: {count - len(stamped)} of {count} frames without a time, the first is "
+            f"{first}; cut, or say --map rate=HZ"
+        )
+    t = np.array([_numbers(path, held.fields[i]["Timestamp"], 1, i)[0] for i in range(count)])
+    return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9)
+
+
+def _rate(path: Path, options: Options) -> float:
+    try:
+        rate = float(options["rate"])
+    except KeyError:
+        raise UsageError(f"{path.name}: its frames have no times; say --map rate=HZ") from None
+    except ValueError:
+        rate = 0.0
+    if not 0 < rate < np.inf:
+        raise UsageError(f"--map rate={options['rate']}: expected a number of Hz above 0")
+    return rate
+
+
+def _numbers(path: Path, text: str, count: int, frame: int) -> Floats:
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (count,) or not np.isfinite(values).all():
+        raise RecordingError(
+            f"{path.name}: frame {frame}: '{text[:60]}' is not {count} finite numbers; damaged"
+        )
+    return values
+
+
+def _tool(path: Path, held: Sequence, tool: str, t: Floats) -> dict[str, Signal]:
+    """Both signals of a transform where its status is OK, or says nothing."""
+    key = f"{tool}Transform"
+    texts = {
+        i: fields[key]
+        for i, fields in sorted(held.fields.items())
+        if key in fields and fields.get(f"{key}Status", "OK") == "OK"
+    }
+    if not texts:
+        return {}
+    T = np.array([_numbers(path, text, 16, i) for i, text in texts.items()]).reshape(-1, 4, 4)
+    wrong = np.abs(T[:, 3] - [0, 0, 0, 1]).max(axis=1) > 1e-6
+    if wrong.any():
+        i = list(texts)[int(wrong.argmax())]
+        raise RecordingError(f"{path.name}: frame {i}: the last row of {key} is not 0 0 0 1")
+    at, frame = t[list(texts)], tool.rpartition("To")[2]
+    return {
+        f"{tool}/{ROTATION}": Signal(at, T[:, :3, :3].reshape(-1, 9), "1", 0.0, frame),
+        f"{tool}/{TRANSLATION}": Signal(at, _MM * T[:, :3, 3], "m", 0.0, frame),
+    }
+
+
+def _images(path: Path, held: Sequence, t: Floats, options: Options) -> dict[str, Frames]:
+    """Images whose status is OK, or says nothing."""
+    fields = [held.fields.get(i, {}) for i in range(len(held.images))]
+    said = [f.get("ImageStatus", f.get("Status", "OK")) for f in fields]
+    good = [i for i, status in enumerate(said) if status == "OK"]
+    if not good:
+        return {}
+    images = tuple(held.images[i] for i in good)
+    return {IMAGES: Frames(t[good], images, _pixel(path, held, options), np.eye(4), "image")}
+
+
+def _pixel(path: Path, held: Sequence, options: Options) -> tuple[float, float]:
+    """Sides of a pixel, m."""
+    if "m_per_px" in options:
+        number, unit = split(options["m_per_px"]) or (0.0, "")
+        side = in_si(number, unit or "m", "m")
+        if side is None or side <= 0:
+            raise UsageError(f"--map m_per_px={options['m_per_px']}: expected a length, as 0.1mm")
+        return side, side
+    if held.spacing == (1.0, 1.0):
+        raise UsageError(
+            f"{path.name}: states a spacing of 1 1, which means pixels, not mm; say --map "
+            "m_per_px=0.1mm, or --map images=no for the transforms alone"
+        )
+    return _MM * held.spacing[0], _MM * held.spacing[1]
