@@ -1,13 +1,18 @@
 """What calibrates: declared with bounds and a source, kept apart from what validates."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from calibrating import NU, OPEN, E, Open
 
-from validate.errors import UsageError
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError, UsageError
+from validate.recording.types import Recording
 from validate.replay.calibration import Calibrates, Calibration, Free
-
-E = Free("material.E", 1e3, 1e5, "assumed")
+from validate.replay.options import Options
+from validate.replay.road import compare
 
 
 def test_bounds_are_two_finite_numbers_in_order() -> None:
@@ -27,5 +32,83 @@ def test_a_calibration_names_parameters_and_residuals_each_once() -> None:
         Calibration("fem", (), on)
     with pytest.raises(UsageError, match="1 parameters on 0 quantities"):
         Calibration("fem", (E,), (Calibrates(()),))
-    with pytest.raises(UsageError, match=r"material\.E is free twice"):
+    with pytest.raises(UsageError, match=r"E is free twice"):
         Calibration("fem", (E, E), on)
+
+
+# --- on the road ----------------------------------------------------------------------------------
+
+
+def test_what_stands_open_is_identified_and_what_calibrated_is_fitted() -> None:
+    result = compare(OPEN, Options({}))
+    (modulus,) = result.identified
+    assert modulus.name == "E"
+    assert modulus.value == pytest.approx(10e3, rel=0.05)
+    assert {p.path: p.origin for p in result.parameters}["E"] == "identified"
+    assert result.sentence.startswith("Fitted: E = ")
+    assert "with 'fem' on force@0.1mm of moved; predicted: force@0.3mm off by" in result.sentence
+    assert {i.name: i.source for i in result.inputs}["identified E"].startswith("identified on")
+
+
+def test_a_residual_that_calibrated_is_no_evidence() -> None:
+    whole = replace(OPEN, accept=(Accept("force", 1e-3, "ours"),))
+    verdicts = {c.name: c.verdict for c in compare(whole, Options({})).checks}
+    assert verdicts.pop("force@0.1mm") == "fitted"
+    assert "fitted" not in verdicts.values()
+
+
+def test_the_covariance_of_what_was_identified_is_uncertain_input() -> None:
+    """Force is proportional to E, so its relative uncertainty is that of E, at every load."""
+    result = compare(OPEN, Options({}))
+    (check,) = (c for c in result.checks if c.name == "force@0.3mm")
+    (cell,) = (o for o in result.registered[0].compared if o.name == "cell")
+    forces = {load: cell.at(t) for load, t in (("0.1mm", 10.0), ("0.3mm", 30.0))}
+    assert check.u_input == pytest.approx(1e-4 * forces["0.3mm"] / forces["0.1mm"], rel=0.02)
+
+
+def test_a_value_is_taken_as_it_is_and_then_nothing_is_fitted() -> None:
+    result = compare(replace(OPEN, parameters=Open(E=9e3)), Options({}))
+    assert result.identified == ()
+    assert not result.sentence.startswith("Fitted")
+    assert all(c.verdict != "fitted" for c in result.checks)
+
+
+def test_a_figure_that_would_serve_twice_is_an_error() -> None:
+    for quantities in (("force",), ("force@0.3mm",)):
+        twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(quantities),)),))
+        with pytest.raises(ComparisonError, match=r"calibrates 'fem': a figure serves once"):
+            compare(twice, Options({}))
+
+
+def test_the_judged_recording_under_another_name_serves_once_too() -> None:
+    on = Calibrates(("force@0.3mm",), lambda p: replace(p, nu=0.3), "another")
+    twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (on,)),))
+    hashed = replace(twice, load=_hashed)
+    with pytest.raises(ComparisonError, match="what is judged is the same recording"):
+        compare(hashed, Options({}))
+
+
+def _hashed(p: Open, folder: Path) -> tuple[Recording, ...]:
+    return tuple(
+        replace(r, source=replace(r.source, sha256="ab" * 32)) for r in OPEN.load(p, folder)
+    )
+
+
+@pytest.mark.slow
+def test_what_is_not_identifiable_blocks_the_prediction_unless_anyway() -> None:
+    """With the top moved and its force alone, Poisson ratio and modulus are one number."""
+    both = replace(
+        OPEN,
+        parameters=Open(nu=None),
+        calibrations=(Calibration("fem", (E, NU), (Calibrates(("force@0.1mm", "force@0.2mm")),)),),
+    )
+    with pytest.raises(ComparisonError, match=r"nu is not identifiable .*the sides' motion would"):
+        compare(both, Options({}))
+    result = compare(both, Options({}, anyway=True))
+    assert any("nu is not identifiable" in note for note in result.notes)
+
+
+def test_a_residual_that_is_not_there_is_named_with_those_that_are() -> None:
+    wrong = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(("forse",)),)),))
+    with pytest.raises(ComparisonError, match=r"no residual 'forse'.*0 matched.*force@0\.1mm"):
+        compare(wrong, Options({}))

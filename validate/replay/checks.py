@@ -42,7 +42,11 @@ def variants_of(road: Road) -> list[Variant]:
             v for n in accepted for levels in variants(uncertainty, n).values() for v in levels
         ]
         wanted += [Variant(uncertainty.surrogate)] if uncertainty.inputs else []
-        wanted += [Variant(uncertainty.surrogate, i.by(1.0)) for i in uncertainty.inputs]
+        wanted += [
+            Variant(by, i.by(1.0))
+            for i in uncertainty.inputs
+            for by in dict.fromkeys(_moved_by(road, uncertainty, i, n) for n in accepted)
+        ]
         wanted += _joint_variants(road)
     return wanted + [v for e in shown_effects(road) for v in (e.one, e.other)]
 
@@ -83,7 +87,7 @@ def terms_of(road: Road, mine: Followed) -> list[tuple[Accept, dict[str, Terms]]
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
     refined = _refined(road, mine.method)
-    inputs, own = _sensitivities(road), _own_doubt(mine)
+    inputs, own = _sensitivities(road, mine.method), _own_doubt(mine)
 
     def terms(key: str, limit: float) -> Terms:
         residual = mine.residuals[key]
@@ -134,19 +138,29 @@ def _declared(road: Road) -> Uncertainty | None:
     return experiment.uncertainty
 
 
-def _sensitivities(road: Road) -> dict[str, list[Sensitivity]]:
-    """Per residual name: what one standard uncertainty of each input does, by the surrogate."""
+def _sensitivities(road: Road, judged: str = "") -> dict[str, list[Sensitivity]]:
+    """Per residual name: what one standard uncertainty of each input does, by the surrogate.
+
+    A `judged` method that was itself calibrated moves what was identified itself: its parameters
+    may be none of the surrogate's.
+    """
     uncertainty = _declared(road)
     found: dict[str, list[Sensitivity]] = {}
     if uncertainty is None or not uncertainty.inputs:
         return found
-    base = road.main(Variant(uncertainty.surrogate)).residuals
     for source in uncertainty.inputs:
-        moved = road.main(Variant(uncertainty.surrogate, source.by(1.0))).residuals
+        by = _moved_by(road, uncertainty, source, judged)
+        base = road.main(Variant(by)).residuals
+        moved = road.main(Variant(by, source.by(1.0))).residuals
         for key in base.keys() & moved.keys():
             step = replace(base[key], values=moved[key].values - base[key].values, sd=0.0)
             found.setdefault(key, []).append(Sensitivity(source.name, step))
     return found
+
+
+def _moved_by(road: Road, uncertainty: Uncertainty, source: Input, judged: str) -> str:
+    own = source.identified and judged in {c.method for c in road.experiment.calibrations}
+    return judged if own else uncertainty.surrogate
 
 
 def joint_inputs(road: Road) -> tuple[Joint, ...]:

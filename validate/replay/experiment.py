@@ -42,13 +42,14 @@ class Input:
     """An uncertain input: `move` takes parameters to where it is off by z standard uncertainties.
 
     z lies within +-sqrt(3), the half-width of a uniform range. `source` says where the range comes
-    from, or "assumed".
+    from, or "assumed". `identified`: it is a share of the covariance of what was identified.
     """
 
     name: str
     move: Callable[[Any, float], Any]
     doc: str
     source: str
+    identified: bool = False
 
     def __post_init__(self) -> None:
         if not self.source.strip():

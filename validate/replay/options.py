@@ -17,11 +17,13 @@ _MESHES = ".npz"
 
 @dataclass(frozen=True)
 class Options:
-    """What the user changed: values by path, methods to run (none: all), quick."""
+    """What the user changed: values by path, methods to run (none: all), quick; `anyway`: predict
+    with parameters that were not identifiable, too."""
 
     values: Mapping[str, str]
     methods: tuple[str, ...] = ()
     quick: bool = False
+    anyway: bool = False
 
 
 def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Method]]:

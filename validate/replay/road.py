@@ -19,6 +19,16 @@ from validate.fem.locking import locking_notes
 from validate.memory import MemoryShortError
 from validate.parameters import Changed, Parameter, changed, describe
 from validate.register.markers import MarkerObservation
+from validate.replay.calibrated import (
+    Identify,
+    calibrated,
+    here,
+    identified_by,
+    middle,
+    require_identified,
+    with_inputs,
+)
+from validate.replay.calibrated_words import predicted
 from validate.replay.checks import checks_of, effects_of, joint_inputs, variants_of
 from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
@@ -27,6 +37,7 @@ from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, configure
 from validate.replay.origins import Opened, marked, opened
 from validate.replay.plausible import doubts
+from validate.replay.problem import Calibrated
 from validate.replay.room import coarser, require_room
 from validate.replay.runs import Road
 from validate.replay.sentence import figures_sentence, verdict_sentence
@@ -39,10 +50,18 @@ _AGAINST: Mapping[Kind, str] = {
 }
 
 
-def compare(experiment: Experiment, options: Options, report: Report | None = None) -> Result:
-    """Runs an experiment and judges it. Raises children of `ValidateError` for bad input."""
+def compare(
+    experiment: Experiment,
+    options: Options,
+    report: Report | None = None,
+    identify: Identify = here,
+) -> Result:
+    """Runs an experiment and judges it; `identify` finds what its calibrations leave open.
+
+    Raises children of `ValidateError` for bad input.
+    """
     try:
-        return _compared(experiment, options, report)
+        return _compared(experiment, options, report, identify)
     except MemoryShortError as short:
         parameters, _ = configure(experiment, options)
         step = coarser(experiment.name, parameters, short.share)
@@ -53,7 +72,8 @@ def compare(experiment: Experiment, options: Options, report: Report | None = No
 class SetOut:
     """An experiment as its recordings have it, and its road with nothing run on it yet.
 
-    `differing` parameters are not as the experiment declares them.
+    `differing` parameters are not as the experiment declares them; `fitted` are the calibrations
+    that were carried out.
     """
 
     experiment: Experiment
@@ -61,10 +81,16 @@ class SetOut:
     found: Opened
     identified: Identified | None
     differing: tuple[Changed, ...]
+    fitted: tuple[Calibrated, ...]
 
 
 def set_out(
-    experiment: Experiment, options: Options, report: Report | None = None, *, since: float = 0.0
+    experiment: Experiment,
+    options: Options,
+    report: Report | None = None,
+    identify: Identify = here,
+    *,
+    since: float = 0.0,
 ) -> SetOut:
     """Loads, asks for memory and identifies. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
@@ -75,23 +101,29 @@ def set_out(
     shipped, parameters = found.recordings, found.parameters
     if report:
         report(0, 1, "asks for memory")
-    require_room(experiment, methods, parameters, shipped[0], quick=options.quick)
-    identified = None
-    if experiment.identify:
-        if report:
-            report(0, 1, "identifies parameters")
-        identified = experiment.identify(shipped, parameters, all_methods(experiment, options))
+    asked = middle(experiment, parameters)
+    require_room(experiment, methods, asked, shipped[0], quick=options.quick)
+    if report and (experiment.identify or experiment.calibrations):
+        report(0, 1, "identifies parameters")
+    every = all_methods(experiment, options)
+    fitted = calibrated(experiment, parameters, every, shipped, identify)
+    if not options.anyway:
+        require_identified(experiment, fitted)
+    experiment = with_inputs(experiment, fitted)
+    identified = identified_by(experiment, shipped, parameters, every, fitted)
     used = identified.parameters if identified else parameters
-    calibrated = identified.calibrated if identified else ()
     road = Road(
         experiment, methods, used, report,
-        quick=options.quick, calibrated=calibrated, since=since or perf_counter(),
+        quick=options.quick, calibrated=identified.calibrated if identified else (),
+        since=since or perf_counter(),
     )  # fmt: skip
-    return SetOut(experiment, road, found, identified, differing)
+    return SetOut(experiment, road, found, identified, differing, fitted)
 
 
-def _compared(experiment: Experiment, options: Options, report: Report | None) -> Result:
-    out = set_out(experiment, options, report, since=perf_counter())
+def _compared(
+    experiment: Experiment, options: Options, report: Report | None, identify: Identify
+) -> Result:
+    out = set_out(experiment, options, report, identify, since=perf_counter())
     experiment, road, found, identified = out.experiment, out.road, out.found, out.identified
     methods = road.methods
     road.expect(variants_of(road))
@@ -111,6 +143,7 @@ def _compared(experiment: Experiment, options: Options, report: Report | None) -
         source=experiment.source,
         sentence=_doubtful(warnings)
         + _opening(identified)
+        + (f"{predicted(results)}. " if out.fitted else "")
         + verdict_sentence(results, road.kind, quick=options.quick)
         + figures_sentence(published),
         parameters=parameters_used,

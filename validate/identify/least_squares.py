@@ -1,0 +1,177 @@
+"""Bounded least squares over a callable residual that is dear: scipy's trust region, few calls.
+
+The Jacobian is taken by differences once and then follows the steps (Broyden 1965); where the
+optimiser stops it is taken anew, and what that promises decides whether the end is one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError, ValidateError
+
+Residual = Callable[[Floats], Floats]  # x (p,) from 0 to 1 -> (m,), independent, of variance one
+At = Callable[[Floats], Floats]  # coordinates that move -> all of them
+
+STEP = 5e-4  # of the searched range, for differences
+PROMISE = 1e-2  # a fall of chi-square, over its mean per freedom, that is none
+ROUNDS = 6  # of the optimiser, each from a Jacobian taken anew
+EVALUATIONS = 200  # of the residual, then it has not converged
+_OFTEN = 1e3  # how many times the first rms a point counts that could not be evaluated
+_EDGE = 1e-6  # of the range: as good as at a bound
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where one start ended: x (p,), chi-square over `count` residuals, J^T J (p, p) there.
+
+    `why` says what kept it from converging, or "". `count` is 0 where nothing could be simulated,
+    `evaluations` counts calls of the residual.
+    """
+
+    start: Floats
+    x: Floats
+    chi_square: float
+    count: int
+    normal: Floats
+    evaluations: int
+    converged: bool
+    why: str = ""
+
+    @property
+    def freedom(self) -> int:
+        return self.count - len(self.x)
+
+
+class CalledOnce:
+    """A residual that is called once a point; where it raises, it is far off."""
+
+    def __init__(self, residual: Residual) -> None:
+        self._residual = residual
+        self._known: dict[bytes, Floats] = {}
+        self._penalty: Floats | None = None
+        self.calls = 0
+        self.failure = ""
+
+    def __call__(self, x: Floats) -> Floats:
+        """Raises what the first point raises; later ones that raise are only bad."""
+        key = np.asarray(x, dtype=np.float64).tobytes()
+        if key not in self._known:
+            self.calls += 1
+            self._known[key] = self._guarded(x)
+        return self._known[key]
+
+    def _guarded(self, x: Floats) -> Floats:
+        try:
+            found = self._residual(x)
+        except ValidateError as error:
+            if self._penalty is None:
+                raise
+            self.failure = " ".join(str(error).split())
+            return self._penalty
+        if self._penalty is None:
+            if len(found) == 0:
+                raise ComparisonError("0 matched samples to identify from")
+            far = _OFTEN * max(1.0, float(np.sqrt(np.mean(found**2))))
+            self._penalty = np.full(len(found), far)
+        elif len(found) != len(self._penalty):
+            raise ComparisonError(
+                f"{len(self._penalty)} residuals at first, {len(found)} elsewhere: what is "
+                "compared must not depend on what is identified"
+            )
+        return found
+
+
+class Following:
+    """A Jacobian (m, q) in the directions `free` that follows the steps of an optimiser."""
+
+    def __init__(
+        self, r: CalledOnce, at: Callable[[Floats], Floats], J: Floats | None = None
+    ) -> None:
+        self._r, self._at = r, at
+        self._J = J
+        self._last: tuple[Floats, Floats] | None = None
+
+    def residual(self, y: Floats) -> Floats:
+        return self._r(self._at(y))
+
+    def fresh(self, y: Floats) -> Floats:
+        """By forward differences, into the box."""
+        base = self.residual(y)
+        columns = []
+        for i in range(len(y)):
+            h = STEP if y[i] + STEP <= 1 else -STEP
+            moved = y.copy()
+            moved[i] += h
+            columns.append((self.residual(moved) - base) / h)
+        self._J, self._last = np.stack(columns, axis=1), (y.copy(), base)
+        return self._J
+
+    def __call__(self, y: Floats) -> Floats:
+        r = self.residual(y)
+        if self._J is None:
+            return self.fresh(y)
+        if self._last is not None:
+            s, d = y - self._last[0], r - self._last[1]
+            length = float(s @ s)
+            if length > 0:
+                self._J = self._J + np.outer(d - self._J @ s, s) / length
+        self._last = (y.copy(), r)
+        return self._J
+
+
+def minimised(
+    r: CalledOnce, at: At, y: Floats, J: Floats | None = None
+) -> tuple[Floats, Floats, bool]:
+    """Where |r(at(y))|^2 is least for y (q,) in the box: y, the Jacobian there, whether it is one.
+
+    `J` (m, q) is one to begin with; None: taken by differences.
+    """
+    for _ in range(ROUNDS):
+        follow = Following(r, at, J)
+        found = least_squares(
+            follow.residual, np.clip(y, 1e-9, 1 - 1e-9), jac=follow, bounds=(0.0, 1.0),
+            ftol=1e-4, xtol=1e-7, gtol=1e-12, max_nfev=25,
+        )  # fmt: skip
+        y = np.asarray(found.x)
+        fresh = follow.fresh(y)
+        J = None
+        residual = r(at(y))
+        spread = max(1.0, float(residual @ residual) / max(1, len(residual) - len(y)))
+        if promised(residual, fresh, y) <= PROMISE * spread:
+            return y, fresh, True
+        J = fresh
+        if r.calls > EVALUATIONS:
+            break
+    return y, fresh, False
+
+
+def promised(r: Floats, J: Floats, y: Floats) -> float:
+    """By how much a full step in the box's inside would lower |r|^2, were r linear."""
+    g = J.T @ r
+    inside = ~((y <= _EDGE) & (g > 0)) & ~((y >= 1 - _EDGE) & (g < 0))
+    if not inside.any():
+        return 0.0
+    step, *_ = np.linalg.lstsq(J[:, inside], -r, rcond=1e-10)
+    full = np.zeros(len(y))
+    full[inside] = step
+    reached = np.clip(y + full, 0.0, 1.0) - y
+    linear = r + J @ reached
+    return float(r @ r - linear @ linear)
+
+
+def fit(residual: Residual, start: Floats) -> Fit:
+    """The minimum that one start (p,) leads to; a start where nothing can be simulated is none."""
+    r = CalledOnce(residual)
+    try:
+        x, J, converged = minimised(r, lambda y: y, np.asarray(start, dtype=np.float64))
+    except ValidateError as error:
+        p = len(start)
+        why = " ".join(str(error).split())
+        return Fit(start, start, 0.0, 0, np.zeros((p, p)), r.calls, False, why)
+    found = r(x)
+    why = "" if converged else r.failure or f"still falling after {r.calls} evaluations"
+    return Fit(start, x, float(found @ found), len(found), J.T @ J, r.calls, converged, why)

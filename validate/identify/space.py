@@ -1,0 +1,62 @@
+"""The box that is searched: every parameter between its bounds, as a number from 0 to 1."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from validate.arrays import Floats
+from validate.errors import UsageError
+
+DECADE = 10.0  # bounds further apart than this factor are searched on a logarithmic scale
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter searched from `low` to `high`, in its own unit."""
+
+    name: str
+    low: float
+    high: float
+
+    @property
+    def logarithmic(self) -> bool:
+        return self.low > 0 and self.high / self.low > DECADE
+
+
+@dataclass(frozen=True)
+class Space:
+    """p parameters; coordinates x (p,) from 0 at `low` to 1 at `high`."""
+
+    ranges: tuple[Range, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(r.name for r in self.ranges)
+
+    def value(self, i: int, x: float) -> float:
+        """Parameter i at a coordinate, in its own unit, never beyond its bounds."""
+        r = self.ranges[i]
+        x = min(max(x, 0.0), 1.0)
+        return r.low * (r.high / r.low) ** x if r.logarithmic else r.low + x * (r.high - r.low)
+
+    def values(self, x: Floats) -> tuple[float, ...]:
+        return tuple(self.value(i, float(xi)) for i, xi in enumerate(x))
+
+    def slope(self, i: int, x: float) -> float:
+        """d value / d coordinate of parameter i there."""
+        r = self.ranges[i]
+        if r.logarithmic:
+            return self.value(i, x) * float(np.log(r.high / r.low))
+        return r.high - r.low
+
+    def starts(self, count: int, seed: int = 1) -> Floats:
+        """(count, p): the middle, then a seeded Latin hypercube (McKay, Beckman & Conover 1979).
+
+        Raises `UsageError` for no start.
+        """
+        if count < 1:
+            raise UsageError(f"--seeds {count}: at least one start, ten or more to trust it")
+        p = len(self.ranges)
+        drawn = qmc.LatinHypercube(p, rng=seed).random(count - 1) if count > 1 else np.empty((0, p))
+        return np.vstack([np.full((1, p), 0.5), drawn])

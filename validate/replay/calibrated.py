@@ -1,0 +1,193 @@
+"""Identification before prediction: what stands open is found on what calibrates, kept apart.
+
+What was identified goes on with its covariance as uncertain inputs, along its principal axes; what
+calibrated is named, so that no figure serves twice.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError, UsageError
+from validate.identify.identification import Identification, InTurn
+from validate.identify.identification import identify as identify_in
+from validate.parameters import describe, with_values
+from validate.recording.types import Recording
+from validate.replay.calibrated_words import headline, lines, not_identified, scores
+from validate.replay.calibration import Free
+from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+from validate.replay.method import Method
+from validate.replay.origins import opened
+from validate.replay.problem import Calibrated, Part, Problem, with_free
+
+#: From the number of a calibration among those of its experiment, and its problem.
+Identify = Callable[[int, Problem], Identification]
+
+
+def here(number: int, problem: Problem) -> Identification:
+    """In this process, one evaluation after the other."""
+    return identify_in(problem.space, InTurn(problem.residual))
+
+
+def open_free(experiment: Experiment, parameters: Any) -> tuple[tuple[Free, ...], ...]:
+    """What of every calibration stands open; raises `UsageError` for a path that is none."""
+    values = {p.path: p.default for p in describe(parameters)}
+    for free in (f for c in experiment.calibrations for f in c.free):
+        with_values(parameters, {free.path: repr(free.low)})
+    return tuple(
+        tuple(f for f in c.free if values[f.path] is None) for c in experiment.calibrations
+    )
+
+
+def middle(experiment: Experiment, parameters: Any) -> Any:
+    """Parameters with what stands open in the middle of its bounds: for what only asks of sizes."""
+    for free in open_free(experiment, parameters):
+        parameters = with_free(parameters, {f.path: (f.low + f.high) / 2 for f in free})
+    return parameters
+
+
+def problem_of(
+    experiment: Experiment,
+    number: int,
+    free: tuple[Free, ...],
+    parameters: Any,
+    methods: Mapping[str, Method],
+    shipped: tuple[Recording, ...],
+) -> Problem:
+    """The recordings that calibrate are loaded; raises what that raises."""
+    calibration = experiment.calibrations[number]
+    if calibration.method not in methods:
+        raise UsageError(
+            f"calibration by '{calibration.method}': no such method; {', '.join(methods)}"
+        )
+    own = {r.source.sha256 for r in shipped} - {""}
+    parts = []
+    for on in calibration.on:
+        if on.judged:
+            parts.append(Part(on, shipped, parameters, True))
+            continue
+        found = opened(experiment, on.change(parameters))
+        same = any(r.source.sha256 in own for r in found.recordings)
+        parts.append(Part(on, found.recordings, found.parameters, same))
+    return Problem(experiment, calibration, free, methods[calibration.method], tuple(parts))
+
+
+def calibrated(
+    experiment: Experiment,
+    parameters: Any,
+    methods: Mapping[str, Method],
+    shipped: tuple[Recording, ...],
+    identify: Identify = here,
+) -> tuple[Calibrated, ...]:
+    """Every calibration of which something stands open, in order; each sees what those before
+    found. Raises `ComparisonError` for a figure that would serve twice."""
+    done: list[Calibrated] = []
+    for number, free in enumerate(open_free(experiment, parameters)):
+        if not free:
+            continue
+        problem = problem_of(experiment, number, free, parameters, methods, shipped)
+        require_apart(experiment.accept, problem)
+        done.append(Calibrated(problem, identify(number, problem)))
+        parameters = with_free(parameters, done[-1].values)
+    return tuple(done)
+
+
+def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
+    """Raises `ComparisonError` where what is judged calibrates, under whatever name."""
+    for part in (p for p in problem.parts if p.judged):
+        twice = next((n for n in part.on.quantities for a in accept if _all_of(a, n)), "")
+        if not twice:
+            continue
+        mark = part.recordings[0].source.sha256[:8]
+        same = "" if part.on.judged else f", and what is judged is the same recording ({mark})"
+        raise ComparisonError(
+            f"'{twice}' of {part.name} calibrates '{problem.calibration.method}'{same}: a figure "
+            "serves once; judge other loads, quantities or recordings, or set "
+            f"{', '.join(problem.space.names)}"
+        )
+
+
+def _all_of(accept: Accept, name: str) -> bool:
+    """Whether what calibrates is all that a limit judges of a quantity, or a load that it names."""
+    quantity, _, load = name.partition("@")
+    return quantity == accept.quantity and (not load or load in accept.loads)
+
+
+def require_identified(experiment: Experiment, fitted: Iterable[Calibrated]) -> None:
+    """Raises `ComparisonError` for a parameter that its recordings do not identify."""
+    for one in fitted:
+        for estimate, free in zip(one.found.estimates, one.problem.free, strict=True):
+            if not estimate.identified:
+                raise ComparisonError(
+                    f"{not_identified(one, estimate, free)}; --anyway predicts with it all the "
+                    f"same, `validate identify {experiment.name}` shows its profile"
+                )
+
+
+def served(fitted: Iterable[Calibrated]) -> tuple[str, ...]:
+    """Residuals of the recording that is judged that calibrated: fitted, and no evidence."""
+    parts = (part for one in fitted for part in one.problem.parts)
+    return tuple(q for part in parts if part.judged for q in part.on.quantities)
+
+
+# --- what was identified is uncertain -------------------------------------------------------------
+
+
+def with_inputs(experiment: Experiment, fitted: Sequence[Calibrated]) -> Experiment:
+    """The experiment with the covariance of what was identified among its uncertain inputs."""
+    inputs = tuple(i for one in fitted for i in inputs_of(one))
+    if not inputs:
+        return experiment
+    declared = experiment.uncertainty or Uncertainty(surrogate=fitted[0].problem.calibration.method)
+    surrogate = declared.surrogate or fitted[0].problem.calibration.method
+    more = replace(declared, inputs=(*declared.inputs, *inputs), surrogate=surrogate)
+    return replace(experiment, uncertainty=more)
+
+
+def inputs_of(one: Calibrated) -> tuple[Input, ...]:
+    """One input a principal axis of the covariance, named after the parameter that it moves most;
+    they are independent."""
+    variances, axes = np.linalg.eigh(one.found.covariance)
+    found = []
+    for k in np.argsort(-variances):
+        step = np.sqrt(max(float(variances[k]), 0.0)) * axes[:, k]
+        name = one.found.space.names[int(np.argmax(np.abs(axes[:, k])))]
+        found.append(_input(one, f"identified {name}", step, int(np.argmax(np.abs(axes[:, k])))))
+    return tuple(found)
+
+
+def _input(one: Calibrated, name: str, step: Any, most: int) -> Input:
+    space, best = one.found.space, one.found.best.x
+
+    def move(parameters: Any, z: float) -> Any:
+        values = space.values(best + z * step)
+        return with_free(parameters, dict(zip(space.names, values, strict=True)))
+
+    e = one.found.estimates[most]
+    words = f"{e.name} within its covariance, {e.value:.5g} ± {e.sd:.2g} (one sd), and what goes "
+    return Input(name, move, words + "with it", f"identified on {one.on}", identified=True)
+
+
+def identified_by(
+    experiment: Experiment,
+    shipped: tuple[Recording, ...],
+    parameters: Any,
+    methods: Mapping[str, Method],
+    fitted: Sequence[Calibrated],
+) -> Identified | None:
+    """What calibrations found, and what the experiment's own `identify` makes of that."""
+    for one in fitted:
+        parameters = with_free(parameters, one.values)
+    own = experiment.identify(shipped, parameters, methods) if experiment.identify else None
+    if not fitted:
+        return own
+    own = own or Identified(parameters, (), ())
+    told = (*(line for one in fitted for line in lines(one)), *own.notes)
+    opening = "; ".join([*map(headline, fitted), *([own.headline] if own.headline else [])])
+    return Identified(
+        own.parameters, (*scores(fitted), *own.scores), told, opening,
+        (*served(fitted), *own.calibrated),
+    )  # fmt: skip

@@ -1,0 +1,84 @@
+"""What an identification says: fitted on what, how surely, and what the recording leaves open."""
+
+from collections.abc import Iterable, Sequence
+
+from validate.compare.result import MethodResult
+from validate.compare.score import Score
+from validate.compare.verdict import Check
+from validate.identify.identification import Profiled
+from validate.parameters import describe
+from validate.replay.calibration import Free
+from validate.replay.problem import Calibrated
+from validate.report.numbers import with_unit
+
+_AGAINST = "what calibrates"
+_DIGITS = 4
+_SHOWN = 4  # predictions in a sentence
+
+
+def headline(one: Calibrated) -> str:
+    """Fitted on what."""
+    units = {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}
+    each = ", ".join(_interval(e, units[e.name]) for e in one.found.estimates)
+    return f"Fitted: {each} with '{one.problem.calibration.method}' on {one.on}"
+
+
+def _interval(e: Profiled, unit: str) -> str:
+    value, low, high = (with_unit(v, unit, _DIGITS) for v in (e.value, e.low, e.high))
+    return f"{e.name} = {value} (95 %: {low} to {high})"
+
+
+def predicted(results: Sequence[MethodResult]) -> str:
+    """Predicted what, within what: the accepted methods' checks that are evidence."""
+    found = [c for m in results for c in m.checks if c.evidence or c.verdict == "cannot decide"]
+    if not found:
+        return "predicted: nothing, for all that is judged served to fit"
+    each = (_within(c) for c in found[:_SHOWN])
+    more = f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else ""
+    return f"predicted: {', '.join(each)}{more}"
+
+
+def _within(c: Check) -> str:
+    off, doubt = with_unit(abs(c.value), c.unit), with_unit(2 * c.u_val, c.unit)
+    return f"{c.name} off by {off} (2 u_val {doubt})"
+
+
+def lines(one: Calibrated) -> tuple[str, ...]:
+    """What is to be said of an identification: how sure it is, and what it is not."""
+    found, p = one.found, len(one.found.space.ranges)
+    misfit = (
+        f"; the model leaves {found.misfit:.3g} times the variance that noise explains, and all "
+        f"intervals are wider by a factor {found.misfit**0.5:.3g}"
+        if found.misfit > 1
+        else ""
+    )
+    said = [
+        f"{', '.join(found.space.names)}: {found.found_again} of {len(found.fits)} starts ended at "
+        f"the best fit (chi-square {found.best.chi_square:.4g} over {found.best.count} residuals "
+        f"less {p}){misfit}."
+    ]
+    pairs = zip(found.estimates, one.problem.free, strict=True)
+    said += [f"{not_identified(one, e, free)}." for e, free in pairs if not e.identified]
+    return tuple(said)
+
+
+def not_identified(one: Calibrated, e: Profiled, free: Free) -> str:
+    """Why, with its numbers, and the measurement that would help."""
+    helps = free.helps or "a measurement that moves with it and not with the others"
+    return (
+        f"{e.name} is not identifiable from {one.on}: {'; '.join(e.findings)} ({e.value:.5g}, 95 % "
+        f"{e.low:.5g} to {e.high:.5g}); {helps} would identify it"
+    )
+
+
+def scores(fitted: Iterable[Calibrated]) -> tuple[Score, ...]:
+    """Every value with its interval, in SI."""
+    found = []
+    for one in fitted:
+        units = {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}
+        for e in one.found.estimates:
+            words = f"identified on {one.on}; 95 % profile interval {e.low:.6g} to {e.high:.6g}"
+            found.append(
+                Score(e.name, e.value, units[e.name], one.found.best.count, _AGAINST, words)
+            )
+    return tuple(found)
