@@ -18,7 +18,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh
-from validate.scene.shape_functions import Quadrature, facet_rule
+from validate.scene.shape_functions import Quadrature, facet_rule, simplex_rule
 
 
 @dataclass(frozen=True)
@@ -66,15 +66,14 @@ def _require_closed_line(surface: CavitySurface) -> None:
 
 def volume_of(surface: CavitySurface, positions: Floats) -> float:
     """Volume m^3 for the positions (n, d) m of all mesh nodes; in 2-D m^3 per metre."""
-    x = positions[surface.nodes]
-    return float(_trilinear(surface, *(3 * [x - x.mean(axis=0)])))
+    return float(volume_form(surface, positions[None])[0, 0, 0])
 
 
 def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
     """dV/dx (n, d) m^(d - 1): nodal forces of a unit pressure, fluid pushing on the solid."""
     rule = _rule(surface, positions)
     x = positions[surface.facets]
-    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, _into_solid(rule, x, x))
+    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, _into_solid(rule, x))
     load = np.zeros_like(positions)
     np.add.at(load, surface.facets, nodal)
     return load
@@ -86,32 +85,33 @@ def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
     `columns` (k, n, d): the rest positions first, then displacement fields. A translation of a
     closed surface leaves its volume, so every column is centred for the digits' sake.
     """
-    k = len(columns)
-    local = columns[:, surface.nodes] - columns[:, surface.nodes].mean(axis=1, keepdims=True)
+    k, d = len(columns), columns.shape[2]
+    x = columns[:, surface.nodes]
+    x = (x - x.mean(axis=1, keepdims=True))[:, surface.local()]
+    rule = _rule(surface, columns[0])
+    weighted = (np.einsum("qm,kfmd->kfqd", rule.N, x) * rule.weights[:, None]).reshape(k, -1)
+    along = np.einsum("qmj,kfmd->jkfqd", rule.dN, x)
     T = np.zeros((k, k, k))
-    # An area is bilinear: its first factor is the constant one that stands with the rest shape.
-    firsts = range(1 if columns.shape[2] == 2 else k)
-    for a in firsts:
-        for b in range(k):
-            for c in range(k):
-                T[a, b, c] = _trilinear(surface, local[a], local[b], local[c])
-    return np.asarray(np.mean([T.transpose(p) for p in permutations(range(3))], axis=0))
+    if d == 2:  # an area is bilinear: its first factor is the constant one of the rest shape
+        normals = np.stack([-along[0, ..., 1], along[0, ..., 0]], axis=-1)
+        T[0] = weighted @ normals.reshape(k, -1).T / d
+    else:
+        normals = -np.cross(along[0][:, None], along[1][None])
+        T = (weighted @ normals.reshape(k * k, -1).T).reshape(k, k, k) / d
+    return np.asarray(sum(T.transpose(p) for p in permutations(range(3))) / 6)
 
 
-def _trilinear(surface: CavitySurface, a: Floats, b: Floats, c: Floats) -> Floats:
-    local, rule, d = surface.local(), _rule(surface, a), a.shape[1]
-    value = a if d == 3 else b
-    normal = _into_solid(rule, b[local], c[local])
-    return np.asarray(np.einsum("q,fqd,fqd->", rule.weights, rule.at(value[local]), normal) / d)
-
-
-def _into_solid(rule: Quadrature, b: Floats, c: Floats) -> Floats:
-    """Normals (f, q, d) of facets with nodes b and c (f, m, d): bilinear, in the plane of c."""
-    if c.shape[2] == 2:
-        along = rule.jacobians(c)[..., 0]
-        return np.stack([-along[..., 1], along[..., 0]], axis=-1)
-    return np.asarray(-np.cross(rule.jacobians(b)[..., 0], rule.jacobians(c)[..., 1]))
+def _into_solid(rule: Quadrature, x: Floats) -> Floats:
+    """Normals (f, q, d) of facets with nodes x (f, m, d), as long as the facet is large."""
+    along = rule.jacobians(x)
+    if x.shape[2] == 2:
+        return np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
+    return np.asarray(-np.cross(along[..., 0], along[..., 1]))
 
 
 def _rule(surface: CavitySurface, positions: Floats) -> Quadrature:
-    return facet_rule(positions.shape[1], surface.facets.shape[1])
+    """Exact for the volume and its load; flat facets need their middle alone."""
+    d, nodes = positions.shape[1], surface.facets.shape[1]
+    if nodes == d:
+        return simplex_rule(1, np.full((1, d), 1 / d), np.array([1 / (d - 1)]))
+    return facet_rule(d, nodes)
