@@ -107,4 +107,5 @@ EXPERIMENT = Experiment(
     frames=2,
     follows=follows,
     locates=("data", "logs"),
+    specimen=lambda recording: recording.name.rstrip("0123456789"),  # EF30_0T_A1 is A's first
 )

@@ -25,7 +25,7 @@ class Residual:
     `systematic` the part that all points share (registration), per component. `simulated` and
     `measured` are kept for scalar quantities. `role` says whether the observation validates.
     `freedom` counts the numbers in which noise is independent; None: all of them. `scale` is the
-    largest that was measured of what has a zero.
+    largest that was measured of what has a zero, `reference` (k, c) what was measured of it.
     """
 
     quantity: str
@@ -40,6 +40,7 @@ class Residual:
     role: Role = "validates"
     freedom: int | None = None
     scale: float | None = None
+    reference: Floats | None = None
 
     def __post_init__(self) -> None:
         values = checked(self.values, f"residual {self.name}", (None, None), error=ComparisonError)
@@ -111,9 +112,11 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
         if other is not None:
             values = np.vstack([other.values, residual.values])
             freedom = None if residual.freedom is None else residual.freedom + (other.freedom or 0)
+            truths = [r.reference for r in (other, residual) if r.reference is not None]
             residual = replace(
-                residual, values=values, simulated=None, measured=None, freedom=freedom
-            )
+                residual, values=values, simulated=None, measured=None, freedom=freedom,
+                reference=np.vstack(truths) if len(truths) == 2 else None,
+            )  # fmt: skip
         merged[residual.name] = residual
     return merged
 
@@ -121,7 +124,7 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
 def _of(d: Deviation, selection: Selection, role: Role) -> Residual:
     return Residual(
         d.quantity, selection.label, d.values, d.sd, d.systematic, d.unit, d.definition,
-        d.simulated, d.measured, role, d.freedom, d.scale,
+        d.simulated, d.measured, role, d.freedom, d.scale, d.reference,
     )  # fmt: skip
 
 

@@ -73,7 +73,8 @@ class Result:
     """An experiment compared: all that a report needs.
 
     `kind` is what the recording is: measured, a twin, or the judged model's own. `warnings` doubt
-    what was given. `changed` parameters are not as the experiment declares them.
+    what was given. `changed` parameters are not as the experiment declares them. `specimens` are
+    those of the recordings, one name each.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Result:
     joint: tuple[Joint, ...] = ()
     exhibits: tuple[Exhibit, ...] = ()
     changed: tuple[Changed, ...] = ()
+    specimens: tuple[str, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:

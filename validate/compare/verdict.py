@@ -24,6 +24,7 @@ from scipy.special import ndtr
 from validate.arrays import rms
 from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual
+from validate.compare.sizes import Size, kind_of, size_of
 from validate.errors import ComparisonError
 from validate.estimate.consistency import chi_square_quantile
 
@@ -62,7 +63,9 @@ class Check:
     """A verdict: error `value`, `limit`, `u_val` and its parts, in `unit`; points compared.
 
     u_num and u_val are infinite where nothing bounds them; `numerical` says how u_num was found.
-    `raw` is the rms as it is, `noise` what the measurement's noise alone explains of it.
+    `raw` is the rms as it is, `noise` what the measurement's noise alone explains of it. `kind` is
+    what was measured, and `size` how large it was, measured and simulated; None: of nothing that
+    has a zero.
     """
 
     name: str
@@ -79,6 +82,8 @@ class Check:
     raw: float = 0.0
     noise: float = 0.0
     numerical: str = ""
+    kind: str = ""
+    size: Size | None = None
 
     @property
     def evidence(self) -> bool:
@@ -141,7 +146,8 @@ def judge(
     name = residual.name if _scalar(residual) else f"{residual.quantity}.rms@{residual.load}"
     return Check(
         name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why,
-        seen.raw, seen.noise, numerical.words,
+        seen.raw, seen.noise, numerical.words, kind_of(residual.quantity, residual.unit),
+        size_of(residual),
     )  # fmt: skip
 
 

@@ -111,13 +111,15 @@ class MarkerObservation:
         shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
         x, error, late = self._seen(np.asarray(selection.t), samples)
         off = (shown - x).reshape(-1, self.x.shape[2])
-        off = off[np.isfinite(off).all(axis=1)]
+        kept = np.isfinite(off).all(axis=1)
+        off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
         tre = rms(self.tre) / float(np.sqrt(3))
         found = (
             Deviation(
                 g.quantity, off[:, list(g.axes)], "m",
                 float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
                 scale=_largest((self.x - self.rest)[..., list(g.axes)]),
+                reference=moved[:, list(g.axes)],
             )
             for g in self.together
         )  # fmt: skip
@@ -154,7 +156,7 @@ class MarkerObservation:
         words = "estimate less measured displacement of the marker, at the times it was seen"
         off = (np.stack(probe, axis=1) - moved[samples])[seen]
         found = Deviation(name, off, "m", self.along(range(len(axes))), float(self.tre[j]), words,
-                          scale=_largest(moved))  # fmt: skip
+                          scale=_largest(moved), reference=moved[samples][seen])  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         return with_clock(found, sd_t, self._speed(j, samples, sd_t)) if sd_t > 0 else found
 

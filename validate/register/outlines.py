@@ -125,7 +125,7 @@ class OutlineObservation:
                 "contour.material", moved[0] - moved[1], "m",
                 self.sd * float(np.sqrt((np.diag(along).mean() + across) / 2)), 0.0,
                 "displacement of the outline at equal polar angle about its own centroid, every "
-                "10 deg", freedom=_freedom(along),
+                "10 deg", freedom=_freedom(along), reference=moved[1],
             ),
             *(self._corner(c, start, end) for c in self.corners),
             Deviation(
@@ -184,9 +184,11 @@ def merged(group: list[Deviation]) -> Deviation:
     first = group[0]
     systematic = rms([d.systematic for d in group])
     freedom = None if first.freedom is None else sum(d.freedom or 0 for d in group)
+    truths = [d.reference for d in group if d.reference is not None]
+    reference = np.vstack(truths) if len(truths) == len(group) else None
     return Deviation(
         first.quantity, values, first.unit, rms([d.sd for d in group]), systematic,
-        first.definition, freedom=freedom,
+        first.definition, freedom=freedom, reference=reference,
     )  # fmt: skip
 
 

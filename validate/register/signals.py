@@ -63,8 +63,9 @@ class SignalObservation:
         off = (simulated - measured)[:, None]
         scale = float(np.abs(self.y[:, 0]).max())
         found = Deviation(
-            self.quantity, off, self.unit, self.sd, 0.0, words, one[0], one[1], scale=scale
-        )
+            self.quantity, off, self.unit, self.sd, 0.0, words, one[0], one[1], scale=scale,
+            reference=measured[:, None],
+        )  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         if sd_t > 0:
             found = with_clock(found, sd_t, slopes(self.t, self.y[:, :1], at, sd_t))

@@ -206,6 +206,8 @@ class Experiment:
     `ladder` is how it enters the studies; what it leaves out is derived from the scene.
     `follows` is the experiment as its recordings have it (title, limits, what figures belong to);
     `locates` are parameters that only say where recordings lie, so that `follows` judges these.
+    `specimen` names the one that a recording is of: repeats of one specimen count once over all
+    experiments; without it all recordings are of one.
     """
 
     name: str
@@ -237,6 +239,7 @@ class Experiment:
     ladder: Ladder | None = None
     follows: Callable[[Any, Sequence[Recording], Any], Any] = _as_declared
     locates: tuple[str, ...] = ()
+    specimen: Callable[[Recording], str] | None = None
     quick: Change = unchanged
     path: Path | None = field(default=None, compare=False)
 

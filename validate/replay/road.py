@@ -18,6 +18,7 @@ from validate.compare.track import track_scores
 from validate.fem.locking import locking_notes
 from validate.memory import MemoryShortError
 from validate.parameters import Changed, Parameter, changed, describe
+from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.replay.calibrated import (
     Identify,
@@ -166,7 +167,13 @@ def _compared(
             for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
         ),
         changed=out.differing,
+        specimens=_specimens(experiment, road.recordings),
     )
+
+
+def _specimens(experiment: Experiment, recordings: tuple[Recording, ...]) -> tuple[str, ...]:
+    named = experiment.specimen or (lambda _: experiment.name)
+    return tuple(named(recording) for recording in recordings)
 
 
 def _following(experiment: Experiment, found: Opened, differing: tuple[Changed, ...]) -> Experiment:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats, rms
+from validate.compare.domain import Domain, domains
 from validate.compare.overall import Overall
 from validate.compare.published import Published
 from validate.compare.residual import Residual
@@ -80,6 +81,7 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "made": _made(made or Made()),
         "environment": environment(),
         "methods": [_method(m, result, share) for m in result.methods],
+        "domain": recorded(_domains(result)),
         "effects": recorded(result.effects),
         "rest": [_rest(r) for r in result.rest],
         "identified": [_score(s) for s in result.identified],
@@ -88,6 +90,13 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "joint_inputs": [members(j) | {"percent": recorded(j.percent)} for j in result.joint],
         "exhibits": exhibits(result.exhibits),
     }  # fmt: skip
+
+
+def _domains(result: Result) -> tuple[Domain, ...]:
+    """What the first accepted method covered, else the first one."""
+    method = next((m for m in result.methods if m.accepted), next(iter(result.methods), None))
+    names = tuple(r.name for r in result.recordings)
+    return domains(method, names, result.specimens) if method else ()
 
 
 def write_json(content: Json, path: Path) -> None:
