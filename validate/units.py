@@ -38,6 +38,8 @@ _SPELLED = {
     "msec": "millisecond",
     "PSI": "psi",
 }
+#: Units that a recording has and nobody stated: shown as they are, equal to themselves alone.
+SYMBOLIC = ("force unit",)
 _OWN = ("px", "dB")  # a library's are others: its pixel is 1/96 inch
 _WHOLE = {
     '"': "in", "牛": "N", "牛顿": "N", "千牛": "kN", "毫米": "mm", "厘米": "cm", "米": "m",
@@ -62,6 +64,8 @@ def si_factor(unit: str, quantity: str) -> float:
     if factor is None:
         kinds = [name for name, _ in QUANTITIES if _factor(unit.strip(), name) is not None]
         meant = f"it measures {kinds[0]}" if kinds else "it is not known"
+        if is_symbolic(unit):
+            meant = "nobody stated which one it is, so that it converts to nothing"
         if quantity == "force" and unit.strip().lower() in ("kg", "g"):
             meant = f"it is not known as force; if the weight of a mass is meant say {unit}f"
         raise RecordingError(
@@ -83,7 +87,7 @@ def in_si(number: float, unit: str, si_unit: str) -> float | None:
     """
     if unit == si_unit:
         return number
-    if si_unit in _OWN or unit in _OWN:
+    if si_unit in _OWN or unit in _OWN or is_symbolic(unit) or is_symbolic(si_unit):
         return None
     if si_unit == "1":
         factor = _NUMBERS.get(unit) if unit in ("%", "percent") else None
@@ -101,6 +105,11 @@ def _times(number: float, factor: float) -> float:
     if parts > 1 and math.isclose(parts * factor, 1, rel_tol=1e-12):
         return number / parts
     return number * (whole if math.isclose(whole, factor, rel_tol=1e-12) else factor)
+
+
+def is_symbolic(unit: str) -> bool:
+    """Whether a unit is, or is made with, one that nobody stated: it converts to nothing."""
+    return any(word in unit for word in SYMBOLIC)
 
 
 def is_unit(text: str) -> bool:

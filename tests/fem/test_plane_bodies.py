@@ -101,6 +101,25 @@ def test_a_stretched_sheet_is_the_material_point(
     assert run.traces["pull.force"].y == pytest.approx(expected, rel=1e-8)
 
 
+def test_forces_have_the_unit_of_their_scene() -> None:
+    scene = replace(
+        sheet(MESHES["tri3"], "stress", sample("neo_hooke", 15_200.0, 0.45)),
+        supports=(Support("x0", (0, 1)),),
+        drives=(Drive("pull", "x1", (1.0, 0.0)),),
+    )
+    one = np.array([1.0]), np.array([[0.001]]), np.array([0])
+    known, unknown = (
+        run_scheme("sheet", StaticNewton("none"), s, *one)
+        for s in (scene, replace(scene, force_unit="force unit"))
+    )
+    assert known.traces["pull.force"].unit == "N"
+    assert unknown.traces["pull.force"].unit == "force unit"
+    assert unknown.traces["pull.displacement"].unit == "m"
+    assert (unknown.traces["pull.force"].y == known.traces["pull.force"].y).all()
+    with pytest.raises(SceneError, match="forces in 'kN'"):
+        replace(scene, force_unit="kN")
+
+
 def test_a_sheet_turned_over_is_inverted() -> None:
     b = Body(sheet(MESHES["tri3"], "stress", sample("neo_hooke", 15_200.0, 0.45)))
     turned = b.mesh.nodes @ np.diag([-2.0, 0.0])

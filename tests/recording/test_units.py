@@ -96,7 +96,8 @@ def test_a_value_is_the_number_that_would_be_written_in_si(
 @pytest.mark.parametrize(
     ("unit", "si_unit"),
     [("mm", "Pa"), ("kPa", "1"), ("dB/cm", "m"), ("mm", "px"), ("px", "m"), ("m", "N/s^0.5"),
-     ("furlongs", "Pa"), ("__class__", "m"), ("m**9", "m")],
+     ("furlongs", "Pa"), ("__class__", "m"), ("m**9", "m"), ("force unit", "N"),
+     ("N", "force unit"), ("force unit/m", "N/m"), ("N/m", "force unit/m")],
 )  # fmt: skip
 def test_another_dimension_or_an_unknown_unit_has_no_value(unit: str, si_unit: str) -> None:
     assert in_si(1.0, unit, si_unit) is None
@@ -109,3 +110,10 @@ def test_another_dimension_or_an_unknown_unit_has_no_value(unit: str, si_unit: s
 )  # fmt: skip
 def test_number_and_unit_of_a_text(text: str, parts: tuple[float, str] | None) -> None:
     assert split(text) == parts
+
+
+def test_a_unit_that_nobody_stated_is_itself_alone() -> None:
+    assert in_si(2.5, "force unit", "force unit") == 2.5
+    assert split("26 force unit/m") == (26.0, "force unit/m")
+    with pytest.raises(RecordingError, match="nobody stated"):
+        si_factor("force unit", "force")

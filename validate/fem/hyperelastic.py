@@ -76,7 +76,7 @@ class Body:
             raise SceneError("a Prony series is for bodies in 3-D: drop it, or take a 3-D mesh")
         require_positive_cells(mesh)
         self.mesh = mesh
-        self.parts = tuple(_parts(scene))
+        self.parts, self.sheet = tuple(_parts(scene)), scene.plane == "stress"
         points = stiffness_points(mesh)
         self.gradients = np.pad(points.slopes, [(0, 0)] * 3 + [(0, 3 - mesh.dimension)])
         self.weights = scene.thickness * points.weights
@@ -167,6 +167,8 @@ class Body:
         if self.mean:
             p = self.mean.pressures(self._cell_gradient(u), self._cell_gradient(du))
             return np.asarray(p[:, None])
+        if self.sheet:
+            return np.zeros(self.weights.shape)  # no stress across leaves no pressure
         out = np.empty(self.weights.shape)
         for b, step in zip(self._blocks(u), self._blocks(du), strict=True):
             s, slope = b.law.dilatation(b.H)

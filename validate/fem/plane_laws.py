@@ -1,8 +1,8 @@
 """A hyperelastic law in plane stress: the stretch across the sheet is what leaves no stress there.
 
-At every point P_33(H_33) = 0 is solved by Newton's method in the logarithm of that stretch, and the
-tangent is condensed: A_iJjK - A_iJ33 A_33jK / A_3333. The in-plane
-stress of what is left has a pressure no more, so that nothing locks as nu nears .5.
+At every point P_33(H_33) = 0 is solved by secants in the logarithm of that stretch, and the tangent
+is condensed: A_iJjK - A_iJ33 A_33jK / A_3333. No pressure is left in the sheet, so that nothing
+locks as nu nears .5.
 """
 
 from dataclasses import dataclass
@@ -44,21 +44,26 @@ class PlaneStress:
 
     def completed(self, H: Floats) -> Floats:
         """H with the H_33 that leaves no stress across; -1 (no thickness) where there is none."""
-        H = H.copy()
         flat = volume_change(H)
+        sound = flat > -1
+        out = np.where(sound[..., None, None], H, 0.0)
         nu = (3 * self.bulk - 2 * self.mu) / (2 * (3 * self.bulk + self.mu))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            log = np.where(flat > -1, -nu / (1 - nu) * np.log1p(np.maximum(flat, -1)), np.nan)
-            for _ in range(_ITERATIONS):
-                H[..., 2, 2] = np.expm1(np.nan_to_num(log))
-                P, A = self._across(H)
-                left = np.abs(P) > _SETTLED * (self.bulk + self.mu)
-                if not (left & np.isfinite(log)).any():
-                    break
-                step = -P / (A * (1 + H[..., 2, 2]))
-                log = np.where(left, log + np.clip(step, -_STEP, _STEP), log)
-        H[..., 2, 2] = np.where(np.isfinite(log) & ~left, H[..., 2, 2], -1.0)
-        return H
+        log = -nu / (1 - nu) * np.log1p(np.where(sound, flat, 0.0))
+        slope = np.full_like(log, self.bulk + 4 * self.mu / 3)  # at rest, then by secants
+        before, step = np.zeros_like(log), np.zeros_like(log)
+        for _ in range(_ITERATIONS):
+            out[..., 2, 2] = np.expm1(log)
+            P = self.stress(out)[..., 2, 2]
+            left = np.abs(P) > _SETTLED * (self.bulk + self.mu)
+            if not left.any():
+                break
+            moved = left & (step != 0) & (before != P)
+            slope = np.where(moved, (P - before) / np.where(moved, step, 1.0), slope)
+            step = np.where(left, np.clip(-P / slope, -_STEP, _STEP), 0.0)
+            before, log = P, log + step
+        out[..., :2, :2] = H[..., :2, :2]
+        out[..., 2, 2] = np.where(sound & ~left, out[..., 2, 2], -1.0)
+        return out
 
     def energy(self, H: Floats) -> Floats:
         s, _ = self.law.dilatation(H)
@@ -90,7 +95,3 @@ class PlaneStress:
         _, p, stiff = self.law.volumetric(s, self.bulk)
         A = self.law.tangent(H) + p[..., None, None, None, None] * self.law.curvature(H)
         return np.asarray(A + np.einsum("...,...iJ,...jK->...JijK", stiff, slope, slope))
-
-    def _across(self, H: Floats) -> tuple[Floats, Floats]:
-        """P_33 and A_3333 (...) Pa."""
-        return self.stress(H)[..., 2, 2], self._whole(H)[..., 2, 2, 2, 2]

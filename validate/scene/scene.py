@@ -13,6 +13,7 @@ from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.select import Place, kind_of, nodes_of
 from validate.scene.tracked import Prescribed
+from validate.units import SYMBOLIC
 
 Dilatation = Literal["pointwise", "nodal_mean", "mixed"]
 PlaneState = Literal["strain", "stress"]
@@ -172,7 +173,8 @@ class Scene:
     of a drive is that on the whole body. `dilatation`: the volume change is that of every point, in
     the mean of the cells around each node (tet4), or "mixed", projected in every cell
     (`fem.mean_dilatation`); the latter two do not lock near nu = .5. `plane` and `thickness` m are
-    those of a 2-D mesh; at 1 m all forces are per metre.
+    those of a 2-D mesh; at 1 m all forces are per metre. `force_unit`: N, or that of a recording
+    whose unit nobody stated; moduli are then in it per m^2, and no force is in N.
     """
 
     mesh: Mesh
@@ -193,6 +195,7 @@ class Scene:
     masses: tuple[Mass, ...] = ()
     contacts: tuple[RigidContact, ...] = ()
     tracked: tuple[Prescribed, ...] = ()
+    force_unit: str = "N"
 
     def __post_init__(self) -> None:
         own = tuple(d for d in self.drives if d.follows is None)
@@ -215,6 +218,8 @@ class Scene:
                 )
         for material in self.materials:
             material.require_stable()
+        if self.force_unit not in ("N", *SYMBOLIC):
+            raise SceneError(f"forces in '{self.force_unit}': N, or {', '.join(SYMBOLIC)}")
         if self.copies < 1:
             raise SceneError(f"{self.copies} copies of the mesh: at least 1")
         self._check_places()

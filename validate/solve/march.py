@@ -86,6 +86,7 @@ def march(
         traces[name] = Trace(np.array([numbers[name] for numbers in walk.numbers]), unit)
     traces |= _totals(stepper.scene, traces)
     traces |= _probed(stepper, walk.probes)
+    traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
     seconds = np.array(walk.seconds)
     seconds = seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds[:done]
     times = _step_times(seconds) if done else None
@@ -128,6 +129,11 @@ def _walk(
             if isinstance(stepper, Uncertain):
                 walk.sd.append(stepper.sd(state))
     return walk, Outcome("finished", len(inputs))
+
+
+def _in_unit_of(scene: Scene, trace: Trace) -> Trace:
+    """A force in the unit that the scene has for forces: schemes know numbers alone."""
+    return replace(trace, unit=scene.force_unit) if trace.unit == "N" else trace
 
 
 def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:

@@ -13,6 +13,7 @@ from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
 from validate.solve.pressure_loop import PressureLoop
 from validate.solve.propagated import Propagated
+from validate.solve.proportional import Proportional
 from validate.solve.pulse import PulsePressure
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.stretch_test import StretchTest
@@ -37,7 +38,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
 )
 
 # What solves a whole scene at once.
-SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest, Propagated)
+SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest, Propagated, Proportional)
 
 
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
