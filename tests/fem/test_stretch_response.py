@@ -9,7 +9,7 @@ from validate.fem.laws import law_of
 from validate.fem.stretch_response import response
 from validate.scene.material import LawName, Material
 from validate.scene.material_point import MaterialPoint, StretchMode
-from validate.scene.rubber import mooney_rivlin
+from validate.scene.rubber import mooney_rivlin, ogden
 
 E, NU = 12_000.0, 0.4
 STRETCHES = np.array([0.6, 0.8, 1.0, 1.2, 1.5])
@@ -125,3 +125,13 @@ def test_each_input_has_its_stretch() -> None:
     assert two.inputs == ("stretch", "second")
     with pytest.raises(SceneError, match=r"stretches: .*\(3, 1\)"):
         response(two, np.array([1.0, 1.1, 1.2]))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_law_of_powers_is_its_closed_form_far_out(mode: StretchMode) -> None:
+    """G (2/a) (l^(a-1) - l3^a/l): at stretch 7 the third direction is down to a fiftieth."""
+    G, a, l = 2e5, 2.4946, np.array([0.5, 3.0, 5.0, 7.0])
+    free = {"uniaxial": l**-0.5, "equibiaxial": l**-2, "pure_shear": 1 / l}[mode]
+    law = ogden((2 * G / a,), (a,), 0.4999999, stretches=(1e-2, 10.0))
+    found = response(MaterialPoint(law, mode), l)["nominal_stress"]
+    assert found == pytest.approx(2 * G / a * (l ** (a - 1) - free**a / l), rel=1e-4)

@@ -18,7 +18,8 @@ class Domain:
     """One run: principal logarithmic strain (its largest size) that 99 % of the cells stay below,
     the fastest that it grew (1/s), the smallest and largest side (m) of the box about the body.
 
-    None where the run does not say: a material point has no size, one instant no rate.
+    None where the run does not say: a material point has no size, one instant or rows without
+    times no rate.
     """
 
     recording: str
@@ -35,9 +36,10 @@ def domains(
     mesh = method.scene.mesh
     sides = np.ptp(mesh.nodes, axis=0) if len(mesh.nodes) else None
     found = []
-    for run, recording, specimen in zip(method.runs, recordings, specimens, strict=False):
+    each = zip(method.runs, method.registered, recordings, specimens, strict=False)
+    for run, seen, recording, specimen in each:
         t, strain = _strains(mesh, run)
-        rate = _largest(np.abs(np.diff(strain)) / np.diff(t))
+        rate = _largest(np.abs(np.diff(strain)) / np.diff(t)) if seen.timed else None
         box = None if sides is None else (float(sides.min()), float(sides.max()))
         found.append(Domain(recording, specimen, _largest(strain), rate, box))
     return tuple(found)

@@ -94,13 +94,16 @@ def _first_guess(point: MaterialPoint, stretch: Floats) -> Floats:
 
 def _free_strain(law: Law, driven: Floats, free: Floats, h: Floats) -> Floats:
     """h (nt,) without stress P_33 at F = I + driven + h free."""
+    largest = 1 + np.abs(driven).max(axis=(1, 2))
     for _ in range(_ITERATIONS):
         H = driven + h[:, None, None] * free
         stress, slope = _free_stress(law, H, free, 1 + h)
         # A step may not cross zero length.
         change = np.maximum(-stress / slope, -0.9 * (1 + h))
         h = h + change
-        if (np.abs(change) <= _SETTLED * (1 + h)).all():
+        # Principal stretches come from F^T F, whose rounding is that of the largest one squared.
+        rounding = np.maximum(largest / (1 + h), 1.0) ** 2
+        if (np.abs(change) <= _SETTLED * rounding * (1 + h)).all():
             return h
         if (1 + h < _COLLAPSED).any():
             break

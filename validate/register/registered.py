@@ -20,6 +20,7 @@ class Registered:
     `rest` is the unloaded instant, where registration and geometry can be looked at alone.
     `outside` counts samples left out because they lie beyond the law's validity. `time_scale` are
     the recorded seconds in one second of these times, where a slow recording is walked faster.
+    `timed` is False where rows were recorded without times and their numbers stand for them.
     Raises `ComparisonError` unless driving signals, on common times, are there.
     """
 
@@ -29,6 +30,7 @@ class Registered:
     outside: int = 0
     findings: tuple[str, ...] = ()
     time_scale: float = 1.0
+    timed: bool = True
 
     def __post_init__(self) -> None:
         drives = self.drives

@@ -4,7 +4,7 @@ What was identified goes on with its covariance as uncertain inputs, along its p
 calibrated is named, so that no figure serves twice.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from validate.identify.identification import identify as identify_in
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.calibrated_words import headline, lines, not_identified, scores
-from validate.replay.calibration import Free
+from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.replay.origins import opened
@@ -67,12 +67,32 @@ def problem_of(
     parts = []
     for on in calibration.on:
         if on.judged:
-            parts.append(Part(on, shipped, parameters, True))
+            served = _observing(experiment, calibration, on, shipped, parameters, methods)
+            parts.append(Part(on, served, parameters, True))
             continue
         found = opened(experiment, on.change(parameters))
         same = any(r.source.sha256 in own for r in found.recordings)
         parts.append(Part(on, found.recordings, found.parameters, same))
     return Problem(experiment, calibration, free, methods[calibration.method], tuple(parts))
+
+
+def _observing(
+    experiment: Experiment,
+    calibration: Calibration,
+    on: Calibrates,
+    shipped: tuple[Recording, ...],
+    parameters: Any,
+    methods: Mapping[str, Method],
+) -> tuple[Recording, ...]:
+    """The recordings with an observation of what calibrates: what is predicted in the others must
+    not decide what can be identified. All of them where none says so."""
+    if len(shipped) == 1:
+        return shipped
+    asked, model = middle(experiment, parameters), methods[calibration.method].scene
+    names = {q.partition("@")[0] for q in on.quantities}
+    seen = (experiment.place(r, asked, experiment.build(r, asked, model)) for r in shipped)
+    units = [{q for o in one.compared for q in o.units} for one in seen]
+    return tuple(r for r, own in zip(shipped, units, strict=True) if own & names) or shipped
 
 
 def calibrated(
@@ -81,18 +101,45 @@ def calibrated(
     methods: Mapping[str, Method],
     shipped: tuple[Recording, ...],
     identify: Identify = here,
-) -> tuple[Calibrated, ...]:
+    *,
+    wanted: Collection[str] = (),
+    anyway: bool = False,
+) -> tuple[tuple[Calibrated, ...], Mapping[str, str]]:
     """Every calibration of which something stands open, in order; each sees what those before
-    found. Raises `ComparisonError` for a figure that would serve twice."""
+    found. And methods that are refused, with the reason.
+
+    Where several methods are calibrated, each by itself, those that are not `wanted` (none: all)
+    are left out, and one that cannot be identified is refused while others go on. Raises
+    `ComparisonError` for a figure that would serve twice, and, unless `anyway`, for what is not
+    identifiable where no method is left.
+    """
     done: list[Calibrated] = []
+    refused: dict[str, str] = {}
+    alone = _each_by_itself(experiment)
     for number, free in enumerate(open_free(experiment, parameters)):
-        if not free:
+        name = experiment.calibrations[number].method
+        if not free or (alone and wanted and name not in wanted):
             continue
         problem = problem_of(experiment, number, free, parameters, methods, shipped)
         require_apart(experiment.accept, problem)
-        done.append(Calibrated(problem, identify(number, problem)))
-        parameters = with_free(parameters, done[-1].values)
-    return tuple(done)
+        try:
+            one = Calibrated(problem, identify(number, problem))
+            if not anyway:
+                require_identified(experiment, one)
+        except ComparisonError as error:
+            refused[name] = str(error)
+            if not alone or set(refused) >= (set(wanted) or alone):
+                raise
+            continue
+        done.append(one)
+        parameters = with_free(parameters, one.values)
+    return tuple(done), refused
+
+
+def _each_by_itself(experiment: Experiment) -> set[str]:
+    """The methods that are calibrated where there are several; none where one serves all."""
+    methods = {c.method for c in experiment.calibrations}
+    return methods if len(methods) > 1 else set()
 
 
 def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
@@ -116,15 +163,14 @@ def _all_of(accept: Accept, name: str) -> bool:
     return quantity == accept.quantity and (not load or load in accept.loads)
 
 
-def require_identified(experiment: Experiment, fitted: Iterable[Calibrated]) -> None:
+def require_identified(experiment: Experiment, one: Calibrated) -> None:
     """Raises `ComparisonError` for a parameter that its recordings do not identify."""
-    for one in fitted:
-        for estimate, free in zip(one.found.estimates, one.problem.free, strict=True):
-            if not estimate.identified:
-                raise ComparisonError(
-                    f"{not_identified(one, estimate, free)}; --anyway predicts with it all the "
-                    f"same, `validate identify {experiment.name}` shows its profile"
-                )
+    for estimate, free in zip(one.found.estimates, one.problem.free, strict=True):
+        if not estimate.identified:
+            raise ComparisonError(
+                f"{not_identified(one, estimate, free)}; --anyway predicts with it all the "
+                f"same, `validate identify {experiment.name}` shows its profile"
+            )
 
 
 def served(fitted: Iterable[Calibrated]) -> tuple[str, ...]:

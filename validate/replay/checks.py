@@ -214,7 +214,8 @@ def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
 def _nothing(accept: Accept, mine: Followed) -> Check:
     """A check that compared nothing, in the unit of what it should have compared."""
     units = {q: unit for seen in mine.seen.compared for q, unit in seen.units.items()}
-    ends = "; ".join(f"{r.outcome.state}: {r.outcome.why}" for r in mine.runs if not r.finished)
+    said = (f"{r.outcome.state}: {r.outcome.why}" for r in mine.runs if not r.finished)
+    ends = "; ".join(dict.fromkeys(said))
     why = f"compared nothing: {ends or 'no such quantity in the recording'}"
     unit = units.get(accept.quantity, _NO_UNIT)
     return Check(

@@ -26,7 +26,6 @@ from validate.replay.calibrated import (
     here,
     identified_by,
     middle,
-    require_identified,
     with_inputs,
 )
 from validate.replay.calibrated_words import predicted
@@ -107,16 +106,18 @@ def set_out(
     if report and (experiment.identify or experiment.calibrations):
         report(0, 1, "identifies parameters")
     every = all_methods(experiment, options)
-    fitted = calibrated(experiment, parameters, every, shipped, identify)
-    if not options.anyway:
-        require_identified(experiment, fitted)
+    by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    fitted, refused = calibrated(
+        experiment, parameters, every, shipped, identify, wanted={*methods, by} - {""},
+        anyway=options.anyway,
+    )  # fmt: skip
     experiment = with_inputs(experiment, fitted)
     identified = identified_by(experiment, shipped, parameters, every, fitted)
     used = identified.parameters if identified else parameters
     road = Road(
         experiment, methods, used, report,
         quick=options.quick, calibrated=identified.calibrated if identified else (),
-        since=since or perf_counter(),
+        since=since or perf_counter(), refused=refused,
     )  # fmt: skip
     return SetOut(experiment, road, found, identified, differing, fitted)
 

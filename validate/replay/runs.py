@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from time import perf_counter
+from types import MappingProxyType
 from typing import Any
 
 from validate.compare.result import Kind
 from validate.errors import ComparisonError
 from validate.fem.fill import next_to_nothing, require_solvable
 from validate.recording.types import Recording
+from validate.replay.calibrated import middle
 from validate.replay.experiment import Case, Change, Experiment, Variant, unchanged
 from validate.replay.followed import MAIN, Followed, Truth
 from validate.replay.method import Limited, Method
@@ -23,7 +25,8 @@ class Road:
     """Solves each variant once on each case and counts them for the progress bar.
 
     `truths` are kept by case: the twin is repeated once. `calibrated` names residuals whose data
-    served to identify; `remade` says that the user's own parameters made the recording.
+    served to identify; `remade` says that the user's own parameters made the recording. `refused`
+    methods are not run, for the reason given: they are rows of the result.
     """
 
     def __init__(
@@ -36,9 +39,10 @@ class Road:
         quick: bool,
         calibrated: tuple[str, ...] = (),
         since: float | None = None,
+        refused: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.experiment, self.methods, self.parameters = experiment, methods, parameters
-        self.calibrated = calibrated
+        self.calibrated, self.refused = calibrated, refused
         self.settings: Mapping[str, Method] = {**experiment.methods, **methods}
         self.quick = quick
         self.cases = () if quick else _cases(experiment, methods)
@@ -150,9 +154,12 @@ class Road:
             settings = self.settings[as_.method]
             method = replace(settings, split=as_.split * settings.split)
             what = f"{as_.method} on {case}" if case else as_.method
+            why = self.refused.get(as_.method, "")
+            if why:  # what stands open of its parameters is not known
+                parameters = middle(self.experiment, parameters)
             found = solve(
                 self.experiment, recordings, as_.method, method, parameters, case,
-                lambda doing: self.tell(f"{what}: {doing}"),
+                lambda doing: self.tell(f"{what}: {doing}"), why,
             )  # fmt: skip
             self._done[key] = self._with_truth(found, true)
             self._pace.took(key, perf_counter() - start)

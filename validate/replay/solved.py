@@ -18,7 +18,7 @@ from validate.replay.method import Method
 from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.scene import Scene
 from validate.solve.march import Tell, march, run_scheme
-from validate.solve.types import Run, SceneSolver, Stepper
+from validate.solve.types import Outcome, Run, SceneSolver, Stepper, Trace
 
 
 def solve(
@@ -29,10 +29,12 @@ def solve(
     parameters: Any,
     case: str = MAIN,
     tell: Tell = lambda _: None,
+    refused: str = "",
 ) -> Followed:
     """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input.
 
-    `tell` is given what is being done, in words.
+    `tell` is given what is being done, in words. A method that is `refused`, for that reason, has
+    its scene built and is not run.
     """
     start = perf_counter()
     tell("mesh")
@@ -41,9 +43,18 @@ def solve(
     pairs = zip(recordings, scenes, strict=True)
     seen = tuple(experiment.place(r, parameters, s) for r, s in pairs)
     runs = _Runs(experiment, name, method, parameters, scene, built, tell)
-    done = tuple(runs.on(*pair) for pair in zip(seen, scenes, strict=True))
+    done = tuple(
+        _refused(refused) if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True)
+    )
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
     return Followed(name, _label(method, scene), case, scene, seen, done, stacked(found))
+
+
+def _refused(why: str) -> Run:
+    none = np.zeros(0)
+    traces = {"updates": Trace(none, "1")}
+    at, u = none.astype(np.int64), np.zeros((0, 0, 3))
+    return Run("", none, at, u, traces, Outcome("refused", 0, why), 0.0, None)
 
 
 def _scenes(

@@ -1,0 +1,112 @@
+"""Laws that are calibrated each by itself: one that cannot be identified is a row, not the end."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError
+from validate.parameters import quantity
+from validate.recording.types import Recording, Signal, Source
+from validate.register.registered import Registered
+from validate.register.signals import driving, validating
+from validate.replay.calibration import Calibrates, Calibration, Free
+from validate.replay.experiment import Experiment, Uncertainty
+from validate.replay.method import Method
+from validate.replay.options import Options
+from validate.replay.road import compare
+from validate.scene.material import LawName, Material
+from validate.scene.material_point import MaterialPoint
+from validate.solve.stretch_test import StretchTest
+
+MU, NU = 30e3, 0.4999
+POWERS = {"uniaxial": -2, "equibiaxial": -5}
+
+
+@dataclass(frozen=True)
+class Moduli:
+    neo: float | None = quantity(None, "Pa", "shear modulus of neo-Hooke; none: identified")
+    svk: float | None = quantity(None, "Pa", "shear modulus of the other; none: identified")
+
+
+def pulled(mode: str, most: float) -> Recording:
+    """Incompressible neo-Hooke in tension, with 100 Pa of noise."""
+    l = np.linspace(1.02, most, 12)
+    t = np.arange(len(l), dtype=float)
+    P = MU * (l - l ** POWERS[mode]) + np.random.default_rng(3).normal(0, 100.0, len(l))
+    signals = {
+        "stretch": Signal(t, l[:, None], "1", 0.0, "machine"),
+        "stress": Signal(t, P[:, None], "Pa", 100.0, "machine"),
+    }
+    return Recording(mode, Source("x", "", 0, "x"), 0, signals=MappingProxyType(signals))
+
+
+def build(recording: Recording, p: Moduli, law: LawName) -> MaterialPoint:
+    mu = p.neo if law == "neo_hooke" else p.svk
+    assert mu is not None
+    return MaterialPoint(Material(2 * mu * (1 + NU), NU, law), recording.name)  # type: ignore[arg-type]
+
+
+def place(recording: Recording, p: Moduli, scene: MaterialPoint) -> Registered:
+    stress = validating(recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress")
+    return Registered((driving(recording, "stretch", "1"), stress), timed=False)
+
+
+def calibration(method: str, low: float) -> Calibration:
+    free = (Free(method, low, 1e3 * low, "assumed", "another mode"),)
+    return Calibration(method, free, (Calibrates(("uniaxial",)),))
+
+
+def laws(uniaxial: float, equibiaxial: float) -> Experiment:
+    most = {"uniaxial": uniaxial, "equibiaxial": equibiaxial}
+    return Experiment(
+        "laws", "a strip pulled", "this test", Moduli(),
+        {"neo": Method("neo-Hooke", StretchTest(), "neo_hooke"),
+         "svk": Method("St. Venant-Kirchhoff", StretchTest(), "svk")},
+        ("neo",), (Accept("equibiaxial", 5e3, "ours"),),
+        lambda p, folder: tuple(pulled(mode, m) for mode, m in most.items()), build, place,
+        calibrations=(calibration("svk", 1e3), calibration("neo", 1e3)),
+        uncertainty=Uncertainty(surrogate="neo"), path=Path(__file__),
+    )  # fmt: skip
+
+
+def test_a_law_without_a_state_is_refused_and_the_others_go_on() -> None:
+    result = compare(laws(2.0, 1.5), Options({}))
+    assert {m.name: m.run.outcome.state for m in result.methods} == {
+        "neo": "finished", "svk": "refused",
+    }  # fmt: skip
+    refused = next(m for m in result.methods if m.name == "svk")
+    assert "no free stretch is without stress" in refused.run.outcome.why
+    assert [(c.name, c.verdict) for c in result.checks] == [("equibiaxial.rms@all", "agrees")]
+    (modulus,) = (s for s in result.identified if s.name == "neo")
+    assert modulus.value == pytest.approx(MU, rel=0.01)
+
+
+def test_what_a_law_cannot_predict_does_not_keep_it_from_being_identified() -> None:
+    """Of two recordings only the first calibrates: at 1.6 both ways the law has no state."""
+    result = compare(laws(1.1, 1.6), Options({}))
+    assert {s.name for s in result.identified} >= {"neo", "svk"}
+    refused = next(m for m in result.methods if m.name == "svk")
+    assert [r.finished for r in refused.runs] == [True, False]
+
+
+def test_a_parameter_that_is_not_identifiable_refuses_its_own_law() -> None:
+    narrow = replace(
+        laws(1.2, 1.2), calibrations=(calibration("svk", 1e6), calibration("neo", 1e3))
+    )
+    refused = next(m for m in compare(narrow, Options({})).methods if m.name == "svk")
+    assert "svk is not identifiable" in refused.run.outcome.why
+    assert "another mode would identify it" in refused.run.outcome.why
+    anyway = compare(narrow, Options({}, anyway=True))
+    assert all(m.run.finished for m in anyway.methods)
+
+
+def test_only_the_laws_that_are_run_are_identified_and_none_left_is_an_error() -> None:
+    alone = compare(laws(2.0, 1.5), Options({}, methods=("neo",)))
+    assert {s.name for s in alone.identified} == {"neo"}
+    none = replace(laws(2.0, 1.5), calibrations=(calibration("svk", 1e6), calibration("neo", 1e6)))
+    with pytest.raises(ComparisonError, match="neo is not identifiable"):
+        compare(none, Options({}))
