@@ -17,7 +17,15 @@ from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton
-from validate.solve.schemes import INERTIAL, LARGE_INERTIAL, LINEAR, SCHEMES, SOLVERS, TOUCHING
+from validate.solve.schemes import (
+    INERTIAL,
+    LARGE_INERTIAL,
+    LINEAR,
+    NEEDLES,
+    SCHEMES,
+    SOLVERS,
+    TOUCHING,
+)
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import Scheme
 
@@ -54,7 +62,7 @@ def settings(scheme: type[Scheme]) -> Scheme:
 
 @pytest.mark.parametrize(
     "scheme",
-    [s for s in SCHEMES if s not in (*INERTIAL, *LARGE_INERTIAL, *TOUCHING)],
+    [s for s in SCHEMES if s not in (*INERTIAL, *LARGE_INERTIAL, *TOUCHING, *NEEDLES)],
     ids=lambda s: s.__name__,
 )
 def test_a_scheme_steps_and_says_what_its_states_mean(
@@ -206,6 +214,7 @@ def test_what_a_refusal_names_instead_handles_it() -> None:
                 "point": not h.mesh,
                 "membranes": "membranes" in h.contact,
                 "rigid": "rigid" in h.contact,
+                "needle": "needle" in h.contact,
                 **{law: law in h.law for law in ("linear", *LARGE)},
             }
             assert has.get(part) or getattr(h, part, False), (part, name)

@@ -90,6 +90,18 @@ class Condensed:
             self._columns[unknown] = self._solved(np.array([unknown]))[:, 0]
         return self._columns[unknown]
 
+    def prefetch(self, unknowns: Ints) -> None:
+        """Keeps the columns of `unknowns` before they are asked for, so that no step has to solve.
+
+        Raises `MemoryShortError` where they do not fit.
+        """
+        wanted = np.setdiff1d(np.intersect1d(unknowns, self.free), list(self._columns))
+        require_memory(8 * self.size * len(wanted), f"{len(wanted)} columns of {self.size} numbers")
+        for start in range(0, len(wanted), _AT_ONCE):
+            part = wanted[start : start + _AT_ONCE]
+            found = np.ascontiguousarray(self._solved(part).T)
+            self._columns.update(zip(part.tolist(), found, strict=True))
+
     @property
     def dimension(self) -> int:
         return int(self._system.scene.mesh.dimension)
@@ -143,7 +155,7 @@ def condense(system: System, keep: Ints) -> Condensed:
     whole = responses_of(system)
     d = mesh.dimension
     free = np.flatnonzero(np.isin((nodes[:, None] * d + np.arange(d)).ravel(), system.free))
-    kept = np.ascontiguousarray(whole.fields[:, nodes].reshape(len(whole.fields), -1))
+    kept = np.ascontiguousarray(whole.fields[:, nodes].reshape(len(whole.fields), nodes.size * d))
     surfaces = tuple(_renumbered(c, nodes) for c in system.cavities)
     return Condensed(whole, nodes, free, kept, surfaces, system, system.factor())
 

@@ -12,6 +12,7 @@ from validate.scene.contact import RigidContact, require_clear
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.select import Place, kind_of, nodes_of
+from validate.scene.tool import Needle, require_usable
 from validate.scene.tracked import Prescribed
 from validate.units import SYMBOLIC
 
@@ -196,6 +197,7 @@ class Scene:
     contacts: tuple[RigidContact, ...] = ()
     tracked: tuple[Prescribed, ...] = ()
     force_unit: str = "N"
+    tools: tuple[Needle, ...] = ()
 
     def __post_init__(self) -> None:
         own = tuple(d for d in self.drives if d.follows is None)
@@ -239,6 +241,7 @@ class Scene:
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)
         require_clear(self.contacts, self.mesh)
+        require_usable(self.tools, self.mesh)
 
     def _check_region(self, region: Region) -> None:
         """Its cells are those of the mesh."""
@@ -274,9 +277,9 @@ class Scene:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what a step is given: drives in m, then loads in N and weights in m/s^2, then
-        rigid bodies that move in m."""
+        rigid bodies that move and needles' tips in m."""
         parts = (*self.drives, *self.loads, *self.movers)
-        return tuple(part.name for part in parts)
+        return (*(part.name for part in parts), *(i for tool in self.tools for i in tool.inputs))
 
     @property
     def movers(self) -> tuple[RigidContact, ...]:

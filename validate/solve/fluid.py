@@ -18,12 +18,10 @@ from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
 from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear import LinearStepper, condensed
-from validate.solve.pressure_curve import cubic, least_slope, rises
+from validate.solve.pressure_curve import NEWTON_STEPS, ROUNDING, cubic, least_slope, root_of
 from validate.solve.types import Ending, State, Stepper
 
 FLUID = Handles(("linear",), inertia=False, cavities=True, loads=False, contact=GLUED)
-ROUNDING = 4e-15  # relative volume error that rounding alone leaves
-_NEWTON_STEPS = 30
 
 
 @dataclass(frozen=True)
@@ -142,28 +140,12 @@ class ExactStepper(Settling):
         form, p = self.responses.volumes[0], len(drives) + 1
         z = np.concatenate([[1.0], drives, [0.0]])
         V0 = float(form[0, 0, 0])
-        a, b, own, V = cubic(form, z, p)
-        c, d = own + self.softness * V0, V - self.ratio * V0
-        scale = V0 * max(1.0, abs(self.ratio)) if self.softness else V0 * self.ratio
-        P, failed = float(state.inner.z[p - 1]), ""
-        for updates in range(_NEWTON_STEPS):
-            error = ((a * P + b) * P + c) * P + d
-            slope = (3 * a * P + 2 * b) * P + c
-            if abs(error) <= ROUNDING * scale or slope == 0:
-                break
-            step = error / slope
-            P -= step
-            if abs(step) <= 1e-14 * abs(P):
-                updates += 1
-                break
-        z[p] = P
-        if not abs(error) <= 1e-9 * scale:
-            failed = f"error {error / scale:.2%} after {updates} Newton steps"
-        elif not rises(a, b, c, P):
-            failed = f"P = {P:.4g} Pa is a spurious root: volume falls as pressure grows before it"
-        ratio = np.array([(((a * P + b) * P + own) * P + V) / V0])
-        why: tuple[Ending, str] = ("not_converged", f"no pressure keeps the volume: {failed}")
-        return self._state(state.k + 1, z, updates, why if failed else None, ratio)
+        start = float(state.inner.z[p - 1])
+        root = root_of(cubic(form, z, p), V0, start, self.ratio, self.softness)
+        z[p] = root.P
+        why: tuple[Ending, str] = ("not_converged", f"no pressure keeps the volume: {root.failed}")
+        ratio = np.array([root.volume / V0])
+        return self._state(state.k + 1, z, root.updates, why if root.failed else None, ratio)
 
     def _cavities(self, state: State, drives: Floats) -> State:
         """Newton on all volumes together; one cavity's pressure changes the others' volumes."""
@@ -171,7 +153,7 @@ class ExactStepper(Settling):
         V0 = self.responses.rest_volumes
         scale = V0 * (max(1.0, abs(self.ratio)) if self.softness else self.ratio)
         z = np.concatenate([[1.0], drives, state.inner.z[k:]])
-        for updates in range(_NEWTON_STEPS):
+        for updates in range(NEWTON_STEPS):
             own = forms @ z @ z
             error = own @ z - (self.ratio - self.softness * z[k + 1 :]) * V0
             if np.abs(error / scale).max(initial=0.0) <= ROUNDING:
@@ -181,5 +163,5 @@ class ExactStepper(Settling):
             if np.abs(step).max() <= 1e-14 * np.abs(z[k + 1 :]).max():
                 return self._settled(state.k + 1, z, updates + 1, softness=self.softness)
         worst = float(np.abs(error / scale).max())
-        why = f"no pressure keeps the volume: error {worst:.2%} after {_NEWTON_STEPS} Newton steps"
-        return self._state(state.k + 1, z, _NEWTON_STEPS, ("not_converged", why))
+        why = f"no pressure keeps the volume: error {worst:.2%} after {NEWTON_STEPS} Newton steps"
+        return self._state(state.k + 1, z, NEWTON_STEPS, ("not_converged", why))

@@ -10,14 +10,15 @@ from validate.scene.material import LawName
 from validate.scene.material_point import MaterialPoint
 from validate.scene.scene import Scene
 
-ContactName = Literal["foundations", "membranes", "rigid"]
+ContactName = Literal["foundations", "membranes", "rigid", "needle"]
 LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS))
 GLUED: tuple[ContactName, ...] = ("foundations", "membranes")
 
 
 @dataclass(frozen=True)
 class Handles:
-    """`law`: the laws it solves; `contact`: what may be glued to facets, or touch them ("rigid").
+    """`law`: the laws it solves; `contact`: what may be glued to facets, or touch
+    them ("rigid", "needle").
 
     `inertia` says that it marches in time with masses; the others which parts a scene may have.
     `mesh` is False for what solves a material point; `viscous`: that stress may relax.
@@ -59,6 +60,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "drives": ("KfFem", "ModalKf"),
     "membranes": ("QuasiStatic", "Newmark"),
     "rigid": ("ContactNewton", "CentralDifference"),
+    "needle": ("NeedleLoop",),
 }
 
 
@@ -96,4 +98,6 @@ def _refused(handles: Handles, scene: Scene | MaterialPoint) -> tuple[str, str] 
         return "membranes", "knows no membranes: they are linear only"
     if scene.contacts and "rigid" not in handles.contact:
         return "rigid", f"knows no rigid bodies that touch, the scene has {len(scene.contacts)}"
+    if scene.tools and "needle" not in handles.contact:
+        return "needle", "knows no needle whose path is given"
     return None

@@ -138,7 +138,8 @@ def _in_unit_of(scene: Scene, trace: Trace) -> Trace:
 
 def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     """`<drive>.displacement` m, `<load>.force` N (with `per_node` that at each node, else the
-    total), `<weight>.acceleration` m/s^2, of a rigid body `<contact>.displacement` m."""
+    total), `<weight>.acceleration` m/s^2, of a rigid body `<contact>.displacement` m,
+    and `<needle>.x`.. m of its tip."""
     traces = {
         f"{d.name}.displacement": Trace(y, "m")
         for d, y in zip(scene.drives, inputs.T, strict=False)
@@ -146,7 +147,10 @@ def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     for load, y in zip(scene.loads, inputs.T[len(scene.drives) :], strict=False):
         kind, unit = ("acceleration", "m/s^2") if isinstance(load, Weight) else ("force", "N")
         traces[f"{load.name}.{kind}"] = Trace(y, unit)
-    for mover, y in zip(scene.movers[::-1], inputs.T[::-1], strict=False):
+    paths = [name for tool in scene.tools for name in tool.inputs]
+    columns = inputs.T[: inputs.shape[1] - len(paths)]
+    traces |= {name: Trace(y, "m") for name, y in zip(paths, inputs.T[len(columns) :], strict=True)}
+    for mover, y in zip(scene.movers[::-1], columns[::-1], strict=False):
         traces[f"{mover.name}.displacement"] = Trace(y, "m")
     return traces
 

@@ -4,12 +4,16 @@ With fixed normals the volume is a polynomial in the amounts z of the response c
 pressure it is a cubic (a quadratic in the plane). Source: paper 000, section 3.3.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import Responses
 
+ROUNDING = 4e-15  # relative volume error that rounding alone leaves
+NEWTON_STEPS = 30
 RATIOS = np.linspace(0.7, 1.3, 61)  # of the volume, over which the paper fits its line
 
 
@@ -51,8 +55,13 @@ def pressure_at_volume(
     Raises `SceneError` when no pressure does: a ratio of zero or less, or below the smallest.
     """
     amounts = still(responses) if z is None else z
-    terms = np.array(cubic(responses.volumes[cavity], amounts, responses.drives + 1 + cavity))
-    V0 = float(responses.rest_volumes[cavity])
+    return pressure_of(responses.volumes[cavity], responses.drives + 1 + cavity, ratios, amounts)
+
+
+def pressure_of(form: Floats, p: int, ratios: Floats, z: Floats | None = None) -> Floats:
+    """The same from a volume polynomial, whose amount `p` is the pressure."""
+    amounts = np.eye(len(form))[0] if z is None else z
+    terms, V0 = np.array(cubic(form, amounts, p)), float(form[0, 0, 0])
     return np.array([_cubic_root(terms, float(ratio), V0) for ratio in ratios])
 
 
@@ -72,6 +81,46 @@ def _cubic_root(terms: Floats, ratio: float, V0: float) -> float:
 def _real_roots(polynomial: Floats) -> Floats:
     roots = np.roots(polynomial)
     return np.asarray(roots.real[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))])
+
+
+@dataclass(frozen=True)
+class Root:
+    """A pressure P Pa, the updates it took, the volume m^3 there; `failed` says why it is none."""
+
+    P: float
+    updates: int
+    volume: float
+    failed: str
+
+
+def root_of(
+    terms: tuple[float, float, float, float],
+    V0: float,
+    start: float = 0.0,
+    ratio: float = 1.0,
+    softness: float = 0.0,
+) -> Root:
+    """Where the cubic `terms` is (ratio - softness P) V0, by Newton from `start` Pa, on the branch
+    through P = 0; softness in 1/Pa."""
+    a, b, own, V = terms
+    c, d = own + softness * V0, V - ratio * V0
+    scale = V0 * max(1.0, abs(ratio)) if softness else V0 * ratio
+    P, failed = start, ""
+    for updates in range(NEWTON_STEPS):
+        error = ((a * P + b) * P + c) * P + d
+        slope = (3 * a * P + 2 * b) * P + c
+        if abs(error) <= ROUNDING * scale or slope == 0:
+            break
+        step = error / slope
+        P -= step
+        if abs(step) <= 1e-14 * abs(P):
+            updates += 1
+            break
+    if not abs(error) <= 1e-9 * scale:
+        failed = f"error {error / scale:.2%} after {updates} Newton steps"
+    elif not rises(a, b, c, P):
+        failed = f"P = {P:.4g} Pa is a spurious root: volume falls as pressure grows before it"
+    return Root(P, updates, ((a * P + b) * P + own) * P + V, failed)
 
 
 def rises(a: float, b: float, c: float, P: float) -> bool:

@@ -23,10 +23,17 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
-from validate.solve.fluid import FLUID, ROUNDING, Settling
+from validate.solve.fluid import FLUID, Settling
 from validate.solve.handles import Handles, require_handled
 from validate.solve.linear import condensed
-from validate.solve.pressure_curve import RATIOS, pressure_at_volume, slopes, still, tuned_gain
+from validate.solve.pressure_curve import (
+    RATIOS,
+    ROUNDING,
+    pressure_at_volume,
+    slopes,
+    still,
+    tuned_gain,
+)
 from validate.solve.types import State, Stepper
 
 UpdateName = Literal["proportional", "retuned", "piecewise", "secant", "newton", "golden"]

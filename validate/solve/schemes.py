@@ -9,6 +9,7 @@ from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.handles import Handles
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
+from validate.solve.needle import NeedleLoop
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
 from validate.solve.pressure_loop import PressureLoop
@@ -35,6 +36,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
     CentralDifference,
     NewtonDynamics,
     ContactNewton,
+    NeedleLoop,
 )
 
 # What solves a whole scene at once.
@@ -47,7 +49,7 @@ def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
 
 
 # Linear schemes of drives and cavities, and those of drives and loads.
-LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities)
+LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities and "needle" not in h.contact)
 INERTIAL = schemes_that(lambda h: h.law == ("linear",) and h.loads)
 
 # Dynamics at large strain of drives and loads, without cavities.
@@ -55,3 +57,6 @@ LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia)
 
 # Bodies that touch rigid ones.
 TOUCHING = schemes_that(lambda h: "rigid" in h.contact)
+
+# Bodies that a needle touches, whose path is given.
+NEEDLES = schemes_that(lambda h: "needle" in h.contact)

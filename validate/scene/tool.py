@@ -1,0 +1,49 @@
+"""A point tool: the tip of a needle whose path is given, and the surface that it may touch."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.errors import SceneError
+from validate.scene.mesh import Mesh
+from validate.scene.select import Place, kind_of, nodes_of
+
+_UNIT = 1e-9
+
+
+@dataclass(frozen=True)
+class Needle:
+    """A tip that stands at `tip` m at rest, outside the body, and points along the unit `axis`.
+
+    Inputs `<name>.x`, `.y`(, `.z`) in m move it. It touches `facets`, and nothing else.
+    """
+
+    name: str
+    facets: Place
+    tip: tuple[float, ...]
+    axis: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not np.isfinite((*self.tip, *self.axis)).all():
+            raise SceneError(f"needle '{self.name}': tip {self.tip} m, axis {self.axis}: finite")
+        length = float(np.linalg.norm(self.axis))
+        if abs(length - 1) > _UNIT:
+            raise SceneError(f"needle '{self.name}': axis of length {length:g}, needs 1")
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return tuple(f"{self.name}.{axis}" for axis in "xyz"[: len(self.tip)])
+
+
+def require_usable(tools: tuple[Needle, ...], mesh: Mesh) -> None:
+    """Raises `SceneError` for needles of another dimension, more than one, or on no faces."""
+    if len(tools) > 1:
+        raise SceneError(f"{len(tools)} needles: one at a time")
+    for tool in tools:
+        if len(tool.tip) != mesh.dimension or len(tool.axis) != mesh.dimension:
+            raise SceneError(
+                f"needle '{tool.name}': tip {tool.tip} in a scene of {mesh.dimension} dimensions"
+            )
+        nodes_of(mesh, tool.facets)
+        if kind_of(tool.facets) != "faces":
+            raise SceneError(f"needle '{tool.name}' touches {kind_of(tool.facets)}: choose faces")
