@@ -44,8 +44,8 @@ class Proportional:
         if any(more) or scene.tracked:
             raise SceneError(
                 "forces are in proportion to the modulus where one body is moved by drives alone: "
-                "drop loads, cavities, foundations, membranes, regions and tracked sets, or run the "
-                "inner scheme"
+                "drop loads, cavities, foundations, membranes, regions and tracked sets, or run "
+                "the inner scheme"
             )
         E = scene.material.E
         unit = replace(scene, material=in_proportion(scene.material, 1 / E))
@@ -92,6 +92,7 @@ def _key(inner: Scheme, scene: Scene, t: Floats, inputs: Floats) -> str:
     law = (m.law, m.nu, m.prony, c.volumetric, c.stretches, c.ogden_alpha)
     numbers = [f"{x:.12g}" for x in (c.C01, c.C20, c.C30, *c.ogden_mu)]
     parts = (inner, law, numbers, scene.supports, scene.pins, scene.drives, scene.probes,
-             scene.dilatation, scene.plane, scene.thickness, scene.copies, scene.force_unit)  # fmt: skip
+             scene.dilatation, scene.plane, scene.thickness, scene.copies,
+             scene.force_unit)  # fmt: skip
     found.update(repr(parts).encode())
     return found.hexdigest()
