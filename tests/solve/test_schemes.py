@@ -212,6 +212,7 @@ def test_what_a_refusal_names_instead_handles_it() -> None:
             has = {
                 "mesh": h.mesh,
                 "point": not h.mesh,
+                "rigid_body": not h.mesh and not h.law,
                 "membranes": "membranes" in h.contact,
                 "rigid": "rigid" in h.contact,
                 "needle": "needle" in h.contact,

@@ -17,7 +17,7 @@ from validate.compare.verdict import Check
 from validate.parameters import Changed, Parameter
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.scene.material_point import AnyScene
+from validate.scene.meshless import AnyScene
 from validate.solve.types import Run
 
 Kind = Literal["measured", "twin", "same model"]

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh
+from validate.scene.meshless import AnyScene, Meshless
 from validate.scene.scene import Scene
 
 # P1 / P2 displacement of a held cube that is pulled, 4 boxes an edge: .98 at nu .3, .96 at .4, .92
@@ -31,7 +31,7 @@ def locking_warning(scene: AnyScene) -> str | None:
     nodal mean dilatation from .49 where fewer than five lie across the body, all of them where few
     lie across a slender one. A material point has no cells.
     """
-    if isinstance(scene, MaterialPoint) or scene.mesh.order != 1:
+    if isinstance(scene, Meshless) or scene.mesh.order != 1:
         return None
     cells = f"linear {_SHAPES[scene.mesh.kind][0]}"
     found = [

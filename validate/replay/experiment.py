@@ -23,7 +23,7 @@ from validate.replay.calibration import unchanged as unchanged
 from validate.replay.followed import Cases, Truth
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
-from validate.scene.material_point import AnyScene
+from validate.scene.meshless import AnyScene
 
 Progress = Callable[[str], None]
 

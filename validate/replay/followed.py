@@ -10,8 +10,8 @@ from validate.arrays import Floats
 from validate.compare.residual import Residual, reached_end
 from validate.errors import SceneError
 from validate.register.registered import Registered
-from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh
+from validate.scene.meshless import AnyScene, Meshless
 from validate.scene.scene import Scene
 from validate.solve.types import Run
 
@@ -65,7 +65,7 @@ class Followed:
     @property
     def body(self) -> Scene:
         """The scene of a run on a mesh; raises `SceneError` for a material point."""
-        if isinstance(self.scene, MaterialPoint):
+        if isinstance(self.scene, Meshless):
             raise SceneError(f"'{self.label}' was run at a material point: it has no mesh")
         return self.scene
 

@@ -18,8 +18,8 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.origins import opened
 from validate.scene.material import LawName
-from validate.scene.material_point import AnyScene, MaterialPoint
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.meshless import AnyScene, Meshless
 from validate.scene.refine import refined
 from validate.scene.scene import Scene
 
@@ -112,7 +112,7 @@ def own_body(experiment: Experiment) -> OwnBody:
 def meshed(scene: AnyScene) -> Scene:
     """The scene; raises `SceneError` for a material point, in which nothing can be refined, and for
     rigid bodies that touch, which the schemes of a derived ladder do not know."""
-    if isinstance(scene, MaterialPoint):
+    if isinstance(scene, Meshless):
         raise SceneError("a material point has no mesh and no steps: it enters no study")
     if scene.contacts:
         raise SceneError(

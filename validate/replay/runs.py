@@ -18,7 +18,7 @@ from validate.replay.options import Report, folder_of
 from validate.replay.pace import Pace
 from validate.replay.remade import made_by, require_known, synthetic
 from validate.replay.solved import solve
-from validate.scene.material_point import MaterialPoint
+from validate.scene.meshless import Meshless
 
 
 class Road:
@@ -71,7 +71,7 @@ class Road:
         not fit; where the first one takes next to nothing the others are not asked."""
         for name, method in self.methods.items():
             scene = self.experiment.build(recording, self.parameters, method.scene)
-            if isinstance(scene, MaterialPoint):
+            if isinstance(scene, Meshless):
                 continue
             d = scene.mesh.dimension
             unknowns = self._finest.get(name, 1.0) ** d * scene.mesh.nodes.size

@@ -15,7 +15,7 @@ from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.followed import MAIN, Followed
 from validate.replay.method import Method
-from validate.scene.material_point import AnyScene, MaterialPoint
+from validate.scene.meshless import AnyScene, Meshless
 from validate.scene.scene import Scene
 from validate.solve.march import Tell, march, run_scheme
 from validate.solve.types import Outcome, Run, SceneSolver, Stepper, Trace
@@ -63,7 +63,7 @@ def _scenes(
     """One scene for all recordings; a material point of its own for each, since every test of one
     material may be in another mode."""
     first = experiment.build(recordings[0], parameters, method.scene)
-    if not isinstance(first, MaterialPoint):
+    if not isinstance(first, Meshless):
         return (first,) * len(recordings)
     others = (experiment.build(r, parameters, method.scene) for r in recordings[1:])
     return (first, *others)
@@ -102,7 +102,7 @@ class _Runs:
         at = seen.frames(t, self._experiment.frames)
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
-        if isinstance(method.settings, SceneSolver) or isinstance(scene, MaterialPoint):
+        if isinstance(method.settings, SceneSolver) or isinstance(scene, Meshless):
             settings = method.given(given)
             return run_scheme(self._name, settings, scene, t, inputs, at, self._tell)
         stepper, setup = self._stepper(scene, seen, given)

@@ -8,8 +8,8 @@ from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.report.numbers import significant, spaced, with_unit
 from validate.report.observed import Held, holds, outline, shown_method
-from validate.scene.material_point import AnyScene
 from validate.scene.mesh import Mesh
+from validate.scene.meshless import AnyScene
 from validate.scene.scene import Weight
 from validate.scene.select import nodes_of
 

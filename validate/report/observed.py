@@ -15,7 +15,7 @@ from validate.register.markers import MarkerObservation
 from validate.register.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.scene.material_point import AnyScene
+from validate.scene.meshless import AnyScene
 from validate.solve.types import Run, StepTimes
 
 _APART = 0.08  # share of the largest difference below which two methods draw one line

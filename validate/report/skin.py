@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.scene.material_point import AnyScene
 from validate.scene.mesh import Mesh, boundary_facets
+from validate.scene.meshless import AnyScene
 
 OUTSIDE = "outside"
 _FEWEST = 8  # triangles that a thinned part keeps, to remain a body

@@ -23,6 +23,7 @@ _HOMES = {
     "prony": ("Prony",),
     "rubber": ("mooney_rivlin", "ogden", "yeoh"),
     "material_point": ("MaterialPoint",),
+    "rigid_body": ("RigidBody",),
     "box": ("grid",),
     "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
     "cylinder": ("quarter_cylinder",),

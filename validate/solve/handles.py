@@ -8,6 +8,7 @@ from validate.errors import SceneError
 from validate.scene.laws import LAWS
 from validate.scene.material import LawName
 from validate.scene.material_point import MaterialPoint
+from validate.scene.meshless import AnyScene
 from validate.scene.scene import Scene
 
 ContactName = Literal["foundations", "membranes", "rigid", "needle"]
@@ -21,7 +22,7 @@ class Handles:
     them ("rigid", "needle").
 
     `inertia` says that it marches in time with masses; the others which parts a scene may have.
-    `mesh` is False for what solves a material point; `viscous`: that stress may relax.
+    `mesh` is False for what solves a scene without one; `viscous`: that stress may relax.
     """
 
     law: tuple[LawName, ...]
@@ -33,7 +34,7 @@ class Handles:
     mesh: bool = True
     viscous: bool = False
 
-    def covers(self, scene: Scene | MaterialPoint) -> bool:
+    def covers(self, scene: AnyScene) -> bool:
         return not _refused(self, scene)
 
 
@@ -50,6 +51,7 @@ class Handling(Protocol):
 
 # Where to go instead: what handles the refused part, by name. A test asserts that each does.
 INSTEAD: Mapping[str, tuple[str, ...]] = {
+    "rigid_body": ("RigidMotion",),
     "mesh": ("QuasiStatic", "StaticNewton"),
     "point": ("StretchTest",),
     "linear": ("ExactPressure", "Newmark"),
@@ -64,7 +66,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def require_handled(scene: Scene | MaterialPoint, settings: Handling) -> None:
+def require_handled(scene: AnyScene, settings: Handling) -> None:
     """Raises `SceneError` that names what the settings cannot handle, and what can."""
     refused = _refused(settings.handles, scene)
     if refused:
@@ -73,8 +75,10 @@ def require_handled(scene: Scene | MaterialPoint, settings: Handling) -> None:
         raise SceneError(f"{name} {why}; use {others}")
 
 
-def _refused(handles: Handles, scene: Scene | MaterialPoint) -> tuple[str, str] | None:
+def _refused(handles: Handles, scene: AnyScene) -> tuple[str, str] | None:
     """The first part of a scene that is not handled, as a key of `INSTEAD` and in words."""
+    if not isinstance(scene, Scene | MaterialPoint):
+        return "rigid_body", "needs a body that deforms"
     law, point = scene.material.law, isinstance(scene, MaterialPoint)
     if not isinstance(scene, MaterialPoint):  # the first that is not handled, or the body's own
         laws = (law, *(r.material.law for r in scene.regions))

@@ -10,7 +10,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.fem.locate import Rows, probe_rows
 from validate.fem.system import build
-from validate.scene.material_point import MaterialPoint
+from validate.scene.meshless import AnyScene
 from validate.scene.scene import Scene, Weight
 from validate.solve.handles import require_handled
 from validate.solve.types import (
@@ -38,7 +38,7 @@ def _untold(_: str) -> None:
 def run_scheme(
     name: str,
     settings: Scheme | SceneSolver,
-    scene: Scene | MaterialPoint,
+    scene: AnyScene,
     t: Floats,
     inputs: Floats,
     at: Ints,

@@ -17,6 +17,7 @@ from validate.solve.propagated import Propagated
 from validate.solve.proportional import Proportional
 from validate.solve.pulse import PulsePressure
 from validate.solve.quasi_static import QuasiStatic
+from validate.solve.rigid_motion import RigidMotion
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import SceneSolver, Scheme
@@ -40,7 +41,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
 )
 
 # What solves a whole scene at once.
-SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest, Propagated, Proportional)
+SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest, RigidMotion, Propagated, Proportional)
 
 
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:

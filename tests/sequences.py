@@ -1,8 +1,11 @@
 """Tracked sequences as the PLUS toolkit writes them, small."""
 
 import zlib
+from collections.abc import Collection, Mapping
 
 import numpy as np
+
+from validate.arrays import Floats
 
 TURN = "0 -1 0 10 1 0 0 -2e-005 0 0 1 1e3 0 0 0 1"
 
@@ -42,3 +45,19 @@ def images(frames: int) -> np.ndarray:
     found = np.random.default_rng(0).integers(0, 255, (frames, 4, 5)).astype(np.uint8)
     found[:, 0, 0] = np.arange(frames)
     return found
+
+
+def sequence(poses: Mapping[str, Floats], rate: float, lost: Collection[int] = ()) -> bytes:
+    """Transforms (n, 4, 4) mm by name, no images; INVALID, and far off, in the frames `lost`."""
+    count = len(next(iter(poses.values())))
+    lines = ["ObjectType = Image", "NDims = 3", f"DimSize = 0 0 {count}", "ElementType = MET_OTHER"]
+    for i in range(count):
+        for name, T in poses.items():
+            numbers = 9.0 * T[i] * [1, 1, 1, 0] + T[i] * [0, 0, 0, 1] if i in lost else T[i]
+            words = " ".join(f"{v:.9g}" for v in numbers.ravel())
+            lines.append(f"Seq_Frame{i:04d}_{name}Transform = {words}")
+            lines.append(
+                f"Seq_Frame{i:04d}_{name}TransformStatus = {'INVALID' if i in lost else 'OK'}"
+            )
+        lines.append(f"Seq_Frame{i:04d}_Timestamp = {100 + i / rate:.6f}")
+    return ("\n".join([*lines, "ElementDataFile = LOCAL"]) + "\n").encode()
