@@ -60,7 +60,8 @@ def test_noise_moves_neither_size_and_u_is_its_spread() -> None:
     [
         ("force", "N", "force"), ("force.plate", "N", "force"), ("pressure", "Pa", "pressure"),
         ("tip.vertical", "m", "displacement"), ("contour.material", "m", "position"),
-        ("nominal_stress", "Pa", "stress"), ("free_stretch", "1", "stretch"), ("E", "Pa", "stress"),
+        ("nominal_stress", "Pa", "stress"), ("free_stretch", "1", "stretch"),
+        ("stretch", "m", "displacement"),
         ("ringing", "Hz", "frequency"), ("volume.relative_error", "1", ""),
     ],
 )  # fmt: skip

@@ -142,6 +142,16 @@ def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool
     past.show(name, named, out, as_json)
 
 
+@cli.command("summary")
+@click.option("--out", type=_OUT, help="Where the reports are (default: as of run).")
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, no page.")
+def summary_(out: Path | None, as_json: bool) -> None:
+    """Bias and scatter of what was predicted, over every stored run."""
+    from validate.cli import summing
+
+    summing.show(out, as_json=as_json)
+
+
 @cli.command()
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--method", "methods", multiple=True, metavar="GLOB", help="Only these: 'kf_*'.")

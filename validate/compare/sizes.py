@@ -35,11 +35,16 @@ class Size:
 def kind_of(quantity: str, unit: str) -> str:
     """What was measured, in a word; "" where none fits."""
     words = re.split(r"[._]", quantity)
-    if named := [word for word in words if word in _BY_WORD]:
+    if named := [word for word in words if word in _BY_WORD and _fits(word, unit)]:
         return named[0]
     if unit == "m" and words[0] in _PLACES:
         return "position"
     return _BY_UNIT.get(unit, "")
+
+
+def _fits(word: str, unit: str) -> bool:
+    """An extensometer may be called stretch, and measure metres."""
+    return unit == "1" or word not in ("stretch", "strain")
 
 
 def size_of(residual: Residual) -> Size | None:

@@ -1,13 +1,10 @@
 """Stored runs side by side as a folder: page with pictures, all scores as a table, one document."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, Picture
-from validate.compare.result import Result
-from validate.report.folder import MARK, replace_folder
-from validate.report.store import write_json
+from validate.study.loose_page import write_loose
 from validate.study.stored import Pair, Row, SideBySide, pairs
 
 _PICTURES = 6  # pairs that are drawn
@@ -16,39 +13,16 @@ _DRAWN = 40  # scores of a picture
 
 def write_comparison(found: SideBySide, document: dict[str, Any], folder: Path) -> Path:
     """Replaces `folder`; returns the path of report.html. Raises what `replace_folder` does."""
-    return replace_folder(folder, lambda f: _fill(found, document, f), ()) / "report.html"
-
-
-def _fill(found: SideBySide, document: dict[str, Any], folder: Path) -> None:
-    # What draws is imported when something is drawn: matplotlib takes half a second.
-    from validate.report.exhibits import draw_all, write_files
-    from validate.report.html import page
-
-    for name in ("tables", "figures"):
-        (folder / name).mkdir()
-    write_json(document, folder / MARK)
-    result = _result(found)
-    drawn = draw_all(result, result.exhibits)
-    for exhibit in drawn:
-        write_files(exhibit, folder)
-    created = datetime.now(UTC).isoformat(timespec="seconds")
-    text = page(result, drawn, created, ("open", "Comparison"))
-    (folder / "report.html").write_text(text, encoding="utf-8")
-
-
-def _result(found: SideBySide) -> Result:
-    """What a page needs: nothing was run, so it has neither methods nor recordings."""
-    names = [f"{r.name} ({r.created})" for r in found.runs]
+    told = (
+        " and ".join(dict.fromkeys(r.experiment for r in found.runs)),
+        "Stored runs side by side",
+        "; ".join(f"{r.name} ({r.created})" for r in found.runs),
+        f"{len(found.rows)} scores of {len(found.runs)} runs, nothing was run again.",
+    )
     shown, _, _ = pairs(found)
-    return Result(
-        name=" and ".join(dict.fromkeys(r.experiment for r in found.runs)),
-        title="Stored runs side by side",
-        source="; ".join(names),
-        sentence=f"{len(found.rows)} scores of {len(found.runs)} runs, nothing was run again.",
-        parameters=(), methods=(), recordings=(), rest=(), effects=(), published=(),
-        warnings=found.warnings,
-        exhibits=(*(_pair(i, p) for i, p in enumerate(shown, 1)), _parameters(found), _all(found)),
-    )  # fmt: skip
+    drawn = (_pair(i, p) for i, p in enumerate(shown, 1))
+    exhibits = (*drawn, _parameters(found), _all(found))
+    return write_loose(told, exhibits, document, folder, "Comparison", found.warnings)
 
 
 def _pair(number: int, pair: Pair) -> Exhibit:

@@ -1,0 +1,202 @@
+"""A statement over stored runs: which count, which of their checks, and what they say together."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import here, refused
+
+from validate.errors import UsageError
+from validate.study.predictions import predictions, stored_runs
+from validate.study.summary import Summary, summary
+from validate.study.summary_page import document
+
+
+def check(simulated: float, measured: float = 10.0, **more: Any) -> dict[str, Any]:
+    found = {
+        "name": "force@3mm", "value": simulated - measured, "u_val": 0.5, "u_D": 0.3,
+        "u_num": 0.0, "u_input": 0.4, "unit": "N", "count": 1, "verdict": "agrees",
+        "kind": "force", "size": {"measured": measured, "simulated": simulated, "u": 0.3},
+    }  # fmt: skip
+    return {**found, **more}
+
+
+def stored(reports: Path, name: str, *checks: dict[str, Any], **more: Any) -> None:
+    """A run of one recording, called as its folder, of one accepted method."""
+    specimen = more.pop("specimen", name)
+    content = {
+        "experiment": "pressed", "kind": "measured", "created": "2026-11-01T12:00:00+00:00",
+        "inputs": [{"path": f"{name}.csv", "sha256": name.ljust(64, "0")}],
+        "methods": [{"name": "fem", "accepted": True, "checks": list(checks)}],
+        "domain": [{"recording": name, "specimen": specimen, "strain": 0.1, "rate": 0.01,
+                    "sides": [0.03, 0.05]}],
+        **more,
+    }  # fmt: skip
+    (reports / name).mkdir(parents=True)
+    (reports / name / "results.json").write_text(json.dumps(content), encoding="utf-8")
+
+
+def whys(reports: Path) -> dict[str, str]:
+    return {run.folder: run.why for run in stored_runs(reports)}
+
+
+def only(found: Summary) -> Any:
+    (kind,) = found.kinds
+    return kind
+
+
+def test_three_specimens_say_what_their_ratios_say(tmp_path: Path) -> None:
+    for name, by in (("a", 1.0), ("b", 1.1), ("c", 1.2)):
+        stored(tmp_path, name, check(10 * by))
+    kind = only(summary(tmp_path))
+    logs = np.log([1.0, 1.1, 1.2])
+    scatter = np.sqrt(logs.var(ddof=1) - 0.03**2)
+    assert kind.stated.scatter.value == pytest.approx(scatter)
+    assert kind.stated.bias.value == pytest.approx(
+        np.exp(logs.mean() + scatter**2 / 2 - 0.03**2 / 2)
+    )
+    assert (kind.kind, kind.stated.points, kind.stated.specimens) == ("force", 3, 3)
+    assert kind.covered.strain == (0.1, 0.1)
+    assert kind.covered.sides == (0.03, 0.05)
+
+
+def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None:
+    stored(tmp_path, "good", check(11.0))
+    stored(tmp_path, "quick", check(30.0), quick=True)
+    stored(tmp_path, "doubtful", check(30.0), warnings=["E of 15 Pa: 15 kPa?"])
+    stored(tmp_path, "same", check(30.0), kind="same model")
+    stored(tmp_path, "forced", check(30.0), made={"command": "validate run pressed --anyway"})
+    stored(tmp_path, "old", check(30.0))
+    path = tmp_path / "old" / "results.json"
+    content = json.loads(path.read_text())
+    del content["domain"]
+    path.write_text(json.dumps(content))
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "results.json").write_text('{"kind": "meas')
+    found = whys(tmp_path)
+    assert found.pop("good") == ""
+    assert {name: why.split(":")[0] for name, why in found.items()} == {
+        "quick": "a quick run", "doubtful": "doubtful",
+        "same": "recording and model are the same model",
+        "forced": "predicted with parameters that are not identifiable (--anyway)",
+        "old": "stored before sizes were; run it again",
+        "broken": "its results.json cannot be read",
+    }  # fmt: skip
+    assert only(summary(tmp_path)).stated.bias.value == pytest.approx(1.1, rel=0.001)
+
+
+def test_fitted_checks_never_enter(tmp_path: Path) -> None:
+    stored(
+        tmp_path, "a", check(11.0), check(10.0, verdict="fitted"),
+        check(10.0, verdict="repeats itself"), check(10.0, count=0), check(10.0, u_num=None),
+        check(10.0, size=None), check(10.0, kind=""),
+        check(0.9, 1.0, size={"measured": 1.0, "simulated": 0.9, "u": 0.3}),
+        check(12.0, name="force@6mm", verdict="differs"),
+        check(13.0, name="force@9mm", verdict="cannot decide"),
+    )  # fmt: skip
+    found, left = predictions(stored_runs(tmp_path))
+    assert [p.check for p in found] == ["force@3mm", "force@6mm", "force@9mm"]
+    assert sum(left.values()) == 7
+    assert left["fitted"] == 1
+    assert left["measured to no better than 25 %"] == 1
+
+
+def test_the_first_accepted_method_counts(tmp_path: Path) -> None:
+    methods = [
+        {"name": "rival", "accepted": False, "checks": []},
+        {"name": "slip", "accepted": True, "checks": [check(11.0)]},
+        {"name": "bonded", "accepted": True, "checks": [check(15.0)]},
+    ]
+    stored(tmp_path, "a", methods=methods)
+    (found,), left = predictions(stored_runs(tmp_path))
+    assert found.method == "slip"
+    assert left == {"of a further method on the same data": 1}
+
+
+def test_other_settings_on_the_same_recording_are_no_other_experiment(tmp_path: Path) -> None:
+    changed = [{"path": "material.E", "value": 9e4}]
+    inputs = [{"path": "log.csv", "sha256": "1" * 64}]
+    new = "2026-11-09T12:00:00+00:00"
+    stored(tmp_path, "pressed", check(11.0), inputs=inputs)
+    stored(tmp_path, "pressed+E", check(19.0), inputs=inputs, changed=changed, created=new)
+    stored(tmp_path, "pressed+copy", check(12.0), inputs=inputs, created=new,
+           changed=[{"path": "recording", "value": "log.csv"}])  # fmt: skip
+    assert whys(tmp_path) == {
+        "pressed": "the same recordings as pressed+copy, which is taken: it is newer",
+        "pressed+E": "the same recordings as pressed+copy, which is taken: fewer of its settings "
+        "are changed",
+        "pressed+copy": "",
+    }
+    assert only(summary(tmp_path)).points[0].simulated == 12.0
+
+
+def test_repeats_of_one_specimen_count_once(tmp_path: Path) -> None:
+    for name, simulated in (("r1", 11.0), ("r2", 13.0)):
+        stored(tmp_path, name, check(simulated), specimen="beam")
+    heavier = [{"path": "load.mass", "value": 0.052}]
+    stored(tmp_path, "r3", check(14.0), specimen="beam", changed=heavier)
+    stored(tmp_path, "r4", check(10.0), specimen="another")
+    kind = only(summary(tmp_path))
+    found = {(p.specimen, p.simulated): p.folders for p in kind.points}
+    assert found == {
+        ("beam", 12.0): ("r1", "r2"), ("beam", 14.0): ("r3",), ("another", 10.0): ("r4",),
+    }  # fmt: skip
+    assert (kind.stated.points, kind.stated.specimens) == (3, 2)
+
+
+def test_twins_and_units_stand_apart(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(11.0), check(11.0, name="pull@3mm", unit="force unit"))
+    stored(tmp_path, "t", check(30.0), kind="twin")
+    found = summary(tmp_path)
+    assert [(k.kind, k.covered.unit) for k in found.kinds] == [
+        ("force", "N"), ("force", "force unit"),
+    ]  # fmt: skip
+    assert [p.simulated for k in found.twins for p in k.points] == [30.0]
+
+
+def test_a_wrong_sign_is_said_and_has_no_ratio(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(11.0))
+    stored(tmp_path, "b", check(-2.0))
+    kind = only(summary(tmp_path))
+    assert kind.stated is None
+    assert kind.why == (
+        "1 of 2 predictions have the wrong sign (pressed: force@3mm): there is no ratio"
+    )
+    json.dumps(document(summary(tmp_path)), allow_nan=False)
+
+
+def test_the_area_stands_beside_the_error(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(11.0))
+    (point,) = document(summary(tmp_path))["measured"][0]["predictions"]
+    assert (point["error"], point["u_val"]) == (1.0, 0.5)
+    assert point["area"] == pytest.approx(1.0, abs=1e-6)  # sd 0.4 and 0.3, 1.0 apart
+
+
+def test_nothing_that_counts_is_refused_with_the_reason(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(11.0), quick=True)
+    line = refused("summary", "--out", str(tmp_path))
+    assert "counts (a: a quick run); `validate run silicone_beam` makes one" in line
+    with pytest.raises(UsageError, match="0 runs"):
+        summary(tmp_path / "nowhere")
+
+
+@pytest.mark.slow
+def test_the_command_prints_and_draws_all_of_it(tmp_path: Path) -> None:
+    for name, by in (("a", 1.0), ("b", 1.1), ("c", 1.2)):
+        size = {"measured": 2e-3, "simulated": 2e-3 * by, "u": 1e-5}
+        tip = check(2e-3 * by, 2e-3, name="tip@3mm", unit="m", kind="displacement", size=size)
+        stored(tmp_path, name, check(10 * by), tip)
+    stored(tmp_path, "q", check(10.0), quick=True)
+    code, out, err = here("summary", "--out", str(tmp_path))
+    assert code == 0, err
+    assert "force +10 %, 8.6 % scatter beyond the measurements' (3 of 3)" in " ".join(out.split())
+    assert "3 of 4 stored runs count" in out
+    assert "q: a quick run" in out
+    folder = tmp_path / "summary"
+    assert "Predicted against measured size" in (folder / "report.html").read_text("utf-8")
+    assert {p.name for p in (folder / "figures").iterdir()} == {"against.png"}
+    again = json.loads(here("summary", "--out", str(tmp_path), "--json")[1])
+    assert again == json.loads((folder / "results.json").read_text("utf-8"))
+    assert [run["folder"] for run in again["runs"]] == ["a", "b", "c", "q"]

@@ -1,0 +1,118 @@
+"""Relative bias and scatter of predictions over many experiments, as fire models are validated.
+
+McGrattan and Toman (2011), "Quantifying the predictive uncertainty of complex numerical models",
+Metrologia 48, 173-180; NUREG-1824, supplement 1 (2016). Measured E and predicted M scatter about
+the truth by the relative standard deviations omega_E, which is known, and omega_M, which is not:
+
+    omega_M^2 + omega_E^2 = variance of ln(M/E)
+    delta = exp(mean of ln(M/E) + omega_M^2/2 - omega_E^2/2)
+
+so that a prediction M has the truth about M/delta, with the scatter omega_M.
+
+Departures: points of one specimen have much in common, so that means are taken over specimens
+first, and intervals rest on how many of these there are: with one point each it is as printed.
+Intervals are 95 % by Student's t and by chi-square, with one degree of freedom less than specimens.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, stdtrit
+
+from validate.arrays import Floats, rms
+from validate.errors import ComparisonError
+from validate.estimate.consistency import chi_square_quantile
+
+_TAIL = 0.975
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """One prediction of a specimen: ln(predicted / measured), and the relative standard uncertainty
+    of the measured one."""
+
+    specimen: str
+    log_ratio: float
+    own: float
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A value with its 95 % interval; None where so few specimens give none."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Statement:
+    """`bias` is predicted over true (1: none), `scatter` the models' relative standard deviation
+    with the measurements' `own` one removed (None: of one point)."""
+
+    bias: Estimated
+    scatter: Estimated | None
+    own: float
+    points: int
+    specimens: int
+
+
+def statement(points: Sequence[Predicted]) -> Statement:
+    """Bias and scatter of predictions. Raises `ComparisonError` for none."""
+    if not points:
+        raise ComparisonError("0 predictions: nothing to state")
+    own = rms([p.own for p in points])
+    names = dict.fromkeys(p.specimen for p in points)
+    groups = [np.array([p.log_ratio for p in points if p.specimen == name]) for name in names]
+    means = np.array([g.mean() for g in groups])
+    squared = _variance(groups, means)
+    if squared is None:
+        return Statement(Estimated(float(np.exp(means.mean()))), None, own, 1, 1)
+    low, high = _scatter_ends(squared, len(groups) - 1)
+    scatter = Estimated(_without(squared, own), low and _without(low, own),
+                        high and _without(high, own))  # fmt: skip
+    shift = float(means.mean()) + (scatter.value**2 - own**2) / 2
+    return Statement(_bias(shift, means), scatter, own, len(points), len(groups))
+
+
+def _variance(groups: Sequence[Floats], means: Floats) -> float | None:
+    """Of one point: that between the specimens' means, and that within, which means hide."""
+    within = float(np.mean([g.var() for g in groups]))
+    if len(groups) > 1:
+        return float(means.var(ddof=1)) + within
+    return float(groups[0].var(ddof=1)) if len(groups[0]) > 1 else None
+
+
+def _scatter_ends(squared: float, freedom: int) -> tuple[float | None, float | None]:
+    if freedom < 1:
+        return None, None
+    low, high = (float(chi_square_quantile(p, freedom)) for p in (_TAIL, 1 - _TAIL))
+    return squared * freedom / low, squared * freedom / high
+
+
+def _without(squared: float, own: float) -> float:
+    """The models' part of a scatter; 0 where the measurements' own explains all of it."""
+    return float(np.sqrt(max(squared - own**2, 0.0)))
+
+
+def _bias(shift: float, means: Floats) -> Estimated:
+    value = float(np.exp(shift))
+    if len(means) < 2:
+        return Estimated(value)
+    off = float(stdtrit(len(means) - 1, _TAIL) * means.std(ddof=1) / np.sqrt(len(means)))
+    return Estimated(value, value * float(np.exp(-off)), value * float(np.exp(off)))
+
+
+def area_metric(error: float, simulated: float, measured: float) -> float:
+    """Area between the distributions of a prediction and of a measurement, in the unit of `error`.
+
+    Normal ones, `error` apart, of standard deviations `simulated` and `measured`: the mean of
+    |error + (simulated - measured) z| over a standard normal z. Ferson, Oberkampf, Ginzburg (2008),
+    "Model validation and predictive capability", Comput. Methods Appl. Mech. Eng. 197, 2408-2430.
+    """
+    spread = abs(simulated - measured)
+    if spread == 0:
+        return abs(error)
+    at = error / spread
+    return float(spread * np.sqrt(2 / np.pi) * np.exp(-(at**2) / 2) + error * (1 - 2 * ndtr(-at)))
