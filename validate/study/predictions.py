@@ -33,7 +33,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Compared:
+class Foretold:
     """A check that was measured and predicted, SI: sizes, the measured one's standard uncertainty,
     error and its uncertainties; several repeats of one specimen are one, by their means.
 
@@ -126,10 +126,10 @@ def _changed(content: Json) -> list[str]:
     )
 
 
-def predictions(runs: Iterable[Seen]) -> tuple[tuple[Compared, ...], dict[str, int]]:
+def predictions(runs: Iterable[Seen]) -> tuple[tuple[Foretold, ...], dict[str, int]]:
     """What the runs that count predicted, repeats as one; and how many checks do not count, by the
     reason."""
-    found: list[Compared] = []
+    found: list[Foretold] = []
     left: dict[str, int] = {}
     for run in runs:
         if run.why:
@@ -167,11 +167,11 @@ def _no_evidence(check: Json) -> str:
     return ""
 
 
-def _prediction(run: Seen, method: str, check: Json) -> Compared:
+def _prediction(run: Seen, method: str, check: Json) -> Foretold:
     content, size = run.content, check["size"]
     specimen = ", ".join(sorted({d["specimen"] for d in content["domain"]}))
     experiment = str(content["experiment"])
-    return Compared(
+    return Foretold(
         (run.folder,), experiment, method, check["name"], check["kind"], check["unit"], specimen,
         size["measured"], size["simulated"], size["u"], check["value"], check["u_val"],
         float(np.hypot(check["u_num"], check["u_input"])), check["u_D"], check["verdict"],
@@ -179,7 +179,7 @@ def _prediction(run: Seen, method: str, check: Json) -> Compared:
     )  # fmt: skip
 
 
-def _mean(group: list[Compared]) -> Compared:
+def _mean(group: list[Foretold]) -> Foretold:
     """Repeats as one: their mean sizes and errors. Uncertainties are those of one of them, for what
     repeats share is not known; a verdict counts where all agree on it."""
     first = group[0]
@@ -189,4 +189,4 @@ def _mean(group: list[Compared]) -> Compared:
     means = {n: float(np.mean([getattr(p, n) for p in group])) for n in names}
     verdicts = dict.fromkeys(p.verdict for p in group)
     folders = tuple(f for p in group for f in p.folders)
-    return Compared(**vars(first) | means | {"folders": folders, "verdict": " or ".join(verdicts)})
+    return Foretold(**vars(first) | means | {"folders": folders, "verdict": " or ".join(verdicts)})

@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.compare.bias import Predicted, Statement, area_metric, statement
 from validate.errors import UsageError
-from validate.study.predictions import Json, Compared, Seen, predictions, stored_runs
+from validate.study.predictions import Foretold, Json, Seen, predictions, stored_runs
 
 Range = tuple[float, float] | None
 
@@ -35,7 +35,7 @@ class OfKind:
     """
 
     kind: str
-    points: tuple[Compared, ...]
+    points: tuple[Foretold, ...]
     stated: Statement | None
     covered: Covered
     why: str
@@ -72,12 +72,12 @@ def summary(reports: Path) -> Summary:
     return Summary(reports, runs, _kinds(points, measured), _kinds(made, twins), left)
 
 
-def area_of(point: Compared) -> float:
+def area_of(point: Foretold) -> float:
     """The area metric of one prediction, in its unit."""
     return area_metric(point.error, point.u_simulated, point.u_measured)
 
 
-def _kinds(points: Sequence[Compared], runs: Sequence[Seen]) -> tuple[OfKind, ...]:
+def _kinds(points: Sequence[Foretold], runs: Sequence[Seen]) -> tuple[OfKind, ...]:
     """By kind, and by unit where a kind has several: newtons and an unknown unit stay apart."""
     groups = dict.fromkeys((p.kind, p.unit) for p in points)
     return tuple(
@@ -86,7 +86,7 @@ def _kinds(points: Sequence[Compared], runs: Sequence[Seen]) -> tuple[OfKind, ..
     )
 
 
-def _of_kind(kind: str, points: list[Compared], runs: Sequence[Seen]) -> OfKind:
+def _of_kind(kind: str, points: list[Foretold], runs: Sequence[Seen]) -> OfKind:
     turned = [p for p in points if p.simulated <= 0]
     covered = _covered(points, runs)
     if turned:
@@ -104,7 +104,7 @@ def _of_kind(kind: str, points: list[Compared], runs: Sequence[Seen]) -> OfKind:
     return OfKind(kind, tuple(points), stated, covered, few)
 
 
-def _covered(points: Sequence[Compared], runs: Sequence[Seen]) -> Covered:
+def _covered(points: Sequence[Foretold], runs: Sequence[Seen]) -> Covered:
     folders = {f for p in points for f in p.folders}
     domains = [d for r in runs if r.folder in folders for d in r.content["domain"]]
     sizes = [p.measured for p in points]

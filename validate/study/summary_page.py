@@ -11,7 +11,7 @@ from validate.compare.bias import Estimated
 from validate.compare.exhibit import Exhibit, NumberTable, Picture, TableCell
 from validate.report.numbers import shown_unit, significant, text, with_unit
 from validate.study.loose_page import write_loose
-from validate.study.predictions import Compared
+from validate.study.predictions import Foretold
 from validate.study.summary import OfKind, Range, Summary, area_of
 
 _PERCENT = 100.0
@@ -164,7 +164,7 @@ def _points(name: str, kinds: tuple[OfKind, ...]) -> NumberTable:
     return NumberTable(name, words, head, rows, "" if rows else "None.", below="runs")
 
 
-def _point(p: Compared) -> tuple[Any, ...]:
+def _point(p: Foretold) -> tuple[Any, ...]:
     def cell(value: float) -> TableCell:
         return TableCell(value, p.unit, with_unit(value, p.unit))
 
