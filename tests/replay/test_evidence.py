@@ -168,7 +168,7 @@ def test_the_terminals_first_line_says_what_was_judged(
     )
     code = run_command(
         ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
-        as_json=False,
+        as_json=False, anyway=False,
     )  # fmt: skip
     printed = " ".join(capsys.readouterr().out.split())
     assert code == 0
@@ -199,7 +199,7 @@ def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(
     monkeypatch.setattr("validate.cli.chosen.find", lambda name, start, named: locks)
     run_command(
         ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
-        as_json=False,
+        as_json=False, anyway=False,
     )  # fmt: skip
     said = "nu = 0.4999: linear tetrahedra lock near incompressibility"
     (line,) = (x for x in capsys.readouterr().out.splitlines() if said in x)

@@ -106,6 +106,6 @@ def test_windows_are_named_by_the_strains_they_end_at(logs: Path) -> None:
     assert material_of(recordings[0]) == "EF30_0T"
 
 
-def test_missing_logs_name_both_settings(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"--set data=FOLDER and --set logs=PATTERN"):
+def test_missing_logs_name_the_folder_and_the_setting(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no logs '\*.csv' in .*; pass --set logs=PATTERN"):
         load(replace(LoggedCylinder(), data=str(tmp_path), logs="*.csv"), tmp_path)
