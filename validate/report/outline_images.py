@@ -32,23 +32,30 @@ def outline_images(
     frames = recording.frames.get(contours.images) if contours is not None else None
     if contours is None or frames is None:
         return ()
+    words = "The circle at rest places the inclusion; the outlines are what runs are compared with."
+    return (outlines_over(frames, contours, holds, "at the loads", words),)
+
+
+def outlines_over(
+    frames: Frames, contours: Contours, holds: tuple[Held, ...], which: str, words: str
+) -> Picture:
+    """The images nearest to the holds in time, with outlines and circles; `which` they are, and
+    `words` on what they are for, stand in the caption."""
     circles = [_circle(contours, hold) for hold in holds]
     told = "; ".join(f"{spaced(h.label)}: {_told(c)}" for h, c in zip(holds, circles, strict=True))
     rows = -(-len(holds) // _COLUMNS)
     tall = frames.images[0].shape[0] * frames.m_per_px[1]
     wide = frames.images[0].shape[1] * frames.m_per_px[0]
     panel = float(np.clip(0.42 * WIDTH * tall / wide, 1.2, 4.0)) + 0.35
-    made = Picture(
+    return Picture(
         "outline_images",
-        f"The images '{contours.images}' at the loads, image coordinates in mm, with the outline "
-        "that was found in each (solid, yellow) and the circle through it (dashed, blue). Radius "
-        f"of that circle and rms distance of the outline from it: {told}. The circle at rest "
-        "places the inclusion; the outlines are what runs are compared with.",
+        f"The images '{contours.images}' {which}, image coordinates in mm, with the outline that "
+        "was found in each (solid, yellow) and the circle through it (dashed, blue). Radius of "
+        f"that circle and rms distance of the outline from it: {told}. {words}",
         f"{len(holds)} images with the outline found in each and the circle fitted to it.",
         draw(lambda f: _panels(f, frames, contours, holds, circles), WIDTH, panel * rows + _ROOM),
         photo=True,
     )
-    return (made,)
 
 
 def _outline(contours: Contours, hold: Held) -> Floats:

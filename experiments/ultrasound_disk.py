@@ -1,0 +1,42 @@
+"""A disk of 20 mm in real B-mode images: outline, diameter and roundness, image by image.
+
+Verasonics images made by others (creatis-ULTIM/PyMUST, LGPL-3). Nothing is fitted but the disk's
+place. Other images of the kind: `--set recording=FILE --set disk.diameter=15mm`.
+"""
+
+from validate.compare.verdict import Accept
+from validate.papers.disk.disk import ImagedDisk, build, load, place
+from validate.papers.disk.shown import exhibits, follows, identified
+from validate.replay.cards import moved
+from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.method import Method
+from validate.solve.rigid_motion import RigidMotion
+
+UNCERTAINTY = Uncertainty(
+    inputs=(
+        Input("scale", moved("image", scale=lambda p, z: p.image.scale * (1 + z * p.ranges.scale)),
+              "lengths of the images", "assumed: the speed of sound within 1.7 % of the scanner's"),
+        Input("nominal diameter",
+              moved("disk", diameter=lambda p, z: p.disk.diameter + z * p.ranges.diameter),
+              "diameter", "assumed; the data set gives none"),
+    ),
+    surrogate="rigid",
+)  # fmt: skip
+
+EXPERIMENT = Experiment(
+    name="ultrasound_disk",
+    title="A disk of 20 mm in B-mode images",
+    source="creatis-ULTIM/PyMUST c605195 (LGPL-3)",
+    parameters=ImagedDisk(),
+    methods={"rigid": Method("rigid disk of nominal diameter", RigidMotion())},
+    accepted=("rigid",),
+    accept=(Accept("diameter", 1e-3, "a twentieth of the diameter (ours)"),),
+    load=load,
+    build=build,
+    place=place,
+    identify=identified,
+    uncertainty=UNCERTAINTY,
+    exhibits=exhibits,
+    follows=follows,
+    locates=("recording", "image.m_per_px", "image.rate", "image.topic"),
+)

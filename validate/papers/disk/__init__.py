@@ -1,0 +1,1 @@
+"""A disk of known diameter in B-mode images."""

@@ -1,0 +1,146 @@
+"""A disk of nominal diameter in real B-mode images: parameters, recording, scene, registration.
+
+The outline is found in every image by itself. Image metres are the file's pixels times their side,
+which rests on the speed of sound that the scanner assumed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats, rms
+from validate.datasets.home import found
+from validate.errors import RecordingError, UsageError
+from validate.parameters import Ranges, quantity
+from validate.recording.images.outline import Outline, extract_outline
+from validate.recording.readers import recognised
+from validate.recording.types import Contours, Frames, Recording
+from validate.register.registered import Registered
+from validate.register.round_outlines import ENDS, RoundOutlines
+from validate.register.signals import SignalObservation
+from validate.scene.rigid_body import RigidBody
+
+FOLDER, FILE = "ultrasound/disk", "bmode_PWI_disk.mat"
+OUTLINES, FOUND = "disk", "outlines"
+_FEWEST = 0.5  # of the images in which the disk must be seen
+
+
+@dataclass(frozen=True)
+class Disk:
+    diameter: float = quantity(20e-3, "m", "nominal diameter")
+
+    def __post_init__(self) -> None:
+        if not 0 < self.diameter < 1:
+            raise UsageError(f"disk.diameter = {self.diameter:g} m: above 0, below 1 m; as 20mm")
+
+
+@dataclass(frozen=True)
+class ImageCard:
+    m_per_px: float = quantity(1e-4, "m", "side of a pixel, where the file does not state it")
+    rate: float = quantity(1.0, "Hz", "images a second, where it does not; nothing follows from it")
+    topic: str | None = quantity(None, "1", "the images among several; none: the only ones")
+    bright: bool = quantity(True, "1", "whether the disk is brighter than what surrounds it")
+    scale: float = quantity(1.0, "1", "true lengths over those of the images")
+
+
+@dataclass(frozen=True)
+class DiskRanges(Ranges):
+    scale: float = quantity(0.01, "1", "relative, of the images' lengths: the speed of sound")
+    diameter: float = quantity(0.05e-3, "m", "of the nominal diameter")
+
+
+@dataclass(frozen=True)
+class ImagedDisk:
+    """`recording` is any file of images that a reader takes; none: the data set's."""
+
+    disk: Disk = Disk()
+    image: ImageCard = ImageCard()
+    ranges: DiskRanges = DiskRanges()
+    recording: str | None = quantity(None, "1", "the images; none: the data set's")
+
+
+def load(parameters: ImagedDisk, folder: Path) -> tuple[Recording, ...]:
+    """The images with the outline found in each; those without one are named in its records.
+
+    Raises `RecordingError` where fewer than half of the images show a disk.
+    """
+    p = parameters
+    path = found(FOLDER, FILE, folder, p.recording)
+    recording = recognised(path).read(path, _options(path, p.image))
+    topic = _topic(recording, p.image.topic)
+    frames = recording.frame(topic)
+    outlines, refused = _outlines(frames, p.image.bright)
+    if len(outlines) < _FEWEST * len(frames.images):
+        raise RecordingError(
+            f"{recording.name}: the disk is found in {len(outlines)} of {len(frames.images)} "
+            f"images; first refusal: {next(iter(refused.values()))}; a dark disk is "
+            "--set image.bright=false"
+        )
+    at = np.array(sorted(outlines))
+    contours = Contours(
+        frames.t[at], tuple(outlines[i].points for i in at), rms([o.sd for o in outlines.values()]),
+        frames.pose, frames.frame, topic,
+    )  # fmt: skip
+    told = {f"image {i}": why for i, why in refused.items()}
+    told["contrast"] = f"{min(o.contrast for o in outlines.values()):.2f}"
+    return (
+        replace(
+            recording,
+            contours={**recording.contours, OUTLINES: contours},
+            metadata={**recording.metadata, FOUND: told},
+        ),
+    )
+
+
+def _options(path: Path, image: ImageCard) -> Mapping[str, str]:
+    """What formats that state no scale are asked for; one that does is taken at its word."""
+    if recognised(path).name not in ("matlab", "png-stack"):
+        return {}
+    return {"m_per_px": repr(image.m_per_px), "rate": repr(image.rate)}
+
+
+def _topic(recording: Recording, wanted: str | None) -> str:
+    topics = list(recording.frames)
+    if wanted is None and len(topics) != 1:
+        raise RecordingError(
+            f"{recording.name}: {len(topics)} streams of images {topics}; --set image.topic=NAME"
+        )
+    return wanted or topics[0]
+
+
+def _outlines(frames: Frames, bright: bool) -> tuple[dict[int, Outline], dict[int, str]]:
+    """Outlines by image, and why others have none."""
+    outlines, refused = {}, {}
+    for i, image in enumerate(frames.images):
+        try:
+            outlines[i] = extract_outline(image, frames.m_per_px, bright=bright)
+        except RecordingError as error:
+            refused[i] = str(error)
+    return outlines, refused
+
+
+def build(recording: Recording, parameters: ImagedDisk, model: None) -> RigidBody:
+    """Two points of the disk, a diameter apart; it does not deform."""
+    radius = parameters.disk.diameter / 2
+    return RigidBody(ENDS, np.array([[-radius, 0.0, 0.0], [radius, 0.0, 0.0]]))
+
+
+def place(recording: Recording, parameters: ImagedDisk, scene: RigidBody) -> Registered:
+    """The disk's centre is that of the circle through every outline; its diameter is predicted."""
+    seen = outlined(recording, parameters)
+    centres: Floats = np.array([[*c.centre, 0.0] for c in seen.circles])
+    none = np.zeros(centres.shape)
+    drives = (
+        SignalObservation("rotation", "drives", seen.t, none, "rad", 0.0),
+        SignalObservation("translation", "drives", seen.t, centres, "m", 0.0),
+    )
+    return Registered((*drives, seen))
+
+
+def outlined(recording: Recording, p: ImagedDisk) -> RoundOutlines:
+    """The disk as it was found in the images."""
+    contours = recording.contour(OUTLINES)
+    frames = recording.frame(contours.images)
+    return RoundOutlines("diameter", "validates", contours, frames, p.image.scale)
