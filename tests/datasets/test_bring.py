@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from hashlib import sha256
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -15,6 +16,7 @@ from validate.datasets import home, registry
 from validate.datasets.bring import bring
 from validate.datasets.home import cache_folder
 from validate.datasets.registry import DataFile, DataSet
+from validate.datasets.rows import csv_of
 from validate.errors import RecordingError
 
 LOG, NOTE = b"0.0,1.0\n" * 40_000, b"as you like"
@@ -199,11 +201,54 @@ def test_the_command_brings_says_what_to_cite_and_knows_what_is_here(
     assert server.asked == ["LICENSE", "log.csv"]
 
 
+PROGRAM = """
+function pull()
+    matrix = [
+    1.0 0.00
+    1.2345678912 -0.5
+    ]
+    return matrix
+end # a comment
+function planes(λ₁)
+    @assert λ₁ ∈ [1.5, 2]
+    if λ₁ == 1.5
+        λ₂ = [0.9, 1.0]
+        λ₁ = fill(λ₁, length(λ₂))
+        s₁ = [0.10, 0.2]
+        s₂ = [0.000, 0.3]
+    elseif λ₁ == 2
+        λ₂ = [1.250]
+        λ₁ = fill(λ₁, length(λ₂))
+        s₁ = [3]
+        s₂ = [4]
+    end
+    return rows(s₁ .* 1e6, s₂, λ₁, λ₂)
+end
+"""
+
+
+def test_rows_of_a_program_become_the_registered_file(
+    server: Server, logs: DataSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert csv_of(PROGRAM, "planes", "a,b,c,d") == (
+        "a,b,c,d\n1.5,0.9,0.1,0\n1.5,1,0.2,0.3\n2,1.25,3,4\n"
+    )
+    assert csv_of(PROGRAM, "nothing", "a,b") == "a,b\n"
+    content = b"x,y\n1,0\n1.23456789,-0.5\n"
+    elsewhere = "/other/lab/9999999/data.jl"
+    server.answers[elsewhere] = 200, len(PROGRAM.encode()), PROGRAM.encode()
+    rows = DataFile("pull.csv", elsewhere, sha256(content).hexdigest(), len(content), "pull", "x,y")
+    bring(replace(logs, files=(rows,)), nothing)
+    assert (cache_folder() / "force/logs/pull.csv").read_bytes() == content
+    wrong = replace(rows, name="other.csv", header="x,z")
+    with pytest.raises(RecordingError, match=r"other\.csv: what lies at .* is not the registered"):
+        bring(replace(logs, files=(wrong,)), nothing)
+    assert kept() == ["pull.csv"]
+
+
 def test_what_was_made_by_hand_is_not_brought(
     server: Server, logs: DataSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dataclasses import replace
-
     by_hand = replace(logs.files[0], source="")
     made = replace(logs, files=(by_hand,), made="the rows of data.jl")
     monkeypatch.setattr(registry, "data_sets", lambda: (made,))

@@ -13,6 +13,7 @@ import requests
 
 from validate.datasets.home import cache_folder, whole
 from validate.datasets.registry import DataFile, DataSet
+from validate.datasets.rows import csv_of
 from validate.errors import RecordingError
 
 #: Told bytes done, bytes in all, and the file that comes.
@@ -52,11 +53,20 @@ class _OtherFileError(RecordingError):
 def _one(address: str, file: DataFile, place: Path, bar: "_Bar") -> None:
     loader = pooch.HTTPDownloader(progressbar=bar, chunk_size=_CHUNK, timeout=_PATIENCE)
     with _in_a_line(address, file), _aside() as aside:
-        came = pooch.retrieve(
-            address, f"sha256:{file.sha256}", fname="file", path=aside, downloader=loader
-        )
+        registered = None if file.rows else f"sha256:{file.sha256}"
+        came = Path(pooch.retrieve(address, registered, "file", aside, downloader=loader))
+        if file.rows:
+            _write_rows(came, file)
         place.parent.mkdir(parents=True, exist_ok=True)
-        Path(came).replace(place)
+        came.replace(place)
+
+
+def _write_rows(source: Path, file: DataFile) -> None:
+    """The registered file in the place of its source; `ValueError` where it is another one."""
+    text = csv_of(source.read_text("utf-8"), file.rows, file.header)
+    source.write_bytes(text.encode())
+    if not whole(source, file):
+        raise ValueError(f"the rows of {file.rows} are not the registered ones")
 
 
 @contextmanager

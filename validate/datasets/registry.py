@@ -15,15 +15,19 @@ _TABLE = Path(__file__).with_name("registry.toml")
 
 @dataclass(frozen=True)
 class DataFile:
-    """One file: `name` below its set's folder, `source` below its repository.
+    """One file: `name` below its set's folder, `source` below its repository at the commit, or of
+    another one as in "/owner/name/commit/path".
 
-    An empty source: the file was made from what lies there and cannot be brought as it is.
+    An empty source: the file was made from what lies there and cannot be brought. With `rows` it is
+    made here: of that function's numbers in the source, below `header`.
     """
 
     name: str
     source: str
     sha256: str
     size: int  # bytes
+    rows: str = ""
+    header: str = ""
 
 
 @dataclass(frozen=True)
@@ -47,11 +51,13 @@ class DataSet:
 
     @property
     def brought(self) -> tuple[DataFile, ...]:
-        """The files that are brought as they are."""
+        """The files that are brought, or made of what is."""
         return tuple(file for file in self.files if file.source)
 
     def address(self, file: DataFile) -> str:
-        """Of a file at its commit."""
+        """Of a file's source at its commit."""
+        if file.source.startswith("/"):
+            return f"{RAW}{file.source}"
         return f"{RAW}/{self.repository}/{self.commit}/{file.source}"
 
 
