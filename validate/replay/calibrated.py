@@ -16,7 +16,7 @@ from validate.identify.identification import Identification, InTurn
 from validate.identify.identification import identify as identify_in
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
-from validate.replay.calibrated_words import headline, lines, not_identified, scores
+from validate.replay.calibrated_words import headlines, lines, not_identified, scores
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
@@ -232,7 +232,7 @@ def identified_by(
         return own
     own = own or Identified(parameters, (), ())
     told = (*(line for one in fitted for line in lines(one)), *own.notes)
-    opening = "; ".join([*map(headline, fitted), *([own.headline] if own.headline else [])])
+    opening = "; ".join([headlines(fitted), *([own.headline] if own.headline else [])])
     return Identified(
         own.parameters, (*scores(fitted), *own.scores), told, opening,
         (*served(fitted), *own.calibrated),

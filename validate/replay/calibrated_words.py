@@ -16,6 +16,15 @@ _DIGITS = 4
 _SHOWN = 4  # predictions in a sentence
 
 
+def headlines(fitted: Sequence[Calibrated]) -> str:
+    """Fitted on what; of several methods without their values, which stand below."""
+    methods = [one.problem.calibration.method for one in fitted]
+    if len(set(methods)) == 1:
+        return "; ".join(map(headline, fitted))
+    on = " and ".join(dict.fromkeys(one.on for one in fitted))
+    return f"Fitted: {', '.join(methods)}, each by itself on {on}"
+
+
 def headline(one: Calibrated) -> str:
     """Fitted on what."""
     units = {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}

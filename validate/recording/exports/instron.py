@@ -68,7 +68,7 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
     """
     said = dict(mapping or {})
     require_known(said, KEYS)
-    data = _bytes(path)
+    data = whole_file(path)
     try:
         tables = specimen_tables(parse_tables(data, said.get("encoding"), said.get("decimal")))
         label, table = chosen(tables, said.get("specimen"))
@@ -77,7 +77,8 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         raise RecordingError(f"{path.name}: {error}") from error
 
 
-def _bytes(path: Path) -> bytes:
+def whole_file(path: Path) -> bytes:
+    """The bytes of a text of bounded size; `UsageError` where it cannot be read."""
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:

@@ -1,0 +1,49 @@
+"""Laws of rubber identified in one mode and judged in the others: which predicts, not which fits.
+
+Nominal stress against stretch, digitised from publications: Treloar (1944) vulcanised natural
+rubber; a very soft gel (Soft Matter 7 (2011) 2632) by `--set material=yohsuke`; Kawabata's plane of
+two stretches (Macromolecules 14 (1981) 154) by `--set material=kawabata1981`, identified on its
+diagonal. Others of the same kind: `--set data=FOLDER --set material=NAME` of files NAME_MODE.csv.
+"""
+
+from validate.papers.multimode.calibrating import accepted, calibrations, follows
+from validate.papers.multimode.curves import Multimode, build, load, material_of, place
+from validate.papers.multimode.exhibits import exhibits
+from validate.replay.cards import moved
+from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.method import Method
+from validate.solve.stretch_test import StretchTest
+
+METHODS = {
+    "svk": Method("St. Venant-Kirchhoff", StretchTest(), "svk"),
+    "neo_hooke": Method("neo-Hooke", StretchTest(), "neo_hooke"),
+    "mooney_rivlin": Method("Mooney-Rivlin", StretchTest(), "mooney_rivlin"),
+    "yeoh": Method("Yeoh", StretchTest(), "yeoh"),
+    "ogden": Method("Ogden, one term", StretchTest(), "ogden"),
+    "ogden_two": Method("Ogden, two terms", StretchTest(), "ogden_two"),
+}
+LESS = Input(
+    "Poisson ratio",
+    moved(nu=lambda p, z: p.nu - abs(z) * p.ranges.nu),
+    "nu",
+    "assumed; the curves say nothing of the volume",
+)
+
+EXPERIMENT = Experiment(
+    name="multimode",
+    title="treloar: identified in uniaxial tension, predicted in equibiaxial tension, pure shear",
+    source="HyperData.jl 66f5b45, Hyperelastics.jl 0fbfeb3 (MIT)",
+    parameters=Multimode(),
+    methods=METHODS,
+    accepted=tuple(name for name in METHODS if name != "svk"),
+    accept=(accepted("equibiaxial"), accepted("pure_shear")),
+    load=load,
+    build=build,
+    place=place,
+    calibrations=calibrations("uniaxial", 0.3e6, 57.0),
+    uncertainty=Uncertainty(inputs=(LESS,), surrogate="neo_hooke"),
+    exhibits=exhibits,
+    follows=follows,
+    specimen=material_of,
+    locates=("data", "material"),
+)

@@ -1,0 +1,1 @@
+"""Rubbers and gels pulled in several modes: stress against stretch, digitised from publications."""

@@ -1,0 +1,164 @@
+"""What the report shows: laws ranked by prediction, a picture of every mode, the plane."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.fem.stretch_response import response
+from validate.papers.multimode.calibrating import words_of
+from validate.papers.multimode.curves import Multimode, point
+from validate.papers.multimode.laws import as_card
+from validate.papers.multimode.ranking import (
+    LawError,
+    RankedLaw,
+    better_fit_worse_prediction,
+    mode_of,
+    ranked,
+    stress_of,
+)
+from validate.register.registered import Registered
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import MAIN, Cases
+
+_FINE = 200  # stretches of a drawn line
+_BEYOND = 1.3  # of the largest measured stress: a line ends there
+_SERIES = 5  # of a plane, in one picture
+_PAIRS = 4  # of laws, in sentences
+_MEGA = 1e5  # Pa: stresses from here on are shown in MPa
+
+
+def exhibits(p: Multimode, cases: Cases, tell: Progress) -> Told:
+    """Ranking, its sentences, and every mode with all laws."""
+    tell("ranks the laws by prediction")
+    runs = cases[MAIN]
+    found = ranked(p, runs, {name: as_card(name) for name in runs})
+    seen = next(iter(runs.values())).registered
+    if not found or len(seen) == 1:
+        return Told()
+    roles = ["identified on these points", *(["predicted"] * (len(seen) - 1))]
+    charts = [
+        _plane(p, one, found[0], role) if mode_of(one) == "biaxial" else _mode(p, one, found, role)
+        for one, role in zip(seen, roles, strict=True)
+    ]
+    exhibit = Exhibit(
+        "laws-by-prediction",
+        "Laws ranked by what they predict",
+        sentences(found),
+        tables=(_ranking(found, mode_of(seen[0])),),
+        charts=tuple(charts),
+    )
+    numbers = {f"predicted.{one.method}": one.predicted.value for one in found}
+    numbers |= {f"fitted.{one.method}": one.fit.value for one in found}
+    return Told((exhibit,), numbers)
+
+
+def sentences(found: Sequence[RankedLaw]) -> tuple[str, ...]:
+    """Which law predicts best, which fits best, where the two part, and who is unstable."""
+    best, fitting = found[0], min(found, key=lambda one: one.fit.value)
+    first = f"{best.label} predicts best: {_said(best.predicted)} of the measured stress"
+    if fitting is best:
+        said = [f"{first}; it fits best as well ({_said(best.fit)})."]
+    else:
+        said = [
+            f"{first}. {fitting.label} fits best ({_said(fitting.fit)}) and predicts to "
+            f"{_said(fitting.predicted)}. A law is chosen by prediction, not by fit."
+        ]
+    said += [
+        f"{one.label} fits better, predicts worse than {other.label}: fitted {_said(one.fit)} "
+        f"against {_said(other.fit)}, predicted {_said(one.predicted)} against "
+        f"{_said(other.predicted)}."
+        for one, other in better_fit_worse_prediction(found)[:_PAIRS]
+    ]
+    said += [
+        f"{one.label} as identified loses positive energy at stretch {one.lost.stretch:.3g} "
+        f"({one.lost.mode}), among the stretches that were measured: no simulation should use it."
+        for one in found
+        if one.lost
+    ]
+    return tuple(said)
+
+
+def _said(s: LawError) -> str:
+    return f"{100 * s.value:.1f} % ({_interval(s)})"
+
+
+def _interval(s: LawError) -> str:
+    return f"{100 * s.low:.1f} to {100 * s.high:.1f}"
+
+
+def _ranking(found: Sequence[RankedLaw], fitted: str) -> NumberTable:
+    modes = list(found[0].modes)
+    headings = ["law", "rank"]
+    for name in (*(f"predicted, {m}" for m in ("all", *modes)), f"fitted, {fitted}"):
+        headings += [f"{name} / %", "95 %"]
+    rows: list[tuple[Entry, ...]] = []
+    for k, one in enumerate(found):
+        spreads = (one.predicted, *one.modes.values(), one.fit)
+        cells = [c for s in spreads for c in (round(100 * s.value, 2), _interval(s))]
+        rows.append((one.label, k + 1, *cells, _stable(one)))
+    return NumberTable(
+        "laws",
+        "Rms over the rows of simulated less measured stress, relative to the measured one. The "
+        "interval is what another reading of the figures would give, every law identified again "
+        "on it. Rows of all predicted modes count alike in 'all'.",
+        (*headings, "stable where measured"),
+        tuple(rows),
+    )
+
+
+def _stable(one: RankedLaw) -> str:
+    return f"no: {one.lost.mode}, {one.lost.stretch:.3g}" if one.lost else "yes"
+
+
+def _mode(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str) -> Chart:
+    """Measured points of a mode and the curves of all laws."""
+    mode, stress, l = mode_of(seen), stress_of(seen).y[:, 0], seen.inputs[:, 0]
+    fine = np.linspace(min(l.min(), 1.0), max(l.max(), 1.0), _FINE)
+    unit, factor = _shown(stress)
+    lines = []
+    for one in found:
+        y = response(point(p, as_card(one.method), mode), fine)["nominal_stress"]
+        inside = np.abs(y) <= _BEYOND * np.abs(stress).max()
+        lines.append(Series(one.label, fine[inside], factor * y[inside]))
+    return Chart(
+        f"stress_{mode}",
+        f"{words_of(mode).capitalize()}, {role}",
+        "stretch / 1",
+        f"nominal stress / {unit}",
+        (Series("measured", l, factor * stress, "points"), *lines),
+        caption="A line ends where it leaves the measured stresses by 30 %.",
+    )
+
+
+def _plane(p: Multimode, seen: Registered, best: RankedLaw, role: str) -> Chart:
+    """The second stress against the second stretch at some first stretches, by the best law."""
+    (l1, l2), stress = seen.inputs.T, stress_of(seen).y[:, 1]
+    unit, factor = _shown(stress)
+    series = []
+    for stretch in _spread_out(np.unique(l1)):
+        at, of = l1 == stretch, f"first stretch {stretch:g}"
+        fine = np.linspace(l2[at].min(), l2[at].max(), _FINE)
+        pairs = np.stack([np.full(_FINE, stretch), fine], axis=1)
+        y = response(point(p, as_card(best.method), "biaxial"), pairs)["second_stress"]
+        series.append(Series("measured", l2[at], factor * stress[at], "points", of=of))
+        series.append(Series(best.label, fine, factor * y, of=of))
+    return Chart(
+        "stress_biaxial",
+        f"Second stress of the plane, {role}; {best.label}, which predicts best",
+        "second stretch / 1",
+        f"second nominal stress / {unit}",
+        tuple(series),
+    )
+
+
+def _spread_out(values: Floats) -> Floats:
+    """At most `_SERIES` of them, evenly."""
+    at = np.linspace(0, len(values) - 1, min(_SERIES, len(values)))
+    return np.asarray(values[at.round().astype(np.int64)])
+
+
+def _shown(stress: Floats) -> tuple[str, float]:
+    """The unit that stresses Pa are drawn in."""
+    return ("MPa", 1e-6) if np.abs(stress).max() >= _MEGA else ("kPa", 1e-3)

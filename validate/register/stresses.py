@@ -1,0 +1,84 @@
+"""Nominal stresses of a material point, compared relative to what was measured.
+
+Curves that were read off a printed figure are as uncertain as the stress is large, and stresses of
+one curve differ a hundredfold: an absolute error would be that of the last few rows alone.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError
+from validate.fem.locate import Rows
+from validate.register.observation import Deviation, Role, Selection, Simulated
+
+TRACES = ("nominal_stress", "second_stress")
+_NOTHING = 0.01  # of the largest stress: below it a relative error is that of the figure's axis
+
+
+@dataclass(frozen=True)
+class StressObservation:
+    """y (nt, c) Pa at rows t (nt,): the first and, where it was measured, the second stress.
+
+    A residual is simulated less measured over the larger stress of its row. `sd` is the relative
+    standard deviation of a row's reading, `shared` that of all rows together (a figure's axis).
+    """
+
+    name: str
+    role: Role
+    t: Floats
+    y: Floats
+    sd: float
+    shared: float
+    quantity: str
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        return {self.quantity: "1"}
+
+    @property
+    def traces(self) -> tuple[str, ...]:
+        return TRACES[: self.y.shape[1]]
+
+    @property
+    def scale(self) -> Floats:
+        """The larger stress (nt,) Pa of every row."""
+        return np.asarray(np.abs(self.y).max(axis=1))
+
+    @property
+    def loaded(self) -> NDArray[np.bool_]:
+        """Whether each row (nt,) has a stress that an error can be relative to: not at rest."""
+        return np.asarray(self.scale > _NOTHING * self.scale.max())
+
+    def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
+        """One of all rows and stresses. Raises `ComparisonError` for a trace that is no stress."""
+        found = [run.traces.get(name) for name in self.traces]
+        seen = [trace for trace in found if trace is not None]
+        if len(seen) < len(found):
+            return ()
+        if any(trace.unit != "Pa" for trace in seen):
+            raise ComparisonError(
+                f"{run.method}: '{self.traces[0]}' is in {seen[0].unit}, expected Pa"
+            )
+        at = selection.samples(self.t, run.t, self.quantity)
+        at = at[self.loaded[at]]
+        if len(at) == 0:
+            return ()
+        read = [selection.read(run.t, trace.y, self.t[at]) for trace in seen]
+        off = (np.stack(read, axis=1) - self.y[at]) / self.scale[at][:, None]
+        words = "simulated less measured nominal stress over the larger measured one of its row"
+        return (
+            Deviation(
+                self.quantity, off.reshape(-1, 1), "1", self.sd, self.shared, words, scale=1.0,
+                reference=(self.y[at] / self.scale[at][:, None]).reshape(-1, 1),
+            ),
+        )  # fmt: skip
+
+    def unanswered(self, run: Simulated) -> tuple[str, ...]:
+        return tuple(name for name in self.traces if name not in run.traces)
+
+    def rows(self) -> Rows | None:
+        return None
