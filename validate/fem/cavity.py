@@ -17,6 +17,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.compiled import compiled
 from validate.scene.mesh import Mesh
 from validate.scene.shape_functions import Quadrature, facet_rule, simplex_rule
 
@@ -87,7 +88,10 @@ def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
     """
     k, d = len(columns), columns.shape[2]
     x = columns[:, surface.nodes]
-    x = (x - x.mean(axis=1, keepdims=True))[:, surface.local()]
+    x = x - x.mean(axis=1, keepdims=True)
+    if surface.facets.shape[1] == 3 and d == 3:
+        return flat_form(surface.local(), x)
+    x = x[:, surface.local()]
     rule = _rule(surface, columns[0])
     weighted = (np.einsum("qm,kfmd->kfqd", rule.N, x) * rule.weights[:, None]).reshape(k, -1)
     along = np.einsum("qmj,kfmd->jkfqd", rule.dN, x)
@@ -99,6 +103,30 @@ def volume_form(surface: CavitySurface, columns: Floats) -> Floats:
         normals = -np.cross(along[0][:, None], along[1][None])
         T = (weighted @ normals.reshape(k * k, -1).T).reshape(k, k, k) / d
     return np.asarray(sum(T.transpose(p) for p in permutations(range(3))) / 6)
+
+
+@compiled(fastmath=True)
+def flat_form(facets: Ints, x: Floats) -> Floats:
+    """`volume_form` of triangles (f, 3) in positions of x (k, c, 3): -det(x_a, x_b, x_c)/6 of each,
+    its mean over the orders of a, b, c."""
+    k = len(x)
+    T = np.zeros((k, k, k))
+    for f in range(len(facets)):
+        p, q, r = facets[f]
+        for b in range(k):
+            for c in range(k):
+                n0 = x[b, q, 1] * x[c, r, 2] - x[b, q, 2] * x[c, r, 1]
+                n1 = x[b, q, 2] * x[c, r, 0] - x[b, q, 0] * x[c, r, 2]
+                n2 = x[b, q, 0] * x[c, r, 1] - x[b, q, 1] * x[c, r, 0]
+                for a in range(k):
+                    T[a, b, c] -= x[a, p, 0] * n0 + x[a, p, 1] * n1 + x[a, p, 2] * n2
+    mean = np.empty_like(T)
+    for a in range(k):
+        for b in range(k):
+            for c in range(k):
+                mean[a, b, c] = (T[a, b, c] + T[b, c, a] + T[c, a, b]
+                                 + T[b, a, c] + T[a, c, b] + T[c, b, a]) / 36  # fmt: skip
+    return mean
 
 
 def _into_solid(rule: Quadrature, x: Floats) -> Floats:

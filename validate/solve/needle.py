@@ -225,9 +225,7 @@ class NeedleStepper:
             along(node, a) if self.settings.at == "node" else between(entry.nodes, entry.shares, a)
             for a in axes
         )
-        working = WorkingSet(self.small)
-        for one in imposed:
-            working = working.with_row(one)
+        working = WorkingSet(self.small).with_rows(imposed)
         assert working.coupling is not None
         assert working.columns is not None
         assert working.bases is not None

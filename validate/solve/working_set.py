@@ -53,19 +53,21 @@ class WorkingSet:
 
     def with_row(self, row: Imposed) -> "WorkingSet":
         """One more. Raises `SceneError` for a row that is held, or follows from the others."""
-        weights = np.abs(row.weights) > 0
-        column = sum(
-            (w * self.condensed.column(int(i))
-             for i, w in zip(row.unknowns[weights], row.weights[weights], strict=True)),
-            np.zeros(self.condensed.size),
-        )  # fmt: skip
-        base = self.condensed.fields[:, row.unknowns] @ row.weights
-        columns = column[None] if self.columns is None else np.vstack([self.columns, column])
-        bases = base[None] if self.bases is None else np.vstack([self.bases, base])
-        made = WorkingSet(self.condensed, (*self.rows, row), columns, None, bases)
-        coupling = np.array([made._seen(c) for c in columns])
+        return self.with_rows((row,))
+
+    def with_rows(self, rows: Sequence[Imposed]) -> "WorkingSet":
+        """All of these more, at once. Raises as `with_row` does."""
+        condensed = self.condensed
+        found = [self.columns] if self.columns is not None else []
+        found += [_column(condensed, row)[None] for row in rows]
+        more = np.array([condensed.fields[:, row.unknowns] @ row.weights for row in rows])
+        columns = np.vstack(found)
+        bases = more if self.bases is None else np.vstack([self.bases, more])
+        every = (*self.rows, *rows)
+        coupling = np.array([[r.weights @ c[r.unknowns] for r in every] for c in columns])
+        coupling = (coupling + coupling.T) / 2
         _require_independent(coupling)
-        return WorkingSet(self.condensed, made.rows, columns, (coupling + coupling.T) / 2, bases)
+        return WorkingSet(condensed, every, columns, coupling, bases)
 
     def without(self, index: int) -> "WorkingSet":
         """The others, as if that one had never been."""
@@ -78,10 +80,6 @@ class WorkingSet:
         rows = tuple(self.rows[i] for i in kept)
         coupling = self.coupling[np.ix_(kept, kept)]
         return WorkingSet(self.condensed, rows, self.columns[kept], coupling, self.bases[kept])
-
-    def _seen(self, u: Floats) -> Floats:
-        """(c,): a displacement (W,) along every row."""
-        return np.array([row.weights @ u[row.unknowns] for row in self.rows])
 
     def forces(self, z: Floats, targets: Floats) -> Floats:
         """(c,) N along each row, so that it moves by its target (c,) m under drives m and pressures
@@ -96,16 +94,23 @@ class WorkingSet:
         return np.asarray(u if self.columns is None else u + forces @ self.columns)
 
 
+def _column(condensed: Condensed, row: Imposed) -> Floats:
+    """(W,) m per newton along the row."""
+    found = np.zeros(condensed.size)
+    for unknown, weight in zip(row.unknowns.tolist(), row.weights.tolist(), strict=True):
+        if weight:
+            found += weight * condensed.column(unknown)
+    return found
+
+
 def _require_independent(coupling: Floats) -> None:
-    last = coupling[-1]
-    own = float(last[-1])
-    left = own
-    if len(coupling) > 1:
-        left -= float(last[:-1] @ np.linalg.solve(coupling[:-1, :-1], coupling[:-1, -1]))
-    if not left > _DEPENDENT * own > 0:
+    """Every compliance that is left beside the others, as pivots of the scaled matrix."""
+    own = np.sqrt(np.abs(np.diag(coupling)))
+    sizes = np.linalg.eigvalsh(coupling / np.outer(own, own)) if own.all() else np.zeros(1)
+    if not sizes[0] > _DEPENDENT:
         raise SceneError(
-            f"what is imposed follows from the {len(coupling) - 1} others, or is held: compliance "
-            f"{left:.1e} m/N is left of {own:.1e}"
+            f"what is imposed along one of {len(coupling)} axes follows from the others, or is "
+            f"held: {sizes[0]:.1e} of its compliance is left"
         )
 
 
