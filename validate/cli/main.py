@@ -252,6 +252,26 @@ def choose(name: str, **options: Any) -> int:
 
 
 @cli.command()
+@click.option(
+    "--parameters",
+    default="",
+    metavar="A,B=LOW:HIGH",
+    help="These (default: those that stand open); what is not declared needs bounds.",
+)
+@click.option("--seeds", type=int, help="Seeded starts (default: 10).")
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+@_studied
+def identify(name: str, **options: Any) -> int:
+    """Parameters with profile intervals, or that the recordings do not identify them (exit code 1).
+
+    By many starts over what the experiment says calibrates; goes on where it was stopped.
+    """
+    from validate.cli import identifying
+
+    return identifying.identifying(name, _common(options), **options)
+
+
+@cli.command()
 @click.argument("file", type=_FILE)
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def inspect(file: Path, as_json: bool) -> None:

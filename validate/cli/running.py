@@ -21,9 +21,10 @@ from validate.cli.progress import progress
 from validate.compare.result import KINDS, MethodResult, Result
 from validate.compare.verdict import Check
 from validate.fem.locking import locking_notes
+from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment
 from validate.replay.named_run import run_folder
-from validate.replay.options import Options
+from validate.replay.options import Options, Report
 from validate.replay.reused import rests_on
 from validate.replay.road import compare
 from validate.report import gl
@@ -76,7 +77,7 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
     try_results(folder, (STUDIES,))
     ask_about(experiment, options.values)
     with progress(experiment.name) as report:
-        result = compare(experiment, options, report)
+        result = compare(experiment, options, report, _identify(experiment, options, out, report))
         created = datetime.now(UTC).isoformat(timespec="seconds")
         page = write_report(
             result, folder, created=created, made=by,
@@ -88,6 +89,17 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
             f"kept, see `validate history {experiment.name}`"
         )
     return result, page
+
+
+def _identify(
+    experiment: Experiment, options: Options, out: Path | None, report: Report
+) -> Identify:
+    """What stands open is identified as `validate identify` does, on the same kept cells."""
+    if not experiment.calibrations:
+        return here
+    from validate.study.identify import beside
+
+    return beside(experiment, options, out, report)
 
 
 def _summary(result: Result, page: Path, seconds: float) -> None:

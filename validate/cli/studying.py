@@ -78,16 +78,16 @@ def filters(
     words += [text.partition("=")[0].strip() for text in sweeps]
     words += ["seeds"] * (seeds_of(seeds) != SEEDS) + [by] * (by != POOLED)
     place = f"filters{tag(words, [content, sorted(sweeps), seeds_of(seeds), by])}"
-    with _running(experiment, place, "filters", common) as report:
+    with running(experiment, place, "filters", common) as report:
         found = study(
             experiment, sweeps, methods=chosen, values=given,
             seeds=seeds_of(seeds), by=by, quick=common.quick, out=common.out, where=common.where,
             report=report,
         )  # fmt: skip
-    page = _written(experiment, filter_page.told(found), place, common)
+    page = written(experiment, filter_page.told(found), place, common)
     if not common.as_json:
         _show_filters(found)
-        _end(found.done, page)
+        end(found.done, page)
     return OK
 
 
@@ -95,7 +95,7 @@ def stability_map(name: str, common: StudyOptions) -> int:
     """Maps where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
     experiment = find(name, Path.cwd(), common.named)
     place = f"stability{_quick(common)}"
-    with _running(experiment, place, "stability", common) as report:
+    with running(experiment, place, "stability", common) as report:
         found = stability(
             experiment, quick=common.quick, out=common.out, where=common.where, report=report
         )
@@ -104,10 +104,10 @@ def stability_map(name: str, common: StudyOptions) -> int:
             still = gain_map(experiment, out=common.out, where=common.where, report=report)
     if found is None:
         return _still(experiment, still, place, common)
-    page = _written(experiment, stability_page.told(found), place, common)
+    page = written(experiment, stability_page.told(found), place, common)
     if not common.as_json:
         _show_stability(found)
-        _end(found.done, page)
+        end(found.done, page)
     return OK if found.passed else FAILED
 
 
@@ -118,7 +118,7 @@ def _still(experiment: Experiment, still: GainMap | None, place: str, common: St
         if still is None
         else still_page.told_gain(still, common.quick)
     )
-    page = _written(experiment, told, place, common)
+    page = written(experiment, told, place, common)
     if not common.as_json:
         say(f"{told.sentence}\nreport: {relative(page)}")
     return FAILED if told.passed is False else OK
@@ -127,14 +127,14 @@ def _still(experiment: Experiment, still: GainMap | None, place: str, common: St
 def tradeoff(name: str, common: StudyOptions) -> int:
     """Measures error against time; 0."""
     experiment, place = find(name, Path.cwd(), common.named), f"tradeoff{_quick(common)}"
-    with _running(experiment, place, "pilot runs", common) as report:
+    with running(experiment, place, "pilot runs", common) as report:
         found = trade(
             experiment, quick=common.quick, out=common.out, where=common.where, report=report
         )
-    page = _written(experiment, trade_page.told(found), place, common)
+    page = written(experiment, trade_page.told(found), place, common)
     if not common.as_json:
         _show_trade(found)
-        _end(found.done, page)
+        end(found.done, page)
     return OK
 
 
@@ -144,7 +144,7 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
     experiment = find(name, Path.cwd(), common.named)
     words = ["quick"] * common.quick + [error, rate] + ["declared_law"] * declared_law
     place = f"choose{tag(words, [common.quick, want, declared_law])}"
-    with _running(experiment, place, "pilot runs", common) as report:
+    with running(experiment, place, "pilot runs", common) as report:
         climb = rungs(
             experiment, declared_law=declared_law, quick=common.quick, out=common.out,
             where=common.where, report=report,
@@ -153,10 +153,10 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
             climb, want, declared_law,
             lambda trade, row, dt: again(trade, row, dt, common.out, common.where),
         )  # fmt: skip
-    page = _written(experiment, trade_page.told_choice(choice), place, common)
+    page = written(experiment, trade_page.told_choice(choice), place, common)
     if not common.as_json:
         _show_choice(choice)
-        _end(choice.trade.done, page)
+        end(choice.trade.done, page)
     return OK if choice.pick is not None else FAILED
 
 
@@ -178,7 +178,7 @@ def _quick(common: StudyOptions) -> str:
 
 
 @contextmanager
-def _running(
+def running(
     experiment: Experiment, place: str, title: str, common: StudyOptions
 ) -> Iterator[Report]:
     """A progress bar, once the place was tried; an interruption says that cells are kept."""
@@ -194,7 +194,7 @@ def _running(
         raise
 
 
-def _written(experiment: Experiment, told: Findings, place: str, common: StudyOptions) -> Path:
+def written(experiment: Experiment, told: Findings, place: str, common: StudyOptions) -> Path:
     """The page's path; prints results.json where that is asked for."""
     by = made(command_line(), sources_of(experiment.path) if experiment.path else ())
     page = write_study(experiment, told, study_folder(experiment, place, common.out), by)
@@ -203,7 +203,7 @@ def _written(experiment: Experiment, told: Findings, place: str, common: StudyOp
     return page
 
 
-def _end(done: Finished[Any], page: Path) -> None:
+def end(done: Finished[Any], page: Path) -> None:
     where = f" on {done.workers}" if done.workers else ""
     say(
         f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"

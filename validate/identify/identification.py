@@ -145,7 +145,7 @@ class Identification:
             share = (e.high - e.low) / (r.high - r.low)
             wide, words = (
                 share > SHARE,
-                f"its 95 % interval spans {share:.0%} of the range searched",
+                f"its 95 % interval spans {100 * share:.0f} % of the range searched",
             )
         if e.low_open and e.high_open:
             return ("its 95 % interval is the whole range searched",)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, ValidateError
@@ -21,7 +21,7 @@ PROMISE = 1e-2  # a fall of chi-square, over its mean per freedom, that is none
 ROUNDS = 6  # of the optimiser, each from a Jacobian taken anew
 EVALUATIONS = 200  # of the residual, then it has not converged
 _OFTEN = 1e3  # how many times the first rms a point counts that could not be evaluated
-_EDGE = 1e-6  # of the range: as good as at a bound
+INSIDE = 1e-9  # of the range: the optimiser begins off the bounds
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,14 @@ class Following:
         self._J, self._last = np.stack(columns, axis=1), (y.copy(), base)
         return self._J
 
+    def walked(self, y: Floats) -> Floats:
+        """Where scipy's trust region ends."""
+        found = least_squares(
+            self.residual, np.clip(y, INSIDE, 1 - INSIDE), jac=self, bounds=(0.0, 1.0),
+            ftol=1e-3, xtol=1e-7, gtol=1e-12, max_nfev=25,
+        )  # fmt: skip
+        return np.asarray(found.x)
+
     def __call__(self, y: Floats) -> Floats:
         r = self.residual(y)
         if self._J is None:
@@ -123,44 +131,41 @@ class Following:
         return self._J
 
 
-def minimised(
-    r: CalledOnce, at: At, y: Floats, J: Floats | None = None
-) -> tuple[Floats, Floats, bool]:
+def minimised(r: CalledOnce, at: At, y: Floats) -> tuple[Floats, Floats, bool]:
     """Where |r(at(y))|^2 is least for y (q,) in the box: y, the Jacobian there, whether it is one.
 
-    `J` (m, q) is one to begin with; None: taken by differences.
+    Converged is what a Jacobian taken anew at the end promises no fall from.
     """
+    follow = Following(r, at)
     for _ in range(ROUNDS):
-        follow = Following(r, at, J)
-        found = least_squares(
-            follow.residual, np.clip(y, 1e-9, 1 - 1e-9), jac=follow, bounds=(0.0, 1.0),
-            ftol=1e-4, xtol=1e-7, gtol=1e-12, max_nfev=25,
-        )  # fmt: skip
-        y = np.asarray(found.x)
-        fresh = follow.fresh(y)
-        J = None
-        residual = r(at(y))
-        spread = max(1.0, float(residual @ residual) / max(1, len(residual) - len(y)))
-        if promised(residual, fresh, y) <= PROMISE * spread:
-            return y, fresh, True
-        J = fresh
-        if r.calls > EVALUATIONS:
+        y = follow.walked(y)
+        J = follow.fresh(y)
+        ended = settled(follow.residual(y), J, y)
+        if ended or r.calls > EVALUATIONS:
             break
-    return y, fresh, False
+    return y, J, ended
+
+
+def followed(r: CalledOnce, at: At, y: Floats, J: Floats | None) -> tuple[Floats, Floats]:
+    """As `minimised`, from near the minimum, by a Jacobian that only follows the steps: cheap."""
+    follow = Following(r, at, J)
+    J = follow(y)
+    if not settled(follow.residual(y), J, y):
+        y = follow.walked(y)
+        J = follow(y)
+    return y, J
+
+
+def settled(r: Floats, J: Floats, y: Floats) -> bool:
+    """Whether a full step would lower |r|^2 by next to nothing, for its size."""
+    spread = max(1.0, float(r @ r) / max(1, len(r) - len(y)))
+    return promised(r, J, y) <= PROMISE * spread
 
 
 def promised(r: Floats, J: Floats, y: Floats) -> float:
-    """By how much a full step in the box's inside would lower |r|^2, were r linear."""
-    g = J.T @ r
-    inside = ~((y <= _EDGE) & (g > 0)) & ~((y >= 1 - _EDGE) & (g < 0))
-    if not inside.any():
-        return 0.0
-    step, *_ = np.linalg.lstsq(J[:, inside], -r, rcond=1e-10)
-    full = np.zeros(len(y))
-    full[inside] = step
-    reached = np.clip(y + full, 0.0, 1.0) - y
-    linear = r + J @ reached
-    return float(r @ r - linear @ linear)
+    """By how much the best step within the box would lower |r|^2, were r linear."""
+    found = lsq_linear(J, -r, (np.minimum(-y, -INSIDE), np.maximum(1 - y, INSIDE)), method="bvls")
+    return float(r @ r) - 2 * float(found.cost)
 
 
 def fit(residual: Residual, start: Floats) -> Fit:

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from validate.arrays import Floats
-from validate.identify.least_squares import CalledOnce, Fit, Residual, minimised
+from validate.identify.least_squares import CalledOnce, Fit, Residual, followed
 
 RISE = float(chi2.ppf(0.95, 1))  # 3.84
-_WITHIN = 0.01  # of the rise: the end of an interval is found
+_WITHIN = 0.1  # of the rise: the end of an interval is found, a straight line away
 _POINTS = 14  # of a side at most
 _STRAIGHT = 5  # of them by straight lines, then by halves
 _HALF = 0.5  # of the way, in sqrt(rise), to the first point
@@ -89,7 +89,7 @@ class _Outwards:
 
         y = self._guess(xi)
         if self._others:
-            y, self._J, _ = minimised(self._r, at, y, self._J)
+            y, self._J = followed(self._r, at, y, self._J)
         found = self._r(at(y))
         rise = float(found @ found) - self._best.chi_square
         self._known.append((xi, y))
@@ -125,12 +125,13 @@ def _next(at: Floats, rise: Floats, wanted: float, reach: float, room: float) ->
 
 
 def _end(at: Floats, rise: Floats, wanted: float, room: float) -> tuple[float, bool]:
-    """Distance to the interval's end, and whether it is only the bound."""
-    above = at[rise >= (1 - _WITHIN) * wanted]
-    if len(above) == 0:
+    """Distance to the interval's end, on the line of sqrt(rise) through the two points nearest to
+    it, and whether it is only the bound."""
+    z, target = np.sqrt(np.maximum(rise, 0.0)), float(np.sqrt(wanted))
+    if rise.max() < (1 - _WITHIN) * wanted:
         return room, True
-    b = above.min()
-    a = at[at < b].max()
-    za, zb = (np.sqrt(max(float(rise[at == d][0]), 0.0)) for d in (a, b))
-    share = (np.sqrt(wanted) - za) / (zb - za) if zb > za else 1.0
-    return float(min(a + share * (b - a), room)), False
+    b = int(np.argmin(np.abs(rise - wanted)))
+    others = [k for k in range(len(at)) if z[k] != z[b]]
+    a = min(others, key=lambda k: abs(at[k] - at[b]))
+    end = at[b] + (target - z[b]) * (at[b] - at[a]) / (z[b] - z[a])
+    return float(min(end, room)), bool(end > room)

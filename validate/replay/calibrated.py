@@ -17,11 +17,12 @@ from validate.identify.identification import identify as identify_in
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.calibrated_words import headlines, lines, not_identified, scores
-from validate.replay.calibration import Calibrates, Calibration, Free
+from validate.replay.calibration import Calibrates, Calibration, Change, Free
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.replay.origins import opened
 from validate.replay.problem import Calibrated, Part, Problem, with_free
+from validate.replay.remade import made_by
 
 #: From the number of a calibration among those of its experiment, and its problem.
 Identify = Callable[[int, Problem], Identification]
@@ -68,11 +69,13 @@ def problem_of(
     for on in calibration.on:
         if on.judged:
             served = _observing(experiment, calibration, on, shipped, parameters, methods)
-            parts.append(Part(on, served, parameters, True))
+            made = _made(experiment, served, parameters, on.change)
+            parts.append(Part(on, made, parameters, True))
             continue
         found = opened(experiment, on.change(parameters))
         same = any(r.source.sha256 in own for r in found.recordings)
-        parts.append(Part(on, found.recordings, found.parameters, same))
+        made = _made(experiment, found.recordings, found.parameters, on.change)
+        parts.append(Part(on, made, found.parameters, same))
     return Problem(experiment, calibration, free, methods[calibration.method], tuple(parts))
 
 
@@ -93,6 +96,39 @@ def _observing(
     seen = (experiment.place(r, asked, experiment.build(r, asked, model)) for r in shipped)
     units = [{q for o in one.compared for q in o.units} for one in seen]
     return tuple(r for r, own in zip(shipped, units, strict=True) if own & names) or shipped
+
+
+def _made(
+    experiment: Experiment, recordings: tuple[Recording, ...], parameters: Any, change: Change
+) -> tuple[Recording, ...]:
+    """The recordings, made anew where the user changed their twin."""
+    twin = experiment.twin
+    if twin is None or len(recordings) != 1:
+        return recordings
+    declared = change(experiment.parameters)
+    made, _, _ = made_by(
+        recordings[0], parameters, declared, twin.remake, lambda p: twin.made(p, lambda _: None)
+    )
+    return (made,)
+
+
+def identified(
+    experiment: Experiment,
+    parameters: Any,
+    methods: Mapping[str, Method],
+    shipped: tuple[Recording, ...],
+    identify: Identify,
+    asked: Sequence[tuple[Free, ...]],
+) -> tuple[Calibrated, ...]:
+    """Every calibration of which something is `asked`, in order, whether it can be identified or
+    not; each sees what those before found. Nothing is predicted, so no figure serves twice."""
+    done: list[Calibrated] = []
+    for number, free in enumerate(asked):
+        if free:
+            problem = problem_of(experiment, number, free, parameters, methods, shipped)
+            done.append(Calibrated(problem, identify(number, problem)))
+            parameters = with_free(parameters, done[-1].values)
+    return tuple(done)
 
 
 def calibrated(

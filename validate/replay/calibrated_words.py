@@ -73,11 +73,15 @@ def lines(one: Calibrated) -> tuple[str, ...]:
 
 def not_identified(one: Calibrated, e: Profiled, free: Free) -> str:
     """Why, with its numbers, and the measurement that would help."""
-    helps = free.helps or "a measurement that moves with it and not with the others"
     return (
         f"{e.name} is not identifiable from {one.on}: {'; '.join(e.findings)} ({e.value:.5g}, 95 % "
-        f"{e.low:.5g} to {e.high:.5g}); {helps} would identify it"
+        f"{e.low:.5g} to {e.high:.5g}); {helping(free)} would identify it"
     )
+
+
+def helping(free: Free) -> str:
+    """The measurement that would help."""
+    return free.helps or "a measurement that moves with it and not with the others"
 
 
 def scores(fitted: Iterable[Calibrated]) -> tuple[Score, ...]:

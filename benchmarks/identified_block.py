@@ -1,0 +1,111 @@
+"""A block of 5184 unknowns between plates it sticks to: what `benchmarks/identify.py` times.
+
+Force and the bulge of two points are recorded with noise from the model itself; modulus, Poisson
+ratio and the second Mooney-Rivlin coefficient stand open.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.compare.verdict import Accept
+from validate.fem.system import build as build_system
+from validate.parameters import quantity
+from validate.recording.types import Recording
+from validate.register.markers import placed_markers
+from validate.register.registered import Registered
+from validate.register.signals import driving, holds_at, validating
+from validate.replay.calibration import Calibrates, Calibration, Free
+from validate.replay.experiment import Experiment, Twin
+from validate.replay.method import Method
+from validate.scene.box import box
+from validate.scene.laws import Coefficients
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Probe, Scene, Support
+from validate.solve.march import march, output_frames
+from validate.solve.newton import StaticNewton
+from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+
+SIDE, CELLS = 0.03, 11
+HOLDS = (2e-3, 4e-3, 6e-3)  # m
+FIDUCIALS = {"f1": (0.0, 0.0, 0.0), "f2": (SIDE, 0.0, 0.0), "f3": (0.0, SIDE, 0.0)}
+BULGES = {"right": (SIDE, SIDE / 2, SIDE / 2), "left": (0.0, SIDE / 2, SIDE / 3)}
+
+
+@dataclass(frozen=True)
+class Block:
+    E: float | None = quantity(None, "Pa", "modulus; none: identified")
+    nu: float | None = quantity(None, "1", "Poisson ratio; none: identified")
+    C01: float | None = quantity(None, "Pa", "Mooney-Rivlin; none: identified")
+
+
+TRUE = Block(20e3, 0.42, 1e3)
+
+
+def scene(p: Block) -> Scene:
+    assert p.E is not None
+    assert p.nu is not None
+    assert p.C01 is not None
+    coefficients = Coefficients(C01=p.C01)
+    return Scene(
+        box((SIDE,) * 3, (CELLS,) * 3),
+        Material(p.E, p.nu, "mooney_rivlin", 1000.0, coefficients=coefficients),
+        (Support("z0", (0, 1, 2)), Support("z1", (0, 1))),
+        drives=(Drive("stage", "z1", (0.0, 0.0, -1.0)),),
+        probes=tuple(Probe(name, at) for name, at in BULGES.items()),
+        dilatation="nodal",
+    )
+
+
+def record(p: Block, progress: Callable[[str], None]) -> Recording:
+    true = scene(TRUE)
+    stepper = StaticNewton("none").prepare(build_system(true))
+    y, t = np.array(HOLDS)[:, None], np.arange(1.0, len(HOLDS) + 1)
+    run = march("twin", stepper, t, y, output_frames(len(HOLDS), 3), 0.0)
+    readings = {
+        "stage": Reading(np.array(HOLDS), "m"),
+        "cell": Reading(run.traces["stage.force"].y, "N", 0.02),
+    }
+    at = {name: np.array(x) for name, x in FIDUCIALS.items()}
+    camera = Camera(2e-5, 1, still=10_000)
+    return record_tracked(Origin("block", 7, True), points_of(run, true), at, camera, readings)
+
+
+def place(recording: Recording, p: Any, its: Scene) -> Registered:
+    stage = driving(recording, "stage", "m")
+    cell = validating(recording, "cell", "N", quantity="force", trace="stage.force")
+    rest, *holds = holds_at(stage, stage.t, HOLDS, 1e-6)
+    return Registered((stage, placed_markers(recording, its.mesh), cell), tuple(holds), rest)
+
+
+def load(p: Block, folder: Path) -> tuple[Recording, ...]:
+    return (record(TRUE, print),)
+
+
+EXPERIMENT = Experiment(
+    name="identified_block",
+    title="Block between plates it sticks to",
+    source="this file",
+    parameters=Block(),
+    methods={"newton": Method("Mooney-Rivlin, static", StaticNewton("none"))},
+    accepted=("newton",),
+    accept=(Accept("left", 1e-4, "ours"),),
+    load=load,
+    build=lambda recording, p, model: scene(p),
+    place=place,
+    calibrations=(
+        Calibration(
+            "newton",
+            (
+                Free("E", 2e3, 2e5, "assumed"),
+                Free("nu", 0.2, 0.49, "assumed", "the bulge"),
+                Free("C01", 0.0, 2e3, "assumed", "force at larger strain"),
+            ),
+            (Calibrates(("force", "right")),),
+        ),
+    ),
+    twin=Twin(record, remake=(), same_model=True),
+)

@@ -1,0 +1,52 @@
+"""Three parameters of a static body of 5184 unknowns, ten starts, profiles: how many seconds.
+
+OMP_NUM_THREADS=1 python benchmarks/identify.py [WORKERS]    local processes (default 2)
+
+The body is `benchmarks/identified_block.py`, Mooney-Rivlin in three load steps. Wall time is that
+of all cells with nothing kept from before; CPU time is that of the processes, which a busy machine
+leaves alone.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+from validate.replay.find import load_file
+from validate.report.numbers import significant
+from validate.study.identify import IdentifyStudy, identification
+from validate.study.job import Where
+
+BLOCK = Path(__file__).with_name("identified_block.py")
+WANTED_S = 180.0
+
+
+def timed(workers: int) -> tuple[IdentifyStudy, float]:
+    """The identification and its wall time s."""
+    with tempfile.TemporaryDirectory() as out:
+        start = perf_counter()
+        found = identification(
+            load_file(BLOCK), out=Path(out), where=Where(workers),
+            report=lambda done, total, what: print(f"  {what}", file=sys.stderr),
+        )  # fmt: skip
+        return found, perf_counter() - start
+
+
+def main() -> None:
+    workers = int(sys.argv[1]) if len(sys.argv) > 1 else 2
+    found, seconds = timed(workers)
+    (one,) = found.calibrated
+    for e in one.found.estimates:
+        low, high = significant(e.low, 4), significant(e.high, 4)
+        print(f"{e.name}: {significant(e.value, 4)}, 95 % {low} to {high} (SI)")
+    work = sum(r.seconds for r in found.done.records.values())
+    calls = sum(f.evaluations for f in one.found.fits)
+    print(f"{len(one.found.fits)} starts ({calls} evaluations), {len(one.found.sides)} sides")
+    print(
+        f"{seconds:.0f} s on {workers} workers ({work:.0f} s of work in cells), {WANTED_S:.0f} s "
+        "wanted"
+    )
+
+
+if __name__ == "__main__":
+    main()

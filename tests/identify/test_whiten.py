@@ -1,0 +1,35 @@
+"""What is whitened has the chi-square of its covariance."""
+
+import numpy as np
+import pytest
+
+from validate.errors import ComparisonError
+from validate.identify.whiten import whitened
+
+
+def test_chi_square_is_that_of_noise_and_what_all_points_share() -> None:
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=(7, 2))
+    sd, shared = 0.3, 0.8
+    C = sd**2 * np.eye(7) + shared**2 * np.ones((7, 7))
+    expected = sum(float(r @ np.linalg.solve(C, r)) for r in values.T)
+    found = whitened(values, sd, shared)
+    assert found.shape == (14,)
+    assert float(found @ found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_one_value_has_both_parts() -> None:
+    assert whitened(np.array([[2.0]]), 0.3, 0.4)[0] == pytest.approx(4.0)
+    assert whitened(np.array([[2.0]]), 0.0, 0.5)[0] == pytest.approx(4.0)
+
+
+def test_fewer_independent_numbers_weigh_as_many_as_they_are() -> None:
+    values = np.ones((100, 1))
+    found = whitened(values, 1.0, 0.0, freedom=4)
+    assert float(found @ found) == pytest.approx(4.0)
+
+
+def test_a_sensor_without_noise_is_refused() -> None:
+    for sd, shared in ((0.0, 0.0), (0.0, 1.0)):
+        with pytest.raises(ComparisonError, match="force@1: 3 values with a standard deviation"):
+            whitened(np.ones((3, 1)), sd, shared, name="force@1")

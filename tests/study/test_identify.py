@@ -1,0 +1,120 @@
+"""`validate identify` on the benchmark's block in eight boxes: kept cells, bounds, errors."""
+
+import json
+from pathlib import Path
+
+import pytest
+from commands import here, refused
+
+from validate.replay.find import load_file
+from validate.study.identify import IdentifyStudy, identification
+from validate.study.job import Where
+
+ALONE = ("--workers", "0")
+
+
+@pytest.fixture(scope="module")
+def block(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path:
+    """The benchmark's experiment, coarse and linear; Poisson ratio and C01 are known."""
+    text = (project_root / "benchmarks" / "identified_block.py").read_text("utf-8")
+    for one, other in (
+        ("SIDE, CELLS = 0.03, 11", "SIDE, CELLS = 0.03, 2"),
+        ("nu: float | None = quantity(None", "nu: float | None = quantity(0.42"),
+        ("C01: float | None = quantity(None", "C01: float | None = quantity(1e3"),
+    ):
+        assert one in text
+        text = text.replace(one, other)
+    path = tmp_path_factory.mktemp("block") / "identified_block.py"
+    path.write_text(text, "utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("out")
+
+
+@pytest.mark.slow
+def test_what_stands_open_is_identified_reported_and_kept(block: Path, out: Path) -> None:
+    command = ("identify", str(block), "--quick", "--out", str(out), *ALONE, "--json")
+    code, printed, _ = here(*command, VALIDATE_NO_GL="1")
+    assert code == 0
+    told = json.loads(printed)["study"]
+    (one,) = told["calibrations"]
+    (E,) = one["parameters"]
+    assert (E["name"], E["unit"], E["identified"]) == ("E", "Pa", True)
+    assert E["low"] < 20e3 < E["high"]
+    assert E["value"] == pytest.approx(20e3, rel=0.02)
+    assert max(E["rise"]) > 3.4
+    assert len(one["starts"]) == 4
+    assert told["reused"] == 0
+    page = next(out.glob("identified_block/study-identify*/report.html")).read_text("utf-8")
+    assert "Fitted: E = " in page
+    assert "E: profile" in page
+    again = json.loads(here(*command, VALIDATE_NO_GL="1")[1])["study"]
+    assert again["reused"] == 6  # four starts, two sides
+    assert again["calibrations"] == told["calibrations"]
+
+
+@pytest.mark.slow
+def test_run_identifies_with_the_same_cells_and_opens_with_what_was_fitted(
+    block: Path, out: Path
+) -> None:
+    before = len(list(out.glob("identified_block/study-identify/cells/*.json")))
+    code, printed, _ = here("run", str(block), "--quick", "--out", str(out), VALIDATE_NO_GL="1")
+    assert code == 0
+    assert " ".join(printed.split()).count("Fitted: E = ") == 1
+    assert len(list(out.glob("identified_block/study-identify/cells/*.json"))) == before
+    (page,) = out.glob("identified_block+quick*/report.html")
+    assert "Fitted: E = " in page.read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_bounds_make_any_number_free_and_what_is_not_identified_is_told(
+    block: Path, tmp_path: Path
+) -> None:
+    """Bounds so near that the recording says nothing between them."""
+    code, printed, errors = here(
+        "identify", str(block), "--quick", "--parameters", "C01=900:1100", "--seeds", "2",
+        "--out", str(tmp_path), *ALONE, VALIDATE_NO_GL="1",
+    )  # fmt: skip
+    assert code == 1, errors
+    assert "C01" in printed
+    assert "not identifiable" in printed
+    assert "force at larger strain would identify it" in " ".join(printed.split())
+    assert "correlations: " in printed
+
+
+def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
+    common = ("identify", str(block), "--out", str(tmp_path), *ALONE)
+    line = refused(*common, "--parameters", "mu")
+    assert "unknown parameter 'mu'" in line
+    line = refused(*common, "--parameters", "E=1kPa")
+    assert "expected E=LOW:HIGH" in line
+    line = refused(*common, "--parameters", "E=1e5:1e3")
+    assert "bounds 100000 to 1000" in line
+    line = refused(*common, "--parameters", "E,E")
+    assert "E stands twice" in line
+    line = refused(*common, "--seeds", "0")
+    assert "--seeds 0: at least one start" in line
+
+
+def test_a_parameter_that_is_not_declared_needs_bounds(block: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "identified_block.py"
+    kept = [line for line in block.read_text("utf-8").splitlines() if 'Free("nu"' not in line]
+    bare.write_text("\n".join(kept), "utf-8")
+    line = refused("identify", str(bare), "--parameters", "nu", "--out", str(tmp_path), *ALONE)
+    assert "--parameters nu: no bounds; declared: E, C01" in line
+
+
+def test_finished_cells_are_not_run_again(block: Path, tmp_path: Path) -> None:
+    def found(starts: int) -> IdentifyStudy:
+        return identification(load_file(block), starts=starts, out=tmp_path, where=Where(0))
+
+    one = found(1)
+    assert (one.done.reused, len(one.done.records)) == (0, 3)
+    more = found(2)
+    assert more.done.reused == 3
+    (first,), (second,) = ([c.found.estimates[0] for c in f.calibrated] for f in (one, more))
+    assert first.value == pytest.approx(second.value, rel=1e-4)
+    assert first.low < 20e3 < first.high
