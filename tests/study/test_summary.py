@@ -153,6 +153,7 @@ def test_twins_and_units_stand_apart(tmp_path: Path) -> None:
     assert [(k.kind, k.covered.unit) for k in found.kinds] == [
         ("force", "N"), ("force", "force unit"),
     ]  # fmt: skip
+    assert [p.simulated for k in found.kinds for p in k.points] == [11.0, 11.0]
     assert [p.simulated for k in found.twins for p in k.points] == [30.0]
 
 

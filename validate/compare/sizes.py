@@ -16,7 +16,7 @@ _BY_UNIT = {
     "m": "displacement", "N": "force", "N/m": "force", "Pa": "stress", "Hz": "frequency",
     "m2": "area",
 }  # fmt: skip
-_PLACES = ("contour", "outline", "diameter", "radius")
+_PLACES = ("contour", "outline", "diameter", "radius", "landmark")
 
 
 @dataclass(frozen=True)

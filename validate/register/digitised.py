@@ -113,7 +113,11 @@ class TouchedLandmarks:
         off = np.array(shown) - d.places[at]
         # Every pose has six numbers of all landmarks: so many of the differences are not free.
         freedom = max(off.size - 6, 1)
-        return (Deviation(self.name, off, "m", rms(d.expected), 0.0, words, freedom=freedom),)
+        about = d.places[at] - d.places.mean(axis=0)
+        return (
+            Deviation(self.name, off, "m", rms(d.expected), 0.0, words, freedom=freedom,
+                      reference=about),
+        )  # fmt: skip
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return tuple(n for n in self.digitised.touched if f"{n}.x" not in run.traces)

@@ -94,8 +94,8 @@ class Deviation:
     `sd` is the measurement's standard deviation per component, independent between points;
     `systematic` what all points share (registration), per component. `freedom` counts the numbers
     in which noise is independent (None: all). `scale` is the largest that was measured of what has
-    a zero, in `unit`, and `reference` (k, c) what was measured of it. `simulated` and `measured`
-    are kept of scalars.
+    a zero, in `unit`, and `reference` (k, c) what was measured of it; of places, from the middle of
+    them. `simulated` and `measured` are kept of scalars.
     """
 
     quantity: str

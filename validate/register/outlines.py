@@ -111,7 +111,8 @@ class OutlineObservation:
     def _distance(self, simulated: Floats, measured: Floats) -> Deviation:
         apart = normal_distances(simulated, measured)[:, None]
         words = "distance of the simulated outline from each measured outline point, outward "
-        return Deviation("contour", apart, "m", self.sd, 0.0, words + "positive")
+        about = np.linalg.norm(measured - enclosed(measured)[1], axis=1)[:, None]
+        return Deviation("contour", apart, "m", self.sd, 0.0, words + "positive", reference=about)
 
     def _changes(self, start: tuple[Floats, Floats], end: tuple[Floats, Floats]) -> list[Deviation]:
         """What changed of the simulated and of the measured outline since rest."""

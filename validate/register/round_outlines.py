@@ -80,6 +80,7 @@ class RoundOutlines:
             simulated=float(shown[0]) if one else None,
             measured=float(seen[0]) if one else None,
             scale=float(seen.max()),
+            reference=seen[:, None],
         )
         return (found,)
 
