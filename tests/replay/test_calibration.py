@@ -10,6 +10,7 @@ from calibrating import NU, OPEN, E, Open
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.recording.types import Recording
+from validate.register.sensing import ForceSensing
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.options import Options
 from validate.replay.road import compare
@@ -112,3 +113,27 @@ def test_a_residual_that_is_not_there_is_named_with_those_that_are() -> None:
     wrong = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(("forse",)),)),))
     with pytest.raises(ComparisonError, match=r"no residual 'forse'.*0 matched.*force@0\.1mm"):
         compare(wrong, Options({}))
+
+
+def test_a_sensor_is_identified_beside_the_material() -> None:
+    """A cell that reads .2 N of nothing: the force's slope over the holds is the modulus'."""
+    bias = Free("cell.bias", -1.0, 1.0, "assumed")
+    on = Calibrates(("force@0.1mm", "force@0.2mm"))
+
+    def off(p: Open, folder: Path) -> tuple[Recording, ...]:
+        (recording,) = OPEN.load(p, folder)
+        cell = recording.signal("cell", "N")
+        signals = {**recording.signals, "cell": replace(cell, y=cell.y + 0.2)}
+        return (replace(recording, signals=signals),)
+
+    biased = replace(
+        OPEN,
+        load=off,
+        parameters=Open(cell=ForceSensing(bias=None)),
+        calibrations=(
+            Calibration("fem", (E, bias), (Calibrates(("force@0.1mm", "force@0.2mm")),)),
+        ),
+    )
+    found = {s.name: s.value for s in compare(biased, Options({})).identified}
+    assert found["cell.bias"] == pytest.approx(0.2, abs=5e-4)
+    assert found["E"] == pytest.approx(10e3, rel=0.05)

@@ -3,6 +3,11 @@
 from validate.exports import lazily, names
 
 _HOMES = {
+    "identification": ("Identification", "InTurn", "Profiled", "identify"),
+    "least_squares": ("Fit", "fit"),
+    "profile": ("Side", "side"),
+    "space": ("Range", "Space"),
+    "whiten": ("whitened",),
     "interval": ("Interval", "mesh_share", "profile_interval"),
     "law": ("LawFit", "fit_scale"),
     "modulus": ("ModulusFit", "gent_correction", "identify_modulus"),

@@ -14,6 +14,7 @@ _HOMES = {
     "observation": ("Deviation", "Observation", "Selection"),
     "markers": ("MarkerObservation", "observe_markers"),
     "outlines": ("OutlineObservation", "observe_outlines"),
+    "sensing": ("ForceSensing", "LengthSensing", "PoseShift", "PressureSensing", "Sensing"),
     "signals": ("SignalObservation",),
 }
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from validate.compare.result import Result
 from validate.replay import road
+from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import (
     Case,
     EffectSpec,
@@ -28,9 +29,12 @@ from validate.replay.method import Method
 from validate.replay.options import Options
 
 __all__ = [
+    "Calibrates",
+    "Calibration",
     "Case",
     "EffectSpec",
     "Experiment",
+    "Free",
     "Identified",
     "Input",
     "Ladder",

@@ -7,6 +7,7 @@ _HOMES = {
     "job": ("Job", "Plan", "Where"),
     "store": ("Record",),
     "filters": ("FilterStudy",),
+    "identify": ("IdentifyStudy", "identification"),
     "trade": ("ParetoFront", "Trade", "TradeRow"),
     "choose": ("Choice", "Wanted", "wanted"),
 }
