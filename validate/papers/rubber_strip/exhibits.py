@@ -1,0 +1,66 @@
+"""What the report of the strip shows: its contraction and all laws, its parts, the tracker."""
+
+from pathlib import Path
+
+import numpy as np
+
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
+from validate.papers.rubber_strip.stretches import stretches
+from validate.papers.rubber_strip.strip import FIRST, LAST, Strip, recorded
+from validate.papers.rubber_strip.tracker import stage_exhibit
+from validate.recording.formats.npz_points import read_points
+from validate.register.signals import SignalObservation
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import MAIN, Cases
+
+_UNKNOWN = (
+    "No force was recorded: no modulus can be known, and none enters. No thickness was recorded: "
+    "that the strip contracts in it as it does in width is assumed by every law here, and with it "
+    "the change of volume. The states have no times: no rate is told."
+)
+
+
+def exhibits(p: Strip, cases: Cases, tell: Progress, *, folder: Path) -> Told:
+    """Contraction over stretch, the parts of the strip, the tracker against its stage; `folder` is
+    the experiment's."""
+    tell("compares the tracker with its stage")
+    path = recorded(p, folder)
+    tracker = stage_exhibit(path.parent, p.stage)
+    shown = (_contraction(cases), _parts(p, path))
+    return Told((*shown, *((tracker,) if tracker else ())))
+
+
+def _contraction(cases: Cases) -> Exhibit:
+    runs = [f for f in cases[MAIN].values() if f.run.finished]
+    seen = runs[0].seen
+    first, last = (next(s for s in seen.of(SignalObservation) if s.quantity == q)
+                   for q in (FIRST, LAST))  # fmt: skip
+    points = [
+        Series(label, np.interp(s.t, seen.t, seen.inputs[:, 0]), s.y[:, 0], "points")
+        for label, s in (("measured, calibrates", first), ("measured, predicted", last))
+    ]
+    lines = [
+        Series(f.label, f.run.traces["stretch"].y, f.run.traces["free_stretch"].y) for f in runs
+    ]
+    chart = Chart(
+        "contraction", "Stretch across the strip", "stretch along it / 1", "stretch across / 1",
+        (*points, *lines),
+    )  # fmt: skip
+    return Exhibit("contraction", "How the strip contracts", (_UNKNOWN,), charts=(chart,))
+
+
+def _parts(p: Strip, path: Path) -> Exhibit:
+    found = stretches(read_points(path, p.unit).marker("points").x, p.patches)
+    rows = [
+        (k + 1, found.axial[-1, k], found.across[-1, k], found.ratio[0, k], found.ratio[-1, k])
+        for k in range(p.patches)
+    ]
+    table = NumberTable(
+        "parts",
+        "Parts of the strip from one end to the other: stretches at the last state, and "
+        "-ln(across)/ln(along) at the first step and at the last.",
+        ("part", "along / 1", "across / 1", "ratio, first / 1", "ratio, last / 1"),
+        tuple(rows),
+    )
+    words = "The strip is not homogeneous: what its parts differ by is in the uncertainty."
+    return Exhibit("parts", "Parts of the strip", (words,), tables=(table,))

@@ -1,0 +1,95 @@
+"""Tracked points in NumPy archives: positions over states of a test, no times, no clock.
+
+The unit stands at the end of the file's name (`points3d_mm.npz`), or is asked for. Archives are
+read without pickles: they hold arrays and nothing else.
+"""
+
+import hashlib
+import re
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats, checked
+from validate.errors import RecordingError, UsageError
+from validate.recording.types import Markers, Recording, Source
+from validate.units import si_factor
+
+_MOST = 200_000_000  # bytes of one archive, unpacked
+_UNIT = re.compile(r".*_(px|um|mm|cm|m)")
+
+
+@dataclass(frozen=True)
+class StageTest:
+    """A rigid body on a stage as one camera saw it: points (nt, n, 2) px, NaN = not seen, and the
+    stage's position (nt,) m."""
+
+    name: str
+    points: Floats
+    stage: Floats
+
+
+def read_points(path: Path, unit: str | None = None) -> Recording:
+    """Markers `points` (nt, n, 3) m, NaN = not seen, of an array `points`; states count as seconds.
+
+    Raises `UsageError` for a missing file and a unit that nobody states, `RecordingError` for an
+    archive that is damaged or holds no such array.
+    """
+    data, arrays = _archive(path)
+    factor = si_factor(unit or _said(path), "length")
+    x = factor * _array(path, arrays, "points", (None, None, 3))
+    markers = Markers(
+        np.arange(len(x), dtype=np.float64), tuple(f"point {i + 1}" for i in range(x.shape[1])),
+        x, 0.0, "cameras",
+    )  # fmt: skip
+    return Recording(
+        path.stem,
+        Source(path.name, hashlib.sha256(data).hexdigest(), len(data), "verified (CRC-32)"),
+        0,
+        markers={"points": markers},
+        metadata={"provenance": {"file": path.name, "unit": unit or f"{_said(path)}, of the name"}},
+        unread={k: f"{a.shape} {a.dtype}" for k, a in arrays.items() if k != "points"},
+    )
+
+
+def read_stage(path: Path) -> StageTest:
+    """Arrays `points` (nt, n, 2) px and `stage_mm` (nt,); raises as `read_points` does."""
+    _, arrays = _archive(path)
+    x = _array(path, arrays, "points", (None, None, 2))
+    stage = 1e-3 * _array(path, arrays, "stage_mm", (len(x),), nan=False)
+    return StageTest(path.stem, x, stage)
+
+
+def _archive(path: Path) -> tuple[bytes, dict[str, np.ndarray]]:
+    if not path.is_file():
+        raise UsageError(f"cannot read {path}: no such file")
+    try:
+        with zipfile.ZipFile(path) as zipped:
+            size = sum(i.file_size for i in zipped.infolist())
+            if size > _MOST:
+                raise RecordingError(f"{path.name}: {size} bytes unpacked, the limit is {_MOST}")
+            bad = zipped.testzip()
+        if bad:
+            raise RecordingError(f"{path.name}: '{bad}' is damaged (CRC-32); copy the file again")
+        with np.load(path, allow_pickle=False) as found:
+            return path.read_bytes(), {name: found[name] for name in found.files}
+    except (zipfile.BadZipFile, ValueError, EOFError, OSError) as error:
+        raise RecordingError(f"{path.name}: no archive of arrays ({error})") from error
+
+
+def _array(
+    path: Path, arrays: dict[str, np.ndarray], name: str, shape: tuple[int | None, ...],
+    nan: bool = True,
+) -> Floats:  # fmt: skip
+    if name not in arrays or arrays[name].dtype.kind not in "fiu":
+        raise RecordingError(f"{path.name}: no numbers '{name}'; it holds {sorted(arrays)}")
+    return checked(arrays[name], f"{path.name}: {name}", shape, nan=nan, error=RecordingError)
+
+
+def _said(path: Path) -> str:
+    found = _UNIT.fullmatch(path.stem)
+    if not found or found[1] == "px":
+        raise UsageError(f"{path.name} does not say its unit; give it with --set unit=mm")
+    return found[1]
