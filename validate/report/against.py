@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Picture
@@ -22,9 +22,10 @@ from validate.report.style import (
     legend_height,
 )
 
-_PANEL = 3.3  # inches, both ways
+_PANEL, _TITLE = 3.3, 0.25  # inches, both ways; of a panel's title and the room above
 _ROW = 2  # panels side by side
 _ROOM = 1.3  # beyond the points, both ways
+_NARROW = 0.6  # decades: less has ticks as on a linear axis
 _POINTS = ("o", "s", "^", "D", "v", "P", "X")
 _LINES = (
     "measured = predicted, ± 2 sd of the measurements",
@@ -71,7 +72,7 @@ def against(name: str, caption: str, panels: Sequence[Against]) -> Picture:
     points = sum(len(panel.measured) for panel in panels)
     return Picture(
         name, caption, f"{points} predictions against what was measured, and their bands.",
-        draw(paint, width, _PANEL * rows + legend_height(labels, width)),
+        draw(paint, width, (_PANEL + _TITLE) * rows + legend_height(labels, width)),
     )  # fmt: skip
 
 
@@ -104,9 +105,12 @@ def _band(line: Floats, by: float, sd: float) -> tuple[Floats, Floats]:
 
 def _scales(axes: Axes, line: Floats) -> None:
     """Logarithmic with few ticks that can be read, the same both ways."""
-    wide = line[1] / line[0] > 100
+    decades = float(np.log10(line[1] / line[0]))
     axes.set(xscale="log", yscale="log", xlim=line, ylim=line, aspect="equal")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+        if decades < _NARROW:
+            axis.set_major_locator(MaxNLocator(4))
+        else:
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2 else (1.0,)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())

@@ -16,7 +16,7 @@ from validate.study.summary import OfKind, Range, Summary, area_of
 
 _PERCENT = 100.0
 #: Of a row's texts: what is stated, then where it holds.
-STATED = ("quantity", "bias / %", "scatter / %", "measured / %", "predictions", "specimens")
+STATED = ("quantity", "bias / %", "scatter / %", "measurement / %", "predictions", "specimens")
 COVERED = ("size", "strain / %", "rate / 1/s", "body / mm")
 _WORDS = (
     "Bias: predicted over true, less one. Scatter: relative standard deviation of the predictions, "
