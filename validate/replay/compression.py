@@ -96,7 +96,8 @@ class Specimen:
 
     diameter: float | None = quantity(None, "m", "diameter; none: the recording's", asked=True)
     height: float | None = quantity(None, "m", "height; none: the recording's", asked=True)
-    mesh: str | None = quantity(None, "1", "mesh file (npz); none: a cylinder")
+    mesh: str | None = quantity(None, "1", "mesh file (npz, or Abaqus inp); none: a cylinder")
+    mesh_unit: str = quantity("m", "1", "unit of lengths in a mesh file that states none (inp)")
 
     @property
     def size(self) -> Cylinder:
@@ -244,7 +245,7 @@ def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
 def _body(p: Compression) -> Mesh:
     """The body of the mesh file, or a quarter of the cylinder."""
     if p.specimen.mesh is not None:
-        return read_mesh(Path(p.specimen.mesh))
+        return read_mesh(Path(p.specimen.mesh), p.specimen.mesh_unit)
     size, grid = p.specimen.size, p.mesh
     return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
 

@@ -4,6 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "mesh": ("Mesh", "quadratic"),
+    "abaqus": ("read_abaqus",),
     "mesh_file": ("read_mesh", "write_mesh"),
     "scene": (
         "Cavity",

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import SceneError
+from validate.scene.abaqus import read_abaqus
 from validate.scene.mesh import Kind, Mesh, require_positive_cells
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
@@ -36,12 +37,14 @@ def write_mesh(mesh: Mesh, path: Path, provenance: str = "") -> None:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def read_mesh(path: Path) -> Mesh:
-    """The mesh of a file that `write_mesh` wrote.
+def read_mesh(path: Path, unit: str = "m") -> Mesh:
+    """The mesh of a file that `write_mesh` wrote, or of an Abaqus .inp with lengths in `unit`.
 
     Raises `SceneError`, one line that names the file, for one that is missing, damaged, too large
     or no such mesh, and for inverted elements.
     """
+    if path.suffix.lower() == ".inp":
+        return read_abaqus(path, unit)
     try:
         mesh = _mesh(_arrays(path))
         require_positive_cells(mesh)

@@ -30,7 +30,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def decoded(decoder: str, path: Path, extra: str) -> dict[str, NDArray[Any]]:
-    """What `arrays(path)` of the module `decoder` beside this file gives.
+    """What `arrays(path)` of the module `decoder` gives, one beside this file or named in full.
 
     Raises `UsageError` with what to install where the library of the `extra` is absent, else
     `RecordingError` naming the file: what the decoder said, or how its process ended.
@@ -38,7 +38,7 @@ def decoded(decoder: str, path: Path, extra: str) -> dict[str, NDArray[Any]]:
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         out = Path(folder) / "arrays.npz"
         done = _ended(decoder, path, out)
-        line = done.stdout.decode("utf-8", "replace").strip()[:300]
+        line = " ".join(done.stdout.decode("utf-8", "replace").split())[:300]
         if done.returncode == _MISSING:
             raise UsageError(f"{path.name}: {line}; pip install 'validate-tissue[{extra}]'")
         if done.returncode == _SAID:
@@ -76,7 +76,9 @@ def _decode(decoder: str, path: Path, out: Path, limit: int) -> int:
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        arrays: Arrays = import_module(f"{_HOME}.{decoder}").arrays(path)
+        arrays: Arrays = import_module(decoder if "." in decoder else f"{_HOME}.{decoder}").arrays(
+            path
+        )
     except ImportError as missing:
         print(f"the library '{missing.name}' that reads this format is not installed")
         return _MISSING
