@@ -1,12 +1,19 @@
-"""What the commands share: exit codes, and texts of the form PATH=VALUE."""
+"""What the commands share: exit codes, kinds of options, and texts of the form PATH=VALUE."""
 
 import sys
+from pathlib import Path
 
 import click
 
 from validate.cli.layout import width, wrapped
 from validate.errors import UsageError
 
+FOLDER = click.Path(file_okay=False, path_type=Path)
+FILE = click.Path(dir_okay=False, path_type=Path)
+EXPERIMENTS = click.option(
+    "--experiments", "named", multiple=True, type=FOLDER, metavar="DIR",
+    help="A folder of experiment files to look at too.",
+)  # fmt: skip
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 

@@ -8,16 +8,10 @@ from typing import Any
 import click
 
 from validate import __version__
-from validate.cli.arguments import BAD_INPUT, BUG, INTERRUPTED, complain
+from validate.cli.arguments import BAD_INPUT, BUG, EXPERIMENTS, FOLDER, INTERRUPTED, complain
+from validate.cli.of_recordings import data_, import_, inspect, merge, new, record
 from validate.errors import UsageError, ValidateError
 from validate.places import of_the_place, why_not
-
-_OUT = click.Path(file_okay=False, path_type=Path)
-_FILE = click.Path(dir_okay=False, path_type=Path)
-_EXPERIMENTS = click.option(
-    "--experiments", "named", multiple=True, type=_OUT, metavar="DIR",
-    help="A folder of experiment files to look at too.",
-)  # fmt: skip
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -80,7 +74,7 @@ def cli() -> None:
 
 @cli.command("list")
 @click.argument("name", required=False)
-@_EXPERIMENTS
+@EXPERIMENTS
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
     """Experiments; with NAME its parameters, methods, scores and source."""
@@ -96,10 +90,10 @@ def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
 @cli.command("run")
 @click.argument("names", nargs=-1, metavar="NAME|FILE.py ...")
 @click.option("--all", "everything", is_flag=True, help="Every experiment.")
-@_EXPERIMENTS
+@EXPERIMENTS
 @click.option("--quick", is_flag=True, help="Coarser and fewer comparisons; a banner says so.")
 @click.option(
-    "--out", type=_OUT, help="Where reports go (default: reports/ of the project, or here)."
+    "--out", type=FOLDER, help="Where reports go (default: reports/ of the project, or here)."
 )
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
@@ -116,9 +110,9 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
 
 @cli.command()
 @click.argument("names", nargs=-1, metavar="[NAME ...]")
-@_EXPERIMENTS
+@EXPERIMENTS
 @click.option("--fresh", is_flag=True, help="Make every run anew, stored ones that match too.")
-@click.option("--out", type=_OUT, help="Where reports lie (as for run).")
+@click.option("--out", type=FOLDER, help="Where reports lie (as for run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def check(names: tuple[str, ...], **options: Any) -> int:
     """Every published figure and accepted limit: ours, theirs, verdict, count.
@@ -132,8 +126,8 @@ def check(names: tuple[str, ...], **options: Any) -> int:
 
 @cli.command("history")
 @click.argument("name", metavar="NAME|FILE.py")
-@_EXPERIMENTS
-@click.option("--out", type=_OUT, help="Where its reports are (default: as of run).")
+@EXPERIMENTS
+@click.option("--out", type=FOLDER, help="Where its reports are (default: as of run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     """The runs of an experiment, and what changed from one to the next."""
@@ -143,7 +137,7 @@ def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool
 
 
 @cli.command("summary")
-@click.option("--out", type=_OUT, help="Where the reports are (default: as of run).")
+@click.option("--out", type=FOLDER, help="Where the reports are (default: as of run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, no page.")
 def summary_(out: Path | None, as_json: bool) -> None:
     """Bias and scatter of what was predicted, over every stored run."""
@@ -161,7 +155,7 @@ def summary_(out: Path | None, as_json: bool) -> None:
     default="change", show_default=True, help="Order of the scores, the largest change first.",
 )  # fmt: skip
 @click.option("--all", "everything", is_flag=True, help="Everything, not 40 lines of it.")
-@click.option("--out", type=_OUT, help="Where the page goes (default: beside the first run).")
+@click.option("--out", type=FOLDER, help="Where the page goes (default: beside the first run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document; a page only with --out.")
 def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
     """Stored runs (report folders) side by side, drawn; nothing is run again."""
@@ -183,11 +177,11 @@ def _studied(command: Any) -> Any:
         click.option("--workers", type=int, help="Local processes (0: this one; else one a core)."),
         click.option(
             "--out",
-            type=_OUT,
+            type=FOLDER,
             help="Where reports go (default: reports/ of the project, or here).",
         ),
         click.option("--quick", is_flag=True, help="Coarser and fewer runs; a banner says so."),
-        _EXPERIMENTS,
+        EXPERIMENTS,
         click.argument("name", metavar="NAME|FILE.py"),
     ):
         command = option(command)
@@ -271,99 +265,5 @@ def identify(name: str, **options: Any) -> int:
     return identifying.identifying(name, _common(options), **options)
 
 
-@cli.command()
-@click.argument("file", type=_FILE)
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def inspect(file: Path, as_json: bool) -> None:
-    """What a recording holds: topics, clocks, rates, gaps, units, defects."""
-    from validate.cli import inspecting
-
-    inspecting.inspect(file, as_json)
-
-
-@cli.command("import")
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--as",
-    "kind",
-    metavar="KIND",
-    help="c3d, instron, matlab, mcap, metaimage, nrrd or png-stack; else as shown.",
-)
-@click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
-@click.option(
-    "--map",
-    "mapping",
-    multiple=True,
-    metavar="ROLE=COLUMN[:UNIT][:-]",
-    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; unit=mm.",
-)
-@click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
-@click.option("--rate", type=float, help="png-stack: images a second, Hz.")
-@click.option("--topic", help="png-stack: its topic (default: images).")
-def import_(
-    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
-) -> None:
-    """Turn a testing machine's export, C3D, MATLAB 5 or a folder of PNG images into a recording."""
-    from validate.cli import recordings
-
-    recordings.import_file(file, kind, out, mapping, given)
-
-
-@cli.command()
-@click.argument("files", nargs=-1, required=True, type=_FILE)
-@click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
-@click.option(
-    "--shift",
-    "shifts",
-    multiple=True,
-    metavar="TOPIC=SECONDS[:SD]",
-    help="Add to the times of a stream with a clock of its own; kept as a record.",
-)
-def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
-    """Put the streams of several recordings into one, clocks as they are or shifted."""
-    from validate.cli import recordings
-
-    recordings.merge_files(files, out, shifts)
-
-
-@cli.command()
-@click.argument("name")
-@click.option("--from", "source", required=True, type=_FILE, help="The MCAP recording.")
-@click.option("-o", "out", type=_FILE, help="The file (default: experiments/NAME.py).")
-def new(name: str, source: Path, out: Path | None) -> None:
-    """Write a commented experiment file, filled with what a recording holds."""
-    from validate.cli import new as writing
-
-    writing.new(name, source, out)
-
-
-@cli.command()
-@click.argument("name")
-@click.option("-o", "out", required=True, type=_FILE, help="The MCAP recording to write.")
-@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
-@_EXPERIMENTS
-def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...]) -> None:
-    """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
-    from validate.cli import making
-
-    making.record(name, out, values, named)
-
-
-@cli.group("data", invoke_without_command=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-@click.pass_context
-def data_(context: click.Context, as_json: bool) -> None:
-    """Public recordings by name: which there are, and which of them are here."""
-    if context.invoked_subcommand is None:
-        from validate.cli import data
-
-        data.show(as_json)
-
-
-@data_.command("get")
-@click.argument("name")
-def get_(name: str) -> None:
-    """Bring one into the user's cache, checked against its registered hashes."""
-    from validate.cli import data
-
-    data.get(name)
+for _command in (inspect, import_, merge, new, record, data_):
+    cli.add_command(_command)

@@ -1,0 +1,106 @@
+"""The commands on recordings: what one holds, importing, merging, making and bringing them."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from validate.cli.arguments import EXPERIMENTS, FILE
+
+
+@click.command()
+@click.argument("file", type=FILE)
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def inspect(file: Path, as_json: bool) -> None:
+    """What a recording holds: topics, clocks, rates, gaps, units, defects."""
+    from validate.cli import inspecting
+
+    inspecting.inspect(file, as_json)
+
+
+@click.command("import")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--as",
+    "kind",
+    metavar="KIND",
+    help="c3d, instron, matlab, mcap, metaimage, nrrd or png-stack; else as shown.",
+)
+@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@click.option(
+    "--map",
+    "mapping",
+    multiple=True,
+    metavar="ROLE=COLUMN[:UNIT][:-]",
+    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; unit=mm.",
+)
+@click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
+@click.option("--rate", type=float, help="png-stack: images a second, Hz.")
+@click.option("--topic", help="png-stack: its topic (default: images).")
+def import_(
+    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
+) -> None:
+    """Turn a testing machine's export, C3D, MATLAB 5 or a folder of PNG images into a recording."""
+    from validate.cli import recordings
+
+    recordings.import_file(file, kind, out, mapping, given)
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@click.option(
+    "--shift",
+    "shifts",
+    multiple=True,
+    metavar="TOPIC=SECONDS[:SD]",
+    help="Add to the times of a stream with a clock of its own; kept as a record.",
+)
+def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
+    """Put the streams of several recordings into one, clocks as they are or shifted."""
+    from validate.cli import recordings
+
+    recordings.merge_files(files, out, shifts)
+
+
+@click.command()
+@click.argument("name")
+@click.option("--from", "source", required=True, type=FILE, help="The MCAP recording.")
+@click.option("-o", "out", type=FILE, help="The file (default: experiments/NAME.py).")
+def new(name: str, source: Path, out: Path | None) -> None:
+    """Write a commented experiment file, filled with what a recording holds."""
+    from validate.cli import new as writing
+
+    writing.new(name, source, out)
+
+
+@click.command()
+@click.argument("name")
+@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+@EXPERIMENTS
+def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...]) -> None:
+    """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
+    from validate.cli import making
+
+    making.record(name, out, values, named)
+
+
+@click.group("data", invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.pass_context
+def data_(context: click.Context, as_json: bool) -> None:
+    """Recordings made by others, by name; which of them are here."""
+    if context.invoked_subcommand is None:
+        from validate.cli import data
+
+        data.show(as_json)
+
+
+@data_.command("get")
+@click.argument("name")
+def get_(name: str) -> None:
+    """Bring one into the cache, checked against its hashes."""
+    from validate.cli import data
+
+    data.get(name)
