@@ -50,7 +50,6 @@ def test_a_law_that_is_not_the_material_s_is_said_to_differ(tmp_path: Path) -> N
     assert "predicted: stress.equibiaxial" in result.sentence
 
 
-@pytest.mark.slow
 def test_the_material_s_law_predicts_the_other_modes(tmp_path: Path) -> None:
     read = {"data": str(curves(tmp_path)), "ranges.reading": "0.002", "ranges.axis": "0.002"}
     options = Options(read, methods=("neo_hooke", "mooney_rivlin"))
@@ -70,6 +69,17 @@ def test_modes_that_a_material_lacks_are_not_asked_for(tmp_path: Path) -> None:
     assert [r.record("test")["role"] for r in found] == ["calibrates", "validates"]
     fitted = load(Multimode(data=str(tmp_path), fit="pure_shear"), tmp_path)
     assert mode_of(fitted[0]) == "pure_shear"
+
+
+def test_a_curve_alone_is_identified_and_predicts_nothing(tmp_path: Path) -> None:
+    laws = {"data": str(curves(tmp_path, "uniaxial")), "svk.mu": "1e5", "yeoh.C10": "1e5"}
+    taken = {"mooney_rivlin.C10": "1e5", "mooney_rivlin.C01": "0", "yeoh.C20": "0", "yeoh.C30": "0",
+             "ogden.G": "2e5", "ogden.alpha": "2", "ogden_two.G_1": "2e5", "ogden_two.alpha_1": "2",
+             "ogden_two.G_2": "1e5", "ogden_two.alpha_2": "-2"}  # fmt: skip
+    result = compare(load_experiment("multimode"), Options({**laws, **taken}))
+    assert "predicted: nothing" in result.sentence
+    assert result.checks == ()
+    assert not result.passed
 
 
 def test_a_plane_falls_into_its_lines_and_what_lies_between(tmp_path: Path) -> None:
@@ -140,5 +150,6 @@ def test_natural_rubber_of_1944(shared_data: Path) -> None:
     assert errors["Yeoh"] == pytest.approx(16.3, abs=0.3)
     assert any("fits best (2.3 %" in words for words in exhibit.words)
     assert any("loses positive energy" in words for words in exhibit.words)
+    assert any("Ogden, two terms is not ranked" in words for words in exhibit.words)
     states = {m.name: m.run.outcome.state for m in result.methods}
     assert states["svk"] == states["ogden_two"] == "refused"

@@ -1,6 +1,6 @@
 """What the report shows: laws ranked by prediction, a picture of every mode, the plane."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from validate.papers.multimode.ranking import (
 )
 from validate.register.registered import Registered
 from validate.replay.experiment import Progress, Told
-from validate.replay.followed import MAIN, Cases
+from validate.replay.followed import MAIN, Cases, Followed
 
 _FINE = 200  # stretches of a drawn line
 _BEYOND = 1.3  # of the largest measured stress: a line ends there
@@ -33,9 +33,11 @@ def exhibits(p: Multimode, cases: Cases, tell: Progress) -> Told:
     """Ranking, its sentences, and every mode with all laws."""
     tell("ranks the laws by prediction")
     runs = cases[MAIN]
-    found = ranked(p, runs, {name: as_card(name) for name in runs})
     seen = next(iter(runs.values())).registered
-    if not found or len(seen) == 1:
+    if len(seen) == 1:
+        return Told()  # nothing is predicted
+    found = ranked(p, runs, {name: as_card(name) for name in runs})
+    if not found:
         return Told()
     roles = ["identified on these points", *(["predicted"] * (len(seen) - 1))]
     charts = [
@@ -45,7 +47,7 @@ def exhibits(p: Multimode, cases: Cases, tell: Progress) -> Told:
     exhibit = Exhibit(
         "laws-by-prediction",
         "Laws ranked by what they predict",
-        sentences(found),
+        (*sentences(found), *left_out(runs.values())),
         tables=(_ranking(found, mode_of(seen[0])),),
         charts=tuple(charts),
     )
@@ -78,6 +80,12 @@ def sentences(found: Sequence[RankedLaw]) -> tuple[str, ...]:
         if one.lost
     ]
     return tuple(said)
+
+
+def left_out(runs: Iterable[Followed]) -> tuple[str, ...]:
+    """The laws that are not ranked, each with its reason."""
+    ends = ((f.label, next((r.outcome for r in f.runs if not r.finished), None)) for f in runs)
+    return tuple(f"{label} is not ranked: {end.why}." for label, end in ends if end)
 
 
 def _said(s: LawError) -> str:
