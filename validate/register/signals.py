@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, rms
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import Rows
 from validate.recording.types import Recording
@@ -23,7 +23,8 @@ from validate.register.observation import (
 class SignalObservation:
     """y (nt, c) in its own `unit` at t (nt,) s; the run's `trace` predicts it, where it validates.
 
-    `quantity` is what scores call it, `sd_t` s how uncertain its clock is.
+    `quantity` is what scores call it, `sd_t` s how uncertain its clock is. `share` is a relative
+    standard uncertainty that all samples have in common: how far specimens differ, say.
     """
 
     name: str
@@ -35,6 +36,7 @@ class SignalObservation:
     quantity: str = ""
     trace: str = ""
     sd_t: float = 0.0
+    share: float = 0.0
 
     def at(self, t: float) -> float:
         """The sample nearest in time; raises `ComparisonError` when none is within a second."""
@@ -61,9 +63,9 @@ class SignalObservation:
         words = f"{self.quantity}, {selection.words or 'simulated less measured at every sample'}"
         one = (float(simulated[0]), float(measured[0])) if len(at) == 1 else (None, None)
         off = (simulated - measured)[:, None]
-        scale = float(np.abs(self.y[:, 0]).max())
+        scale, common = float(np.abs(self.y[:, 0]).max()), self.share * rms(measured[:, None])
         found = Deviation(
-            self.quantity, off, self.unit, self.sd, 0.0, words, one[0], one[1], scale=scale,
+            self.quantity, off, self.unit, self.sd, common, words, one[0], one[1], scale=scale,
             reference=measured[:, None],
         )  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))

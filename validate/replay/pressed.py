@@ -7,6 +7,7 @@ import numpy as np
 from validate.identify.modulus import ModulusFit, loading
 from validate.recording.types import Recording
 from validate.register.clock import clock_sd
+from validate.register.observation import Role
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, windows_of
 
@@ -18,11 +19,14 @@ def pressed_log(
     limit: float,
     strains: Mapping[str, tuple[float, float]],
     noise: float,
+    role: Role = "validates",
+    share: float = 0.0,
 ) -> Registered:
     """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
 
     The force, of sd `noise` N, is read at the displacement's times and compared in the windows of
-    strain; what an uncertain clock of either makes of it is counted.
+    strain; what an uncertain clock of either makes of it is counted. `share` is how far specimens
+    differ, relative, one standard uncertainty.
     """
     log = loading(recording)
     moved = log.d[:, None] - fit.contact - fit.toe * height
@@ -32,8 +36,9 @@ def pressed_log(
         recording.signal("displacement", "m").sd, sd_t=clock_sd(recording, "displacement"),
     )  # fmt: skip
     cell = SignalObservation(
-        "force", "validates", log.t[:last], log.force[:last, None] - fit.offset, "N",
+        "force", role, log.t[:last], log.force[:last, None] - fit.offset, "N",
         float(np.hypot(noise, log.error)), "force", "stage.force", clock_sd(recording, "force"),
+        share,
     )  # fmt: skip
     windows = {label: (a * height, b * height) for label, (a, b) in strains.items()}
     return Registered((stage, cell), windows_of(stage, windows), outside=len(log.t) - last)

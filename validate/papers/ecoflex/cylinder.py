@@ -10,6 +10,7 @@ from validate.errors import RecordingError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
 from validate.identify.modulus import Cylinder, fit_modulus
+from validate.papers.ecoflex.specimens import specimen_of
 from validate.parameters import Ranges, quantity
 from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
@@ -50,7 +51,10 @@ class LoggedSpecimen:
 
 @dataclass(frozen=True)
 class SiliconeRanges(Ranges):
-    specimen: float = quantity(0.043, "1", "relative scatter of E between specimens (4.5 of 104)")
+    specimen: float = quantity(
+        0.043, "1", "relative scatter of E between specimens, where these logs do not say (4.5/104)"
+    )
+    modulus: float = quantity(0.0, "1", "relative, of the modulus; 0: as identified")
     nu: float = quantity(0.0004, "1", "of the Poisson ratio")
 
 
@@ -66,7 +70,10 @@ class LoggedCylinder:
     limit_svk: float = quantity(0.25, "1", "strain to which St. Venant-Kirchhoff is shown")
     limit_neo_hooke: float = quantity(0.50, "1", "strain to which neo-Hooke is shown")
     data: str | None = quantity(None, "1", "folder of the logs; none: VALIDATE_SHARED_DATA")
-    logs: str = quantity("EF30_0T_A*.csv", "1", "file name pattern of the logs")
+    logs: str = quantity("EF30_0T_*.csv", "1", "file name pattern of the logs")
+    judged: str | None = quantity(
+        None, "1", "specimen that is left out and predicted; none: the last of several"
+    )
 
 
 @dataclass(frozen=True)
@@ -125,7 +132,10 @@ def grid_of(p: LoggedCylinder, model: CylinderModel) -> tuple[int, int]:
 
 
 def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Registered:
-    """To the law's limit, in windows that end where one of the laws does and the log reaches."""
+    """To the law's limit, in windows that end where one of the laws does and the log reaches.
+
+    Other specimens than the one that is judged calibrate, in windows of their own.
+    """
     p = parameters
     limit: float = getattr(p, f"limit_{scene.material.law}")
     fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to))
@@ -134,7 +144,10 @@ def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Reg
     reached = float(d.max() - fit.contact) / height - fit.toe
     strains = pairwise((p.fit_from, p.fit_to, *_limits(p)))
     shown = {window(b): (a, b) for a, b in strains if b <= min(limit, reached)}
-    return pressed_log(recording, fit, height, limit, shown, fit.noise)
+    if p.judged in (None, specimen_of(recording)):
+        return pressed_log(recording, fit, height, limit, shown, fit.noise, share=p.ranges.specimen)
+    shown = {f"{label} of those that calibrate": span for label, span in shown.items()}
+    return pressed_log(recording, fit, height, limit, shown, fit.noise, "calibrates")
 
 
 def stiffening(p: LoggedCylinder, model: CylinderModel) -> float:

@@ -1,6 +1,5 @@
 """The experiment as its logs have it: title, limit and printed figures belong to a material."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,18 +8,12 @@ import numpy as np
 
 from validate.identify.modulus import loading
 from validate.papers.ecoflex.cylinder import LoggedCylinder, window
+from validate.papers.ecoflex.specimens import material_of, split
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
 
 MATERIAL = "EF30_0T"  # Ecoflex 00-30 without thinner, as the data set calls it
 LOGS = frozenset(f"{MATERIAL}_A{k}" for k in range(1, 6))
-_SAMPLE = re.compile(r"(.+)_[A-Z]_sample_\d+")
-
-
-def material_of(recording: Recording) -> str:
-    """The material as the log's first line names it, less specimen and repeat; else the file."""
-    found = _SAMPLE.fullmatch(recording.metadata["header"].get("line 1", "").strip())
-    return found[1] if found else recording.name
 
 
 def follows(
@@ -31,7 +24,9 @@ def follows(
     Other logs of the printed material are held to its figure, not to our value of the five logs.
     Another material has its own title and limit, and no printed figure.
     """
-    judged = tuple(replace(a, loads=(window(p.limit_linear),)) for a in experiment.accept)
+    apart = split(recordings, p.judged).apart
+    loads = (*((window(p.fit_to),) if apart else ()), window(p.limit_linear))
+    judged = tuple(replace(a, loads=loads) for a in experiment.accept)
     experiment = replace(experiment, accept=judged)
     materials = tuple(dict.fromkeys(material_of(r) for r in recordings))
     if {r.name for r in recordings} == LOGS and materials == (MATERIAL,):

@@ -11,15 +11,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from validate.arrays import rms
+from validate.arrays import Floats, rms
 from validate.compare.score import Score
 from validate.fem.system import build as build_system
 from validate.identify.interval import mesh_share
 from validate.identify.law import LawFit, fit_scale
 from validate.identify.modulus import (
     ModulusSummary,
+    fit_modulus,
     gent_correction,
-    identify_modulus,
 )
 from validate.papers.ecoflex.cylinder import (
     CylinderModel,
@@ -28,6 +28,16 @@ from validate.papers.ecoflex.cylinder import (
     model_scene,
     place,
     stiffening,
+)
+from validate.papers.ecoflex.specimens import (
+    HeldOut,
+    Moduli,
+    apart_notes,
+    by_specimen,
+    left_out,
+    specimen_of,
+    split,
+    summarised,
 )
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
@@ -46,31 +56,54 @@ CORNER_ORDER = 1.19
 def identified(
     recordings: Sequence[Recording], parameters: LoggedCylinder, methods: Mapping[str, Method]
 ) -> Identified:
-    """The modulus for which each method, on its own mesh, has the measured slope or force."""
-    p = parameters
-    size = p.specimen.size
-    found = identify_modulus(recordings, size, (p.fit_from, p.fit_to))
+    """The modulus for which each method, on its own mesh, has the measured slope or force of the
+    specimens that calibrate."""
+    apart = split(recordings, parameters.judged)
+    mine = [r for r in recordings if apart.calibrates(r)]
+    p, size = replace(parameters, judged=None), parameters.specimen.size
+    fits = [fit_modulus(r, size, (p.fit_from, p.fit_to)) for r in recordings]
+    every, names = ([specimen_of(r) for r in logs] for logs in (recordings, mine))
+    calibrating = [f for f, s in zip(fits, every, strict=True) if s in apart.calibrating]
+    found = summarised(calibrating, names)
+    own = by_specimen([f.E_apparent for f in calibrating], names)
     factors = {name: _stiffening(p, methods[name].scene) for name in ("slip", "bonded")}
-    laws = {name: _law_fit(recordings, p, methods[name]) for name in LAWS}
+    laws = {name: _law_fit(mine, p, methods[name]) for name in LAWS}
     moduli = {name: found.mean / factor for name, (factor, _) in factors.items()}
     moduli |= {name: fit.scale for name, (fit, _) in laws.items()}
-    chosen = {f"E_{k}": getattr(p.material, f"E_{k}") or v for k, v in moduli.items()}
-    bonded, _ = factors["bonded"]
     scores = _scores(found, factors, gent_correction(size.diameter, size.height))
     for name, (fit, mesh) in laws.items():
-        scores += _law_scores(name, methods[name].label, fit, mesh, len(recordings))
+        votes = len(own.means) if len(own.means) > 1 else len(mine)
+        scores += _law_scores(name, methods[name].label, fit, mesh, votes)
+    scores += left_out([f.E_apparent for f in fits], every)
     headline = (
-        f"The modulus lies between {_span(moduli['bonded'], found, factors['bonded'])} (bonded "
-        f"plates) and {_span(moduli['slip'], found, factors['slip'])} (slipping): force alone "
-        "cannot say which"
+        f"{apart.words}. The modulus lies between "
+        f"{_span(moduli['bonded'], found, factors['bonded'])} (bonded plates) and "
+        f"{_span(moduli['slip'], found, factors['slip'])} (slipping): force alone cannot say which"
     )
     squat = replace(p, specimen=replace(p.specimen, height=size.height / 2))
-    half = stiffening(squat, methods["bonded"].scene) / bonded
-    notes = _notes(found, moduli, half, size.height)
+    half = stiffening(squat, methods["bonded"].scene) / factors["bonded"][0]
+    notes = (*apart_notes(apart, own, p.ranges.specimen), *_notes(found, moduli, half, size.height))
     fitted = p.material.E_slip is None or p.material.E_bonded is None
-    calibrated = ("force@5pct",) if fitted else ()
-    used = replace(p, material=replace(p.material, **chosen))
-    return Identified(used, scores, notes, headline, calibrated)
+    calibrated = ("force@5pct",) if fitted and not apart.apart else ()
+    return Identified(_used(p, moduli, found, own, apart), scores, notes, headline, calibrated)
+
+
+def _used(
+    p: LoggedCylinder,
+    moduli: Mapping[str, float],
+    found: ModulusSummary,
+    own: Moduli,
+    apart: HeldOut,
+) -> LoggedCylinder:
+    """The parameters with what was identified where nothing was set, and how sure that is."""
+    chosen = {f"E_{k}": getattr(p.material, f"E_{k}") or v for k, v in moduli.items()}
+    ranges = replace(
+        p.ranges,
+        specimen=p.ranges.specimen if own.between is None else own.between / own.mean,
+        modulus=p.ranges.modulus or found.sd_mean / found.mean,
+    )
+    material = replace(p.material, **chosen)
+    return replace(p, material=material, ranges=ranges, judged=apart.judged)
 
 
 Factor = tuple[float, float]  # apparent over true modulus, and its uncertainty from the mesh
@@ -109,15 +142,27 @@ def _meshed(
 def _fitted(recordings: Sequence[Recording], p: LoggedCylinder, method: Method) -> LawFit:
     scene = model_scene(p, method.scene, 1.0)
     stepper = method.settings.prepare(build_system(scene))
-    curves, forces = [], []
+    curves: dict[str, list[Floats]] = {}
+    forces: dict[str, list[Floats]] = {}
     for recording in recordings:
         seen = place(recording, p, scene)
         states = [stepper.step(stepper.rest(), q) for q in seen.inputs]
         good = [s.failure is None for s in states]
         found = [s.numbers["stage.force"] for s in states if s.failure is None]
-        curves.append(np.array(found))
-        forces.append(seen.of(SignalObservation)[0].y[good, 0])
-    return fit_scale(curves, forces)
+        name = specimen_of(recording)
+        curves.setdefault(name, []).append(np.array(found))
+        forces.setdefault(name, []).append(seen.of(SignalObservation)[0].y[good, 0])
+    return _one_vote_each([fit_scale(curves[name], forces[name]) for name in curves])
+
+
+def _one_vote_each(fits: Sequence[LawFit]) -> LawFit:
+    """The mean over specimens, whose scatter then stands for that of repeats."""
+    if len(fits) == 1:
+        return fits[0]
+    scales, count = [f.scale for f in fits], sum(f.count for f in fits)
+    squares = sum(f.residual_rms**2 * f.count for f in fits)
+    sd = float(np.std(scales, ddof=1))
+    return LawFit(float(np.mean(scales)), sd, count, float(np.sqrt(squares / count)))
 
 
 def _law_scores(name: str, label: str, fit: LawFit, mesh: float, logs: int) -> tuple[Score, ...]:
@@ -182,8 +227,5 @@ def _notes(
         "and the same with slipping ones.",
         f"Load cell offsets of {min(offsets):.3f}..{max(offsets):.3f} N and toes of "
         f"{min(toes):.3f}..{max(toes):.3f} mm (seating of the plate: where the fitted line reaches "
-        "zero force) were taken off. The modulus is fitted in the window 5pct, so only 10pct is a "
-        "prediction.",
-        "The scatter of repeats on one specimen understates that between specimens; the range "
-        "declared for the modulus is the latter.",
+        "zero force) were taken off.",
     )

@@ -1,0 +1,159 @@
+"""Which material and specimen a log is of, and the modulus by specimen: repeats count once.
+
+The data set names a log `<material>_<specimen>_sample_<repeat>` in its first line and
+`<material>_<specimen><repeat>` as a file.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from validate.compare.score import Score
+from validate.errors import RecordingError, UsageError
+from validate.identify.modulus import ModulusFit, ModulusSummary
+from validate.recording.types import Recording
+
+_NAMES = (re.compile(r"(.+)_([A-Za-z]+)_sample_\d+"), re.compile(r"(.+)_([A-Z]+)\d+"))
+
+
+def named(recording: Recording) -> tuple[str, str]:
+    """Material and specimen, by the log's first line, else by its file, else the recording's
+    name."""
+    line = recording.metadata.get("header", {}).get("line 1", "").strip()
+    for text in (line, Path(recording.source.path).stem):
+        for name in _NAMES:
+            found = name.fullmatch(text)
+            if found:
+                return found[1], found[2]
+    return recording.name, ""
+
+
+def material_of(recording: Recording) -> str:
+    return named(recording)[0]
+
+
+def specimen_of(recording: Recording) -> str:
+    """The specimen, with its material: A of one grade is not A of another."""
+    return "_".join(part for part in named(recording) if part)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The specimen that is judged, and those that calibrate: itself where there is no other."""
+
+    judged: str
+    calibrating: tuple[str, ...]
+
+    @property
+    def apart(self) -> bool:
+        return self.judged not in self.calibrating
+
+    @property
+    def words(self) -> str:
+        """Fitted on what, predicted what."""
+        if self.apart:
+            return f"Fitted on {', '.join(self.calibrating)}, predicted: {self.judged}, left out"
+        return f"Fitted on {self.judged}, predicted: larger strains of the same logs"
+
+    def calibrates(self, recording: Recording) -> bool:
+        return specimen_of(recording) in self.calibrating
+
+
+def split(recordings: Sequence[Recording], judged: str | None) -> HeldOut:
+    """Leaves `judged` out (its name or its letter; none: the last specimen).
+
+    Raises `RecordingError` for logs of several materials, `UsageError` for an unknown specimen.
+    """
+    materials = sorted({material_of(r) for r in recordings})
+    if len(materials) > 1:
+        raise RecordingError(
+            f"logs of {len(materials)} materials ({', '.join(materials[:4])}): their moduli have "
+            f"nothing to do with each other; choose one, as --set logs='{materials[0]}_*.csv'"
+        )
+    every = tuple(dict.fromkeys(specimen_of(r) for r in recordings))
+    chosen = [s for s in every if judged in (s, s.removeprefix(f"{materials[0]}_"))]
+    if judged and not chosen:
+        raise UsageError(f"judged = {judged}: no such specimen; {', '.join(every)}")
+    out = chosen[0] if chosen else every[-1]
+    return HeldOut(out, tuple(s for s in every if s != out) or every)
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """Means Pa by specimen; `between`: their sd (None for one), `within`: sd of repeats of one."""
+
+    means: dict[str, float]
+    between: float | None
+    within: float | None
+    logs: int
+
+    @property
+    def mean(self) -> float:
+        return float(np.mean(list(self.means.values())))
+
+
+def by_specimen(values: Sequence[float], specimens: Sequence[str]) -> Moduli:
+    """Values of logs, and the specimen of each; every specimen has one vote."""
+    of = {s: np.array([v for v, o in zip(values, specimens, strict=True) if o == s])
+          for s in dict.fromkeys(specimens)}  # fmt: skip
+    means = {s: float(v.mean()) for s, v in of.items()}
+    between = float(np.std(list(means.values()), ddof=1)) if len(means) > 1 else None
+    freedom = len(values) - len(means)
+    spread = sum(float(((v - v.mean()) ** 2).sum()) for v in of.values())
+    within = float(np.sqrt(spread / freedom)) if freedom > 0 else None
+    return Moduli(means, between, within, len(values))
+
+
+def summarised(fits: Sequence[ModulusFit], specimens: Sequence[str]) -> ModulusSummary:
+    """The mean over specimens, and its sd by what scatters most: specimens, repeats, the fit."""
+    found = by_specimen([f.E_apparent for f in fits], specimens)
+    if found.between is not None:
+        sd_mean = found.between / np.sqrt(len(found.means))
+    elif found.within is not None:
+        sd_mean = found.within / np.sqrt(found.logs)
+    else:
+        sd_mean = fits[0].sd
+    return ModulusSummary(found.mean, found.within, float(sd_mean), tuple(fits))
+
+
+def left_out(values: Sequence[float], specimens: Sequence[str]) -> tuple[Score, ...]:
+    """What the others say of every specimen less its own, relative: leave one specimen out."""
+    means = by_specimen(values, specimens).means
+    found = []
+    for name, own in means.items():
+        others = [E for other, E in means.items() if other != name]
+        if others:
+            off = float(np.mean(others)) / own - 1
+            words = f"modulus of the other {len(others)} less that of {name}, over the latter"
+            found.append(Score(f"left_out.{name}", off, "1", len(others), "measured logs", words))
+    return tuple(found)
+
+
+def apart_notes(apart: HeldOut, own: Moduli, scatter: float) -> tuple[str, ...]:
+    """Fitted on what, predicted what, and whose scatter stands in u_D."""
+    k = len(own.means)
+    if apart.apart:
+        first = (
+            f"Fitted on {', '.join(apart.calibrating)}; predicted: {apart.judged}, which was left "
+            "out. Repeats of one specimen have one vote."
+        )
+    else:
+        first = (
+            f"All {own.logs} log{'s are' if own.logs > 1 else ' is'} of one specimen, "
+            f"{apart.judged}: what is predicted is an extrapolation in strain of the very logs "
+            "whose first part was fitted. It says nothing of another specimen."
+        )
+    if own.between is not None:
+        second = (
+            f"Scatter between specimens {100 * own.between / own.mean:.2g} %, of the {k} that "
+            "calibrate; it stands in u_D."
+        )
+    else:
+        second = (
+            f"The scatter between specimens is unknown: {k} specimen calibrates, and repeats of "
+            f"one understate it. The declared {100 * scatter:.2g} % stands in u_D."
+        )
+    return first, second
