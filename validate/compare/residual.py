@@ -68,7 +68,8 @@ def residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
     found: list[Residual] = []
     for selection in registered.selections:
         for seen in registered.compared:
-            found += [_of(d, selection, seen.role) for d in seen.deviations(run, selection)]
+            if seen.name in (selection.of or (seen.name,)):
+                found += [_of(d, selection, seen.role) for d in seen.deviations(run, selection)]
         found += [_of(d, selection, "validates") for d in _volumes(run, selection)]
     return tuple(found)
 
@@ -81,6 +82,7 @@ def rest_residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
     return tuple(
         _of(d, rest, seen.role)
         for seen in registered.compared
+        if seen.name in (rest.of or (seen.name,))
         for d in seen.deviations(run, rest)
         if d.unit == "m"
     )

@@ -53,13 +53,15 @@ class Selection:
     """The instants t (m,) s that are compared under one label; None: every sample of a sensor.
 
     A hold is one instant, a window of a curve many. `words` say which, for definitions. `sd_t` s is
-    the standard uncertainty of the drive's clock against the sensors'.
+    the standard uncertainty of the drive's clock against the sensors'. `of` names the observations
+    that are compared there; none: all.
     """
 
     label: str
     t: Floats | None = None
     words: str = ""
     sd_t: float = 0.0
+    of: tuple[str, ...] = ()
 
     def instants(self, run: "Simulated") -> "Selection":
         """Itself, or for every sample the times whose fields the run kept."""

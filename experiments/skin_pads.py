@@ -1,0 +1,84 @@
+"""Skin in vivo pulled apart by two pads: force to 4 mm calibrates, force to 8.4 mm is predicted.
+
+One recording of aflahelouneg/inverse_identification_soft_tissue (MIT): 544 tracked points in 49
+images, pad force in a unit that nobody stated. Neither thickness nor unit is known, so modulus
+times thickness is identified, in that unit per metre. No modulus changes the field of the points.
+Other recordings of the kind: `--set data=FOLDER`.
+"""
+
+from validate.compare.verdict import Accept
+from validate.papers.skin_pads.laws import exhibits, follows
+from validate.papers.skin_pads.placed import place
+from validate.papers.skin_pads.sheet import PulledSkin, build, load, stated
+from validate.papers.skin_pads.sheet import SheetModel as Model
+from validate.replay.calibration import Calibrates, Calibration, Free
+from validate.replay.cards import changed, moved
+from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.method import Method
+from validate.solve.newton import StaticNewton
+from validate.solve.proportional import Proportional
+
+LINEAR, LARGE = Proportional(), Proportional(StaticNewton("none", tolerance=1e-7))
+METHODS = {
+    "neo_hooke": Method("neo-Hooke", LARGE, Model()),
+    "linear": Method("linear", LINEAR, Model("linear", "linear")),
+    "svk": Method("St. Venant-Kirchhoff", LARGE, Model("svk", "svk")),
+    "yeoh": Method("Yeoh, cubic term assumed", LARGE, Model("yeoh", "yeoh")),
+    "ogden": Method("Ogden, power assumed", LARGE, Model("ogden", "ogden")),
+    "held": Method("neo-Hooke, far boundary held", LARGE, Model(stiffness="held", far="held")),
+}
+WHERE = "assumed: five decades"
+HELPS = "a force whose unit is stated, and the skin's thickness by ultrasound,"
+CALIBRATIONS = tuple(
+    Calibration(
+        method,
+        (Free(f"material.E_{name}", 0.1, 1e4, WHERE, HELPS),),
+        (Calibrates(("force@fitted",)),),
+    )
+    for method, name in (("neo_hooke", "neo"), ("linear", "linear"), ("svk", "svk"),
+                         ("yeoh", "yeoh"), ("ogden", "ogden"), ("held", "held"))
+)  # fmt: skip
+NONE = "assumed; the data set gives none"
+UNCERTAINTY = Uncertainty(
+    # Order: the corners of the pads are singular.
+    MeshLadder(
+        (changed("mesh", cells=1), changed("mesh", cells=3)),
+        lambda p: p.pads.width / p.mesh.cells,
+        order=1.2,
+    ),
+    (
+        Input("Poisson ratio",
+              moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu), "nu", NONE),
+        Input("pads", moved("pads", length=lambda p, z: p.pads.length + z * p.ranges.pads,
+                            width=lambda p, z: p.pads.width + z * p.ranges.pads),
+              "length and width of the pads", "assumed; drawn 8 mm, the window is 24 mm"),
+        Input("distance", moved("pads", gap=lambda p, z: p.pads.gap + z * p.ranges.gap),
+              "between the pads at rest", "assumed; the authors' scripts call it unknown"),
+    ),
+    surrogate="neo_hooke",
+)  # fmt: skip
+
+EXPERIMENT = Experiment(
+    name="skin_pads",
+    title="Skin in vivo between two pads",
+    source="aflahelouneg/inverse_identification_soft_tissue e9c7a1c (MIT)",
+    parameters=PulledSkin(),
+    methods=METHODS,
+    accepted=("neo_hooke", "linear"),
+    accept=(
+        Accept("force", 0.03, "a tenth of the largest force (ours)", ("predicted", "end")),
+        Accept("field.axial", 0.2e-3, "a twentieth of what the pads move (ours)"),
+        Accept("field.lateral", 0.1e-3, "half of that (ours)"),
+    ),
+    load=load,
+    build=build,
+    place=place,
+    stated=stated,
+    uncertainty=UNCERTAINTY,
+    calibrations=CALIBRATIONS,
+    exhibits=exhibits,
+    follows=follows,
+    axis="x",
+    locates=("data",),
+)
+"""Skin in vivo between two pads: what a force to 4 mm says of one to 8.4 mm."""

@@ -1,0 +1,224 @@
+"""Skin between two pads: files that belong together, clocks paired by displacement, laws."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.papers.skin_pads.files import FORCE, paired, read_folder
+from validate.papers.skin_pads.placed import Images, binned, place, spurious
+from validate.papers.skin_pads.sheet import (
+    PulledSkin,
+    SheetModel,
+    build,
+    load,
+    sheet_mesh,
+    stated,
+)
+from validate.parameters import with_values
+from validate.recording.types import Recording
+from validate.register.markers import MarkerObservation
+from validate.replay.find import load_file
+from validate.replay.solved import solve
+from validate.scene.scene import Scene
+
+SCALE = 0.05  # mm per px
+PULL = np.linspace(0.0, 4.0, 9)  # mm at rest and in eight images
+SHARE = 0.7  # of the moving pad
+GEO = "L = 60;\nH = 40; // drawn\nl_pad = 8.0;\nh_pad = 8.0;\ndL_pad = 30.0;\n"
+SOON = PulledSkin(fit_to=3e-3, predict_to=6e-3, field=(2e-3, 3.5e-3))
+
+
+def stretched(x: Floats, pull: float) -> Floats:
+    """Points (k, 2) mm from the middle: a uniform stretch between pads 38 mm apart."""
+    left, right = -19 - SHARE * pull, 19 + (1 - SHARE) * pull
+    moved = left + (x[:, 0] + 19) / 38 * (right - left)
+    return np.stack([moved, x[:, 1] * (1 - 0.3 * pull / 38)], axis=1)
+
+
+def folder(path: Path, **changed: Floats) -> Path:
+    """A recording of the kind: images in px, drifting across the pull; force 0.02 a mm."""
+    grid = np.stack(np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-4, 4, 5)), -1).reshape(-1, 2)
+    marks = [np.array([[x, -12.0], [x, 12.0]]) for x in (-19.0, 19.0)]
+    drift = np.stack([np.zeros(9), np.linspace(0, 0.4, 9)], axis=1)
+    for names, points in (("x", grid), ("x_1", marks[0]), ("x_2", marks[1])):
+        tail = f"_ref{names[1:]}" if len(names) > 1 else ""
+        free = tail == ""
+        states = np.array([
+            (stretched(points, p) if free else points + [m, 0.0]) + d
+            for p, d, m in zip(PULL, drift, _pads(names), strict=True)
+        ]) / SCALE + [600.0, 400.0]  # fmt: skip
+        for c, axis in enumerate("xy"):
+            np.savetxt(path / f"{axis}0{tail}.dat", states[0, :, c : c + 1])
+            np.savetxt(path / f"{axis}t{tail}.dat", states[1:, :, c].T)
+    u = np.linspace(0.0, 6.5, 400)
+    np.savetxt(path / "u_moving_pad.dat", changed.get("u", u))
+    np.savetxt(path / "f_moving_pad.dat", changed.get("f", 0.05 + 0.02 * u))
+    (path / "skin.geo").write_text(GEO)
+    return path
+
+
+def _pads(names: str) -> Floats:
+    return np.asarray(-SHARE * PULL if names == "x_1" else (1 - SHARE) * PULL)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    return read_folder(folder(tmp_path), (1.0, 1.0))
+
+
+def scene_of(recording: Recording) -> tuple[PulledSkin, Scene]:
+    sizes = {path: repr(value) for path, value in stated(recording).items()}
+    p = with_values(SOON, {**sizes, "material.E_neo": "26", "mesh.cells": "1"})
+    return p, build(recording, p, SheetModel())
+
+
+def test_a_folder_is_a_recording_with_its_clocks_paired(recording: Recording) -> None:
+    assert recording.record("pairing")["images"] == "8 of 8"
+    assert recording.signal("force", FORCE).y.shape == (400, 1)
+    assert stated(recording) == {
+        "sheet.length": 0.06, "sheet.width": 0.04, "pads.length": 0.008, "pads.width": 0.008,
+        "pads.gap": 0.03,
+    }  # fmt: skip
+    assert float(recording.record("scale")["m_per_px"]) == pytest.approx(1e-3 * SCALE)
+    t = recording.marker("points").t
+    d = recording.signal("displacement", "m").y[t.astype(int), 0]
+    assert d == pytest.approx(1e-3 * PULL, abs=1e-3 * 6.5 / 399)
+
+
+def test_points_given_in_mm_say_the_scale_and_the_authors_curve_the_zero(tmp_path: Path) -> None:
+    folder(tmp_path)
+    x, y = (np.loadtxt(tmp_path / f"{a}0.dat") for a in "xy")
+    np.savetxt(tmp_path / "processed_xt_dic_0000.out", 0.06 * np.stack([x, y], axis=1))
+    np.savetxt(tmp_path / "processed_ux_pad_mov.out", -np.linspace(0, 6.2, 300))
+    found = read_folder(tmp_path, (1.0, 1.0))
+    assert float(found.record("scale")["m_per_px"]) == pytest.approx(6e-5)
+    assert float(found.record("zero")["displacement_m"]) == pytest.approx(0.3e-3)
+    np.savetxt(tmp_path / "processed_xt_dic_0000.out", np.stack([0.06 * x, 0.05 * y], axis=1))
+    with pytest.raises(RecordingError, match=r"not the points of x0\.dat"):
+        read_folder(tmp_path, (1.0, 1.0))
+
+
+def test_signs_are_declared_and_tested(tmp_path: Path) -> None:
+    u = np.linspace(0.0, 6.5, 400)
+    folder(tmp_path, u=-u, f=-0.02 * u)
+    with pytest.raises(RecordingError, match=r"displacement goes from .* signs.displacement=-1"):
+        read_folder(tmp_path, (1.0, 1.0))
+    with pytest.raises(RecordingError, match=r"the force goes from .* --set signs.force=-1"):
+        read_folder(tmp_path, (-1.0, 1.0))
+    assert read_folder(tmp_path, (-1.0, -1.0)).signal("force", FORCE).y[-1, 0] > 0
+    with pytest.raises(UsageError, match="each 1 or -1"):
+        with_values(SOON, {"signs.force": "2"})
+
+
+def test_images_that_cannot_be_paired_are_refused() -> None:
+    here, machine = Path("here"), np.linspace(0, 1e-3, 50)
+    t, matched = paired(here, np.array([0.0, 0.5e-3, 2e-3]), machine)
+    assert (len(t), matched) == (2, 1)
+    with pytest.raises(RecordingError, match="0 of 2 images matched"):
+        paired(here, np.array([0.0, 2e-3, 3e-3]), machine)
+    with pytest.raises(RecordingError, match="3 mm nearer to each other"):
+        paired(here, np.array([0.0, -1e-3, -3e-3]), machine)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [("yt.dat", "1 2\n3", "no matrix"), ("xt.dat", "1 2\n3 4\n", "files of shapes"),
+     ("f_moving_pad.dat", "1\n2\n", "2 forces"), ("y0.dat", "nan\n", "not finite"),
+     ("x0_ref_1.dat", None, "no x0_ref_1.dat")],
+)  # fmt: skip
+def test_files_that_are_no_such_recording(
+    tmp_path: Path, name: str, text: str | None, words: str
+) -> None:
+    folder(tmp_path)
+    (tmp_path / name).unlink() if text is None else (tmp_path / name).write_text(text)
+    with pytest.raises(RecordingError, match=words):
+        read_folder(tmp_path, (1.0, 1.0))
+
+
+def test_force_is_averaged_from_its_zero_and_spikes_are_left_out(recording: Recording) -> None:
+    curve = binned(recording, SOON)
+    assert curve.force == pytest.approx(20 * curve.d, rel=0.02, abs=1e-4)
+    assert curve.left_out == 0
+    force = recording.signal("force", FORCE)
+    y = force.y + 1e-4 * np.random.default_rng(1).normal(size=force.y.shape)
+    y[100] += 1.0
+    with_spike = replace(recording, signals={**recording.signals, "force": replace(force, y=y)})
+    again = binned(with_spike, SOON)
+    assert again.left_out >= 1
+    assert again.force == pytest.approx(curve.force, abs=1e-3)
+
+
+def test_points_are_where_the_sheet_is_and_windows_are_apart(recording: Recording) -> None:
+    """What both pads share across the pull is taken off; the pads drive by their own shares."""
+    p, scene = scene_of(recording)
+    seen = place(recording, p, scene)
+    (points,) = seen.of(MarkerObservation)
+    expected = stretched(1e3 * points.rest, 3.5)
+    assert 1e3 * points.x[-1] == pytest.approx(expected, abs=1e-6)
+    assert seen.inputs[-1, 0] / seen.inputs[-1].sum() == pytest.approx(SHARE, abs=1e-6)
+    fitted, predicted = (next(s for s in seen.selections if s.label == n)
+                         for n in ("fitted", "predicted"))  # fmt: skip
+    assert fitted.t is not None
+    assert predicted.t is not None
+    assert fitted.t.max() < predicted.t.min()
+    assert {s.label for s in seen.selections} >= {"2.0mm", "3.5mm", "end"}
+    assert any(note.startswith("8 of 8 images are paired") for note in seen.findings)
+    with pytest.raises(RecordingError, match="set fit_to"):
+        place(recording, replace(p, fit_to=7e-3), scene)
+    with pytest.raises(RecordingError, match="0 matched"):
+        place(recording, replace(p, field=(5e-3,)), scene)
+
+
+def test_a_run_answers_each_stream_where_it_is_compared(
+    project_root: Path, recording: Recording
+) -> None:
+    """Force in its unit, points at the holds; twice the modulus is twice the force, same field."""
+    experiment = load_file(project_root / "experiments" / "skin_pads.py")
+    p, _ = scene_of(recording)
+    one, two = (
+        solve(experiment, (recording,), "neo_hooke", experiment.methods["neo_hooke"],
+              with_values(p, {"material.E_neo": E})).residuals
+        for E in ("20", "40")
+    )  # fmt: skip
+    assert set(one) == {
+        "force@fitted", "force@predicted", "force@end", "field.axial@2.0mm", "field.axial@3.5mm",
+        "field.lateral@2.0mm", "field.lateral@3.5mm",
+    }  # fmt: skip
+    assert one["force@end"].unit == FORCE
+    force = [r["force@end"].values + r["force@end"].reference for r in (one, two)]
+    assert force[1] == pytest.approx(2 * force[0])
+    assert (one["field.axial@3.5mm"].values == two["field.axial@3.5mm"].values).all()
+
+
+def test_a_point_that_moves_otherwise_than_its_neighbours_is_spurious() -> None:
+    x = np.stack(np.meshgrid(np.arange(10.0), np.arange(8.0)), -1).reshape(-1, 2)
+    moved = 0.05 * x + 1e-3 * np.random.default_rng(1).normal(size=x.shape)
+    moved[37] += 0.5
+    assert np.flatnonzero(spurious(x, moved)).tolist() == [37]
+
+
+def test_meshes_are_parts_of_finer_ones_and_reach_beyond_the_pads(recording: Recording) -> None:
+    p, _ = scene_of(recording)
+    coarse, fine = (sheet_mesh(with_values(p, {"mesh.cells": n})).nodes for n in ("1", "2"))
+    apart = np.abs(coarse[:50, None] - fine[None]).max(axis=2).min(axis=1)
+    assert apart.max() < 1e-9
+    assert np.ptp(fine, axis=0) == pytest.approx([0.06, 0.04])
+    with pytest.raises(UsageError, match="must reach beyond"):
+        sheet_mesh(with_values(p, {"sheet.length": "0.04"}))
+
+
+def test_the_data_set_is_paired_whole(shared_data: Path) -> None:
+    p = replace(PulledSkin(), data=str(shared_data / "force" / "skin-pads"))
+    (recording,) = load(p, Path())
+    assert recording.record("pairing")["images"] == "49 of 49"
+    assert float(recording.record("scale")["m_per_px"]) == pytest.approx(24e-3 / 448.5, rel=1e-4)
+    images, curve = Images(recording), binned(recording, p)
+    assert 1e3 * images.pulled[-1] == pytest.approx(3.823, abs=0.002)
+    assert images.share == pytest.approx(0.711, abs=0.002)
+    assert 1e3 * curve.d[-1] == pytest.approx(8.34, abs=0.02)
+    assert curve.force[-1] == pytest.approx(0.293, abs=0.005)
+    assert images.held(p.field)[2] < 20

@@ -1,0 +1,1 @@
+"""Skin in vivo pulled between two pads: tracked points, pad force in a unit nobody stated."""

@@ -1,0 +1,211 @@
+"""The files of aflahelouneg/inverse_identification_soft_tissue as one recording.
+
+A folder holds matrices of numbers: points and two marks per pad in pixels over the images, the
+pad's displacement (mm) and force (no unit) on a clock of its own, some of the points once more in
+mm, and a Gmsh script with the geometry. Nothing has a time stamp: images are paired with samples of
+the force by how far the pads had come apart, and times are numbers of samples.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.types import Markers, Recording, Signal, Source
+from validate.units import SYMBOLIC
+
+FORCE = SYMBOLIC[0]
+WINDOW = (
+    24e-3  # m between the two marks of a pad, the extensometer's window in the authors' scripts
+)
+_LARGEST = 64_000_000  # bytes of a file of numbers
+_POINTS = ("x0.dat", "y0.dat", "xt.dat", "yt.dat")
+_GEO = {"L": "sheet.length", "H": "sheet.width", "l_pad": "pads.length", "h_pad": "pads.width",
+        "dL_pad": "pads.gap"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Points (nt, k, 2) and middles of the two pads (nt, 2, 2), px, at rest first."""
+
+    points: Floats
+    pads: Floats
+    window: float  # px between the marks of a pad at rest
+
+    @property
+    def pulled(self) -> Floats:
+        """How much further apart than at rest the pads are (nt,), px."""
+        apart = np.linalg.norm(self.pads[:, 1] - self.pads[:, 0], axis=1)
+        return np.asarray(apart - apart[0])
+
+
+def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
+    """The recording of a folder; `signs` of displacement and force make pulling apart positive.
+
+    Raises `RecordingError` for files that are missing, no numbers, or do not belong together, for
+    pads that approach each other, and where no image can be paired.
+    """
+    seen = _tracked(folder)
+    u, f = (signs[i] * numbers(folder / name).ravel()
+            for i, name in enumerate(("u_moving_pad.dat", "f_moving_pad.dat")))  # fmt: skip
+    if len(u) != len(f) or len(u) < 20:
+        raise RecordingError(
+            f"{folder}: {len(u)} displacements, {len(f)} forces; 20 of both needed"
+        )
+    _require_apart(folder, u, f)
+    scale, by = _scale(folder, seen)
+    toe = _toe(folder, u)
+    pulled = scale * seen.pulled
+    t, matched = paired(folder, pulled, 1e-3 * u - toe)
+    names = tuple(f"p{i + 1:04d}" for i in range(seen.points.shape[1]))
+    points, pads = (scale * x[: len(t)] for x in (seen.points, seen.pads))
+    samples = np.arange(len(u), dtype=np.float64)
+    return Recording(
+        folder.name,
+        _source(folder),
+        0,
+        markers={
+            "points": Markers(t, names, points, jitter(points), "camera"),
+            "pads": Markers(t, ("moving", "fixed"), pads, jitter(pads), "camera"),
+        },
+        signals={
+            "displacement": Signal(samples, 1e-3 * u[:, None], "m", 0.0, "machine"),
+            "force": Signal(samples, f[:, None], FORCE, jitter(f[:, None, None]), "machine"),
+        },
+        metadata={
+            "pairing": {
+                "images": f"{matched} of {len(pulled) - 1}",
+                "by": "pad displacement; neither images nor force have time stamps",
+                "times": "number of the force's sample, as seconds",
+            },
+            "scale": {"m_per_px": f"{scale:.8g}", "by": by},
+            "zero": {"displacement_m": f"{toe:.8g}"},
+            "geometry": _geometry(folder),
+        },
+    )
+
+
+def numbers(path: Path) -> Floats:
+    """A matrix (rows, columns) of finite numbers; raises `RecordingError` naming the file."""
+    if not path.is_file():
+        raise RecordingError(f"no {path.name} in {path.parent}; pass --set data=FOLDER with it")
+    if path.stat().st_size > _LARGEST:
+        raise RecordingError(f"{path.name}: {path.stat().st_size} bytes of numbers, at most 64 MB")
+    try:
+        found = np.loadtxt(path, ndmin=2)
+    except ValueError as error:
+        raise RecordingError(f"{path.name}: no matrix of numbers ({error})"[:200]) from error
+    if found.size == 0 or not np.isfinite(found).all():
+        bad = int((~np.isfinite(found)).sum())
+        raise RecordingError(f"{path.name}: {found.size} numbers, {bad} of them not finite")
+    return np.asarray(found, dtype=np.float64)
+
+
+def _tracked(folder: Path) -> Tracked:
+    x0, y0, xt, yt = (numbers(folder / name) for name in _POINTS)
+    points = _states("points", x0, y0, xt, yt)
+    marks = []
+    for pad in (1, 2):
+        names = (f"{a}_ref_{pad}.dat" for a in ("x0", "y0", "xt", "yt"))
+        marks.append(_states(f"marks of pad {pad}", *(numbers(folder / n) for n in names)))
+    if len({len(points), *map(len, marks)}) > 1:
+        raise RecordingError(
+            f"{folder}: {len(points)} states of the points, {[len(m) for m in marks]} of the marks"
+        )
+    window = float(np.mean([np.linalg.norm(np.ptp(m[0], axis=0)) for m in marks]))
+    return Tracked(points, np.stack([m.mean(axis=1) for m in marks], axis=1), window)
+
+
+def _states(what: str, x0: Floats, y0: Floats, xt: Floats, yt: Floats) -> Floats:
+    """(1 + nt, k, 2) px of points at rest (k, 1) and in nt images (k, nt)."""
+    if x0.shape != y0.shape or xt.shape != yt.shape or x0.shape != (len(xt), 1):
+        shapes = [a.shape for a in (x0, y0, xt, yt)]
+        raise RecordingError(f"{what}: files of shapes {shapes}; (k, 1) twice and (k, nt) twice")
+    x, y = (np.hstack([a, b]) for a, b in ((x0, xt), (y0, yt)))
+    return np.ascontiguousarray(np.stack([x, y], axis=2).swapaxes(0, 1))
+
+
+def _require_apart(folder: Path, u: Floats, f: Floats) -> None:
+    """Signs are declared, and tested: pulled apart, displacement and force both rise."""
+    for name, y in (("displacement", u), ("force", f)):
+        if np.median(y[-10:]) - np.median(y[:10]) <= 0:
+            raise RecordingError(
+                f"{folder.name}: the {name} goes from {np.median(y[:10]):.4g} to "
+                f"{np.median(y[-10:]):.4g}; pulling apart is positive: pass --set signs.{name}=-1"
+            )
+
+
+def _scale(folder: Path, seen: Tracked) -> tuple[float, str]:
+    """m per px from points that the folder has in mm as well, else from the marks' distance."""
+    first = sorted(folder.glob("*xt_dic_0000.out"))
+    if not first:
+        return WINDOW / seen.window, f"marks {1e3 * WINDOW:g} mm apart, {seen.window:.1f} px"
+    mm = numbers(first[0])
+    ratios = np.ptp(mm, axis=0) / np.ptp(seen.points[0], axis=0)
+    if abs(ratios[0] / ratios[1] - 1) > 0.01:
+        raise RecordingError(
+            f"{first[0].name}: {ratios[0]:.5g} mm per px along x, {ratios[1]:.5g} along y; these "
+            "are not the points of x0.dat and y0.dat"
+        )
+    return 1e-3 * float(ratios.mean()), f"{len(mm)} points given in mm, {first[0].name}"
+
+
+def _toe(folder: Path, u: Floats) -> float:
+    """m of displacement from which the authors count: where their own curve begins, else 0."""
+    found = sorted(folder.glob("*ux_pad_mov.out"))
+    return 1e-3 * float(u.max() - np.abs(numbers(found[0])).max()) if found else 0.0
+
+
+def paired(folder: Path, pulled: Floats, d: Floats) -> tuple[Floats, int]:
+    """Sample at which each state was reached, rest first, and how many images have one.
+
+    `pulled` (nt,) m as the images have it, d (ns,) m as the machine has it, both from their zero.
+    Raises `RecordingError` where no image can be paired.
+    """
+    reached, wanted = np.maximum.accumulate(d), np.maximum.accumulate(pulled)
+    if pulled[-1] <= 0:
+        raise RecordingError(
+            f"{folder.name}: the pads come {-1e3 * pulled[-1]:.3g} mm nearer to each other in the "
+            "images; pad 1 must be the one that moves away from pad 2"
+        )
+    inside = wanted <= reached[-1]
+    matched = int(inside[1:].sum())
+    if matched == 0:
+        raise RecordingError(
+            f"{folder.name}: 0 of {len(pulled) - 1} images matched: the pads are "
+            f"{1e3 * pulled[1]:.3g} mm apart in the first and the machine ends at "
+            f"{1e3 * reached[-1]:.3g} mm; check scale and unit"
+        )
+    return np.searchsorted(reached, wanted[inside]).astype(np.float64), matched
+
+
+def jitter(x: Floats) -> float:
+    """Noise sd of (nt, k, c) that moves smoothly, from second differences in time, robustly."""
+    if len(x) < 3:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(np.diff(x, 2, axis=0))) / np.sqrt(6))
+
+
+def _geometry(folder: Path) -> Mapping[str, str]:
+    """Lengths m of the Gmsh script by parameter; plain assignments alone are read."""
+    scripts = sorted(folder.glob("*.geo"))
+    if not scripts:
+        return {}
+    text = re.sub(r"//[^\n]*", "", scripts[0].read_text("utf-8", errors="replace")[:100_000])
+    found = dict(re.findall(r"\b(\w+)\s*=\s*([0-9.]+)\s*;", text))
+    return {path: f"{1e-3 * float(found[n]):.9g}" for n, path in _GEO.items() if n in found}
+
+
+def _source(folder: Path) -> Source:
+    """The folder's hash is that of its files of numbers, by name."""
+    whole, size = sha256(), 0
+    for path in sorted((*folder.glob("*.dat"), *folder.glob("*.out"), *folder.glob("*.geo"))):
+        content = path.read_bytes()
+        whole.update(path.name.encode() + content)
+        size += len(content)
+    return Source(str(folder), whole.hexdigest(), size, "integrity not provable: plain text")

@@ -1,0 +1,79 @@
+"""Which law predicts best what it was not fitted to, and the experiment as its recording has it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from validate.arrays import Floats, rms
+from validate.compare.exhibit import Exhibit, NumberTable
+from validate.papers.skin_pads.files import FORCE
+from validate.papers.skin_pads.placed import binned
+from validate.papers.skin_pads.sheet import PulledSkin
+from validate.recording.types import Recording
+from validate.register.signals import SignalObservation
+from validate.replay.experiment import Experiment, Told
+from validate.replay.followed import MAIN, Cases, Followed
+
+_HEADINGS = (
+    "law", f"E x thickness / {FORCE}/m", "95 % ±", f"fitted: rms / {FORCE}",
+    "predicted to / mm", f"rms there / {FORCE}", "end: predicted over measured", "95 %",
+)  # fmt: skip
+
+
+def exhibits(parameters: PulledSkin, cases: Cases, progress: Any) -> Told:
+    """Every law's fit beside its prediction, with the interval that the fit leaves."""
+    ended = [f for f in cases[MAIN].values() if f.whole]
+    rows = {f.label: _row(f) for f in ended}
+    note = (
+        "A law is chosen by what it predicts. The interval is that of the modulus alone: by the "
+        "scatter about the fit, Student's t."
+    )
+    if rows:
+        reach = max(row[4] for row in rows.values())
+        best = min((n for n, r in rows.items() if r[4] == reach), key=lambda n: rows[n][5])
+        note += f" Least wrong of those that reach {reach:.2f} mm: {best}."
+    table = NumberTable("laws", "What was fitted, and what it predicts", _HEADINGS,
+                        tuple(rows.values()), note)  # fmt: skip
+    return Told((Exhibit("laws", "What each law predicts", tables=(table,)),))
+
+
+def _row(found: Followed) -> tuple[Any, ...]:
+    seen = found.seen.of(SignalObservation)[0]
+    force = np.interp(seen.t, found.run.t, found.run.traces["moving.force"].y)
+    measured, fitted = seen.y[:, 0], calibrating(found)
+    E = found.body.material.E
+    share = _share(force[fitted], measured[fitted])
+    end = float(force[-1] / measured[-1])
+    pulled = found.seen.inputs.sum(axis=1)[-1]
+    return (
+        found.label, E, E * share, rms(force[fitted] - measured[fitted]),
+        1e3 * float(pulled), rms(force[~fitted] - measured[~fitted]), end,
+        f"{end * (1 - share):.3f} to {end * (1 + share):.3f}",
+    )  # fmt: skip
+
+
+def calibrating(found: Followed) -> np.ndarray:
+    """Which steps of the force calibrated (nt,)."""
+    seen = found.seen.of(SignalObservation)[0]
+    fitted = next(s for s in found.seen.selections if s.label == "fitted")
+    return np.isin(seen.t, np.asarray(fitted.t))
+
+
+def _share(force: Floats, measured: Floats) -> float:
+    """Relative half width of the 95 % interval of a scale fitted to the measured force."""
+    freedom = len(force) - 1
+    scatter = float(np.sqrt(((force - measured) ** 2).sum() / freedom))
+    return float(student.ppf(0.975, freedom)) * scatter / float(np.linalg.norm(force))
+
+
+def follows(experiment: Experiment, recordings: Sequence[Recording], p: PulledSkin) -> Experiment:
+    """Limits in proportion to what was measured: a unit nobody stated has no scale."""
+    largest = float(np.abs(binned(recordings[0], p).force).max())
+    accept = tuple(
+        replace(a, limit=0.1 * largest) if a.quantity == "force" else a for a in experiment.accept
+    )
+    name = recordings[0].name
+    return replace(experiment, accept=accept, title=f"{experiment.title} ({name})")
