@@ -4,15 +4,19 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from calibrating import NU, OPEN, E, Open
 
+from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.recording.types import Recording
 from validate.register.sensing import ForceSensing
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.options import Options
+from validate.replay.own_body import own_body
+from validate.replay.reused import rests_on
 from validate.replay.road import compare
 
 
@@ -130,10 +134,39 @@ def test_a_sensor_is_identified_beside_the_material() -> None:
         OPEN,
         load=off,
         parameters=Open(cell=ForceSensing(bias=None)),
-        calibrations=(
-            Calibration("fem", (E, bias), (Calibrates(("force@0.1mm", "force@0.2mm")),)),
-        ),
+        calibrations=(Calibration("fem", (E, bias), (on,)),),
     )
     found = {s.name: s.value for s in compare(biased, Options({})).identified}
     assert found["cell.bias"] == pytest.approx(0.2, abs=5e-4)
     assert found["E"] == pytest.approx(10e3, rel=0.05)
+
+
+def test_a_body_alone_has_what_stands_open_fitted() -> None:
+    """Studies of schemes and meshes take the experiment's own body."""
+    body = own_body(OPEN)
+    assert pytest.approx(10e3, rel=0.05) == body.scene.material.E
+
+
+def test_a_recording_that_only_calibrates_is_named_among_the_files() -> None:
+    on = Calibrates(("force@0.1mm",), lambda p: replace(p, nu=0.3), "another")
+    apart = replace(OPEN, calibrations=(Calibration("fem", (E,), (on,)),))
+    assert [f.role for f in rests_on(apart, Options({})).files][-1] == "calibrates"
+    taken = replace(apart, parameters=Open(E=1e4))
+    assert "calibrates" not in [f.role for f in rests_on(taken, Options({})).files]
+
+
+def test_several_recordings_calibrate_at_once() -> None:
+    """Two looks at one force with independent noise halve the variance of one."""
+    once = Calibrates(("force@0.1mm",))
+    again = Calibrates(("force@0.1mm",), lambda p: replace(p, nu=0.3), "a repeat")
+    one, two = (
+        compare(replace(OPEN, calibrations=(Calibration("fem", (E,), on),)), Options({}))
+        for on in ((once,), (once, again))
+    )
+    (single,), (double,) = (_inputs(r) for r in (one, two))
+    assert double == pytest.approx(single / np.sqrt(2), rel=5e-3)
+    assert "force@0.1mm of moved and force@0.1mm of a repeat" in two.sentence
+
+
+def _inputs(result: Result) -> list[float]:
+    return [c.u_input for c in result.checks if c.name == "force@0.3mm"]

@@ -175,7 +175,7 @@ def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1
     Raises `ComparisonError` when no start converges, or fewer residuals than parameters are there.
     """
     fits = tuple(evaluates.fits(space.starts(starts, seed)))
-    best = _best(fits, space)
+    best = best_of(fits, space)
     wanted = tuple(product(range(len(space.ranges)), (-1, 1)))
     for _ in range(_AGAIN):
         scale = misfit(best)
@@ -184,7 +184,7 @@ def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1
         if lower.lowest >= -_LOWER * scale:
             break
         fits = (*fits, *evaluates.fits(lower.x[None, :]))
-        best = _best(fits, space)
+        best = best_of(fits, space)
     return Identification(space, fits, best, sides, misfit(best))
 
 
@@ -195,7 +195,8 @@ def misfit(best: Fit) -> float:
     return best.chi_square / best.freedom
 
 
-def _best(fits: Sequence[Fit], space: Space) -> Fit:
+def best_of(fits: Sequence[Fit], space: Space) -> Fit:
+    """The lowest of those that converged; raises `ComparisonError` where none has."""
     ended = [f for f in fits if f.converged]
     if not ended:
         least = min(fits, key=lambda f: (f.count == 0, f.chi_square))

@@ -12,8 +12,9 @@ import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.identify.identification import Identification, InTurn
+from validate.identify.identification import Identification, InTurn, best_of
 from validate.identify.identification import identify as identify_in
+from validate.identify.least_squares import fit
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.calibrated_words import headlines, lines, not_identified, scores
@@ -41,6 +42,28 @@ def open_free(experiment: Experiment, parameters: Any) -> tuple[tuple[Free, ...]
     return tuple(
         tuple(f for f in c.free if values[f.path] is None) for c in experiment.calibrations
     )
+
+
+def apart(experiment: Experiment, parameters: Any) -> tuple[Any, ...]:
+    """The parameters of every recording that only calibrates what stands open."""
+    each = zip(experiment.calibrations, open_free(experiment, parameters), strict=True)
+    ons = (on for c, free in each if free for on in c.on if not on.judged)
+    return tuple(on.change(parameters) for on in ons)
+
+
+def closed(experiment: Experiment, parameters: Any, shipped: tuple[Recording, ...]) -> Any:
+    """Parameters with what stands open fitted from one start, for what asks of a body alone.
+
+    Raises `ComparisonError` where that does not converge.
+    """
+    for number, free in enumerate(open_free(experiment, parameters)):
+        if free:
+            methods = experiment.methods
+            problem = problem_of(experiment, number, free, parameters, methods, shipped)
+            best = best_of([fit(problem.residual, problem.space.starts(1)[0])], problem.space)
+            values = zip(problem.space.names, problem.space.values(best.x), strict=True)
+            parameters = with_free(parameters, dict(values))
+    return parameters
 
 
 def middle(experiment: Experiment, parameters: Any) -> Any:

@@ -15,6 +15,7 @@ from validate.errors import SceneError, ValidateError
 from validate.parameters import Parameter, describe, with_values
 from validate.recording.types import Recording
 from validate.register.registered import Registered
+from validate.replay.calibrated import closed
 from validate.replay.experiment import Experiment
 from validate.replay.origins import opened
 from validate.scene.material import LawName
@@ -103,7 +104,8 @@ class OwnBody:
 def own_body(experiment: Experiment) -> OwnBody:
     """With what the experiment identifies from its recordings."""
     found = opened(experiment, experiment.parameters)
-    recordings, parameters = found.recordings, found.parameters
+    recordings = found.recordings
+    parameters = closed(experiment, found.parameters, recordings)
     if experiment.identify is not None:
         parameters = experiment.identify(recordings, parameters, experiment.methods).parameters
     return OwnBody(experiment, parameters, recordings[0])

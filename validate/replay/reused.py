@@ -12,6 +12,7 @@ from typing import Any
 
 from validate.parameters import describe
 from validate.recording.types import Recording
+from validate.replay.calibrated import apart
 from validate.replay.experiment import Experiment
 from validate.replay.find import sources_of
 from validate.replay.options import Options, configure, folder_of, mesh_files
@@ -29,16 +30,18 @@ def rests_on(experiment: Experiment, options: Options, command: Sequence[str] = 
     path = experiment.path
     parameters, _ = configure(experiment, options)
     found = made(command, sources_of(path) if path else (), mesh_files(parameters))
+    others = (r for on in apart(experiment, parameters) for r in opened(experiment, on).recordings)
+    found = replace(found, files=(*found.files, *(_used(r, "calibrates") for r in others)))
     if options.quick:
         return found
     cases = [c.change(parameters) for c in experiment.cases if c.shipped]
     shipped = [r for p in cases for r in experiment.load(p, folder_of(experiment))]
-    return replace(found, files=(*found.files, *map(_used, shipped)))
+    return replace(found, files=(*found.files, *(_used(r, "case") for r in shipped)))
 
 
-def _used(recording: Recording) -> UsedFile:
+def _used(recording: Recording, role: str) -> UsedFile:
     source = recording.source
-    return UsedFile("case", source.path, source.sha256, source.bytes)
+    return UsedFile(role, source.path, source.sha256, source.bytes)
 
 
 def stored_run(experiment: Experiment, folder: Path) -> tuple[Json | None, str]:

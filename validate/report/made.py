@@ -32,8 +32,8 @@ class Commit:
 
 @dataclass(frozen=True)
 class UsedFile:
-    """A file that a run read beside its recordings: `role` is experiment, mesh, or case: the
-    recording of another truth."""
+    """A file that a run read beside its recordings: `role` is experiment, mesh, case: the
+    recording of another truth, or calibrates: one that only calibrates."""
 
     role: str
     path: str
