@@ -5,7 +5,7 @@ from validate.exports import lazily, names
 _HOMES = {
     "registry": ("DataFile", "DataSet", "data_sets", "named"),
     "bring": ("bring",),
-    "home": ("cache_folder", "found", "searched"),
+    "home": ("cache_folder", "found", "searched", "sought"),
 }
 
 __all__ = names(_HOMES)

@@ -12,20 +12,33 @@ from validate.errors import RecordingError
 SHARED = "VALIDATE_SHARED_DATA"
 
 
-def found(folder: str, name: str | None, beside: Path, own: str | None = None) -> Path:
+def found(
+    folder: str, name: str | None, beside: Path, own: str | None = None, by: str = ""
+) -> Path:
     """A file of a data set, or its folder where `name` is None.
 
     `folder` is the data set's, as in `markers/silicone-beam`; `beside` the folder of the experiment
-    that asks, for a shared folder that lies next to its project; `own` a path that its user gave,
-    which is taken as it is. The places are looked through in order; what lies in the cache counts
-    where its hash is the registered one. Raises `RecordingError` naming the command that brings it.
+    that asks, for a shared folder that lies next to its project; `own` a path that its user gave
+    for the parameter `by`, which is taken as it is. Raises `RecordingError` naming the command that
+    brings it.
     """
     if own:
         return _own(Path(own), name)
-    for place in searched(beside):
-        if _has(place, folder, name):
-            return place / folder / name if name else place / folder
-    raise RecordingError(_absent(folder, name))
+    path = sought(folder, name, beside)
+    if path is None:
+        raise RecordingError(_absent(folder, name, by or ("recording" if name else "data")))
+    return path
+
+
+def sought(folder: str, name: str | None, beside: Path) -> Path | None:
+    """As `found`, of what an experiment can do without: None where it is not here.
+
+    The places are looked through in order; what lies in the cache counts where its hash is the
+    registered one.
+    """
+    has = (place / folder for place in searched(beside) if _has(place, folder, name))
+    path = next(has, None)
+    return path / name if path and name else path
 
 
 def searched(beside: Path) -> tuple[Path, ...]:
@@ -61,12 +74,14 @@ def _has(place: Path, folder: str, name: str | None) -> bool:
     return bool(files) and all(whole(place / folder / f.name, f) for f in files)
 
 
-def _absent(folder: str, name: str | None) -> str:
+def _absent(folder: str, name: str | None, by: str) -> str:
     theirs = named(folder)
     what = f"{folder}/{name}" if name else f"{folder}/"
-    own = "--set recording=FILE" if name else "--set data=FOLDER"
+    own = f"--set {by}={'FILE' if name else 'FOLDER'}"
+    brings = f"`validate data get {theirs.name}` brings it"
+    if not any(f.source for f in theirs.files if name in (None, f.name)):
+        brings = f"`validate data get {theirs.name}` says what it is made of"
     return (
-        f"{what} is not here: `validate data get {theirs.name}` brings it ({theirs.repository} "
-        f"{theirs.commit[:7]}, {theirs.licence}); or pass {own}, or set {SHARED} to a folder that "
-        "holds it"
+        f"{what} is not here: {brings} ({theirs.repository} {theirs.commit[:7]}, "
+        f"{theirs.licence}); or pass {own}, or set {SHARED} to a folder that holds it"
     )

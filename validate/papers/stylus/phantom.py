@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats
-from validate.datasets.home import found
+from validate.datasets.home import found, sought
 from validate.errors import RecordingError
 from validate.parameters import quantity
 from validate.recording.formats.device_set import DeviceSet, read_device_set
@@ -91,13 +91,20 @@ def load(parameters: StylusPhantom, folder: Path) -> tuple[Recording, ...]:
     """The sequence, with the landmarks and the tip's offset of the device set as its records."""
     p = parameters
     path = found(FOLDER, SEQUENCE, folder, p.recording)
-    devices = read_device_set(found(FOLDER, DEVICES, folder, p.landmarks))
+    devices = read_device_set(found(FOLDER, DEVICES, folder, p.landmarks, "landmarks"))
     recording = recognised(path).read(path, _options(path))
     records = {**recording.metadata, LANDMARKS: _landmarks(devices), TIP: _tip(devices, p.tools)}
-    if p.published or not (p.recording or p.landmarks):
-        results = read_device_set(found(FOLDER, RESULTS, folder, p.published))
-        records[PUBLISHED] = _published(results, p.tools)
+    if results := _results(p, folder):
+        records[PUBLISHED] = _published(read_device_set(results), p.tools)
     return (replace(recording, metadata=records),)
+
+
+def _results(p: StylusPhantom, folder: Path) -> Path | None:
+    """Results of PLUS that the user names, else the data set's own where its sequence is judged and
+    they are here: no command brings them."""
+    if p.published:
+        return found(FOLDER, RESULTS, folder, p.published, "published")
+    return None if p.recording or p.landmarks else sought(FOLDER, RESULTS, folder)
 
 
 def _options(path: Path) -> Mapping[str, str]:
