@@ -166,7 +166,12 @@ def still(*probes: str) -> Simulated:
 
 def test_each_marker_is_a_quantity_where_a_probe_has_its_name() -> None:
     (a,) = markers().deviations(still("a"), EVERYTHING)
-    assert (a.quantity, a.unit, a.sd, a.systematic) == ("a", "m", 1e-4, 3e-4)
+    assert (a.quantity, a.unit, a.sd, a.systematic) == (
+        "a",
+        "m",
+        1e-4,
+        pytest.approx(3e-4 / np.sqrt(3)),
+    )
     assert a.values == pytest.approx(-1e-3 * np.array([[0, 0, 0], [0, 0, 1], [0, 0, 2]]))
     _, b = markers().deviations(still("a", "b"), EVERYTHING)
     assert b.values == pytest.approx(-1e-3 * np.array([[0, 0, 0], [0, 0, 2]]))  # lost at the end

@@ -245,6 +245,25 @@ def choose(name: str, **options: Any) -> int:
     return studying.choosing(name, _common(options), **options)
 
 
+@study.command()
+@click.option("--draws", type=int, help="Recordings drawn (default: 200; 40 with --quick).")
+@click.option(
+    "--noise",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="TIMES",
+    help="The real noise over the declared one.",
+)
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+@_studied
+def coverage(name: str, **options: Any) -> int:
+    """How often our verdicts call a perfect model different, and notice a wrong one."""
+    from validate.cli.covering import covering
+
+    return covering(name, _common(options), **options)
+
+
 @cli.command()
 @click.option(
     "--parameters",

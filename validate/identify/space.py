@@ -1,5 +1,6 @@
 """The box that is searched: every parameter between its bounds, as a number from 0 to 1."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,15 @@ class Space:
 
     def values(self, x: Floats) -> tuple[float, ...]:
         return tuple(self.value(i, float(xi)) for i, xi in enumerate(x))
+
+    def coordinates(self, values: Sequence[float]) -> Floats:
+        """Where values (p,) lie, as `values` has them."""
+        pairs = zip(self.ranges, values, strict=True)
+        return np.array([
+            np.log(v / r.low) / np.log(r.high / r.low) if r.logarithmic
+            else (v - r.low) / (r.high - r.low)
+            for r, v in pairs
+        ])  # fmt: skip
 
     def slope(self, i: int, x: float) -> float:
         """d value / d coordinate of parameter i there."""

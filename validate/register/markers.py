@@ -17,6 +17,7 @@ from validate.fem.locate import (
 )
 from validate.recording.types import Markers, Recording
 from validate.register.clock import SAME, clock_sd, interpolated, slopes, with_clock
+from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.fitting import MarkerFit
 from validate.register.labels import require_steady_labels
 from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
@@ -105,6 +106,35 @@ class MarkerObservation:
             return ()
         return tuple(n for n in self.names if f"{n}.x" not in run.traces)
 
+    def left(self, run: Simulated) -> Floats:
+        """Exact position less measured one, flat (nt k d,) m; 0 where a marker was not seen, or
+        nothing of the run is compared with it."""
+        off = np.nan_to_num(self._exact(run) - self.x)
+        return np.asarray(off.ravel())
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "MarkerObservation":
+        """The markers where `left` (nt k d,) m has them; registration, which all samples share,
+        clock and noise drawn."""
+        nt, _, d = self.x.shape
+        exact = (self.x + left.reshape(self.x.shape)).reshape(nt, -1)
+        x = shifted(self.t, exact, draw.lateness(self.sd_t)).reshape(self.x.shape)
+        registered = draw.white(1.0, (d,)) * self.tre[:, None] / np.sqrt(3)
+        noise = draw.white(np.array(self.axis_sd) if self.axis_sd else self.sd, x.shape)
+        return replace(self, x=x + registered + noise)
+
+    def _exact(self, run: Simulated) -> Floats:
+        """Positions (nt, k, d) m at the samples' times: of the kept fields, or by the probes."""
+        nt, k, d = self.x.shape
+        if self.together:
+            moved = np.array([self.positions.apply(u) for u in run.u]).reshape(len(run.u), k * d)
+            return self.rest + from_rest(run.t[run.at], moved, self.t).reshape(nt, k, d)
+        x = self.x.copy()
+        for j, name in enumerate(self.names):
+            if f"{name}.x" in run.traces:
+                probe = np.stack([run.traces[f"{name}.{c}"].y for c in _AXES[:d]], axis=1)
+                x[:, j] = self.rest[j] + from_rest(run.t, probe, self.t)
+        return x
+
     def _gathered(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         selection = selection.instants(run)
         samples = selection.samples(self.t, run.t, self.name)
@@ -155,8 +185,10 @@ class MarkerObservation:
         probe = [selection.read(run.t, run.traces[f"{name}.{c}"].y, t) for c in axes]
         words = "estimate less measured displacement of the marker, at the times it was seen"
         off = (np.stack(probe, axis=1) - moved[samples])[seen]
-        found = Deviation(name, off, "m", self.along(range(len(axes))), float(self.tre[j]), words,
-                          scale=_largest(moved), reference=moved[samples][seen])  # fmt: skip
+        # The tre is a length over three axes, the systematic part is per axis.
+        tre, sd = float(self.tre[j] / np.sqrt(3)), self.along(range(len(axes)))
+        found = Deviation(name, off, "m", sd, tre, words, scale=_largest(moved),
+                          reference=moved[samples][seen])  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         return with_clock(found, sd_t, self._speed(j, samples, sd_t)) if sd_t > 0 else found
 

@@ -6,13 +6,14 @@ a run deviates from them. Comparison, filters and reports know nothing of a sens
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.fem.locate import Rows
+from validate.register.draws import AnyDraw
 
 Role = Literal["drives", "calibrates", "validates"]
 WITHIN = 1.0  # s: a sample further off in time is no match
@@ -144,6 +145,20 @@ class Observation(Protocol):
         ...
 
 
+@runtime_checkable
+class Drawable(Observation, Protocol):
+    """An observation that can be made anew, as a perfect model would have it."""
+
+    def left(self, run: Simulated) -> Floats:
+        """What an exact sensor would have read of a run, less what was measured: flat (m,)."""
+        ...
+
+    def anew(self, left: Floats, draw: AnyDraw) -> Observation:
+        """What would have been measured where exact readings are `left` off the samples, with
+        noise, registration and clock drawn as declared."""
+        ...
+
+
 def nearest_samples(times: Floats, t: Floats, name: str) -> Ints:
     """Indices of the samples nearest to t (m,) s, the earlier of two.
 
@@ -177,3 +192,13 @@ def frame_at(run: Simulated, selection: Selection) -> Floats:
             f"{run.method}: {len(run.at)} output frames, none at '{selection.label}'"
         )
     return run.u[[kept[int(s)] for s in steps]]
+
+
+def field_at(run: Simulated, t: float) -> Floats:
+    """The field (n, d) m at t s between those that the run kept."""
+    kept = run.t[run.at]
+    i = int(np.clip(np.searchsorted(kept, t), 0, len(kept) - 1))
+    before, start = (run.u[i - 1], kept[i - 1]) if i else (np.zeros_like(run.u[0]), 0.0)
+    span = kept[i] - start
+    share = min(max((t - start) / span, 0.0), 1.0) if span > 0 else 1.0
+    return np.asarray(before + share * (run.u[i] - before))

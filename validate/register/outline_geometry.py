@@ -37,6 +37,35 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
     return np.asarray(centre + found[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
 
 
+def ray_points(outline: Floats, angles: Floats) -> Floats:
+    """Where rays from the outline's centroid at polar angles (a,) rad cross its straight segments:
+    (a, 2) m, on the outline itself."""
+    centre, at, radius = _rays(outline)
+    after = np.searchsorted(at, np.mod(angles, _TURN)) % len(at)
+    before = after - 1
+    span = np.mod(at[after] - at[before], _TURN)
+    gone = np.mod(angles - at[before], _TURN)
+    across = radius[before] * np.sin(gone) + radius[after] * np.sin(span - gone)
+    corner = across <= 0  # two vertices on one ray
+    whole = radius[before] * radius[after] * np.sin(span) / np.where(corner, 1.0, across)
+    found = np.where(corner, radius[after], whole)
+    return np.asarray(centre + found[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+
+
+def polar_angles(outline: Floats) -> Floats:
+    """Polar angles (k,) rad of the outline's points about its centroid."""
+    _, centre = enclosed(outline)
+    away = outline - centre
+    return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
+
+
+def normals(outline: Floats) -> Floats:
+    """Unit normals (k, 2) of a closed outline at its points, across the chord of both next ones."""
+    along = np.roll(outline, -1, axis=0) - np.roll(outline, 1, axis=0)
+    across = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
+
+
 def angular_weights(outline: Floats, angles: Floats) -> Floats:
     """Weights (a, k) by which `angular_points` takes the radii of the outline's points, in the
     order of their polar angles."""

@@ -1,7 +1,7 @@
 """Outlines seen in an image plane, against the section of the deformed wall with that plane."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,11 +9,13 @@ from validate.arrays import Floats, rms
 from validate.fem.locate import Rows
 from validate.recording.types import Contours
 from validate.register.clock import SAME, around, with_clock
+from validate.register.draws import AnyDraw
 from validate.register.observation import (
     Deviation,
     Role,
     Selection,
     Simulated,
+    field_at,
     frame_at,
     nearest_sample,
 )
@@ -22,6 +24,9 @@ from validate.register.outline_geometry import (
     angular_weights,
     enclosed,
     normal_distances,
+    normals,
+    polar_angles,
+    ray_points,
 )
 from validate.register.plane import SurfaceSampler, require_rigid, section
 
@@ -78,6 +83,31 @@ class OutlineObservation:
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return ()
+
+    def left(self, run: Simulated) -> Floats:
+        """Simulated section less measured outline at its points' polar angles, flat (2 k,) m."""
+        pairs = zip(self.t.tolist(), self.outlines, strict=True)
+        off = [ray_points(self.simulated(field_at(run, t)), polar_angles(o)) - o for t, o in pairs]
+        return np.concatenate(off).ravel()
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "OutlineObservation":
+        """The outlines where `left` (2 k,) m has them; clock and noise (along normals) drawn."""
+        ends = np.cumsum([len(o) for o in self.outlines])[:-1]
+        moves = np.split(left.reshape(-1, 2), ends)
+        exact = [o + move for o, move in zip(self.outlines, moves, strict=True)]
+        late = draw.lateness(self.sd_t)
+        if late:
+            exact = [o + late * self._velocity(exact, i) for i, o in enumerate(exact)]
+        noisy = (o + draw.white(self.sd, (len(o), 1)) * normals(o) for o in exact)
+        return replace(self, outlines=tuple(noisy))
+
+    def _velocity(self, outlines: list[Floats], i: int) -> Floats:
+        """m/s (k, 2) of the points of outline i, by those before and after."""
+        before, after = max(i - 1, 0), min(i + 1, len(outlines) - 1)
+        span = float(self.t[after] - self.t[before])
+        angles = polar_angles(outlines[i])
+        moved = ray_points(outlines[after], angles) - ray_points(outlines[before], angles)
+        return moved / span if span > 0 else np.zeros_like(moved)
 
     def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         """Of every instant: distance; where loaded also displacement, area, centroid, corners."""

@@ -1,7 +1,7 @@
 """Signals: a number or several over time, driving a simulation or predicted by a trace of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import Rows
 from validate.recording.types import Recording
 from validate.register.clock import clock_sd, slopes, with_clock
+from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.observation import (
     Deviation,
     Role,
@@ -75,6 +76,19 @@ class SignalObservation:
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return () if self.trace in run.traces else (self.name,)
+
+    def left(self, run: Simulated) -> Floats:
+        """Exact reading less measured sample (nt,); 0 where the run has no such trace."""
+        trace = run.traces.get(self.trace)
+        if trace is None:
+            return np.zeros(len(self.t))
+        return from_rest(run.t, trace.y[:, None], self.t)[:, 0] - self.y[:, 0]
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "SignalObservation":
+        """The signal as measured samples with `left` (nt,) would be, clock and noise drawn."""
+        exact = shifted(self.t, (self.y[:, 0] + left)[:, None], draw.lateness(self.sd_t))
+        noisy = exact + draw.white(self.sd, exact.shape)
+        return replace(self, y=np.hstack([noisy, self.y[:, 1:]]))
 
     def rows(self) -> Rows | None:
         return None

@@ -265,10 +265,12 @@ def inputs_of(one: Calibrated) -> tuple[Input, ...]:
 
 
 def _input(one: Calibrated, name: str, step: Any, most: int) -> Input:
-    space, best = one.found.space, one.found.best.x
+    space = one.found.space
 
     def move(parameters: Any, z: float) -> Any:
-        values = space.values(best + z * step)
+        """From where they are: another axis may have moved them."""
+        now = {p.path: p.default for p in describe(parameters)}
+        values = space.values(space.coordinates([now[n] for n in space.names]) + z * step)
         return with_free(parameters, dict(zip(space.names, values, strict=True)))
 
     e = one.found.estimates[most]

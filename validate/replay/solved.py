@@ -1,6 +1,6 @@
 """One method with one set of parameters on the recordings of a case: scene, runs, residuals."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -67,6 +67,19 @@ def _scenes(
         return (first,) * len(recordings)
     others = (experiment.build(r, parameters, method.scene) for r in recordings[1:])
     return (first, *others)
+
+
+def run_on(
+    experiment: Experiment,
+    name: str,
+    method: Method,
+    parameters: Any,
+    scene: AnyScene,
+    seen: Sequence[Registered],
+) -> tuple[Run, ...]:
+    """Runs of a method on recordings as they are registered: a filter's on other samples, say."""
+    runs = _Runs(experiment, name, method, parameters, scene, 0.0, lambda _: None)
+    return tuple(runs.on(one, scene) for one in seen)
 
 
 class _Runs:

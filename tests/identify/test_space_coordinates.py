@@ -1,0 +1,14 @@
+"""Coordinates are where the values lie."""
+
+import numpy as np
+import pytest
+
+from validate.identify.space import Range, Space
+
+SPACE = Space((Range("E", 1e3, 1e6), Range("nu", 0.2, 0.5)))
+
+
+def test_values_and_coordinates_are_inverse() -> None:
+    x = np.array([0.3, 0.8])
+    assert SPACE.coordinates(SPACE.values(x)) == pytest.approx(x)
+    assert SPACE.coordinates((1e3, 0.5)) == pytest.approx([0.0, 1.0])

@@ -1,0 +1,184 @@
+"""Measurements made anew: exact readings leave nothing, noise is what is declared."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats, Ints, rms
+from validate.recording.types import Contours, Markers
+from validate.register.draws import Draw, Exact, from_rest, shifted
+from validate.register.markers import MarkerObservation, Together, observe_markers
+from validate.register.observation import EVERYTHING, Selection, field_at
+from validate.register.outline_geometry import normals, polar_angles, ray_points
+from validate.register.outlines import observe_outlines
+from validate.register.signals import SignalObservation
+from validate.scene.box import box
+from validate.solve.types import Trace
+
+T = np.array([0.0, 1.0, 2.0])
+RUN_T = np.array([0.5, 1.0, 1.5, 2.0])
+MESH = box((0.01, 0.01, 0.01), (1, 1, 1))
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A run of four half seconds from rest, its fields at the second and the last."""
+
+    traces: dict[str, Trace] = field(default_factory=dict)
+    method: str = "run"
+    t: Floats = field(default_factory=lambda: RUN_T)
+    at: Ints = field(default_factory=lambda: np.array([1, 3]))
+    u: Floats = field(default_factory=lambda: np.stack([np.full((8, 3), x) for x in (1e-3, 4e-3)]))
+
+
+RUN = Simulated(
+    {"stage.force": Trace(RUN_T**2, "N")}
+    | {f"a.{c}": Trace(k * RUN_T, "m") for k, c in zip((1e-3, 2e-3, 3e-3), "xyz", strict=True)}
+)
+
+
+def drawn(seed: int = 1, **more: float) -> Draw:
+    return Draw(np.random.default_rng(seed), **more)
+
+
+def signal(**changes: object) -> SignalObservation:
+    y = np.array([[0.3], [0.2], [0.1]])
+    plain = SignalObservation("cell", "validates", T, y, "N", 0.1, "force", "stage.force")
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def markers(together: tuple[Together, ...] = ()) -> MarkerObservation:
+    names = ("a", "b", "c", "d")
+    layout = {n: MESH.nodes[i] for n, i in zip(names, (0, 1, 2, 4), strict=True)}
+    x = np.repeat(np.array(list(layout.values()))[None], 3, axis=0)
+    seen = Markers(T, names, x, 1e-4, "camera")
+    return observe_markers(seen, layout, MESH, together=together)
+
+
+ALL = (Together("moved", (0, 1, 2), "all"),)
+
+
+def test_a_signal_read_exactly_leaves_nothing() -> None:
+    anew = signal().anew(signal().left(RUN), Exact())
+    assert anew.y[:, 0] == pytest.approx([0.0, 1.0, 4.0])
+    (found,) = anew.deviations(RUN, Selection("at 1 s", np.array([1.0])))
+    assert found.values == pytest.approx(np.zeros((1, 1)))
+
+
+def test_a_signal_without_its_trace_stays_as_it_was_measured() -> None:
+    other = signal(trace="none")
+    assert other.anew(other.left(RUN), Exact()).y == pytest.approx(other.y)
+
+
+@pytest.mark.parametrize("together", [(), ALL])
+def test_markers_read_exactly_leave_nothing(together: tuple[Together, ...]) -> None:
+    seen = markers(together)
+    anew = seen.anew(seen.left(RUN), Exact())
+    where = Selection("at 2 s", np.array([2.0]))
+    for found in anew.deviations(RUN, where):
+        assert found.values == pytest.approx(np.zeros_like(found.values), abs=1e-15)
+    if not together:
+        assert anew.x[1, 0] - anew.rest[0] == pytest.approx([1e-3, 2e-3, 3e-3])
+
+
+def test_what_was_not_seen_stays_so() -> None:
+    seen = markers()
+    x = seen.x.copy()
+    x[1, 2] = np.nan
+    hidden = replace(seen, x=x)
+    assert np.isnan(hidden.anew(hidden.left(RUN), drawn()).x[1, 2]).all()
+
+
+def test_an_outline_read_exactly_lies_on_the_section() -> None:
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    circle = 0.005 + 0.002 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    seen = observe_outlines(
+        Contours(T, (circle,) * 3, 1e-4, np.eye(4), "scene"),
+        Wall(),
+        0.0,  # type: ignore[arg-type]
+    )
+    run = replace(RUN, at=np.array([0, 1, 3]), u=np.concatenate([np.zeros((1, 8, 3)), RUN.u]))
+    anew = seen.anew(seen.left(run), Exact())
+    (found,) = (d for d in anew.deviations(run, Selection("x", np.array([2.0])))
+                if d.quantity == "contour")  # fmt: skip
+    assert rms(found.values) < 1e-15
+    noisy = seen.anew(seen.left(run), drawn())
+    off = [a - b for a, b in zip(noisy.outlines, anew.outlines, strict=True)]
+    along = np.abs(np.einsum("kd,kd->k", off[0], normals(anew.outlines[0])))
+    assert along == pytest.approx(np.linalg.norm(off[0], axis=1))
+    assert rms(np.concatenate([np.linalg.norm(o, axis=1) for o in off])) == pytest.approx(
+        1e-4, rel=0.2
+    )
+
+
+def test_rays_end_on_the_straight_edges() -> None:
+    square = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    assert ray_points(square, np.array([0.0, 0.3, np.pi / 2])) == pytest.approx(
+        np.array([[1.0, 0.0], [1.0, np.tan(0.3)], [0.0, 1.0]]), abs=1e-12
+    )
+    assert ray_points(square, polar_angles(square)) == pytest.approx(square)
+
+
+def test_noise_is_the_declared_one_times_what_is_asked_for() -> None:
+    plain = signal(t=np.arange(4000.0), y=np.zeros((4000, 1)), trace="")
+    for times in (1.0, 2.0):
+        off = plain.anew(np.zeros(4000), drawn(noise=times)).y
+        assert rms(off) == pytest.approx(0.1 * times, rel=0.05)
+
+
+def test_the_tre_is_a_length_and_shared_by_all_samples() -> None:
+    seen = replace(markers(), sd=0.0, tre=np.full(4, 3e-4))
+    still = np.zeros(seen.x.size)
+    off = np.array([seen.anew(still, drawn(k)).x - seen.x for k in range(400)])
+    assert np.ptp(off, axis=(1, 2)).max() < 1e-15
+    assert rms(np.linalg.norm(off[:, 0, 0], axis=1)) == pytest.approx(3e-4, rel=0.05)
+
+
+def test_the_systematic_part_of_one_marker_is_per_axis() -> None:
+    """The same tre, whether markers are compared one by one or together."""
+    one = {d.quantity: d.systematic for d in markers().deviations(RUN, EVERYTHING)}
+    (all_of_them,) = markers(ALL).deviations(RUN, Selection("x", np.array([2.0])))
+    tre = markers().tre
+    assert one["a"] == pytest.approx(tre[0] / np.sqrt(3))
+    assert all_of_them.systematic == pytest.approx(rms(tre) / np.sqrt(3))
+
+
+def test_a_clock_that_is_late_reads_later_values() -> None:
+    t = np.arange(5.0)
+    y = np.array([[0.0], [1.0], [np.nan], [3.0], [4.0]])
+    assert shifted(t, y, 0.5)[[0, 1, 3], 0] == pytest.approx([0.5, 1.5, 3.5])
+    assert np.isnan(shifted(t, y, 0.5)[2, 0])
+    late = signal(sd=0.0, y=np.array([[0.0], [1.0], [2.0]]), sd_t=0.0)
+    assert late.anew(np.zeros(3), drawn(late=0.25)).y[:2, 0] == pytest.approx([0.25, 1.25])
+
+
+def test_runs_begin_at_rest() -> None:
+    assert from_rest(RUN_T, RUN_T[:, None], np.array([0.0, 0.25, 2.0]))[:, 0] == pytest.approx(
+        [0.0, 0.25, 2.0]
+    )
+    assert field_at(RUN, 0.5)[0, 0] == pytest.approx(0.5e-3)
+    assert field_at(RUN, 1.5)[0, 0] == pytest.approx(2.5e-3)
+    assert field_at(RUN, 9.0)[0, 0] == pytest.approx(4e-3)
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A cylinder along z that grows by what its nodes move along x."""
+
+    triangles: Ints = field(default_factory=lambda: _tube()[1])
+
+    def deformed(self, u: Floats) -> Floats:
+        nodes = _tube()[0].copy()
+        nodes[:, :2] = 0.005 + (nodes[:, :2] - 0.005) * (1 + 50 * u[0, 0])
+        return nodes
+
+
+def _tube() -> tuple[Floats, Ints]:
+    turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = 0.005 + 0.002 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    nodes = np.vstack([np.column_stack([ring, np.full(24, z)]) for z in (-0.01, 0.01)])
+    a = np.arange(24)
+    b = (a + 1) % 24
+    triangles = np.vstack([np.stack([a, b, a + 24], axis=1), np.stack([b, b + 24, a + 24], axis=1)])
+    return nodes, triangles

@@ -1,0 +1,208 @@
+"""Coverage of verdicts: a normal E differs in 4.6 %, and what is off is named."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import jsonschema
+import numpy as np
+import pytest
+
+from validate.cli.main import run
+from validate.compare.overall import ALPHA
+from validate.errors import ComparisonError, UsageError
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.report.store import schema
+from validate.study.coverage import Coverage, coverage
+from validate.study.coverage_bench import ExactReading
+from validate.study.coverage_found import Quantity
+from validate.study.coverage_plan import World, in_world, true_method, wrong_paths
+from validate.study.job import Where
+
+ROOT = Path(__file__).parents[2]
+HERE = Where(0)
+TINY = (ROOT / "tests" / "replay" / "tiny.py").read_text("utf-8")
+# The block at three holds: one force each, its sensor's noise .1 mN, E perhaps uncertain.
+OWN = """
+from validate.replay.experiment import Input, Uncertainty
+
+def stiffened(card, z):
+    return replace(card, E=card.E * (1 + {range} * z))
+
+EXPERIMENT = replace(
+    AT_HOLDS, name="{name}", accept=(Accept("{quantity}", {limit}, "ours"),),
+    uncertainty={uncertainty}, path=None)
+"""
+INPUTS = 'Uncertainty(inputs=(Input("modulus", stiffened, "E", "assumed"),), surrogate="fem")'
+
+
+def written(name: str, quantity: str = "force", uncertain: float = 0.0) -> Experiment:
+    path = Path(mkdtemp()) / f"{name}.py"
+    declared = INPUTS if uncertain else "None"
+    limit = 5e-3 if quantity == "force" else 5e-5
+    own = OWN.format(
+        name=name, quantity=quantity, limit=limit, range=uncertain, uncertainty=declared
+    )
+    path.write_text(TINY + own, encoding="utf-8")
+    return load_file(path)
+
+
+@cache
+def studied(
+    quantity: str = "force", uncertain: float = 0.0, noise: float = 1.0, draws: int = 200
+) -> Coverage:
+    own = written("drawn", quantity, uncertain)
+    out = Path(mkdtemp())
+    return coverage(own, draws=draws, noise=noise, out=out, where=HERE)
+
+
+def pooled(found: Coverage) -> float:
+    return float(np.mean([q.share.value for q in found.quantities]))
+
+
+def one(found: Coverage) -> Quantity:
+    return found.quantities[0]
+
+
+def test_one_number_with_normal_noise_differs_in_two_sided_two_sd() -> None:
+    """600 draws: their share has a standard deviation of .85 %."""
+    found = studied()
+    assert len(found.quantities) == 3  # a force at each hold
+    assert pooled(found) == pytest.approx(ALPHA, abs=2 * 0.0085)
+    assert all(t.ratio == pytest.approx(1, abs=0.2) for q in found.quantities for t in q.terms)
+    assert all(q.undecided.number == 0 for q in found.quantities)
+
+
+def test_a_standard_deviation_that_is_declared_twice_too_small_is_named() -> None:
+    found = studied(noise=2.0, draws=100)
+    assert pooled(found) == pytest.approx(0.317, abs=0.06)  # a normal law beyond one sd
+    for q in found.quantities:
+        assert q.finding.word == "too narrow"
+        assert q.finding.fault is not None
+        assert q.finding.fault.name == "measurement"
+        assert q.finding.fault.ratio == pytest.approx(2, rel=0.25)
+    assert not found.passed
+
+
+@pytest.mark.slow
+def test_many_numbers_at_once_hold_too() -> None:
+    found = studied("node_B")
+    assert 0.01 <= pooled(found) <= 0.08
+    assert found.together[0].share.value <= 0.07
+
+
+@pytest.mark.slow
+def test_an_input_alone_never_leaves_its_uniform_range() -> None:
+    found = studied(uncertain=0.2)
+    for q in found.quantities:
+        assert q.share.number == 0
+        assert q.finding.word == "too wide"
+        assert q.finding.fault is not None
+        assert q.finding.fault.name == "u_input (modulus)"
+        assert "uniform range ends" in q.finding.words
+
+
+@pytest.mark.slow
+def test_a_wrong_modulus_is_noticed_the_more_the_wronger() -> None:
+    found = studied()
+    every = [p for p in found.power if p.path == "E" and p.name is None]
+    shares = [p.share.value for p in every if p.share]
+    assert [p.by for p in every] == [0.05, 0.1, 0.2]
+    assert shares == [1.0, 1.0, 1.0]  # .1 mN in a force of 30 mN
+    blunt = studied(uncertain=0.2)
+    weak = [p.share.value for p in blunt.power if p.share and p.name is None and p.path == "E"]
+    assert weak[0] < 0.1
+    assert weak == sorted(weak)
+
+
+def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
+    own = written("drawn", uncertain=0.05)
+    first = coverage(own, draws=20, out=tmp_path, where=HERE)
+    again = coverage(own, draws=20, out=tmp_path, where=HERE)
+    assert (first.done.reused, again.done.reused) == (0, 2)
+    assert again.quantities == first.quantities
+
+
+def test_readings_add_up_as_a_linear_body_does() -> None:
+    """Half the step to a wrong world is what lies half-way; other samples are interpolated."""
+    t = np.array([0.0, 1.0, 2.0])
+    base, step = (
+        ExactReading((np.zeros(3),), (t,)),
+        ExactReading((np.array([2.0, 4.0, 6.0]),), (t,)),
+    )
+    assert base.plus(0.5, step, base).left[0] == pytest.approx([1.0, 2.0, 3.0])
+    finer = ExactReading((np.array([2.0, 3.0, 4.0, 5.0, 6.0]),), (np.linspace(0, 2, 5),))
+    assert finer.on(base).left[0] == pytest.approx([2.0, 4.0, 6.0])
+    with pytest.raises(ComparisonError, match="8 numbers are measured there, 3 as judged"):
+        ExactReading((np.zeros(8),), (t,)).on(base)
+
+
+def test_worlds_are_parameters() -> None:
+    own = written("drawn", uncertain=0.1)
+    assert [p.path for p in wrong_paths(own.parameters)] == ["E", "sd"]
+    wrong = in_world(own, own.parameters, World(wrong=("E", 0.2)))
+    assert pytest.approx(1.2 * own.parameters.E) == wrong.E
+    assert (
+        pytest.approx(0.9 * own.parameters.E)
+        == in_world(own, own.parameters, World((("modulus", -1.0),))).E
+    )
+
+
+def test_the_truth_of_a_filter_is_a_method_without_markers() -> None:
+    sys_tiny = load_file(_as_file("tiny_over_time", "EXPERIMENT = replace(TINY, path=None, "
+                                  'name="tiny_over_time")'))  # fmt: skip
+    assert true_method(sys_tiny, "kf") == "fem"
+    assert true_method(sys_tiny, "slow") == "slow"
+
+
+def _as_file(name: str, text: str) -> Path:
+    path = Path(mkdtemp()) / f"{name}.py"
+    path.write_text(f"{TINY}\n{text}\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+def test_a_filter_runs_anew_on_every_draw(tmp_path: Path) -> None:
+    text = 'EXPERIMENT = replace(TINY, path=None, name="filtered", accepted=("kf",), cases=())'
+    found = coverage(load_file(_as_file("filtered", text)), draws=10, out=tmp_path, where=HERE)
+    (q,) = found.quantities
+    assert len(set(q.judged.E)) > 5  # an E that noise explains is zero
+    assert "the filter's own covariance" in {t.name for t in q.terms}
+
+
+@pytest.mark.parametrize(("draws", "noise"), [(3, 1.0), (20, 0.0)])
+def test_too_few_draws_or_no_noise_are_refused(draws: int, noise: float) -> None:
+    with pytest.raises(UsageError, match="draws of"):
+        coverage(written("drawn"), draws=draws, noise=noise, out=Path(mkdtemp()), where=HERE)
+
+
+def test_nothing_accepted_is_refused() -> None:
+    none = replace(written("drawn"), accepted=())
+    path = _as_file("none", 'EXPERIMENT = replace(AT_HOLDS, path=None, name="none", accepted=())')
+    assert none.accepted == ()
+    with pytest.raises(ComparisonError, match="nothing is judged"):
+        coverage(load_file(path), out=Path(mkdtemp()), where=HERE)
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_page_with_tables_and_curves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    own = written("drawn", uncertain=0.05)
+    asked = ["study", "coverage", str(own.path), "--quick", "--workers", "0", "--json"]
+    run([*asked, "--out", str(tmp_path)])
+    content = json.loads(capsys.readouterr().out)
+    jsonschema.validate(content, schema())
+    assert content["study"]["kind"] == "coverage"
+    assert content["study"]["draws"] == 40
+    (folder,) = (tmp_path / "drawn").glob("study-coverage+*")
+    page = (folder / "report.html").read_text("utf-8")
+    assert "How often a perfect model differs" in page
+    assert {p.name for p in (folder / "tables").glob("*.csv")} >= {
+        "cells.csv", "coverage.csv", "terms.csv", "power.csv"
+    }  # fmt: skip
+    assert list((folder / "figures").glob("chart_power_fem_*.png"))

@@ -1,0 +1,52 @@
+"""`validate study coverage`: how often our own verdicts are wrong; runs, writes, prints."""
+
+from pathlib import Path
+
+from validate.cli.arguments import FAILED, OK, pairs
+from validate.cli.chosen import ask_about
+from validate.cli.display import say, table
+from validate.cli.studying import StudyOptions, end, running, written
+from validate.replay.find import find
+from validate.replay.named_run import differences, tag
+from validate.replay.options import Options
+from validate.study import coverage_page
+from validate.study.coverage import Coverage, coverage
+from validate.study.coverage_exhibits import HEAD, interval, percent, share_row
+from validate.study.coverage_plan import DRAWS
+
+
+def covering(
+    name: str, common: StudyOptions, *, draws: int | None, noise: float, values: tuple[str, ...]
+) -> int:
+    """Judges drawn recordings of a perfect model; 0 where every check holds."""
+    experiment = find(name, Path.cwd(), common.named)
+    given = pairs(values, "--set")
+    ask_about(experiment, given)
+    words, content = differences(experiment, Options(given, (), common.quick))
+    words += ["draws"] * (draws not in (None, DRAWS)) + ["noise"] * (noise != 1)
+    place = f"coverage{tag(words, [content, draws, noise])}"
+    with running(experiment, place, "coverage", common) as report:
+        found = coverage(
+            experiment, draws=draws, noise=noise, values=given, quick=common.quick,
+            out=common.out, where=common.where, report=report,
+        )  # fmt: skip
+    page = written(experiment, coverage_page.told(found), place, common)
+    if not common.as_json:
+        _show(found)
+        end(found.done, page)
+    return OK if found.passed else FAILED
+
+
+def _show(found: Coverage) -> None:
+    rows = [list(share_row(q)) for q in found.quantities]
+    rows += [
+        [t.method, f"all {t.checks} (Holm)", percent(t.share), interval(t.share),
+         percent(t.undecided), "holds" if t.holds else "too narrow"]
+        for t in found.together
+    ]  # fmt: skip
+    table("A perfect model under our own verdicts", HEAD, rows)
+    for q in found.quantities:
+        if q.finding.words:
+            say(f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}", indent="  ")
+    quick = "QUICK: fewer draws; " if found.quick else ""
+    say(f"\n{quick}{coverage_page.sentence(found)}")

@@ -1,0 +1,130 @@
+"""How often a verdict is wrong: shares with their intervals, and which term of u_val is at fault.
+
+A perfect model is called different in 4.6 % of comparisons where E is normal with the standard
+uncertainty u_val. More than `MOST` says that a term is too narrow, fewer than `LEAST` that one is
+too wide. Each term is held against what the draws show of it alone: half of the |E| that 4.6 % of
+them exceed, which for a normal law is its standard deviation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.special import betaincinv
+
+from validate.arrays import Floats, rms
+from validate.compare.overall import ALPHA
+
+LEAST, MOST = 0.02, 0.07
+U_NUM = "u_num"
+MEASUREMENT = "measurement"
+_ALIKE = 0.1  # relative: how far a shown term may lie off its part before it is another one
+
+Word = Literal["holds", "too narrow", "too wide", "cannot decide", "no evidence"]
+
+
+@dataclass(frozen=True)
+class Share:
+    """`number` of `count` with the 95 % interval of the probability (Clopper & Pearson 1934)."""
+
+    number: int
+    count: int
+
+    @property
+    def value(self) -> float:
+        return self.number / self.count if self.count else 0.0
+
+    @property
+    def low(self) -> float:
+        if not self.number:
+            return 0.0
+        return float(betaincinv(self.number, self.count - self.number + 1, 0.025))
+
+    @property
+    def high(self) -> float:
+        if self.number == self.count:
+            return 1.0
+        return float(betaincinv(self.number + 1, self.count - self.number, 0.975))
+
+    @property
+    def inside(self) -> bool:
+        return LEAST <= self.value <= MOST
+
+    @property
+    def by_chance(self) -> bool:
+        """Whether the interval reaches into what is allowed."""
+        return self.low <= MOST and self.high >= LEAST
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of u_val in the residual's unit: its `part`, what the draws `shown` of it, and the
+    `spread` (rms) of E by it alone. `kind` tells measurement and discretisation from inputs."""
+
+    name: str
+    part: float
+    shown: float
+    spread: float
+    kind: Literal["measurement", "numerical", "input", "filter"] = "input"
+
+    @property
+    def ratio(self) -> float | None:
+        """Shown over claimed; None where nothing is claimed."""
+        return self.shown / self.part if self.part else None
+
+    @property
+    def excess(self) -> float:
+        """Variance shown less variance claimed."""
+        return self.shown**2 - self.part**2
+
+    @property
+    def words(self) -> str:
+        """What is wrong with it, with its numbers."""
+        if self.kind == "numerical":
+            return (
+                f"{self.name}: {self.part:.3g} of mesh and step, of which a model judged by itself "
+                "on its own mesh shows nothing"
+            )
+        seen = f"{self.name}: {self.part:.3g} claimed, {self.shown:.3g} shown"
+        if (
+            self.kind == "input"
+            and self.excess < 0
+            and abs(self.spread - self.part) < (_ALIKE * self.part)
+        ):
+            return f"{seen}: its spread is right, but a uniform range ends at 1.73 u"
+        return seen
+
+
+def reach(errors: Floats) -> float:
+    """Half of the |E| that `ALPHA` of the draws (n,) exceed."""
+    return float(np.quantile(np.abs(errors), 1 - ALPHA)) / 2 if len(errors) else 0.0
+
+
+def term(
+    name: str, part: float, errors: Floats, kind: Literal["measurement", "input"] = "input"
+) -> Term:
+    """A term by what E (n,) of it alone was over the draws."""
+    return Term(name, part, reach(errors), rms(errors) if len(errors) else 0.0, kind)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the share of a quantity says, and which term is at fault."""
+
+    word: Word
+    fault: Term | None
+    words: str
+
+
+def find_fault(share: Share, terms: Sequence[Term]) -> Finding:
+    """Holds within `LEAST` to `MOST`; else the term whose variance is furthest off that way."""
+    if share.inside:
+        return Finding("holds", None, "")
+    wide = share.value < LEAST
+    worst = min(terms, key=lambda t: t.excess if wide else -t.excess, default=None)
+    word: Word = "too wide" if wide else "too narrow"
+    chance = "; by chance? take more draws" if share.by_chance else ""
+    if worst is None or (worst.excess >= 0 if wide else worst.excess <= 0):
+        return Finding(word, None, f"no term by itself: they act together{chance}")
+    return Finding(word, worst, worst.words + chance)

@@ -1,0 +1,94 @@
+"""What a coverage study tells: its sentence, its part of results.json and its table of draws."""
+
+from collections import Counter
+from dataclasses import asdict
+from typing import Any
+
+from validate.compare.coverage import Share, Term
+from validate.study.coverage import Coverage
+from validate.study.coverage_exhibits import coverage_exhibits
+from validate.study.coverage_found import Power, Quantity
+from validate.study.study_page import CellsTable, Findings
+
+
+def told(study: Coverage) -> Findings:
+    band = ("good", "Verdicts hold") if study.passed else ("bad", "Verdicts are off")
+    return Findings(
+        f"Coverage of our own verdicts: {study.experiment.title}", sentence(study),
+        coverage_exhibits(study), document(study), draws_table(study), study.quick,
+        passed=study.passed, band=band,
+    )  # fmt: skip
+
+
+def sentence(study: Coverage) -> str:
+    """How often a perfect model differs, in one sentence."""
+    words = Counter(q.finding.word for q in study.quantities)
+    found = ", ".join(f"{n} {word}" for word, n in words.items())
+    joint = ", ".join(f"{100 * t.share.value:.1f} % ({t.method})" for t in study.together)
+    worst = [q for q in study.quantities if q.finding.word == "too narrow"]
+    named = f" Too narrow: {'; '.join(f'{q.stated.name} ({q.finding.words})' for q in worst)}."
+    return (
+        f"A perfect model in {study.draws} drawn recordings: of {len(study.quantities)} checks "
+        f"{found}; over all checks it differs in {joint}.{named if worst else ''}"
+    )
+
+
+def document(study: Coverage) -> dict[str, Any]:
+    """The study's own part of results.json: SI, nothing that is not finite."""
+    return {
+        "kind": "coverage",
+        "passed": study.passed,
+        "draws": study.draws,
+        "noise": study.noise,
+        "reused": study.done.reused,
+        "seconds": study.done.seconds,
+        "workers": study.done.workers,
+        "checks": [_quantity(q) for q in study.quantities],
+        "together": [
+            {"method": t.method, "checks": t.checks, "differs": _share(t.share),
+             "cannot_decide": _share(t.undecided), "holds": t.holds}
+            for t in study.together
+        ],
+        "power": [_power(p) for p in study.power],
+        "moves_nothing": list(study.still),
+        "failed": [r.why for r in study.done.records.values() if r.why],
+    }  # fmt: skip
+
+
+def _quantity(q: Quantity) -> dict[str, Any]:
+    return {
+        "method": q.method, "name": q.stated.name, "unit": q.stated.unit, "count": q.stated.count,
+        "differs": _share(q.share), "cannot_decide": _share(q.undecided),
+        "verdict": q.finding.word, "why": q.finding.words,
+        "fault": q.finding.fault.name if q.finding.fault else None,
+        "rms_E": q.spread, "u_val": q.u_val, "line_off": q.off,
+        "terms": [_term(t) for t in q.terms],
+    }  # fmt: skip
+
+
+def _share(s: Share) -> dict[str, Any]:
+    return {**asdict(s), "value": s.value, "low": s.low, "high": s.high}
+
+
+def _term(t: Term) -> dict[str, Any]:
+    return {**asdict(t), "ratio": t.ratio}
+
+
+def _power(p: Power) -> dict[str, Any]:
+    return {
+        "method": p.method, "name": p.name, "path": p.path, "by": p.by,
+        "differs": _share(p.share) if p.share else None, "why": p.why,
+    }  # fmt: skip
+
+
+def draws_table(study: Coverage) -> CellsTable:
+    """Every check of every draw of the perfect model, SI."""
+    head = ("method", "check", "unit", "draw", "E", "u_val", "verdict")
+    rows = tuple(
+        (q.method, q.stated.name, q.stated.unit, k + 1, E, u, verdict)
+        for q in study.quantities
+        for k, (E, u, verdict) in enumerate(
+            zip(q.judged.E, q.judged.u_val, q.judged.verdicts, strict=True)
+        )
+    )
+    return head, rows
