@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
@@ -40,7 +41,8 @@ def _modes(system: System, count: int | None) -> Modes:
     wanted = m if count is None else count
     if wanted > m:
         raise SceneError(f"{wanted} modes of {m} unknowns: at most {m}")
-    squares, shapes = _lowest(system, wanted)
+    K, M = (X[free][:, free] for X in (system.K, system.M))
+    squares, shapes = lowest(K, M, wanted + max(8, wanted // 10))
     omega = np.sqrt(squares)
     end = wanted
     while end < len(omega) and omega[end] <= omega[wanted - 1] * (1 + _CLUSTER):
@@ -56,15 +58,14 @@ def _modes(system: System, count: int | None) -> Modes:
     return Modes(shapes, omega, damping)
 
 
-def _lowest(system: System, wanted: int) -> tuple[Floats, Floats]:
-    """Squares of frequencies and shapes, rising: a few more than wanted, or all."""
-    free = system.free
-    K, M = (X[free][:, free].tocsc() for X in (system.K, system.M))
-    spare = wanted + max(8, wanted // 10)
-    if len(free) <= _DENSE or spare >= len(free) - 1:
+def lowest(K: sparse.csr_array, M: sparse.csr_array, count: int) -> tuple[Floats, Floats]:
+    """Squares (r,) of the lowest frequencies and shapes (m, r), rising: `count`, or all where that
+    is cheaper. K (m, m) N/m positive definite, M (m, m) kg."""
+    m = K.shape[0]
+    if m <= _DENSE or count >= m - 1:
         squares, shapes = eigh(K.toarray(), M.toarray())
     else:
-        start = np.random.default_rng(0).standard_normal(len(free))
-        squares, shapes = eigsh(K, k=spare, M=M, sigma=0.0, which="LM", v0=start)
+        start = np.random.default_rng(0).standard_normal(m)
+        squares, shapes = eigsh(K.tocsc(), k=count, M=M.tocsc(), sigma=0.0, which="LM", v0=start)
     order = np.argsort(squares)
     return np.asarray(squares)[order], np.asarray(shapes)[:, order]

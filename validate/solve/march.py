@@ -81,11 +81,11 @@ def march(
     walk, outcome = _walk(stepper, inputs, frozenset(at.tolist()), tell)
     done = len(walk.updates)
     traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
-    traces |= _given(stepper.scene, inputs[:done])
+    traces |= given_traces(stepper.scene, inputs[:done])
     for name, unit in stepper.units.items():
         traces[name] = Trace(np.array([numbers[name] for numbers in walk.numbers]), unit)
     traces |= _totals(stepper.scene, traces)
-    traces |= _probed(stepper, walk.probes)
+    traces |= probe_traces(stepper.scene, np.array(walk.probes))
     traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
     seconds = np.array(walk.seconds)
     seconds = seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds[:done]
@@ -136,7 +136,7 @@ def _in_unit_of(scene: Scene, trace: Trace) -> Trace:
     return replace(trace, unit=scene.force_unit) if trace.unit == "N" else trace
 
 
-def _given(scene: Scene, inputs: Floats) -> dict[str, Trace]:
+def given_traces(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     """`<drive>.displacement` m, `<load>.force` N (with `per_node` that at each node, else the
     total), `<weight>.acceleration` m/s^2, of a rigid body `<contact>.displacement` m,
     and `<needle>.x`.. m of its tip."""
@@ -174,9 +174,10 @@ def _probe_rows(stepper: Stepper) -> Rows | None:
     return probe_rows(scene.mesh, scene.probes)
 
 
-def _probed(stepper: Stepper, values: list[Floats]) -> dict[str, Trace]:
-    probes, d = stepper.scene.probes, stepper.scene.mesh.dimension
-    u = np.array(values).reshape(len(values), len(probes), d)
+def probe_traces(scene: Scene, values: Floats) -> dict[str, Trace]:
+    """`<probe>.x`, `.y`, `.z` m of the scene's probes, from their displacements (nt, p, d) m."""
+    probes, d = scene.probes, scene.mesh.dimension
+    u = values.reshape(len(values), len(probes), d)
     return {
         f"{probe.name}.{_AXES[c]}": Trace(u[:, j, c], "m")
         for j, probe in enumerate(probes)

@@ -8,6 +8,7 @@ from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.handles import Handles
 from validate.solve.implicit import NewtonDynamics
+from validate.solve.let_go import LetGo
 from validate.solve.modal import Modal
 from validate.solve.needle import NeedleLoop
 from validate.solve.newmark import Newmark
@@ -21,6 +22,7 @@ from validate.solve.rigid_motion import RigidMotion
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
 from validate.solve.types import SceneSolver, Scheme
+from validate.solve.viscous_modes import ViscousModes
 
 SCHEMES: tuple[type[Scheme], ...] = (
     NoFluid,
@@ -41,7 +43,14 @@ SCHEMES: tuple[type[Scheme], ...] = (
 )
 
 # What solves a whole scene at once.
-SOLVERS: tuple[type[SceneSolver], ...] = (StretchTest, RigidMotion, Propagated, Proportional)
+SOLVERS: tuple[type[SceneSolver], ...] = (
+    StretchTest,
+    RigidMotion,
+    Propagated,
+    Proportional,
+    ViscousModes,
+    LetGo,
+)
 
 
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
