@@ -17,11 +17,11 @@ from validate.solve.rigid_motion import RigidMotion
 
 def _tip(axis: str) -> Input:
     def off(p: StylusPhantom, z: float) -> float:
-        return float(getattr(p.tip, axis) or 0.0) + z * float(p.tip.sd or 0.0)
+        return float(getattr(p.tip, f"off_{axis}")) + z * float(p.tip.sd or 0.0)
 
     return Input(
-        f"tip {axis}", moved("tip", **{axis: off}), f"{axis} of the tip's offset",
-        "Error of the device set's StylusTip to Stylus, 0.462 mm, over root 3",
+        f"tip {axis}", moved("tip", **{f"off_{axis}": off}), f"{axis} of the tip's offset",
+        "Error of the device set's StylusTip to Stylus, over root 3",
     )  # fmt: skip
 
 

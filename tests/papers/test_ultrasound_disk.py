@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.io import savemat
 from scipy.ndimage import gaussian_filter
+from sequences import tracked
 
 from validate.compare.result import Result
 from validate.errors import RecordingError, UsageError
@@ -70,6 +71,9 @@ def test_bad_input_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "two.mat"
     savemat(path, {"a": imaged(8.0, 0.2, 1), "b": imaged(8.0, 0.2, 1)})
     with pytest.raises(RecordingError, match=r"2 streams of images .* image\.topic=NAME"):
+        run(path)
+    path.write_bytes(tracked(spacing="1 1 1"))
+    with pytest.raises(UsageError, match=r"--set image\.m_per_px=0\.1mm"):
         run(path)
     with pytest.raises(UsageError, match=r"disk\.diameter = 20 m"):
         run(path, **{"disk.diameter": "20m"})

@@ -31,6 +31,12 @@ def test_a_dwell_is_where_the_tip_stands_without_its_coming_and_leaving() -> Non
     assert second.wander == pytest.approx(0, abs=1e-12)
 
 
+def test_a_noisy_path_widens_the_radius() -> None:
+    noise = np.random.default_rng(5).normal(0, 2e-3, (60, 3))
+    t, x = path(still(A, 30), still(B, 30))
+    assert [(d.begin, d.end) for d in dwells(t, x + noise, 1e-3, 2.0)] == [(0, 30), (30, 60)]
+
+
 def test_a_single_false_sample_parts_no_dwell() -> None:
     x = still(A, 40)
     x[20] = [1.0, 1.0, 1.0]

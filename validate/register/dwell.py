@@ -17,6 +17,7 @@ from validate.errors import RegistrationError
 
 _SPIKE = 3  # samples of the median that a single false one does not pass
 _APART = 0.5  # s between two parts of one dwell
+_CLEAR = 5.0  # standard deviations of noise that a radius takes in
 _SETTLING = 3.0  # times the dwell's own speed: the tip still comes, or already leaves
 
 
@@ -55,9 +56,11 @@ class Dwell:
 def dwells(t: Floats, x: Floats, radius: float, least: float) -> tuple[Dwell, ...]:
     """Parts of a path x (n, 3) m at t (n,) s that stay within `radius` m for `least` s and more.
 
-    The samples in which the tip still comes or already leaves are cut off.
+    The radius is no smaller than the path's own noise from sample to sample asks for. The samples
+    in which the tip still comes or already leaves are cut off.
     """
     smooth = median_filter(x, (_SPIKE, 1), mode="nearest")
+    radius = max(radius, _CLEAR * _noise(x))
     spans = _joined(t, smooth, _stays(smooth, radius), radius)
     found = [_settled(t, x, smooth, *span) for span in spans]
     return tuple(d for d in found if d.t[-1] - d.t[0] >= least)
@@ -76,6 +79,13 @@ def sd_of_mean(parts: tuple[Dwell, ...], whole: tuple[Dwell, ...]) -> float:
     follow = min(max(follow, 0.0), 1.0)
     count = float(np.mean([len(p.x) for p in parts]))
     return wander / float(np.sqrt(max(count * (1 - follow) / (1 + follow), 1.0)))
+
+
+def _noise(x: Floats) -> float:
+    """Standard deviation m along an axis of what changes from sample to sample, while a tip stands:
+    from the median of second differences, which a motion over less than half of them leaves."""
+    bends = np.abs(np.diff(x, n=2, axis=0))
+    return float(np.median(bends)) / 0.6745 / float(np.sqrt(6)) if bends.size else 0.0
 
 
 def _stays(x: Floats, radius: float) -> list[tuple[int, int]]:

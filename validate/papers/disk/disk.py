@@ -24,6 +24,7 @@ from validate.scene.rigid_body import RigidBody
 
 FOLDER, FILE = "ultrasound/disk", "bmode_PWI_disk.mat"
 OUTLINES, FOUND = "disk", "outlines"
+_SIDE = 1e-4  # m: of a pixel of the data set's images
 _FEWEST = 0.5  # of the images in which the disk must be seen
 
 
@@ -38,7 +39,9 @@ class Disk:
 
 @dataclass(frozen=True)
 class ImageCard:
-    m_per_px: float = quantity(1e-4, "m", "side of a pixel, where the file does not state it")
+    m_per_px: float | None = quantity(
+        None, "m", "side of a pixel; none: the file's, 0.1 mm where its format states none"
+    )
     rate: float = quantity(1.0, "Hz", "images a second, where it does not; nothing follows from it")
     topic: str | None = quantity(None, "1", "the images among several; none: the only ones")
     bright: bool = quantity(True, "1", "whether the disk is brighter than what surrounds it")
@@ -68,15 +71,15 @@ def load(parameters: ImagedDisk, folder: Path) -> tuple[Recording, ...]:
     """
     p = parameters
     path = found(FOLDER, FILE, folder, p.recording)
-    recording = recognised(path).read(path, _options(path, p.image))
+    recording = _read(path, p.image)
     topic = _topic(recording, p.image.topic)
     frames = recording.frame(topic)
     outlines, refused = _outlines(frames, p.image.bright)
     if len(outlines) < _FEWEST * len(frames.images):
         raise RecordingError(
             f"{recording.name}: the disk is found in {len(outlines)} of {len(frames.images)} "
-            f"images; first refusal: {next(iter(refused.values()))}; a dark disk is "
-            "--set image.bright=false"
+            f"images; first refusal: {next(iter(refused.values()))}; it was taken to be "
+            f"{'bright' if p.image.bright else 'dark'}: --set image.bright={not p.image.bright}"
         )
     at = np.array(sorted(outlines))
     contours = Contours(
@@ -94,11 +97,22 @@ def load(parameters: ImagedDisk, folder: Path) -> tuple[Recording, ...]:
     )
 
 
+def _read(path: Path, image: ImageCard) -> Recording:
+    try:
+        return recognised(path).read(path, _options(path, image))
+    except UsageError as error:
+        raise UsageError(f"{error}; in a run --set image.m_per_px=0.1mm") from None
+
+
 def _options(path: Path, image: ImageCard) -> Mapping[str, str]:
-    """What formats that state no scale are asked for; one that does is taken at its word."""
-    if recognised(path).name not in ("matlab", "png-stack"):
-        return {}
-    return {"m_per_px": repr(image.m_per_px), "rate": repr(image.rate)}
+    """What formats that state no scale are asked for; one that does is taken at its word, unless
+    the user says otherwise."""
+    kind, side = recognised(path).name, image.m_per_px
+    if kind in ("matlab", "png-stack"):
+        return {"m_per_px": repr(side or _SIDE), "rate": repr(image.rate)}
+    if kind in ("metaimage", "nrrd") and side:
+        return {"m_per_px": repr(side)}
+    return {}
 
 
 def _topic(recording: Recording, wanted: str | None) -> str:

@@ -56,9 +56,17 @@ class TipOffset:
     z: float | None = quantity(None, "m", "across; none: the device set's")
     sd: float | None = quantity(None, "m", "uncertainty of each; none: the device set's Error / √3")
 
+    off_x: float = quantity(0.0, "m", "how far off it may be, once its dwells are found")
+    off_y: float = quantity(0.0, "m", "the same, along y")
+    off_z: float = quantity(0.0, "m", "the same, along z")
+
     @property
     def at(self) -> Floats:
         return np.array([self.x or 0.0, self.y or 0.0, self.z or 0.0])
+
+    @property
+    def off(self) -> Floats:
+        return np.array([self.off_x, self.off_y, self.off_z])
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ class DwellRule:
         "touch", "1", "the first touch, before the stylus is turned far, or the whole dwell"
     )
     radius: float = quantity(3e-3, "m", "within which a tip that stands may wander")
-    least: float = quantity(1.5, "s", "for which it stands at least")
+    least: float = quantity(1.0, "s", "for which it stands at least")
     touch: float = quantity(0.5, "s", "of a dwell that is its first touch")
     holds: float = quantity(0.75e-3, "m", "within which the tip holds in it")
     match: float = quantity(5e-3, "m", "within which a place is a landmark's")
@@ -181,6 +189,11 @@ def digitised(
     parts = standing if whole else tuple(d.touch(rule.touch, rule.holds) for d in standing)
     names, places = known(recording)
     match = match_landmarks(places, np.array([d.centre for d in parts]), rule.match)
+    if p.tip.off.any():
+        _, x = path_of(recording, p, p.tip.off)
+        parts, standing = (
+            tuple(replace(d, x=x[d.begin : d.end]) for d in group) for group in (parts, standing)
+        )
     counted = [tuple(group[i] for i in match.seen) for group in (parts, standing)]
     return Digitised(t, x, standing, parts, names, places, match, sd_of_mean(*counted))
 

@@ -14,6 +14,7 @@ from validate.papers.stylus.phantom import PUBLISHED, SEQUENCE, StylusPhantom, d
 from validate.papers.stylus.plus import by_plus
 from validate.recording.types import Recording
 from validate.register.digitised import Digitised, TouchedLandmarks
+from validate.register.dwell import Dwell
 from validate.register.transform import Similarity
 from validate.replay.experiment import Experiment, Identified, Progress, Told
 from validate.replay.followed import MAIN, Cases
@@ -23,6 +24,7 @@ from validate.report.points import Place, points_picture
 Part = Literal["touch", "whole"]
 PARTS: Mapping[Part, str] = {"touch": "first touch", "whole": "whole dwell"}
 _MM = 1e3
+_AGAIN = 5e-3  # m: from a landmark that was touched already
 _NEAR = (0.1, 0.3e-3)  # degrees and m within which two transforms are one
 
 
@@ -95,7 +97,7 @@ def _touched(d: Digitised) -> str:
     order = "in the order of the list" if d.match.ordered else "in another order than the list's"
     return (
         f"The tip stands {len(d.dwells)} times; {len(d.body)} of them are landmarks, {order}, told "
-        f"by their distances{missing}. The others are where the stylus was parked."
+        f"by their distances{missing}. The others are where it was parked, or touched one again."
     )
 
 
@@ -214,7 +216,7 @@ def _matrix(d: Digitised) -> NumberTable:
 def _dwells(d: Digitised) -> NumberTable:
     named = dict(zip(d.match.seen.tolist(), d.touched, strict=True))
     rows = tuple(
-        (named.get(i, "none: parked"), float(w.t[0]), float(w.t[-1]), len(w.x), _MM * w.wander,
+        (named.get(i) or _again(d, part), float(w.t[0]), float(w.t[-1]), len(w.x), _MM * w.wander,
          len(part.x))
         for i, (w, part) in enumerate(zip(d.dwells, d.parts, strict=True))
     )  # fmt: skip
@@ -224,6 +226,13 @@ def _dwells(d: Digitised) -> NumberTable:
         ("landmark", "from / s", "to / s", "samples", "wander / mm", "samples that count"),
         rows,
     )
+
+
+def _again(d: Digitised, part: Dwell) -> str:
+    """What a place is that is no landmark's own."""
+    off = np.linalg.norm(d.pose.apply(d.body) - part.centre, axis=1)
+    near = int(off.argmin())
+    return f"{d.touched[near]}, again" if off[near] < _AGAIN else "none: parked"
 
 
 def _picture(d: Digitised) -> Picture:
