@@ -42,7 +42,10 @@ NONE = "assumed; the data set gives none"
 UNCERTAINTY = Uncertainty(
     # Order: the corners of the pads are singular.
     MeshLadder(
-        (changed("mesh", cells=1), changed("mesh", cells=3)),
+        (
+            changed("mesh", cells=lambda p: p.mesh.cells - 1 or 3),
+            changed("mesh", cells=lambda p: p.mesh.cells + 1),
+        ),
         lambda p: p.pads.width / p.mesh.cells,
         order=1.2,
     ),

@@ -21,6 +21,7 @@ from validate.papers.skin_pads.sheet import (
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
+from validate.replay import compare
 from validate.replay.find import load_file
 from validate.replay.solved import solve
 from validate.scene.scene import Scene
@@ -222,3 +223,20 @@ def test_the_data_set_is_paired_whole(shared_data: Path) -> None:
     assert 1e3 * curve.d[-1] == pytest.approx(8.34, abs=0.02)
     assert curve.force[-1] == pytest.approx(0.293, abs=0.005)
     assert images.held(p.field)[2] < 20
+
+
+@pytest.mark.slow
+def test_a_linear_law_fitted_to_4_mm_differs_at_8_mm(project_root: Path, shared_data: Path) -> None:
+    """Skin stiffens: what was fitted is no evidence, what was predicted lies far below."""
+    experiment = load_file(project_root / "experiments" / "skin_pads.py")
+    values = {"data": str(shared_data / "force" / "skin-pads"), "mesh.cells": "1"}
+    result = compare(experiment, values, methods=("linear",), quick=True)
+    (linear,) = result.methods
+    verdicts = {c.name: c.verdict for c in linear.checks}
+    assert verdicts["force.rms@predicted"] == "differs"
+    assert "force.rms@fitted" not in verdicts
+    residual = linear.residuals["force@end"]
+    assert residual.values.mean() == pytest.approx(-0.08, abs=0.01)
+    assert linear.scene.force_unit == FORCE
+    found = {s.name: s.value for s in result.identified}
+    assert found["material.E_linear"] == pytest.approx(28.1, rel=0.03)
