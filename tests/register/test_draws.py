@@ -1,6 +1,7 @@
 """Measurements made anew: exact readings leave nothing, noise is what is declared."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from validate.register.markers import MarkerObservation, Together, observe_marke
 from validate.register.observation import EVERYTHING, Selection, field_at
 from validate.register.outline_geometry import normals, polar_angles, ray_points
 from validate.register.outlines import observe_outlines
+from validate.register.round_outlines import RoundOutlines
 from validate.register.signals import SignalObservation
+from validate.register.stresses import StressObservation
 from validate.scene.box import box
 from validate.solve.types import Trace
 
@@ -182,3 +185,31 @@ def _tube() -> tuple[Floats, Ints]:
     b = (a + 1) % 24
     triangles = np.vstack([np.stack([a, b, a + 24], axis=1), np.stack([b, b + 24, a + 24], axis=1)])
     return nodes, triangles
+
+
+def test_stresses_read_exactly_leave_nothing_and_their_noise_is_relative() -> None:
+    y = np.array([[0.0], [90.0], [210.0]])
+    seen = StressObservation("curve", "validates", T, y, 0.0, 0.05, "stress")
+    run = Simulated({"nominal_stress": Trace(100 * RUN_T, "Pa")})
+    anew = seen.anew(seen.left(run), Exact())
+    assert anew.y[:, 0] == pytest.approx([0.0, 100.0, 200.0])
+    off = np.array([seen.anew(seen.left(run), drawn(k)).y[:, 0] for k in range(400)]) - anew.y[:, 0]
+    assert off[:, 2] == pytest.approx(2 * off[:, 1])  # one axis of one figure
+    assert rms(off[:, 1]) == pytest.approx(5.0, rel=0.1)
+    other = Simulated({})
+    assert seen.left(other) == pytest.approx(np.zeros(3))
+
+
+def test_round_outlines_read_exactly_have_the_bodys_diameter() -> None:
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    circle = 0.01 + 0.004 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    contours = Contours(T, (circle, 1.1 * circle, circle), 1e-5, np.eye(4), "scene")
+    frames: Any = None
+    seen = RoundOutlines("diameter", "validates", contours, frames, 1.25)
+    ends = {f"{end}.{c}": Trace(np.full(4, sign * 0.006 * (c == "x")), "m")
+            for end, sign in (("left", -1), ("right", 1)) for c in "xyz"}  # fmt: skip
+    run = Simulated(ends)
+    anew = seen.anew(seen.left(run), Exact())
+    assert anew.diameters == pytest.approx(np.full(3, 0.012))
+    off = np.array([seen.anew(seen.left(run), drawn(k)).diameters for k in range(300)]) - 0.012
+    assert off.std() == pytest.approx(np.hypot(seen.wall, seen.scatter), rel=0.1)

@@ -1,7 +1,7 @@
 """Outlines of a round body, image by image: its diameter, against that of a rigid circle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from validate.arrays import Floats
 from validate.fem.locate import Rows
 from validate.recording.types import Contours, Frames
 from validate.register.circle import Circle, fit_circle
+from validate.register.draws import AnyDraw
 from validate.register.observation import Deviation, Role, Selection, Simulated
 
 ENDS = ("left", "right")  # two points of the body, a diameter apart
@@ -61,11 +62,29 @@ class RoundOutlines:
     def units(self) -> Mapping[str, str]:
         return {self.name: "m"}
 
+    def left(self, run: Simulated) -> Floats:
+        """The body's diameter less those of the circles (nt,) m."""
+        return self._lengths(run)[np.clip(np.searchsorted(run.t, self.t), 0, len(run.t) - 1)] - (
+            self.diameters
+        )
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "RoundOutlines":
+        """Outlines about their centres as wide as `left` (nt,) m has them; the wall, which all
+        share, and what differs between images drawn."""
+        off = draw.white(self.wall, (1,)) + draw.white(self.scatter, left.shape)
+        wider = 1 + (left + off) / self.diameters
+        pairs = zip(wider, self.circles, self.contours.outlines, strict=True)
+        drawn = tuple(_about(np.asarray(c.centre) / self.scale, by, o) for by, c, o in pairs)
+        return replace(self, contours=replace(self.contours, outlines=drawn))
+
+    def _lengths(self, run: Simulated) -> Floats:
+        """The distance (nt,) m of the two ends at the run's steps."""
+        ends = np.array([[run.traces[f"{end}.{c}"].y for c in "xyz"] for end in ENDS])
+        return np.asarray(np.linalg.norm(ends[1] - ends[0], axis=0))
+
     def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         at = selection.samples(self.t, run.t, self.name)
-        ends = np.array([[run.traces[f"{end}.{c}"].y for c in "xyz"] for end in ENDS])
-        lengths = np.linalg.norm(ends[1] - ends[0], axis=0)
-        shown = lengths[np.searchsorted(run.t, self.t[at])]
+        shown = self._lengths(run)[np.searchsorted(run.t, self.t[at])]
         seen = self.diameters[at]
         one = len(at) == 1
         words = "diameter of the body less that of the circle through its outline, every image"
@@ -89,3 +108,8 @@ class RoundOutlines:
 
     def rows(self) -> Rows | None:
         return None
+
+
+def _about(centre: Floats, by: float, outline: Floats) -> Floats:
+    """The outline (k, 2) m `by` times as large about a centre (2,) m."""
+    return centre + by * (outline - centre)

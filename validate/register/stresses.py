@@ -5,7 +5,7 @@ one curve differ a hundredfold: an absolute error would be that of the last few 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.fem.locate import Rows
+from validate.register.draws import AnyDraw, from_rest
 from validate.register.observation import Deviation, Role, Selection, Simulated
 
 TRACES = ("nominal_stress", "second_stress")
@@ -76,6 +77,19 @@ class StressObservation:
                 reference=(self.y[at] / self.scale[at][:, None]).reshape(-1, 1),
             ),
         )  # fmt: skip
+
+    def left(self, run: Simulated) -> Floats:
+        """Exact less measured stresses, flat (nt c,) Pa; 0 where the run has no such trace."""
+        if self.unanswered(run):
+            return np.zeros(self.y.size)
+        exact = np.stack([run.traces[name].y for name in self.traces], axis=1)
+        return np.asarray((from_rest(run.t, exact, self.t) - self.y).ravel())
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "StressObservation":
+        """The rows with `left` (nt c,) Pa; readings and the figure's axis drawn, both relative."""
+        exact = self.y + left.reshape(self.y.shape)
+        off = draw.white(self.sd, exact.shape) + draw.white(self.shared, (1,))
+        return replace(self, y=exact + np.abs(exact).max(axis=1, keepdims=True) * off)
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return tuple(name for name in self.traces if name not in run.traces)
