@@ -13,6 +13,7 @@ from validate.parameters import quantity
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import driving, validating
+from validate.replay.calibrated import here, identified
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment, Uncertainty
 from validate.replay.method import Method
@@ -110,3 +111,14 @@ def test_only_the_laws_that_are_run_are_identified_and_none_left_is_an_error() -
     none = replace(laws(2.0, 1.5), calibrations=(calibration("svk", 1e6), calibration("neo", 1e6)))
     with pytest.raises(ComparisonError, match="neo is not identifiable"):
         compare(none, Options({}))
+
+
+def test_an_identification_alone_tells_who_has_no_answer_and_goes_on() -> None:
+    made = laws(2.0, 1.5)
+    free = tuple(c.free for c in made.calibrations)
+    recordings = made.load(made.parameters, Path())
+    done, failed = identified(made, made.parameters, made.methods, recordings, here, free)
+    assert [one.problem.calibration.method for one in done] == ["neo"]
+    assert "no free stretch is without stress" in failed["svk"]
+    with pytest.raises(ComparisonError, match="no free stretch"):
+        identified(made, made.parameters, made.methods, recordings, here, (free[0], ()))

@@ -142,16 +142,27 @@ def identified(
     shipped: tuple[Recording, ...],
     identify: Identify,
     asked: Sequence[tuple[Free, ...]],
-) -> tuple[Calibrated, ...]:
+) -> tuple[tuple[Calibrated, ...], Mapping[str, str]]:
     """Every calibration of which something is `asked`, in order, whether it can be identified or
-    not; each sees what those before found. Nothing is predicted, so no figure serves twice."""
+    not; each sees what those before found. Nothing is predicted, so no figure serves twice.
+
+    And why others failed, by method, where each is calibrated by itself and one is left.
+    """
     done: list[Calibrated] = []
+    failed: dict[str, str] = {}
     for number, free in enumerate(asked):
-        if free:
-            problem = problem_of(experiment, number, free, parameters, methods, shipped)
+        if not free:
+            continue
+        problem = problem_of(experiment, number, free, parameters, methods, shipped)
+        try:
             done.append(Calibrated(problem, identify(number, problem)))
-            parameters = with_free(parameters, done[-1].values)
-    return tuple(done)
+        except ComparisonError as error:
+            failed[problem.calibration.method] = str(error)
+            if not _each_by_itself(experiment) or len(failed) == sum(map(bool, asked)):
+                raise
+            continue
+        parameters = with_free(parameters, done[-1].values)
+    return tuple(done), failed
 
 
 def calibrated(

@@ -7,7 +7,7 @@ for one in found.calibrated:
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,16 +44,20 @@ _ALONE = 10.0  # s: less work than this is done here, for workers take longer to
 
 @dataclass(frozen=True)
 class IdentifyStudy:
-    """Every calibration that was asked for; `done` counts its cells."""
+    """Every calibration that was asked for; `done` counts its cells, `failed` says why methods
+    that are calibrated each by itself could not be."""
 
     experiment: Experiment
     calibrated: tuple[Calibrated, ...]
     done: Finished[Any]
     quick: bool
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def identified(self) -> bool:
-        return all(e.identified for c in self.calibrated for e in c.found.estimates)
+        return not self.failed and all(
+            e.identified for c in self.calibrated for e in c.found.estimates
+        )
 
 
 class InCells:
@@ -169,5 +173,7 @@ def identification(
     bench = IdentifyBench(found, options)
     cells = InCells(found, options, wanted, count, out, where, report)
     calibrating, free = asked(bench.experiment, bench.parameters, wanted)
-    done = identified(calibrating, bench.parameters, bench.methods, bench.recordings, cells, free)
-    return IdentifyStudy(calibrating, done, cells.done, quick)
+    done, failed = identified(
+        calibrating, bench.parameters, bench.methods, bench.recordings, cells, free
+    )
+    return IdentifyStudy(calibrating, done, cells.done, quick, failed)

@@ -28,8 +28,9 @@ def sentence(study: IdentifyStudy) -> str:
 
 
 def unidentified(study: IdentifyStudy) -> list[str]:
-    """A line for each parameter that its recordings do not identify."""
-    return [
+    """A line for each parameter that its recordings do not identify, and each method that has no
+    answer to them."""
+    return [f"{name} could not be fitted: {why}" for name, why in study.failed.items()] + [
         not_identified(c, e, free)
         for c in study.calibrated
         for e, free in zip(c.found.estimates, c.problem.free, strict=True)
@@ -46,6 +47,7 @@ def document(study: IdentifyStudy) -> dict[str, Any]:
         "seconds": study.done.seconds,
         "workers": study.done.workers,
         "calibrations": [_calibration(c) for c in study.calibrated],
+        "failed": dict(study.failed),
     }
 
 
