@@ -28,10 +28,12 @@ from validate.papers.ecoflex.specimens import (
 )
 from validate.parameters import with_values
 from validate.recording.types import Recording, Signal, Source
+from validate.register.observation import Selection
 from validate.register.signals import SignalObservation
 from validate.replay.cards import QuarterGrid
 from validate.replay.experiment import Identified
 from validate.replay.find import load_file
+from validate.solve.types import Outcome, Run, Trace
 
 HEIGHT, AREA = 0.03, np.pi * 0.05**2 / 4
 SMALL = LoggedCylinder(
@@ -158,3 +160,14 @@ def test_a_prediction_of_another_specimen_is_judged_where_it_was_fitted_too(
 def test_notes_tell_one_log_from_several() -> None:
     own = by_specimen([1.0], ["A"])
     assert apart_notes(split(LOGS[:1], None), own, 0.043)[0].startswith("All 1 log is of one")
+
+
+def test_what_specimens_share_is_systematic_in_proportion_to_the_force() -> None:
+    """By hand: 4 % of the rms of 3 and 4 N; noise alone averages out."""
+    t, y = np.array([0.0, 1.0]), np.array([[3.0], [4.0]])
+    run = Run("m", t, np.array([1]), np.zeros((1, 0, 3)), {"f": Trace(y[:, 0] + 1, "N")},
+              Outcome("finished", 2), 0.0, None)  # fmt: skip
+    force = SignalObservation("force", "validates", t, y, "N", 0.02, "force", "f", share=0.04)
+    (found,) = force.deviations(run, Selection("all", t))
+    assert found.systematic == pytest.approx(0.04 * np.sqrt(12.5))
+    assert (found.sd, found.values.tolist()) == (0.02, [[1.0], [1.0]])
