@@ -24,7 +24,6 @@ from validate.replay.followed import MAIN, Cases, Followed
 
 _FINE = 200  # stretches of a drawn line
 _BEYOND = 1.3  # of the largest measured stress: a line ends there
-_SERIES = 5  # of a plane, in one picture
 _PAIRS = 4  # of laws, in sentences
 _MEGA = 1e5  # Pa: stresses from here on are shown in MPa
 
@@ -41,7 +40,7 @@ def exhibits(p: Multimode, cases: Cases, tell: Progress) -> Told:
         return Told()
     roles = ["identified on these points", *(["predicted"] * (len(seen) - 1))]
     charts = [
-        _plane(p, one, found[0], role) if mode_of(one) == "biaxial" else _mode(p, one, found, role)
+        _plane(p, one, found, role) if mode_of(one) == "biaxial" else _mode(p, one, found, role)
         for one, role in zip(seen, roles, strict=True)
     ]
     exhibit = Exhibit(
@@ -140,31 +139,23 @@ def _mode(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str)
     )
 
 
-def _plane(p: Multimode, seen: Registered, best: RankedLaw, role: str) -> Chart:
-    """The second stress against the second stretch at some first stretches, by the best law."""
-    (l1, l2), stress = seen.inputs.T, stress_of(seen).y[:, 1]
+def _plane(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str) -> Chart:
+    """The second stress of every row of a plane, as each law has it, over the measured one."""
+    stress = stress_of(seen).y[:, 1]
     unit, factor = _shown(stress)
-    series = []
-    for stretch in _spread_out(np.unique(l1)):
-        at, of = l1 == stretch, f"first stretch {stretch:g}"
-        fine = np.linspace(l2[at].min(), l2[at].max(), _FINE)
-        pairs = np.stack([np.full(_FINE, stretch), fine], axis=1)
-        y = response(point(p, as_card(best.method), "biaxial"), pairs)["second_stress"]
-        series.append(Series("measured", l2[at], factor * stress[at], "points", of=of))
-        series.append(Series(best.label, fine, factor * y, of=of))
+    series = [Series("equal", ends := factor * np.array([0.0, stress.max()]), ends)]
+    for one in found:
+        y = response(point(p, as_card(one.method), "biaxial"), seen.inputs)["second_stress"]
+        inside = np.abs(y) <= _BEYOND * np.abs(stress).max()
+        series.append(Series(one.label, factor * stress[inside], factor * y[inside], "points"))
     return Chart(
         "stress_biaxial",
-        f"Second stress of the plane, {role}; {best.label}, which predicts best",
-        "second stretch / 1",
+        f"Second stress of the plane, {role}",
+        f"measured / {unit}",
         f"second nominal stress / {unit}",
         tuple(series),
+        caption="Stresses 30 % beyond the largest measured one are left out.",
     )
-
-
-def _spread_out(values: Floats) -> Floats:
-    """At most `_SERIES` of them, evenly."""
-    at = np.linspace(0, len(values) - 1, min(_SERIES, len(values)))
-    return np.asarray(values[at.round().astype(np.int64)])
 
 
 def _shown(stress: Floats) -> tuple[str, float]:
