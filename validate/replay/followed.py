@@ -64,9 +64,9 @@ class Followed:
 
     @property
     def body(self) -> Scene:
-        """The scene of a run on a mesh; raises `SceneError` for a material point."""
+        """The scene of a run on a mesh; raises `SceneError` without one."""
         if isinstance(self.scene, Meshless):
-            raise SceneError(f"'{self.label}' was run at a material point: it has no mesh")
+            raise SceneError(f"'{self.label}' was run on a scene without a mesh")
         return self.scene
 
     @property

@@ -112,10 +112,10 @@ def own_body(experiment: Experiment) -> OwnBody:
 
 
 def meshed(scene: AnyScene) -> Scene:
-    """The scene; raises `SceneError` for a material point, in which nothing can be refined, and for
+    """The scene; raises `SceneError` for one without a mesh, in which nothing can be refined, and for
     rigid bodies that touch, which the schemes of a derived ladder do not know."""
     if isinstance(scene, Meshless):
-        raise SceneError("a material point has no mesh and no steps: it enters no study")
+        raise SceneError("the scene has no mesh and no steps: it enters no study")
     if scene.contacts:
         raise SceneError(
             f"the scene touches {len(scene.contacts)} rigid bodies, which the ladder that a study "
