@@ -112,7 +112,7 @@ def own_body(experiment: Experiment) -> OwnBody:
 
 
 def meshed(scene: AnyScene) -> Scene:
-    """The scene; raises `SceneError` for one without a mesh, in which nothing can be refined, and for
+    """The scene; raises `SceneError` for one without a mesh, where nothing can be refined, and for
     rigid bodies that touch, which the schemes of a derived ladder do not know."""
     if isinstance(scene, Meshless):
         raise SceneError("the scene has no mesh and no steps: it enters no study")
