@@ -206,3 +206,13 @@ def test_the_command_writes_a_page_with_tables_and_curves(
         "cells.csv", "coverage.csv", "terms.csv", "power.csv"
     }  # fmt: skip
     assert list((folder / "figures").glob("chart_power_fem_*.png"))
+
+
+def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Path) -> None:
+    text = OWN.format(name="steep", quantity="force", limit=5e-3, range=0.7, uncertainty=INPUTS)
+    path = tmp_path / "steep.py"
+    path.write_text(TINY + text, encoding="utf-8")  # beyond -1/.7 u there is no modulus
+    found = coverage(load_file(path), draws=20, out=tmp_path, where=HERE)
+    (note,) = found.notes
+    assert "drawn truths have no solution" in note
+    assert len(found.quantities[0].judged.verdicts) == 20

@@ -62,6 +62,7 @@ class Coverage:
     together: tuple[JointShare, ...]
     power: tuple[Power, ...]
     still: tuple[str, ...]
+    notes: tuple[str, ...]
     done: Finished[Draws]
     draws: int
     noise: float
@@ -135,6 +136,7 @@ def coverage(
         tuple(p.together for p in parts),
         tuple(row for p in parts for row in p.power),
         tuple(dict.fromkeys(path for p in parts for path in p.still)),
+        tuple(note for p in parts for note in p.notes),
         done, draws, noise, quick,
     )  # fmt: skip
 
@@ -147,6 +149,7 @@ class _Part:
     together: JointShare
     power: tuple[Power, ...]
     still: tuple[str, ...]
+    notes: tuple[str, ...]
     done: Finished[Draws]
 
 
@@ -165,7 +168,8 @@ def _of_method(study: _Study, method: str) -> _Part:
     drawn = range(study.draws) if whole else range(CHECKS if study.inputs else 0)
     worlds = {k: World(tuple(zip(study.inputs, z[k].tolist(), strict=True))) for k in drawn}
     solved = _readings(study, true, tuple(worlds.values()))
-    several = {k: _needed(solved[w], method).on(read) for k, w in worlds.items()}
+    drawn_whole = {k: solved[w].value for k, w in worlds.items()}
+    several = {k: found.on(read) for k, found in drawn_whole.items() if found is not None}
     paths = tuple(p.path for p in wrong_paths(study.bench.road.parameters))
     wrong = {(p, by): World(wrong=(p, by)) for p in paths for by in WRONG}
     mistaken = _readings(study, true, tuple(wrong.values()))
@@ -191,6 +195,7 @@ def _of_method(study: _Study, method: str) -> _Part:
         together(given, records),
         tuple(power(given, records, wrong, mistaken)),
         tuple(p for p in paths if _still(p, known, moved)),
+        _unsolved(method, [r.why for r in solved.values() if r.value is None]),
         done,
     )
 
@@ -247,6 +252,13 @@ def _moves(reading: ExactReading, base: ExactReading) -> bool:
     return not all(
         np.allclose(a, b, rtol=1e-9, atol=0.0) for a, b in zip(reading.left, base.left, strict=True)
     )
+
+
+def _unsolved(method: str, why: list[str]) -> tuple[str, ...]:
+    """A line where drawn inputs leave the truth without a solution: those draws are linear."""
+    if not why:
+        return ()
+    return (f"{method}: {len(why)} drawn truths have no solution, straight lines there: {why[0]}",)
 
 
 def _still(path: str, known: Mapping[str, ExactReading], moved: Mapping[str, ExactReading]) -> bool:

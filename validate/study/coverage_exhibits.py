@@ -78,6 +78,7 @@ def _told(study: Coverage) -> Iterator[str]:
             f"sides: a solution a draw would take too long. {CHECKS} draws were solved whole; the "
             "table of terms says how far the lines lay off."
         )
+    yield from study.notes
     if study.still:
         yield f"Moves nothing that is judged: {', '.join(study.still)}."
 
