@@ -4,7 +4,7 @@ The stiffness is pointwise, mixed or with nodal mean dilatation; materials may d
 cell.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,16 @@ def stiffness(scene: Scene) -> sparse.csr_array:
     for part in surface_stiffness(scene):
         K = K + part
     return sparse.csr_array(K)
+
+
+def harmonic(scene: Scene) -> sparse.csr_array:
+    """grad v : grad u (N, N) m of the scene's mesh, for unknowns that a boundary held all round
+    leaves free: 2 eps : eps less div v div u, which differs from it by a surface integral alone."""
+    shear, both = (
+        stiffness(replace(scene, material=Material(E, nu), regions=(), dilatation="pointwise"))
+        for E, nu in ((2.0, 0.0), (2.5, 0.25))  # Lame's (0, 1) and (1, 1) Pa
+    )
+    return sparse.csr_array(2 * shear - both)
 
 
 def stiffness_damping(scene: Scene) -> sparse.csr_array:

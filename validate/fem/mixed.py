@@ -97,9 +97,10 @@ def _require_plain(scene: Scene) -> None:
         )
     places = [p.facets for p in (*scene.supports, *scene.drives, *scene.loads)
               if not isinstance(p, Weight)]  # fmt: skip
-    if scene.masses or scene.tracked or {"faces"} != {"faces", *map(kind_of, places)}:
+    shaped = any(d.shape for d in scene.drives)
+    if scene.masses or scene.tracked or shaped or {"faces"} != {"faces", *map(kind_of, places)}:
         raise SceneError(
-            "mixed elements know faces alone, no edges, points, masses or tracked sets"
+            "mixed elements know faces alone, no edges, points, masses, tracked sets or shapes"
         )
     if scene.foundations or scene.membranes or scene.cavities:
         raise SceneError("mixed elements know supports, pins, drives and loads alone")

@@ -131,6 +131,11 @@ def build(scene: Scene) -> System:
             held[driven] = True
             moves[driven, j] = part.columns(mesh.nodes[nodes])[:, i]
             continue
+        if drive.shape is not None:
+            driven, u = _shaped(scene, drive, drive.shape.u)
+            held[driven] = True
+            moves[driven, j] = u
+            continue
         driven = _driven(scene, drive)
         held[driven] = True
         moves[driven, j] = sum(drive.direction)
@@ -199,6 +204,16 @@ def _driven(scene: Scene, drive: Drive) -> Ints:
     mesh = scene.mesh
     away = np.linalg.norm(mesh.nodes[driven // mesh.dimension] - np.array(drive.point), axis=1)
     return driven[[int(np.argmin(away))]]
+
+
+def _shaped(scene: Scene, drive: Drive, u: Floats) -> tuple[Ints, Floats]:
+    """The unknowns of a drive whose nodes move each by its own, and how, per metre."""
+    driven = _unknowns(scene, drive.facets, tuple(range(scene.mesh.dimension)))
+    if u.size != len(driven):
+        raise SceneError(
+            f"drive '{drive.name}': a shape of {u.shape} for {len(driven)} unknowns of its nodes"
+        )
+    return driven, u.ravel()
 
 
 def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:

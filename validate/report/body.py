@@ -124,7 +124,7 @@ def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:
     scene = method.scene
     drive = scene.drives[0] if scene.drives else None
     travelled = method.run.traces.get(f"{drive.name}.displacement") if drive else None
-    if drive is None or travelled is None or drive.follows:
+    if drive is None or travelled is None or drive.follows or drive.shape:
         return ()
     axis = int(np.argmax(np.abs(drive.direction)))
     travel = travelled.y[method.run.at[frame]]

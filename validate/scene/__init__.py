@@ -16,6 +16,7 @@ _HOMES = {
         "Pin",
         "Probe",
         "Scene",
+        "DriveShape",
         "Support",
         "Weight",
     ),

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Literal
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, checked
 from validate.errors import SceneError
 from validate.scene.contact import RigidContact, require_clear
 from validate.scene.material import Material, Region
@@ -36,6 +37,21 @@ class Pin:
     components: tuple[int, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class DriveShape:
+    """Displacements `u` (k, d) of a drive's nodes, in their order, per metre of its input."""
+
+    u: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "u", checked(self.u, "shape of a drive", (None, None),
+                                              error=SceneError))  # fmt: skip
+
+    def __repr__(self) -> str:
+        """Whole: what is kept by its text must not be another shape's."""
+        return f"DriveShape({sha256(self.u.tobytes()).hexdigest()})"
+
+
 @dataclass(frozen=True)
 class Drive:
     """A facet set moved along `direction` (d,), a unit vector along an axis, by a named input in m.
@@ -43,7 +59,8 @@ class Drive:
     The reported force is that on the driver against the motion: compression positive. With `point`
     m only the set's node nearest to it moves, as under a needle. `speeds`: the true velocity of a
     motion that is planned piecewise linear, (from t s, m/s) in rising order, each valid from its
-    instant on; what dynamic schemes read whose drive rates are "given".
+    instant on; what dynamic schemes read whose drive rates are "given". With a `shape` every node
+    moves by its own displacement, and `direction` is only the axis that charts follow.
     """
 
     name: str
@@ -53,6 +70,7 @@ class Drive:
     speeds: tuple[tuple[float, float], ...] = ()
     #: The set of tracked points that makes this drive, and which of its inputs it is.
     follows: tuple[Prescribed, int] | None = None
+    shape: DriveShape | None = None
 
     def __post_init__(self) -> None:
         starts = [t for t, _ in self.speeds]

@@ -7,6 +7,7 @@ from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.handles import Handles
+from validate.solve.harmonic import Harmonic
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.let_go import LetGo
 from validate.solve.modal import Modal
@@ -50,6 +51,7 @@ SOLVERS: tuple[type[SceneSolver], ...] = (
     Proportional,
     ViscousModes,
     LetGo,
+    Harmonic,
 )
 
 

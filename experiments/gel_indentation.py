@@ -1,0 +1,68 @@
+"""Particles in an indented gel: the inside of a box predicted from the motion of its faces.
+
+35 000 particles before and after indentation (FranckLab/SerialTrack, MIT), unlinked. No force is
+known: displacement alone sees the Poisson ratio and no modulus. The ratio is identified in a lower
+box of small strain and predicts an upper one. Another pair: `--set data=FOLDER`.
+"""
+
+from validate.compare.verdict import Accept
+from validate.papers.gel.box import GelIndentation, build, load, place, stated
+from validate.papers.gel.box import GelModel as Model
+from validate.papers.gel.exhibits import tell
+from validate.papers.gel.lower import fitted_box
+from validate.replay.calibration import Calibrates, Calibration, Free
+from validate.replay.cards import changed, moved
+from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.method import Method
+from validate.solve.harmonic import Harmonic
+from validate.solve.newton import StaticNewton
+from validate.solve.quasi_static import QuasiStatic
+
+STATIC = StaticNewton("none", tolerance=1e-6)
+METHODS = {
+    "linear": Method("linear law", QuasiStatic(), Model()),
+    "neo_hooke": Method("neo-Hooke at large strain", STATIC, Model("neo_hooke")),
+    "svk": Method("St. Venant-Kirchhoff at large strain", STATIC, Model("svk")),
+    "laplace": Method("Laplace's equation: no mechanics", Harmonic(), Model()),
+}
+AXES = tuple(f"inside.{axis}" for axis in "xyz")
+IN_LOWER = changed("box", which="lower")
+UNCERTAINTY = Uncertainty(
+    MeshLadder(
+        (changed("mesh", along=4, up=2), changed("mesh", along=6, up=3)),
+        lambda p: (p.box.side or 1e-4) / p.mesh.along,
+        order=3.0,
+    ),
+    (
+        Input("faces", moved("faces", noise=lambda p, z: p.faces.noise + z),
+              "noise of the particles that move the faces", "their residuals about local fits"),
+    ),
+    surrogate="linear",
+)  # fmt: skip
+EXPERIMENT = Experiment(
+    name="gel_indentation",
+    title="Particles in an indented gel",
+    source="FranckLab/SerialTrack fdb01c6 (MIT); Yang et al. (2022), SoftwareX 19, 101204",
+    parameters=GelIndentation(),
+    methods=METHODS,
+    accepted=("linear", "neo_hooke"),
+    accept=tuple(
+        Accept(axis, 0.4e-6, "a voxel (ours)", ("upper",)) for axis in AXES
+    ),
+    load=load,
+    build=build,
+    place=place,
+    stated=stated,
+    calibrations=(
+        Calibration(
+            "linear",
+            (Free("material.nu", 0.0, 0.4995, "no volume grows when pressed; displacement elements",
+                  "a wider box, or particles with less noise along z"),),
+            (Calibrates(tuple(f"{axis}@lower" for axis in AXES), IN_LOWER, "the lower box"),),
+        ),
+    ),
+    uncertainty=UNCERTAINTY,
+    identify=fitted_box,
+    exhibits=tell,
+    locates=("data", "before", "after"),
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Particles in a gel before and after indentation (FranckLab/SerialTrack)."""

@@ -1,0 +1,278 @@
+"""Boxes in the gel whose faces move as was measured: parameters, scene and registration."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache, reduce
+from operator import or_
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import RegistrationError, UsageError
+from validate.fem.locate import barycentric_rows
+from validate.papers.gel.pair import files, linked_pair, motion, side_of
+from validate.parameters import part, quantity
+from validate.recording.types import Recording
+from validate.register.displacements import DisplacementObservation
+from validate.register.observation import Selection
+from validate.register.registered import Registered
+from validate.register.scattered import local_fit, noise
+from validate.register.signals import SignalObservation
+from validate.scene.box import grid
+from validate.scene.laws import Coefficients
+from validate.scene.material import LawName, Material
+from validate.scene.mesh import Mesh, quadratic
+from validate.scene.scene import Drive, DriveShape, Scene
+from validate.scene.select import Chosen, Labelled, Site, nodes_of
+
+Which = Literal["lower", "upper"]
+
+_SIDES: list[Site] = [Labelled(f"{axis}{end}") for axis in "xyz" for end in (0, 1)]
+FACES: Chosen = reduce(or_, _SIDES).faces
+_FEWEST = 50  # particles to compare
+_SMALL, _LARGE = 0.06, 0.2  # strain norms a spacing below the tops of the boxes
+_SMOOTH = 80  # neighbours of the affine fit that a strain is read from
+_WIDE, _FLOOR = 0.5, 2.0  # side of a box over the volume's; spacings from the volume's bottom
+_DENSE, _ROOM = 0.6, 2.5  # share of the height with few links lost; spacings that a box is high
+
+
+@dataclass(frozen=True)
+class GelMaterial:
+    E: float = quantity(1000.0, "Pa", "modulus; no displacement depends on it: any will do")
+    nu: float | None = quantity(None, "1", "Poisson ratio; none: identified in the lower box")
+    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
+
+
+@dataclass(frozen=True)
+class GelBoxes:
+    """One square column, cut at three heights into a lower and an upper box."""
+
+    which: Which = quantity("upper", "1", "the box that is predicted")
+    x: float | None = quantity(None, "m", "axis of the column; none: where the gel sinks most")
+    y: float | None = quantity(None, "m", "as x")
+    side: float | None = quantity(None, "m", "of the column; none: half of the volume's")
+    bottom: float | None = quantity(
+        None, "m", "of the lower box; none: 2 spacings above the lowest"
+    )
+    middle: float | None = quantity(
+        None, "m", "between the boxes; none: a spacing above a strain of .06, or half"
+    )
+    top: float | None = quantity(None, "m", "of the upper one; none: a spacing above .2")
+    clear: float = quantity(1.0, "1", "spacings off the faces from which particles are judged")
+
+    def ends(self) -> tuple[Floats, Floats]:
+        """Corners (3,) m of the box; raises `UsageError` for one without volume."""
+        x, y, side, bottom, middle, top = (
+            float(v) for v in (self.x, self.y, self.side, self.bottom, self.middle, self.top)
+            if v is not None
+        )  # fmt: skip
+        z = (bottom, middle) if self.which == "lower" else (middle, top)
+        low = np.array([x - side / 2, y - side / 2, z[0]])
+        high = np.array([x + side / 2, y + side / 2, z[1]])
+        if (high <= low).any():
+            um = [f"{1e6 * v:.1f}" for v in (side, bottom, middle, top)]
+            raise UsageError(
+                f"the {self.which} box has no volume: side {um[0]} um, heights "
+                f"{', '.join(um[1:])} um; they must rise: --set box.middle=50um"
+            )
+        return low, high
+
+
+@dataclass(frozen=True)
+class GelFaces:
+    neighbours: int = quantity(80, "1", "particles of the local quadratic fit at a node of a face")
+    noise: float = quantity(0.0, "1", "standard deviations of noise added before, of one seed")
+
+
+@dataclass(frozen=True)
+class GelGrid:
+    along: int = quantity(8, "1", "cells along a horizontal edge")
+    up: int = quantity(4, "1", "cells along the vertical one")
+
+
+@dataclass(frozen=True)
+class GelIndentation:
+    """`data` is a folder with a pair of MATLAB files; none: the data set's own."""
+
+    material: GelMaterial = GelMaterial()
+    box: GelBoxes = GelBoxes()
+    faces: GelFaces = GelFaces()
+    mesh: GelGrid = GelGrid()
+    data: str | None = quantity(None, "1", "folder of the pair; none: VALIDATE_SHARED_DATA")
+    before: str | None = quantity(None, "1", "its file before; none: the first of two")
+    after: str | None = quantity(None, "1", "its file after; none: the second of two")
+    voxel: float | None = quantity(None, "m", "side of a pixel; none: as the data's source says")
+
+
+@dataclass(frozen=True)
+class GelModel:
+    """What a method's scene is built with."""
+
+    law: LawName = quantity("linear", "1", "law of the material")
+    order: int = quantity(2, "1", "of the hexahedra")
+
+
+def load(parameters: GelIndentation, folder: Path) -> tuple[Recording, ...]:
+    """The linked particles of the whole volume."""
+    p = parameters
+    before, after = files(p.data, (p.before, p.after), folder)
+    return (linked_pair(before, after, side_of(p.voxel, before)),)
+
+
+def stated(recording: Recording) -> Mapping[str, float]:
+    """The boxes that the particles suggest, by path.
+
+    Raises `RegistrationError` where strain or links leave no room for two boxes.
+    """
+    x, u = motion(recording)
+    low, size = x.min(axis=0), np.ptp(x, axis=0)
+    spacing = float(recording.record("linking")["spacing_m"])
+    side = _WIDE * float(size[:2].min())
+    axis = _axis(x, u, low + side / 2 + 2 * spacing, low + size - side / 2 - 2 * spacing)
+    bottom = float(low[2]) + _FLOOR * spacing
+    within = (np.abs(x[:, :2] - axis) < side / 2).all(axis=1) & (x[:, 2] > bottom)
+    highest = float(x[:, 2].max()) - spacing
+    middle, top = (
+        min(spacing + _height(x, u, np.flatnonzero(within), spacing, strain), highest)
+        for strain in (_SMALL, _LARGE)
+    )
+    if top - middle < _ROOM * spacing:
+        middle = (bottom + top) / 2
+    if middle - bottom < _ROOM * spacing:
+        raise RegistrationError(
+            f"heights of {1e6 * bottom:.1f} to {1e6 * top:.1f} um, where the strain norm reaches "
+            f"{_LARGE:g}: no room for two boxes of {_ROOM:g} spacings of {1e6 * spacing:.1f} um; "
+            "set box.bottom, box.middle and box.top"
+        )
+    names = {"x": float(axis[0]), "y": float(axis[1]), "side": side}
+    names |= {"bottom": bottom, "middle": middle, "top": top}
+    return {f"box.{name}": value for name, value in names.items()}
+
+
+def _axis(x: Floats, u: Floats, low: Floats, high: Floats) -> Floats:
+    """Where the gel sinks most: the middle of the deepest 3 % of the lower part, where few
+    links are lost; kept so that a column about it lies inside."""
+    dense = x[:, 2] < x[:, 2].min() + _DENSE * np.ptp(x[:, 2])
+    sinks = local_fit(x, u[:, [2]], x[dense], _SMOOTH, 1, robust=True).values[:, 0]
+    deep = x[dense][sinks <= np.quantile(sinks, 0.03)]
+    return np.asarray(np.clip(np.median(deep[:, :2], axis=0), low[:2], high[:2]))
+
+
+def _height(x: Floats, u: Floats, rows: Ints, spacing: float, strain: float) -> float:
+    """The height m up to which 95 % of strain norms stay below `strain`, layer by layer."""
+    norms = strain_norms(local_fit(x, u, x[rows], _SMOOTH, 1).slopes)
+    z = x[rows, 2]
+    heights = np.arange(z.min() + spacing, z.max(), spacing / 4)
+    for height in heights:
+        layer = norms[(z > height - spacing / 2) & (z < height + spacing / 2)]
+        if len(layer) < 5 or np.quantile(layer, 0.95) > strain:
+            return float(height)
+    return float(heights[-1])
+
+
+def strain_norms(slopes: Floats) -> Floats:
+    """Frobenius norms (k,) of the small strains of displacement gradients (k, 3, 3)."""
+    return np.asarray(np.linalg.norm((slopes + slopes.swapaxes(1, 2)) / 2, axis=(1, 2)))
+
+
+def build(recording: Recording, parameters: GelIndentation, model: GelModel) -> Scene:
+    """The box with its lower corner at the origin; all its faces move as the particles there."""
+    p = parameters
+    if p.material.nu is None:
+        raise UsageError("material.nu is open: identify it, or --set material.nu=0.45")
+    mesh, moved = _faces(_Same(recording), p.box, p.faces, p.mesh, model.order)
+    material = Material(
+        p.material.E, p.material.nu, model.law,
+        coefficients=p.material.coefficients.known_to(model.law),
+    )  # fmt: skip
+    faces = Drive(
+        "faces", FACES, (0.0, 0.0, 1.0), shape=DriveShape(moved / float(np.abs(moved).max()))
+    )
+    return Scene(mesh, material, drives=(faces,), force_unit="force unit")
+
+
+def place(recording: Recording, parameters: GelIndentation, scene: Scene) -> Registered:
+    """The faces' largest motion drives; the particles inside are compared, under the box's name."""
+    p, end, whose = parameters, np.array([1.0]), _Same(recording)
+    _, moved = _faces(whose, p.box, p.faces, p.mesh, scene.mesh.order)
+    most = np.array([[float(np.abs(moved).max())]])
+    faces = SignalObservation("faces", "drives", end, most, "m", 0.0)
+    seen = _inside(whose, p.box, p.mesh, scene.mesh.order)
+    hold = Selection(p.box.which, end, "after indentation")
+    return Registered((faces, seen), (hold,), findings=(_links(recording), _corners(p)))
+
+
+@dataclass(frozen=True)
+class _Same:
+    """A recording that is known again by its hash: what depends on it and the box alone is found
+    once, not for every Poisson ratio."""
+
+    recording: Recording = field(compare=False)
+    sha256: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sha256", self.recording.source.sha256)
+
+
+def _mesh(box: GelBoxes, cells: GelGrid, order: int) -> Mesh:
+    low, high = box.ends()
+    mesh = grid(tuple((high - low).tolist()), (cells.along, cells.along, cells.up))
+    return quadratic(mesh) if order == 2 else mesh
+
+
+@lru_cache(maxsize=8)
+def _faces(
+    whose: _Same, box: GelBoxes, faces: GelFaces, cells: GelGrid, order: int
+) -> tuple[Mesh, Floats]:
+    """The mesh, and displacements (k, 3) m of its faces' nodes: local quadratics of the particles
+    around."""
+    x, u = motion(whose.recording)
+    if faces.noise:
+        _, sd = noise(x, u)
+        u = u + faces.noise * sd * np.random.default_rng(1).standard_normal(u.shape)
+    mesh, (low, _) = _mesh(box, cells, order), box.ends()
+    at = mesh.nodes[nodes_of(mesh, FACES)] + low
+    return mesh, local_fit(x, u, at, faces.neighbours, robust=True).values
+
+
+@lru_cache(maxsize=8)
+def _inside(whose: _Same, box: GelBoxes, cells: GelGrid, order: int) -> DisplacementObservation:
+    """The linked particles in the box, as far off its faces as is asked for.
+
+    Raises `RegistrationError` for too few.
+    """
+    x, u = motion(whose.recording)
+    low, high = box.ends()
+    clear = box.clear * float(whose.recording.record("linking")["spacing_m"])
+    inside = ((x > low + clear) & (x < high - clear)).all(axis=1)
+    if inside.sum() < _FEWEST:
+        raise RegistrationError(
+            f"{int(inside.sum())} linked particles in the {box.which} box more than "
+            f"{1e6 * clear:.1f} um off its faces, {_FEWEST} are needed; make it larger: "
+            "--set box.side=200um"
+        )
+    at, mesh = x[inside] - low, _mesh(box, cells, order)
+    _, sd = noise(x[inside], u[inside])
+    return DisplacementObservation(
+        "particles", "validates", np.array([1.0]), at, u[inside], barycentric_rows(mesh, at), sd,
+        "inside",
+    )  # fmt: skip
+
+
+def _links(recording: Recording) -> str:
+    told = recording.record("linking")
+    return (
+        f"{told['linked']} of {told['before']} particles before are linked with one of the "
+        f"{told['after']} after, {told['outliers_cut']} links were cut as outliers; mean spacing "
+        f"{1e6 * float(told['spacing_m']):.2f} µm, voxel {1e6 * float(told['voxel_m']):.3g} µm."
+    )
+
+
+def _corners(p: GelIndentation) -> str:
+    ends = ", ".join(
+        f"{axis} {1e6 * a:.1f} to {1e6 * b:.1f}"
+        for axis, a, b in zip("xyz", *p.box.ends(), strict=True)
+    )
+    return f"The {p.box.which} box: {ends} µm."

@@ -1,0 +1,111 @@
+"""Two clouds of particles as one recording: files found, scale known, particles linked."""
+
+import re
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.datasets.home import found
+from validate.datasets.registry import named
+from validate.errors import RecordingError, UsageError
+from validate.recording.readers import recognised
+from validate.recording.types import Markers, Recording, Source
+from validate.register.link import Linked, link
+
+FOLDER = "field/gel-indentation"
+STREAM = "particles"
+_KNOWN = 0.4e-6  # m, side of a voxel of the registered pair, as its source says
+_SAYS = re.compile(r"([\d.]+(?:e-?\d+)?)\s*([uµ]m|mm|nm)\s+per\s+(?:pixel|px|voxel)", re.IGNORECASE)
+_UNITS = {"um": 1e-6, "µm": 1e-6, "mm": 1e-3, "nm": 1e-9}
+
+
+def files(data: str | None, names: tuple[str | None, str | None], home: Path) -> tuple[Path, Path]:
+    """Before and after: the files named, or the two *.mat files of the folder by their names.
+
+    Raises `RecordingError` for a folder that is not there or holds another number of them.
+    """
+    folder = found(FOLDER, None, home, data)
+    there = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".mat")
+    given = tuple(folder / n for n in names if n)
+    if len(given) == 1 or (not given and len(there) != 2):
+        raise RecordingError(
+            f"{folder}: {len(there)} MATLAB files, a pair is needed: say which, --set before=A.mat "
+            "--set after=B.mat"
+        )
+    one, other = given or there
+    return one, other
+
+
+def side_of(voxel: float | None, before: Path) -> float:
+    """Metres in a pixel: what is set, what a SOURCE.txt beside the file says, or what is known of
+    the registered files. Raises `UsageError` where nobody says it."""
+    if voxel is not None:
+        return voxel
+    text = before.parent / "SOURCE.txt"
+    said = _SAYS.search(text.read_text("utf-8", "replace")) if text.is_file() else None
+    if said:
+        return float(said[1]) * _UNITS[said[2].lower()]
+    mark = sha256(before.read_bytes()).hexdigest()
+    if any(mark == f.sha256 for f in named(FOLDER).files):
+        return _KNOWN
+    raise UsageError(
+        f"{before.name} is in pixels and nobody says their size; measure it and pass --set "
+        "voxel=0.4um"
+    )
+
+
+@lru_cache(maxsize=2)
+def linked_pair(before: Path, after: Path, voxel: float) -> Recording:
+    """Linked particles at 0 s (before) and 1 s (after: the instants have no times), m, with counts
+    in the record `linking`. What `link` and the reader raise."""
+    clouds = [_cloud(path, voxel) for path in (before, after)]
+    links = link(clouds[0][0], clouds[1][0])
+    x = np.stack([cloud[links.pairs[:, k]] for k, (cloud, _) in enumerate(clouds)])
+    sources = [source for _, source in clouds]
+    markers = Markers(
+        np.array([0.0, 1.0]), tuple(str(i + 1) for i in links.pairs[:, 0]), x, 0.0, "volume"
+    )
+    return Recording(
+        name=f"{before.stem} to {after.stem}",
+        source=Source(
+            f"{before.name}, {after.name}",
+            sha256("".join(s.sha256 for s in sources).encode()).hexdigest(),
+            sum(s.bytes for s in sources),
+            sources[0].integrity,
+        ),
+        t0_ns=0,
+        markers={STREAM: markers},
+        metadata={"linking": _told(links, len(clouds[0][0]), len(clouds[1][0]), voxel)},
+    )
+
+
+def _cloud(path: Path, voxel: float) -> tuple[Floats, Source]:
+    recording = recognised(path).read(path, {"unit": repr(voxel)})
+    if len(recording.markers) != 1:
+        raise RecordingError(f"{path.name}: {len(recording.markers)} clouds of points, one needed")
+    (points,) = recording.markers.values()
+    if points.x.shape[2] != 3:
+        raise RecordingError(f"{path.name}: points in {points.x.shape[2]} dimensions, 3 needed")
+    x = points.x[0]
+    return x[np.isfinite(x).all(axis=1)], recording.source
+
+
+def _told(links: Linked, before: int, after: int, voxel: float) -> dict[str, str]:
+    return {
+        "before": str(before),
+        "after": str(after),
+        "linked": str(len(links.pairs)),
+        "seeds": str(links.seeds),
+        "outliers_cut": str(links.cut),
+        "spacing_m": repr(links.spacing),
+        "voxel_m": repr(voxel),
+    }
+
+
+def motion(recording: Recording) -> tuple[Floats, Floats]:
+    """Places before (n, 3) m of the linked particles, and their displacements (n, 3) m."""
+    x = recording.marker(STREAM).x
+    return x[0], x[1] - x[0]
