@@ -7,6 +7,7 @@ of all cells with nothing kept from before; CPU time is that of the processes, w
 leaves alone.
 """
 
+import resource
 import sys
 import tempfile
 from pathlib import Path
@@ -39,13 +40,18 @@ def main() -> None:
     for e in one.found.estimates:
         low, high = significant(e.low, 4), significant(e.high, 4)
         print(f"{e.name}: {significant(e.value, 4)}, 95 % {low} to {high} (SI)")
-    work = sum(r.seconds for r in found.done.records.values())
     calls = sum(f.evaluations for f in one.found.fits)
     print(f"{len(one.found.fits)} starts ({calls} evaluations), {len(one.found.sides)} sides")
     print(
-        f"{seconds:.0f} s on {workers} workers ({work:.0f} s of work in cells), {WANTED_S:.0f} s "
-        "wanted"
+        f"{seconds:.0f} s of wall time on {workers} workers, {WANTED_S:.0f} s wanted; {cpu():.0f}"
+        " s of CPU time"
     )
+
+
+def cpu() -> float:
+    """CPU seconds of this process and of the workers that ended."""
+    each = (resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(r.ru_utime + r.ru_stime for r in each)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,15 @@ def test_fewer_independent_numbers_weigh_as_many_as_they_are() -> None:
     assert float(found @ found) == pytest.approx(4.0)
 
 
-def test_a_sensor_without_noise_is_refused() -> None:
-    for sd, shared in ((0.0, 0.0), (0.0, 1.0)):
-        with pytest.raises(ComparisonError, match="force@1: 3 values with a standard deviation"):
-            whitened(np.ones((3, 1)), sd, shared, name="force@1")
+def test_unstated_noise_is_as_large_as_what_is_shared() -> None:
+    """The mean of k points is then no surer than what they share."""
+    values = np.random.default_rng(1).normal(size=(5, 1))
+    C = 0.2**2 * (np.eye(5) + np.ones((5, 5)))
+    found = whitened(values, 0.0, 0.2)
+    expected = float((values.T @ np.linalg.solve(C, values))[0, 0])
+    assert float(found @ found) == pytest.approx(expected)
+
+
+def test_a_sensor_without_any_uncertainty_is_refused() -> None:
+    with pytest.raises(ComparisonError, match="force@1: 3 values with a standard deviation"):
+        whitened(np.ones((3, 1)), 0.0, 0.0, name="force@1")

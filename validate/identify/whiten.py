@@ -17,13 +17,15 @@ def whitened(
 
     C^(-1/2) is 1/sd across the mean of a component and 1/sqrt(sd^2 + k s^2) along it. `freedom`
     below k c counts the independent numbers: sd then grows so that they weigh no more than these.
-    Raises `ComparisonError` where several points have no noise of their own.
+    A sensor whose noise is not stated (`sd` 0) is taken to differ between points by as much as they
+    share, which widens and never narrows. Raises `ComparisonError` where both are 0.
     """
     k, c = values.shape
+    sd = systematic if sd == 0 and k > 1 else sd
     if freedom is not None and 0 < freedom < k * c:
         sd = sd * float(np.sqrt(k * c / freedom))
     along = float(np.sqrt(sd**2 + k * systematic**2))
-    if along == 0 or (sd == 0 and k > 1):
+    if along == 0:
         raise ComparisonError(
             f"{name}: {k} values with a standard deviation of {sd:g} weigh without limit; state "
             "the noise of the sensor"
