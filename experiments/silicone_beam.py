@@ -3,8 +3,8 @@ by others.
 
 Motion capture of a clamped 30 x 30 x 100 mm beam (srl-ethz/diffPD_sim2real, MIT). Modulus, Poisson
 ratio and density are the data set's own, identified on another load by its authors; how the
-silicone relaxes is identified on the ring-down under gravity alone, and so is the modulus with
-`--set material.E=none`. Another case: `--set recording=NEW.c3d --set load.mass=52g`.
+silicone relaxes is identified on the ring-down under gravity alone. Another case:
+`--set recording=NEW.c3d --set load.mass=52g`.
 """
 
 from collections.abc import Callable
@@ -127,11 +127,6 @@ SWUNG = tuple(f"{quantity_of(name)}@{LABEL}" for name in TIPS)
 RUNG = (f"{FREQUENCY}@{LABEL}", f"{DAMPING}@{LABEL}")
 GRAVITY = "the recording under gravity alone"
 CALIBRATIONS = (
-    Calibration(
-        "still",
-        (Free("material.E", 1e5, 1e6, "assumed: soft silicones", "a force"),),
-        (Calibrates(("tip.vertical@settled",), _gravity_alone, GRAVITY),),
-    ),
     Calibration(
         "ring_down",
         (

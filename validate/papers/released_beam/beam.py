@@ -31,7 +31,6 @@ from validate.papers.released_beam.cards import (
 from validate.papers.released_beam.gaps import over
 from validate.papers.released_beam.recorded import REST, SWING
 from validate.papers.released_beam.swing import LABEL, Swing
-from validate.parameters import known
 from validate.recording.types import Markers, Recording
 from validate.register.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import Deviation, Selection, Simulated
@@ -84,7 +83,7 @@ def _material(p: ReleasedBeam, model: BeamModel) -> Material:
     card = p.material
     relaxes = model.law not in ("linear", "svk")
     return Material(
-        known(card.E, "material.E"),
+        card.E,
         card.nu,
         model.law,
         card.rho,

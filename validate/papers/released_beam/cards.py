@@ -61,9 +61,7 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class BeamSilicone:
-    E: float | None = quantity(
-        263_824.0, "Pa", "relaxed modulus, as the data set declares it; none: identified"
-    )
+    E: float = quantity(263_824.0, "Pa", "relaxed modulus, as the data set declares it")
     nu: float = quantity(0.499, "1", "Poisson ratio that the data set declares")
     rho: float = quantity(1070.0, "kg/m3", "density that the data set declares")
     coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
