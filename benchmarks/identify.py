@@ -4,7 +4,7 @@ OMP_NUM_THREADS=1 python benchmarks/identify.py [WORKERS]    local processes (de
 
 The body is `benchmarks/identified_block.py`, Mooney-Rivlin in three load steps. Wall time is that
 of all cells with nothing kept from before; CPU time is that of the processes, which a busy machine
-changes less. November 2026: 240 s of CPU time, two minutes on two free cores; 638 s of wall time
+changes less. November 2026: 240 s of CPU time (two free cores: not measured); 638 s of wall time
 where some twenty processes shared them.
 """
 
