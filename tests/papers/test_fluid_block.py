@@ -1,0 +1,166 @@
+"""The planar block of paper 000, section 3.3: numbers computed apart, every set-up, refusals."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from validate.errors import SceneError, UsageError
+from validate.papers.fluid_block.block import (
+    Cavities,
+    FluidBlock,
+    PlaneBlock,
+    PlaneGrid,
+    block_mesh,
+    record,
+)
+from validate.papers.fluid_block.curves import condensed_block, curve_exhibit, curve_of
+from validate.papers.fluid_block.updates import laws_exhibit, several_exhibit, updates_exhibit
+from validate.replay import load as experiment_named
+from validate.replay.options import Options
+from validate.replay.road import compare
+from validate.solve.pressure_curve import RATIOS
+
+SMALL = replace(FluidBlock(), mesh=PlaneGrid(20), strains=(0.03, 0.15))
+
+
+def silent(_: str) -> None:
+    pass
+
+
+def with_mesh(squares: int, order: Any = None, **cavities: Any) -> FluidBlock:
+    p = FluidBlock()
+    return replace(p, mesh=PlaneGrid(squares, order), cavities=replace(p.cavities, **cavities))
+
+
+def test_the_curve_of_the_note() -> None:
+    """An earlier study, N = 50, a = 10 mm: fixed and following normals."""
+    small = condensed_block(with_mesh(50), 1)
+    curve = curve_of(small)
+    assert len(small.responses.scene.mesh.nodes) == 2520
+    assert len(small.nodes) == 40
+    assert curve.slope == pytest.approx(9832.3, abs=0.06)
+    assert curve.gain == pytest.approx(9857.3, abs=0.06)
+    assert curve.fixed[[0, -1]] == pytest.approx([-3095.85, 2827.77], abs=0.01)
+    assert curve.follower[[0, -1]] == pytest.approx([-3321.5, 2575.1], abs=0.06)
+    assert curve.follower[30] == pytest.approx(0.0, abs=1e-9)
+    assert 60 < curve.off < 100
+
+
+def test_following_normals_are_the_fixed_ones_for_small_changes() -> None:
+    curve = curve_of(condensed_block(with_mesh(20), 1))
+    near = slice(29, 32)
+    assert curve.follower[near] == pytest.approx(curve.fixed[near], rel=0.02, abs=1e-9)
+    shares = np.diff(curve.follower) / np.diff(RATIOS)
+    assert shares[30] == pytest.approx(curve.slope, rel=0.05)
+    assert (shares > 0).all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_cavities_stand_in_a_row(count: int) -> None:
+    mesh = block_mesh(PlaneBlock(), Cavities(count), 40)
+    middles = [mesh.nodes[mesh.facet_nodes(f"cavity{k}")].mean(axis=0) for k in range(count)]
+    apart = 0.015 * (np.arange(count) - (count - 1) / 2)
+    assert np.array(middles) == pytest.approx(
+        np.column_stack([apart, np.full(count, -0.025)]), abs=1e-12
+    )
+    assert {len(mesh.facets[f"cavity{k}"]) for k in range(count)} == {32}
+    assert len(mesh.facets["top"]) == 40
+    assert len(mesh.facets["patch"]) == 8
+
+
+@pytest.mark.parametrize(
+    ("cavities", "squares", "words"),
+    [
+        (Cavities(4), 40, "1, 2 or 3"),
+        (Cavities(3, septum=0.01), 40, "touch the outside"),
+        (Cavities(1, width=0.05), 40, "touch the outside"),
+        (Cavities(2, septum=0.0), 40, "is 0.000 squares"),
+        (Cavities(1, width=0.0101), 40, r"width = 10.1 mm is 8.080 squares"),
+        (Cavities(2), 50, "not centred on whole ones"),
+    ],
+)
+def test_cavities_without_sense_are_refused(cavities: Cavities, squares: int, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        block_mesh(PlaneBlock(), cavities, squares)
+
+
+@pytest.mark.parametrize("strains", [(), (0.1, 0.05), (0.6,), (0.0, 0.1), (float("nan"),)])
+def test_strains_without_sense_are_refused(strains: tuple[float, ...]) -> None:
+    with pytest.raises(UsageError, match=r"rising numbers between 0 and \.5"):
+        FluidBlock(strains=strains)
+
+
+SETUPS = (
+    {"tool": "needle"},
+    {"tool": "patch", "body.patch": "0.02"},
+    {"body.plane": "stress"},
+    {"body.plates": "bonded"},
+    {"cavities.count": "2"},
+    {"cavities.count": "3"},
+    {"cavities.width": "0.015", "cavities.height": "0.005"},
+    {"mesh.order": "2"},
+)
+
+
+@pytest.mark.parametrize("values", SETUPS, ids=lambda v: "+".join(f"{k}={x}" for k, x in v.items()))
+def test_every_set_up_is_reached_from_the_parameters(values: dict[str, str]) -> None:
+    """The twin is made anew on another mesh; the model predicts its pressures within the limits."""
+    experiment = experiment_named("fluid_block")
+    few = {"strains": "0.01,0.1", "mesh.squares": "20", "twin.squares": "40"}
+    found = compare(
+        replace(experiment, uncertainty=None, accept=(), accepted=()),
+        Options({**few, **values}, ("p2_exact",), quick=True),
+    )
+    residuals = found.methods[0].residuals
+    cavities = int(values.get("cavities.count", "1"))
+    share = 0.2 if values.get("tool") == "needle" else 0.05  # a driven node has the mesh's size
+    names = [f"pressure{k}@pressed" for k in range(cavities)] + ["force@pressed"]
+    for name in names:
+        residual = residuals[name]
+        scale = np.abs(residual.reference).max()
+        assert np.abs(residual.values).max() < share * scale + 40.0, name
+
+
+def test_the_printed_claim_by_tool() -> None:
+    """At most one update to 1 % under a needle, two under a plate at 15 % (findings: 2 to 4)."""
+    shown, numbers = updates_exhibit(SMALL, silent)
+    assert numbers["needle.cold"] == 1
+    assert numbers["plate.cold"] == 2
+    names = [t.name for t in shown.tables]
+    assert names == ["updates_needle", "updates_patch", "updates_plate", "updates_warm"]
+    rows = {row[:2]: row[2:4] for row in shown.tables[2].rows}
+    assert rows["newton", "1e-12"] <= (4, 4)
+    assert rows["newton", "1e-12"][1] < rows["proportional", "1e-12"][1]
+
+
+def test_scalar_gains_weaken_as_the_septum_thins() -> None:
+    shown, radii = several_exhibit(replace(SMALL, mesh=PlaneGrid(40)), silent)
+    own = [radii[f"2.{share}.own"] for share in ("2", "1", "0.5", "0.25")]
+    assert own == sorted(own)
+    assert radii["2.0.25.matrix"] < 0.5 * own[-1]
+    assert any(row[-1] != "settled" for row in shown.tables[0].rows)
+
+
+def test_substitution_diverges_beyond_the_slope_and_newton_does_not() -> None:
+    shown = laws_exhibit(SMALL)
+    rows = [row for row in shown.tables[0].rows if str(row[0]).startswith("P = -B")]
+    assert [row[-1] is None for row in rows] == [False, False, False, True, True, True]
+    assert all(isinstance(row[3], int) and row[3] <= 5 for row in rows)
+    assert "beyond 0.7 to 1.3" in shown.words[0]
+
+
+def test_a_curve_is_shown_with_its_units() -> None:
+    shown = curve_exhibit([("one", curve_of(condensed_block(with_mesh(10), 2)))])
+    assert all("/" in h or h == "cavity" for h in shown.tables[0].headings)
+    assert shown.charts[0].series[0].label == "fixed normals, exact"
+
+
+def test_the_recording_is_seeded() -> None:
+    p = replace(SMALL, twin=replace(SMALL.twin, squares=20))
+    one, two = record(p, silent), record(p, silent)
+    assert np.array_equal(one.signals["force"].y, two.signals["force"].y)
+    other = record(replace(p, twin=replace(p.twin, seed=4)), silent)
+    assert not np.array_equal(one.signals["force"].y, other.signals["force"].y)
+    assert one.metadata["provenance"]["plane"] == "strain"
