@@ -93,7 +93,7 @@ def test_a_folder_that_is_named_is_looked_at(
 def test_of_all_each_ends_for_itself(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compared: list[str] = []
 
-    def without_data(experiment: Experiment, options: Options, report: object) -> None:
+    def without_data(experiment: Experiment, options: Options, *_: object) -> None:
         compared.append(experiment.name)
         raise RecordingError("no logs")
 
@@ -102,7 +102,7 @@ def test_of_all_each_ends_for_itself(own: Path, monkeypatch: pytest.MonkeyPatch)
     for arguments in (["run", "--all"], ["check"]):
         compared.clear()
         code, _, err = here(*arguments, cwd=own)
-        assert code == 2
+        assert code == 2, err
         assert {"fluid_phantom", "kf_cube"} <= set(compared)
         broken = ("fine", "falls", "leaves", "unread", "helper")
         assert len(err.splitlines()) == len(compared) + len(broken)

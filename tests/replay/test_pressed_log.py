@@ -44,4 +44,4 @@ def test_what_is_rounding_is_the_larger_of_two_bounds() -> None:
 
 def test_both_sizes_of_a_specimen_are_asked_for() -> None:
     asked = {p.path: p.asked for p in describe(Specimen())}
-    assert asked == {"diameter": True, "height": True, "mesh": False}
+    assert asked == {"diameter": True, "height": True, "mesh": False, "mesh_unit": False}

@@ -29,7 +29,7 @@ _PRESSED = 0.15  # strain of Fig. 3, whose own is not printed
 
 
 @dataclass(frozen=True)
-class Curve:
+class PressureCurve:
     """Pressures Pa at `RATIOS` of one cavity, the others at zero; `follower` with normals that turn
     with the wall, Pa."""
 
@@ -58,11 +58,11 @@ def condensed_block(p: FluidBlock, order: int) -> Condensed:
     return condense(build_system(scene), np.zeros(0, dtype=np.int64))
 
 
-def curve_of(small: Condensed, cavity: int = 0) -> Curve:
+def curve_of(small: Condensed, cavity: int = 0) -> PressureCurve:
     r = small.responses
     fixed = pressure_at_volume(r, RATIOS, cavity)
     V0, rise = r.rest_volumes[cavity], 3 * r.volumes[cavity, 0, 0, 1 + cavity]
-    return Curve(fixed, follower_pressures(small, cavity, fixed), float(V0 / rise),
+    return PressureCurve(fixed, follower_pressures(small, cavity, fixed), float(V0 / rise),
                  tuned_gain(r, cavity))  # fmt: skip
 
 
@@ -110,7 +110,7 @@ def _wall(surface, x: Floats, A: Floats, u: Floats, P: float) -> Floats:  # type
     raise SceneError(f"the wall does not settle at {P:.4g} Pa: it still moves by {moved:.2g} m")
 
 
-def curve_exhibit(curves: Sequence[tuple[str, Curve]]) -> Exhibit:
+def curve_exhibit(curves: Sequence[tuple[str, PressureCurve]]) -> Exhibit:
     """Fig. 4a: a chart of the first curve, all in a table."""
     name, first = curves[0]
     line = np.asarray(np.polyval(np.polyfit(RATIOS, first.fixed, 1), RATIOS), dtype=np.float64)
