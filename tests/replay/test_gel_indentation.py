@@ -72,7 +72,7 @@ def test_the_upper_box_is_predicted_by_the_lower_one(
 ) -> None:
     """Ratios of the error to the floor; aims: 1.5 in the lower box, 2.2 in the upper one."""
     monkeypatch.setenv("VALIDATE_SHARED_DATA", str(shared_data))
-    result = compare(load_file(project_root / "experiments" / "gel_indentation.py"), Options())
+    result = compare(load_file(project_root / "experiments" / "gel_indentation.py"), Options({}))
     (nu,) = (s for s in result.identified if s.name == "material.nu")
     assert 0.44 < nu.value < 0.49
     lower = {s.name: s.value for s in result.identified}

@@ -126,10 +126,10 @@ def _map(name: str, label: str, error: Floats, seen: DisplacementObservation) ->
         for j in range(_ACROSS):
             here = (z >= zs[i]) & (z < zs[i + 1]) & (x >= xs[j]) & (x < xs[j + 1])
             if here.sum() >= _FEW:
-                values[_HEIGHTS - 1 - i, j] = _UM * rms(error[here])
+                values[i, j] = _UM * rms(error[here])
     return Heat(
         f"map_{name}", f"Where the errors are: {label}", "x in the box (µm)", "z in the box (µm)",
         tuple(f"{_UM * (a + b) / 2:.0f}" for a, b in pairwise(xs)),
-        tuple(f"{_UM * (a + b) / 2:.1f}" for a, b in pairwise(zs))[::-1],
+        tuple(f"{_UM * (a + b) / 2:.1f}" for a, b in pairwise(zs)),
         values, "rms error (µm)",
     )  # fmt: skip
