@@ -17,13 +17,14 @@ from validate.identify.identification import identify as identify_in
 from validate.identify.least_squares import fit
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
-from validate.replay.calibrated_words import headlines, lines, not_identified, scores
+from validate.replay.calibrated_words import headlines, lines, not_identified, scores, unit_of
 from validate.replay.calibration import Calibrates, Calibration, Change, Free
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.replay.origins import opened
 from validate.replay.problem import Calibrated, Part, Problem, with_free
 from validate.replay.remade import made_by
+from validate.report.numbers import with_unit
 
 #: From the number of a calibration among those of its experiment, and its problem.
 Identify = Callable[[int, Problem], Identification]
@@ -285,8 +286,9 @@ def _input(one: Calibrated, name: str, step: Any, most: int) -> Input:
         return with_free(parameters, dict(zip(space.names, values, strict=True)))
 
     e = one.found.estimates[most]
-    words = f"{e.name} within its covariance, {e.value:.5g} ± {e.sd:.2g} (one sd), and what goes "
-    return Input(name, move, words + "with it", f"identified on {one.on}", identified=True)
+    value, sd = (with_unit(v, unit_of(one, e.name)) for v in (e.value, e.sd))
+    words = f"{e.name} within its covariance, {value} ± {sd} (one sd), and what goes with it"
+    return Input(name, move, words, f"identified on {one.on}", identified=True)
 
 
 def identified_by(

@@ -27,9 +27,13 @@ def headlines(fitted: Sequence[Calibrated]) -> str:
 
 def headline(one: Calibrated) -> str:
     """Fitted on what."""
-    units = {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}
-    each = ", ".join(_interval(e, units[e.name]) for e in one.found.estimates)
+    each = ", ".join(_interval(e, unit_of(one, e.name)) for e in one.found.estimates)
     return f"Fitted: {each} with '{one.problem.calibration.method}' on {one.on}"
+
+
+def unit_of(one: Calibrated, path: str) -> str:
+    """The unit of what was identified."""
+    return {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}[path]
 
 
 def _interval(e: Profiled, unit: str) -> str:
@@ -39,17 +43,22 @@ def _interval(e: Profiled, unit: str) -> str:
 
 def predicted(results: Sequence[MethodResult]) -> str:
     """Predicted what, within what: the accepted methods' checks that are evidence."""
-    found = [c for m in results for c in m.checks if c.evidence or c.verdict == "cannot decide"]
+    several = sum(bool(m.checks) for m in results) > 1
+    found = [
+        (c, f" by {m.name}" if several else "")
+        for m in results for c in m.checks
+        if c.count and (c.evidence or c.verdict == "cannot decide")
+    ]  # fmt: skip
     if not found:
         return "predicted: nothing, for all that is judged served to fit"
-    each = (_within(c) for c in found[:_SHOWN])
+    each = (_within(*one) for one in found[:_SHOWN])
     more = f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else ""
     return f"predicted: {', '.join(each)}{more}"
 
 
-def _within(c: Check) -> str:
+def _within(c: Check, by: str) -> str:
     off, doubt = with_unit(abs(c.value), c.unit), with_unit(2 * c.u_val, c.unit)
-    return f"{c.name} off by {off} (2 u_val {doubt})"
+    return f"{c.name}{by} off by {off} (2 u_val {doubt})"
 
 
 def lines(one: Calibrated) -> tuple[str, ...]:
@@ -73,9 +82,12 @@ def lines(one: Calibrated) -> tuple[str, ...]:
 
 def not_identified(one: Calibrated, e: Profiled, free: Free) -> str:
     """Why, with its numbers, and the measurement that would help."""
+    value, low, high = (
+        with_unit(v, unit_of(one, e.name), _DIGITS) for v in (e.value, e.low, e.high)
+    )
     return (
-        f"{e.name} is not identifiable from {one.on}: {'; '.join(e.findings)} ({e.value:.5g}, 95 % "
-        f"{e.low:.5g} to {e.high:.5g}); {helping(free)} would identify it"
+        f"{e.name} is not identifiable from {one.on}: {'; '.join(e.findings)} ({value}, 95 % {low} "
+        f"to {high}); {helping(free)} would identify it"
     )
 
 
@@ -88,10 +100,9 @@ def scores(fitted: Iterable[Calibrated]) -> tuple[Score, ...]:
     """Every value with its interval, in SI."""
     found = []
     for one in fitted:
-        units = {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}
         for e in one.found.estimates:
             words = f"identified on {one.on}; 95 % profile interval {e.low:.6g} to {e.high:.6g}"
             found.append(
-                Score(e.name, e.value, units[e.name], one.found.best.count, _AGAINST, words)
+                Score(e.name, e.value, unit_of(one, e.name), one.found.best.count, _AGAINST, words)
             )
     return tuple(found)

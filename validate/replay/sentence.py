@@ -1,5 +1,6 @@
 """The words that open a report and a terminal: what was judged by what, and what came of it."""
 
+from collections import Counter
 from collections.abc import Iterable
 
 from validate.compare.overall import Overall, judge_all
@@ -67,9 +68,11 @@ def _of(method: MethodResult, kind: Kind) -> str:
 def _corrected(found: Overall) -> str:
     """What the correction for many checks changes; nothing where none differs."""
     if found.differs:
+        names = Counter(c.name for c in found.differs)
+        each = [f"{name} ({n} methods)" if n > 1 else name for name, n in names.items()]
         return (
-            f" Corrected for {found.total} checks (Holm), {len(found.differs)} still differ: "
-            f"{_named(found.differs)}."
+            f" Corrected for {found.total} checks (Holm), {len(names)} still differ: "
+            f"{_listed(each)}."
         )
     if found.alone:
         return (
@@ -80,6 +83,9 @@ def _corrected(found: Overall) -> str:
 
 
 def _named(found: Iterable[Check | Published]) -> str:
-    names = [f.name for f in found]
+    return _listed([f.name for f in found])
+
+
+def _listed(names: list[str]) -> str:
     shown = ", ".join(names[:4])
     return shown if len(names) <= 4 else f"{shown} and {len(names) - 4} others"

@@ -157,19 +157,31 @@ def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: C
 
 
 def _speeds(experiment: Experiment, main: Mapping[str, Followed]) -> Exhibit:
+    if all(f.run.step_s is None for f in main.values()):
+        return _endings(main)
     base = main.get(experiment.reference)
     factor = _real_time(base) if base else None
-    named = base.label if base else "not run"
+    cost = f"; cost is computing time per recorded time over that of '{base.label}'" if base else ""
     table = NumberTable(
         "speeds",
         "Time per step, every method in this run on this machine, one thread. The real-time factor "
-        "is recorded over computing time; cost is computing time per recorded time over that of "
-        f"'{named}'. dt is that of a step of the integration.",
+        f"is recorded over computing time{cost}. dt is that of a step of the integration.",
         ("method", "set-up / s", "step p50 / ms", "p99 / ms", "rate / Hz", "dt / ms",
          "dt over critical / 1", "real-time factor / 1", "cost / 1", "steps", "ended"),
         tuple(_speed_row(f, factor) for f in main.values()),
     )  # fmt: skip
     return Exhibit("speeds", "Time per step", tables=(table,))
+
+
+def _endings(main: Mapping[str, Followed]) -> Exhibit:
+    """Of methods that solve a scene at once: there is no step to time."""
+    rows = tuple((f.label, f.run.setup_s, f.run.outcome.state, f.run.outcome.why)
+                 for f in main.values())  # fmt: skip
+    table = NumberTable(
+        "speeds", "Every method solves its scene at once.",
+        ("method", "time / s", "ended", "why"), rows, below="why",
+    )  # fmt: skip
+    return Exhibit("speeds", "How every method ended", tables=(table,))
 
 
 def _real_time(f: Followed) -> float | None:
