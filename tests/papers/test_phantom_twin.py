@@ -60,6 +60,17 @@ def test_sensors_read_the_simulation_with_their_declared_noise(twin: Recording) 
     assert (noisy - radius).std() == pytest.approx(0.15e-3, rel=0.3)
 
 
+def test_the_sweep_shows_sections_of_the_inclusion_at_rest(twin: Recording) -> None:
+    """Images at 2 mm steps from 17 mm below the outline's plane on; 14 of 18 meet the capsule."""
+    sweep, position = twin.contours["sweep"], twin.signals["sweep_position"]
+    at = np.interp(sweep.t, position.t, position.y[:, 0])
+    assert at == pytest.approx(1e-3 * np.arange(-13, 14, 2), abs=1e-5)
+    assert sweep.t[-1] < 7.0  # the stage rests for 7 s
+    over = np.maximum(np.abs(at) - 5.5e-3, 0)
+    radii = [np.linalg.norm(o - [0.0206, 0.0284], axis=1).mean() for o in sweep.outlines]
+    assert radii == pytest.approx(np.sqrt(8.5e-3**2 - over**2), abs=0.25e-3)  # of a coarse wall
+
+
 def test_signs_compression_and_closing_are_positive(twin: Recording) -> None:
     stage, force, pressure = (twin.signals[k].y[-1, 0] for k in ("stage", "load_cell", "pressure"))
     assert stage == pytest.approx(0.009, abs=1e-5)
@@ -97,13 +108,14 @@ def test_every_sensor_has_a_stream_of_its_own() -> None:
 def test_the_shipped_recording_is_made_again_to_1e_9(project_root: Path) -> None:
     shipped = read_recording(project_root / "recordings" / "fluid_phantom.mcap")
     again = made(PhantomTwin())
-    scale = {"stage": 1e-2, "load_cell": 7.0, "pressure": 1e3}
+    scale = {"stage": 1e-2, "sweep_position": 1e-2, "load_cell": 7.0, "pressure": 1e3}
     for topic, size in scale.items():
         one, other = again.signals[topic], shipped.signals[topic]
         assert apart((one.t, one.y), (other.t, other.y)) < 1e-9 * size
     one, other = again.markers["markers"], shipped.markers["markers"]
     assert one.names == other.names
     assert apart((one.t, one.x), (other.t, other.x)) < 1e-9
-    drawn, found = again.contours["outline"], shipped.contours["outline"]
-    assert apart((drawn.t, *drawn.outlines), (found.t, *found.outlines)) < 1e-9
+    for topic in ("outline", "sweep"):
+        drawn, found = again.contours[topic], shipped.contours[topic]
+        assert apart((drawn.t, *drawn.outlines), (found.t, *found.outlines)) < 1e-9
     assert again.record("marker_layout") == shipped.record("marker_layout")

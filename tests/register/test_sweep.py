@@ -1,6 +1,9 @@
 """From images at 2 mm steps to the inclusion's surface and mesh, against a known shape."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,8 +11,9 @@ from sweeps import LeaningCapsule, sweep_frames
 
 from validate.errors import RecordingError, RegistrationError
 from validate.fem.cavity import cavity_surface, volume_of
+from validate.recording.types import Contours
 from validate.register import sweep
-from validate.register.sweep import Stack, surface_of, sweep_stack
+from validate.register.sweep import Stack, stacked, surface_of, sweep_outlines
 from validate.scene.inclusion import Block, block_with_inclusion
 from validate.scene.mesh import cell_volumes
 from validate.twin.ultrasound import Scanner
@@ -31,47 +35,55 @@ def exact(shape: LeaningCapsule) -> Stack:
     ends = shape.centre[2] + np.array([-1, 1]) * shape.length / 2
     centres = np.array([o.mean(axis=0) for _, o in seen])
     outlines = tuple(o for _, o in seen)
-    return Stack(POSE, at, centres, radii, outlines, ends, 0.0, 0.0, (1, 1))
+    return Stack(POSE, at, centres, radii, outlines, ends, 0.0, 0.0)
 
 
-def off_surface(shape: LeaningCapsule, stack: Stack, kind: str) -> np.ndarray:
+def off_surface(shape: LeaningCapsule, stack: Stack, free: float) -> np.ndarray:
     points = shape.surface(30)
-    surface = surface_of(stack, kind)  # type: ignore[arg-type]
+    surface = surface_of(stack, free)
     return surface.distance(points @ POSE[:3, :3].T + POSE[:3, 3])
 
 
 @pytest.fixture(scope="module")
 def stack() -> Stack:
-    return sweep_stack(sweep_frames(OVAL, POSITIONS, SCANNER, POSE, 5), POSITIONS)
+    frames = sweep_frames(OVAL, POSITIONS, SCANNER, POSE, 5)
+    return stacked(sweep_outlines(frames), frames.t, POSITIONS)
+
+
+def drawn(**changes: Any) -> Contours:
+    """The faultless outlines of the round one, one a second."""
+    stack = exact(ROUND)
+    t = np.searchsorted(POSITIONS, stack.positions).astype(float)
+    return replace(Contours(t, stack.outlines, 0.0, POSE, "phantom"), **changes)
+
+
+TIMES = np.arange(len(POSITIONS), dtype=float)
 
 
 def test_exact_slices_give_the_shape_back() -> None:
-    surface = surface_of(exact(ROUND), "circle")
+    surface = surface_of(exact(ROUND))
     assert surface.volume == pytest.approx(ROUND.volume, rel=0.006)
-    assert np.sqrt((off_surface(ROUND, exact(ROUND), "circle") ** 2).mean()) < 0.04e-3
+    assert np.sqrt((off_surface(ROUND, exact(ROUND), 0) ** 2).mean()) < 0.04e-3
     assert surface.radius == pytest.approx(8.5e-3, rel=1e-6)
 
 
 def test_circles_keep_an_ellipse_volume_but_not_its_surface() -> None:
-    circle, free = (surface_of(exact(OVAL), k) for k in ("circle", "free"))
+    circle, free = (surface_of(exact(OVAL), k) for k in (0, 1))
     assert circle.volume == pytest.approx(OVAL.volume, rel=0.006)
     assert free.volume == pytest.approx(OVAL.volume, rel=0.006)
     # Half axes 9.8 and 7.2 mm against a radius of 8.4 mm: 1.4 mm at the vertices.
-    assert np.abs(off_surface(OVAL, exact(OVAL), "circle")).max() == pytest.approx(
-        1.4e-3, abs=0.15e-3
-    )
-    assert np.sqrt((off_surface(OVAL, exact(OVAL), "free") ** 2).mean()) < 0.05e-3
+    assert np.abs(off_surface(OVAL, exact(OVAL), 0)).max() == pytest.approx(1.4e-3, abs=0.15e-3)
+    assert np.sqrt((off_surface(OVAL, exact(OVAL), 1) ** 2).mean()) < 0.05e-3
 
 
 @pytest.mark.slow
 def test_a_sweep_of_images_gives_volume_and_surface(stack: Stack) -> None:
-    assert stack.empty[0] >= 1
-    assert stack.empty[1] >= 1
     assert stack.ends == pytest.approx([8.5e-3, 36.5e-3], abs=1.0e-3)
     assert stack.sd_ends == pytest.approx(2e-3 / np.sqrt(12))
-    free = surface_of(stack, "free")
+    free = surface_of(stack, 1)
     assert free.volume == pytest.approx(OVAL.volume, rel=0.05)
-    rms = {k: np.sqrt((off_surface(OVAL, stack, k) ** 2).mean()) for k in ("free", "circle")}
+    rms = {k: np.sqrt((off_surface(OVAL, stack, free) ** 2).mean())
+           for k, free in (("free", 1), ("circle", 0))}  # fmt: skip
     assert rms["free"] < 0.25e-3
     assert rms["circle"] > 2.5 * rms["free"]  # what the circular assumption costs
     middle = np.abs(stack.positions - 22.5e-3) < 5e-3
@@ -80,7 +92,7 @@ def test_a_sweep_of_images_gives_volume_and_surface(stack: Stack) -> None:
 
 
 def test_the_surface_becomes_a_mesh(stack: Stack) -> None:
-    surface = surface_of(stack, "free")
+    surface = surface_of(stack, 1)
     block = Block(0.060, 0.045, 0.070)
     mesh = block_with_inclusion(block, (15, 15, 19), surface)
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
@@ -92,20 +104,77 @@ def test_the_surface_becomes_a_mesh(stack: Stack) -> None:
 
 
 def test_an_inclusion_that_goes_on_beyond_the_sweep_is_refused() -> None:
-    cut = POSITIONS[4:9]
+    seen = drawn()
+    last = int(seen.t[-1])
     with pytest.raises(RegistrationError, match="reaches the first or last image"):
-        sweep_stack(sweep_frames(ROUND, cut, SCANNER, POSE, 1), cut)
+        stacked(seen, TIMES[: last + 1], POSITIONS[: last + 1])
 
 
-def test_a_sweep_without_an_inclusion_or_order_is_refused() -> None:
+def test_a_sweep_without_an_inclusion_is_refused() -> None:
     empty = POSITIONS[-3:] + 10e-3
-    frames = sweep_frames(ROUND, empty, SCANNER, POSE, 2)
     with pytest.raises(RegistrationError, match="no slice shows an inclusion"):
-        sweep_stack(frames, empty)
-    with pytest.raises(RegistrationError, match="do not grow"):
-        sweep_stack(frames, empty[::-1])
-    with pytest.raises(RegistrationError, match=r"positions: shape \(2,\)"):
-        sweep_stack(frames, empty[:2])
+        sweep_outlines(sweep_frames(ROUND, empty, SCANNER, POSE, 2))
+
+
+def test_outlines_drawn_along_a_stage_are_stacked_in_their_order() -> None:
+    """Downward as upward, with a stage read more often than images are taken."""
+    up = stacked(drawn(), TIMES, POSITIONS)
+    often = np.linspace(0, TIMES[-1], 171)
+    down = stacked(drawn(t=TIMES[-1] - drawn().t[::-1], outlines=drawn().outlines[::-1]),
+                   often, np.interp(often, TIMES, POSITIONS[::-1]))  # fmt: skip
+    assert down.positions == pytest.approx(up.positions, abs=1e-15)
+    assert down.radii == pytest.approx(up.radii, rel=1e-14)
+    assert up.radii == pytest.approx(exact(ROUND).radii, rel=3e-4)  # 180 corners
+    assert up.centres == pytest.approx(exact(ROUND).centres, abs=1e-12)
+    assert up.ends == pytest.approx(exact(ROUND).ends, abs=0.02e-3)
+    assert up.off_round == pytest.approx(0.0, abs=2e-6)
+
+
+def test_what_the_circle_leaves_of_an_ellipse_is_told_by_slice() -> None:
+    """Radii R + a cos 2 phi: a / sqrt 2 off the circle, a = (9.8 - 7.2) / 2 mm, at first order."""
+    seen = stacked(drawn(outlines=exact(OVAL).outlines), TIMES, POSITIONS)
+    middle = np.abs(seen.positions - 22.5e-3) < 5e-3
+    assert seen.off_round[middle] == pytest.approx(1.3e-3 / np.sqrt(2), rel=0.03)
+
+
+def skipped(seen: Contours) -> Contours:
+    return replace(seen, t=np.delete(seen.t, 4), outlines=seen.outlines[:4] + seen.outlines[5:])
+
+
+def moved_aside(seen: Contours) -> Contours:
+    aside = (*seen.outlines[:4], seen.outlines[4] + [9e-3, 0.0], *seen.outlines[5:])
+    return replace(seen, outlines=aside)
+
+
+def flat(seen: Contours) -> Contours:
+    middle = seen.outlines[4].mean(axis=0)
+    thin = middle + (seen.outlines[4] - middle) * [1.6, 0.2]
+    return replace(seen, outlines=(*seen.outlines[:4], thin, *seen.outlines[5:]))
+
+
+def twice(seen: Contours) -> Contours:
+    t = np.insert(seen.t, 4, seen.t[4] - 0.01)
+    return replace(seen, t=t, outlines=(*seen.outlines[:5], *seen.outlines[4:]))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (skipped, r"no slice between 16\.00 and 20\.00 mm, the others are 2\.00 mm apart"),
+        (moved_aside, r"slices at .* cross: their centres lie 9\.\d\d mm apart"),
+        (flat, r"the slice at 18\.00 mm is no section of an inclusion"),
+        (twice, r"two slices lie at 17\.98 and 18\.00 mm"),
+        (lambda s: replace(s, t=s.t[:2], outlines=s.outlines[:2]), "2 slices show the inclusion"),
+        (lambda s: replace(s, t=s.t + 40), r"known at 0\.00\.\.17\.00 s only"),
+        (lambda s: replace(s, pose=np.diag([1.0, 1, -1, 1])), "mirrors the image"),
+    ],
+)
+def test_slices_that_make_no_inclusion_are_refused_in_one_line(
+    spoil: Callable[[Contours], Contours], says: str
+) -> None:
+    with pytest.raises(RegistrationError, match=says) as caught:
+        stacked(spoil(drawn()), TIMES, POSITIONS)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_a_sphere_ends_where_its_sections_say() -> None:

@@ -8,20 +8,23 @@ the two outermost ones as the end of a sphere.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
+import shapely
 
 from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError, RegistrationError
 from validate.recording.images.outline import Outline, extract_outline
-from validate.recording.types import Frames
+from validate.recording.types import Contours, Frames
 from validate.register.plane import require_rigid
 from validate.scene.inclusion_shape import SlicedShape
 
 _ANGLES = 72
 _LEAST = 3  # slices with the inclusion
 _BEYOND = 1.5  # steps the inclusion may go on behind its last outline
+_GAP = 1.5  # median steps between neighbouring slices: above, one is missing
+_OUT_OF_ROUND = 0.3  # of the radius, rms: above, the outline is no section of an inclusion
+_ORDERS = 6  # of the harmonics that an outline is smoothed to
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,6 @@ class Stack:
 
     radii (n,) m of equal area, outlines n x (k, 2) m in image coordinates, ends (2,) m where the
     inclusion vanishes, sd m of the outlines, sd_ends m. pose is T_frame_from_image at position 0.
-    `empty` counts the images before and behind in which nothing was found.
     """
 
     pose: Floats
@@ -41,7 +43,6 @@ class Stack:
     ends: Floats
     sd: float
     sd_ends: float
-    empty: tuple[int, int]
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -50,38 +51,112 @@ class Stack:
             value = checked(getattr(self, name), f"stack {name}", shape, error=RegistrationError)
             object.__setattr__(self, name, value)
 
+    @property
+    def off_round(self) -> Floats:
+        """Radial distance rms (n,) m of every outline from its circle: what the circle leaves."""
+        rings = zip(self.outlines, self.centres, self.radii, strict=True)
+        return np.array([rms(np.linalg.norm(o - c, axis=1) - r) for o, c, r in rings])
 
-def sweep_stack(
+
+def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
+    """The stack of outlines whose image plane lay at positions (m,) m along its normal at times t
+    (m,) s; `sweep.pose` is that at position 0.
+
+    Raises `RegistrationError` for fewer than 3 slices, two at one place, one missing between
+    others, neighbours that share no point, outlines far from a circle, or an inclusion that is
+    still seen where the sweep begins or ends.
+    """
+    require_rigid(sweep.pose, "sweep")
+    at = _placed(sweep.t, t, positions)
+    order = np.argsort(at, kind="stable")
+    at, outlines = at[order], tuple(sweep.outlines[i] for i in order)
+    step = _step(at)
+    discs = [shapely.Polygon(o) for o in outlines]
+    centres = np.array([shapely.get_coordinates(d.centroid)[0] for d in discs])
+    radii = np.sqrt([d.area / np.pi for d in discs])
+    ends = np.array([_end(at[:2][::-1], radii[:2][::-1], step), _end(at[-2:], radii[-2:], step)])
+    if positions.min() >= at[0] or positions.max() <= at[-1]:
+        raise RegistrationError(
+            "the inclusion reaches the first or last image of the sweep; its end is not seen"
+        )
+    stack = Stack(
+        sweep.pose, at, centres, radii, outlines, ends, sweep.sd, float(step / np.sqrt(12))
+    )
+    _require_sections(stack)
+    return stack
+
+
+def _placed(seen: Floats, t: Floats, positions: Floats) -> Floats:
+    """Positions (n,) m at the times (n,) s of the outlines."""
+    positions = checked(positions, "positions", (len(t),), error=RegistrationError)
+    if len(seen) < _LEAST:
+        raise RegistrationError(
+            f"{len(seen)} slices show the inclusion, {_LEAST} are needed; sweep in smaller steps "
+            "or give its rough centre and radius"
+        )
+    if seen.min() < t[0] or seen.max() > t[-1]:
+        raise RegistrationError(
+            f"slices at {seen.min():.2f}..{seen.max():.2f} s, but the position of the plane is "
+            f"known at {t[0]:.2f}..{t[-1]:.2f} s only; record it over the whole sweep"
+        )
+    return np.asarray(np.interp(seen, t, positions))
+
+
+def _step(at: Floats) -> float:
+    """The step m between slices at growing positions `at` (n,) m, none missing, none twice."""
+    gaps = np.diff(at)
+    step = float(np.median(gaps))
+    near, far = int(gaps.argmin()), int(gaps.argmax())
+    if gaps[near] <= 0.1 * step:
+        raise RegistrationError(
+            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, the others "
+            f"{1e3 * step:.2f} mm apart; keep one of them"
+        )
+    if gaps[far] > _GAP * step:
+        raise RegistrationError(
+            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, the others are "
+            f"{1e3 * step:.2f} mm apart: outline the missing image"
+        )
+    return step
+
+
+def _require_sections(stack: Stack) -> None:
+    worst = int((stack.off_round / stack.radii).argmax())
+    if stack.off_round[worst] > _OUT_OF_ROUND * stack.radii[worst]:
+        raise RegistrationError(
+            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is no section of an inclusion: "
+            f"{1e3 * stack.off_round[worst]:.2f} mm rms off a radius of "
+            f"{1e3 * stack.radii[worst]:.2f} mm; outline it anew"
+        )
+    moved = np.linalg.norm(np.diff(stack.centres, axis=0), axis=1)
+    apart = moved - np.minimum(stack.radii[:-1], stack.radii[1:])
+    i = int(apart.argmax())
+    if apart[i] > 0:
+        raise RegistrationError(
+            f"the slices at {1e3 * stack.positions[i]:.2f} and {1e3 * stack.positions[i + 1]:.2f} "
+            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm apart, more than a radius; "
+            "outline them anew"
+        )
+
+
+def sweep_outlines(
     frames: Frames,
-    positions: Floats,
     *,
     centre: Sequence[float] | Floats | None = None,
     radius: float | None = None,
     bright: bool = False,
-) -> Stack:
-    """The stack of a sweep: frame i lies at positions[i] m along the image normal of frames.pose.
+) -> Contours:
+    """Outlines of the images of a sweep that show the inclusion, which lie side by side.
 
     The clearest of six slices is outlined first (with the rough centre and radius, if given), the
-    others from there to both ends, each near its neighbour. Raises `RegistrationError` for
-    positions that do not grow, fewer than 3 slices with an inclusion, or an inclusion that reaches
-    the first or last image.
+    others from there to both ends, each near its neighbour. Raises `RegistrationError` where no
+    image shows an inclusion.
     """
-    require_rigid(frames.pose, "sweep")
-    positions = checked(positions, "positions", (len(frames.images),), error=RegistrationError)
-    if (np.diff(positions) <= 0).any():
-        raise RegistrationError("positions of the slices do not grow; order the images along them")
     found = _tracked(frames, centre, radius, bright)
     kept = sorted(found)
-    if len(kept) < _LEAST:
-        raise RegistrationError(
-            f"{len(kept)} of {len(frames.images)} slices show the inclusion, {_LEAST} are needed; "
-            "sweep in smaller steps or give its rough centre and radius"
-        )
-    if kept[0] == 0 or kept[-1] == len(frames.images) - 1:
-        raise RegistrationError(
-            "the inclusion reaches the first or last image of the sweep; its end is not seen"
-        )
-    return _stack(frames, positions, [(i, found[i]) for i in kept])
+    outlines = tuple(found[i].points for i in kept)
+    sd = rms([found[i].sd for i in kept])
+    return Contours(frames.t[kept], outlines, sd, frames.pose, frames.frame)
 
 
 def _tracked(
@@ -139,27 +214,6 @@ def _beside(frames: Frames, i: int, near: Outline, bright: bool) -> Outline | No
     return None
 
 
-def _stack(frames: Frames, positions: Floats, kept: list[tuple[int, Outline]]) -> Stack:
-    at = positions[[i for i, _ in kept]]
-    radii = np.array([o.radius for _, o in kept])
-    first, last = kept[0][0], kept[-1][0]
-    ends = [
-        _end(at[:2][::-1], radii[:2][::-1], float(positions[first] - positions[first - 1])),
-        _end(at[-2:], radii[-2:], float(positions[last + 1] - positions[last])),
-    ]
-    return Stack(
-        frames.pose,
-        at,
-        np.array([o.centre for _, o in kept]),
-        radii,
-        tuple(o.points for _, o in kept),
-        np.array(ends),
-        rms([o.sd for _, o in kept]),
-        float(np.diff(positions).max() / np.sqrt(12)),
-        (first, len(frames.images) - 1 - last),
-    )
-
-
 def _end(at: Floats, radii: Floats, step: float) -> float:
     """Where a sphere through the two outermost sections ends, not far behind the last of them.
 
@@ -174,20 +228,26 @@ def _end(at: Floats, radii: Floats, step: float) -> float:
     return float(at[1] + outward * np.clip(tip, 0.1 * step, _BEYOND * step))
 
 
-def surface_of(stack: Stack, sections: Literal["circle", "free"] = "circle") -> SlicedShape:
-    """The inclusion's surface in scene coordinates: circles as in the paper, or free outlines."""
-    radii = np.repeat(stack.radii[:, None], _ANGLES, axis=1)
-    if sections == "free":
-        pairs = zip(stack.outlines, stack.centres, strict=True)
-        radii = np.array([_polar(outline, centre) for outline, centre in pairs])
+def surface_of(stack: Stack, free: float = 0.0) -> SlicedShape:
+    """The inclusion's surface in scene coordinates: circles as in the paper (0), the outlines (1),
+
+    smoothed, or what lies between and beyond. Every section keeps its area.
+    """
+    rings = zip(stack.outlines, stack.centres, stack.radii, strict=True)
+    away = np.array([_out_of_round(outline, centre) for outline, centre, _ in rings])
+    squares = stack.radii[:, None] ** 2 + free * away
+    radii = np.sqrt(np.maximum(squares, 0.0))
     return SlicedShape(stack.pose, stack.positions, stack.centres, radii, stack.ends)
 
 
-def _polar(outline: Floats, centre: Floats) -> Floats:
-    """Radii (72,) m of an outline about its centre at equal angles."""
+def _out_of_round(outline: Floats, centre: Floats) -> Floats:
+    """Squared radii (_ANGLES,) m^2 of an outline about its centre at equal angles, less their mean:
+    harmonics 2 to `_ORDERS`, so that noise of single points stays out."""
     away = outline - centre
     angle = np.mod(np.arctan2(away[:, 1], away[:, 0]), 2 * np.pi)
     order = np.argsort(angle, kind="stable")
     angles = np.arange(_ANGLES) * (2 * np.pi / _ANGLES)
-    radius = np.linalg.norm(away, axis=1)[order]
-    return np.asarray(np.interp(angles, angle[order], radius, period=2 * np.pi))
+    squares = np.interp(angles, angle[order], (away**2).sum(axis=1)[order], period=2 * np.pi)
+    waves = np.fft.rfft(squares)
+    waves[:2], waves[_ORDERS + 1 :] = 0.0, 0.0
+    return np.asarray(np.fft.irfft(waves, _ANGLES))

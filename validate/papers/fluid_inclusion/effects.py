@@ -1,8 +1,18 @@
 """What is uncertain of paper 000's phantom, and what each choice of a model moves."""
 
+from dataclasses import replace
+from typing import Any
+
 from validate.replay.cards import changed, moved
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
 from validate.replay.inclusion import BLOCK_MESHES, INPUTS, gridded
+
+
+def _rounder(p: Any, z: float) -> Any:
+    if p.inclusion.shape == "capsule":
+        return p
+    return replace(p, inclusion=replace(p.inclusion, free=p.inclusion.free + z))
+
 
 ALL = (
     *INPUTS,
@@ -20,6 +30,9 @@ ALL = (
     Input("inclusion length",
           moved("inclusion", longer=lambda p, z: p.inclusion.longer + z * p.ranges.length),
           "length of the meshed inclusion", "assumed"),
+    Input("circular sections", _rounder,
+          "a swept inclusion from circles to its outlines (harmonics 2 to 6); a capsule stays",
+          "measured: outlines of the sweep beside their circles"),
 )  # fmt: skip
 UNCERTAINTY = Uncertainty(BLOCK_MESHES, ALL, surrogate="md_fluid")
 

@@ -9,6 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from validate.errors import UsageError
+from validate.papers.fluid_inclusion.swept import (
+    SWEEP,
+    off_circles,
+    outlined_sweep,
+    stack_of,
+    swept,
+)
 from validate.papers.fluid_inclusion.twin import PhantomTwin, record_phantom
 from validate.parameters import quantity
 from validate.recording.images.outline import outlines_of
@@ -19,6 +27,7 @@ from validate.register.markers import Sampling, Together
 from validate.register.outlines import Corner
 from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
+from validate.register.sweep import Stack
 from validate.replay.experiment import Progress
 from validate.replay.inclusion import (
     BlockCard,
@@ -31,6 +40,7 @@ from validate.replay.inclusion import (
     pressed_block,
 )
 from validate.scene.inclusion import Capsule, block_with_inclusion
+from validate.scene.inclusion_shape import InclusionShape
 from validate.scene.material import LawName, Material
 from validate.scene.plates import Contact
 from validate.scene.scene import Dilatation, Membrane, Scene
@@ -40,6 +50,12 @@ from validate.scene.scene import Dilatation, Membrane, Scene
 class InclusionCard:
     """None: centre x, z and radius from the rest outline, the rest from the declared sweep."""
 
+    shape: Literal["capsule", "sweep"] = quantity(
+        "capsule", "1", "capsule through the rest outline, or meshed from the outlines of a sweep"
+    )
+    free: float = quantity(
+        0.0, "1", "sections of a sweep: circles of equal area (0) to the outlines themselves (1)"
+    )
     centre_x: float | None = quantity(None, "m", "centre along the stage; none: from the outline")
     centre_y: float | None = quantity(None, "m", "height of the centre; none: from the sweep")
     centre_z: float | None = quantity(None, "m", "lateral centre; none: from the outline")
@@ -47,6 +63,15 @@ class InclusionCard:
     length: float | None = quantity(None, "m", "length along y; none: from the sweep")
     wider: float = quantity(0.0, "m", "added to the radius that is meshed")
     longer: float = quantity(0.0, "m", "added to the length that is meshed")
+
+    def __post_init__(self) -> None:
+        own = ("centre_x", "centre_y", "centre_z", "radius", "length")
+        given = [name for name in own if getattr(self, name) is not None]
+        if self.shape == "sweep" and given:
+            raise UsageError(
+                f"inclusion.{given[0]} is of a capsule; a sweep says where its inclusion lies: set "
+                "inclusion.wider or inclusion.longer"
+            )
 
 
 @dataclass(frozen=True)
@@ -127,10 +152,12 @@ def load(parameters: Phantom, folder: Path) -> tuple[Recording, ...]:
 
 def read(recording: Recording, parameters: Phantom) -> Recording:
     """The recording with the outlines that are to be used."""
+    if parameters.inclusion.shape == "sweep":
+        recording = outlined_sweep(recording)
     if parameters.outlines == "recorded":
         return recording
     outlines = outlines_of(recording.frame(IMAGES), images=IMAGES)
-    return replace(recording, contours={"outline": outlines})
+    return replace(recording, contours={**recording.contours, "outline": outlines})
 
 
 def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Scene:
@@ -153,14 +180,15 @@ def _membrane(wall: WallCard) -> tuple[Membrane, ...]:
 def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered:
     p = parameters
     contours = _shifted(recording.contour("outline"), p)
-    capsule, how = measured_inclusion(recording, p), p.registration
-    shape = None if how.wall == "facets" else capsule
+    found, how = measured_inclusion(recording, p), p.registration
+    shape = None if how.wall == "facets" else found
     wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
     seen = placed(
         recording, contours, scene, wall, STREAMS, SIGNALS, p.loads, TOP_FACE,
         corners=(TOP_LEFT,), how=how, sampling=how.sampling,
     )  # fmt: skip
-    return replace(seen, findings=_misplaced(capsule, inclusion(recording, p)))
+    told = (off_circles(_stack(recording, p)),) if p.inclusion.shape == "sweep" else ()
+    return replace(seen, findings=(*told, *_misplaced(found, inclusion(recording, p))))
 
 
 STREAMS, IMAGES = Streams(), "b_mode"
@@ -180,7 +208,7 @@ TOP_FACE = (
 )
 
 
-def _misplaced(measured: Capsule, meshed: Capsule) -> tuple[str, ...]:
+def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, ...]:
     """A word where the meshed inclusion is not where the rest outline lies."""
     off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
     wide = meshed.radius - measured.radius
@@ -192,27 +220,39 @@ def _misplaced(measured: Capsule, meshed: Capsule) -> tuple[str, ...]:
     )
 
 
-def inclusion(recording: Recording, parameters: Phantom) -> Capsule:
+def inclusion(recording: Recording, parameters: Phantom) -> InclusionShape:
     """The inclusion that is meshed: what the user set, else what was measured."""
-    measured, mine = measured_inclusion(recording, parameters), parameters.inclusion
-    centre = tuple(
-        m if own is None else own
-        for own, m in zip(
-            (mine.centre_x, mine.centre_y, mine.centre_z), measured.centre, strict=True
-        )
-    )
+    mine = parameters.inclusion
+    if mine.shape == "sweep":
+        return swept(_stack(recording, parameters), mine.free, mine.wider, mine.longer)
+    measured = _outlined(recording, parameters)
+    own = (mine.centre_x, mine.centre_y, mine.centre_z)
+    x, y, z = (m if o is None else o for o, m in zip(own, measured.centre, strict=True))
     return Capsule(
-        (centre[0], centre[1], centre[2]),
+        (x, y, z),
         (measured.radius if mine.radius is None else mine.radius) + mine.wider,
         (measured.length if mine.length is None else mine.length) + mine.longer,
     )
 
 
-def measured_inclusion(recording: Recording, parameters: Phantom) -> Capsule:
+def measured_inclusion(recording: Recording, parameters: Phantom) -> InclusionShape:
+    """The inclusion as measured: by the rest outline and the declared sweep, or by the sweep."""
+    capsule = _outlined(recording, parameters)  # which refuses a mirrored image
+    if parameters.inclusion.shape == "capsule":
+        return capsule
+    return swept(_stack(recording, parameters), parameters.inclusion.free)
+
+
+def _outlined(recording: Recording, parameters: Phantom) -> Capsule:
     """Centre x, z and radius of the rest outline; height and length from the declared sweep."""
     contours = _shifted(recording.contour("outline"), parameters)
     moved = abs(parameters.registration.image_shift_x) + abs(parameters.registration.image_shift_z)
     return measured_capsule(recording, contours, STREAMS, moved)
+
+
+def _stack(recording: Recording, parameters: Phantom) -> Stack:
+    sweep = _shifted(recording.contour(SWEEP), parameters)
+    return stack_of(recording, sweep, recording.signal(STREAMS.stage, "m"))
 
 
 def _shifted(contours: Contours, parameters: Phantom) -> Contours:

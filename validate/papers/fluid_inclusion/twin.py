@@ -12,8 +12,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import build
+from validate.papers.fluid_inclusion.swept import POSITION, SWEEP
 from validate.parameters import quantity
-from validate.recording.types import Frames, Recording, Source
+from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
 from validate.replay.inclusion import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
@@ -39,7 +40,8 @@ IMAGE_POSE = np.array(
 )
 PROFILE = StageProfile((0.0, 0.003, 0.006, 0.009), speed=1e-3, hold=7.0, rate=10.0)
 PEN_TURN, PEN_SHIFT = (62.0, -17.0, 128.0), (0.412, -0.236, -1.137)
-SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers", "b_mode")
+SENSORS = ("layout", "stage", "load_cell", "pressure", "outline", "markers", "b_mode", "sweep")
+SLICES: Floats = 1e-3 * np.arange(-17.0, 18.0, 2.0)  # m, image plane along its normal (section 4.4)
 SCANNER = Scanner(width=320, height=496, m_per_px=1.25e-4)
 
 
@@ -86,6 +88,7 @@ def record_phantom(
     pen = Pen(twin.sd_tip, twin.sd_hand, PEN_TURN, PEN_SHIFT)
     outline = OutlineSensor(IMAGE_POSE, points=72, sd=twin.sd_outline, frame=FRAME)
     wall = cavity_sampler(mesh, "cavity", capsule)
+    position, slices = _sweep(twin, run.u[:1], wall, rng["sweep"])
     force, pressure = (run.traces[n].y for n in ("stage.force", "inclusion.pressure"))
     return Recording(
         "fluid_phantom",
@@ -96,11 +99,15 @@ def record_phantom(
             "stage": signal(t, stage, "m", twin.sd_stage, FRAME, rng["stage"]),
             "load_cell": signal(t, force, "N", twin.sd_force, FRAME, rng["load_cell"]),
             "pressure": signal(t, pressure, "Pa", twin.sd_pressure, FRAME, rng["pressure"]),
+            POSITION: position,
         },
         frames={"b_mode": _b_mode(middles, run.u, wall, size, rng["b_mode"])}
         if twin.frames
         else {},
-        contours={"outline": outline.measure(middles, run.u, wall, rng["outline"])},
+        contours={
+            "outline": outline.measure(middles, run.u, wall, rng["outline"]),
+            SWEEP: slices,
+        },
         metadata={
             "inclusion": _declared(capsule),
             "marker_layout": {k: " ".join(repr(float(c)) for c in v) for k, v in layout.items()},
@@ -108,6 +115,27 @@ def record_phantom(
             "provenance": _provenance(twin, material, mesh.nodes.size),
         },
     )
+
+
+def _sweep(
+    twin: PhantomTwin, rest: Floats, wall: SurfaceSampler, rng: np.random.Generator
+) -> tuple[Signal, Contours]:
+    """Position of the image plane and the outlines where it meets the inclusion, in field `rest`
+    (1, n, d) m.
+
+    Taken while the stage rests before the first load, an image each .3 s.
+    """
+    t = np.round(0.5 + 0.3 * np.arange(len(SLICES)), 6)
+    height = (wall.rest - IMAGE_POSE[:3, 3]) @ IMAGE_POSE[:3, 2]
+    met = (height - SLICES[:, None]).min(axis=1) * (height - SLICES[:, None]).max(axis=1) < 0
+    outlines: list[Floats] = []
+    for s in SLICES[met]:
+        pose = IMAGE_POSE.copy()
+        pose[:3, 3] += s * pose[:3, 2]
+        sensor = OutlineSensor(pose, points=72, sd=twin.sd_outline, frame=FRAME)
+        outlines += sensor.measure(t[:1], rest, wall, rng).outlines
+    position = signal(t, SLICES, "m", twin.sd_stage, FRAME, rng)
+    return position, Contours(t[met], tuple(outlines), twin.sd_outline, IMAGE_POSE, FRAME)
 
 
 def _b_mode(
