@@ -19,6 +19,7 @@ from validate.solve.propagated import Propagated
 from validate.solve.proportional import Proportional
 from validate.solve.pulse import PulsePressure
 from validate.solve.quasi_static import QuasiStatic
+from validate.solve.regions import AsyncRegions
 from validate.solve.rigid_motion import RigidMotion
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
@@ -41,6 +42,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
     NewtonDynamics,
     ContactNewton,
     NeedleLoop,
+    AsyncRegions,
 )
 
 # What solves a whole scene at once.

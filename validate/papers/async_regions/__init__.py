@@ -1,0 +1,1 @@
+"""Paper 004: asynchronous regions around a touched place."""

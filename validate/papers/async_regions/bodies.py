@@ -1,0 +1,82 @@
+"""Bodies of paper 004: its bar, and blocks in 2-D and 3-D of the same tissue, touched by a probe.
+
+The bar is one row of square cells of a material without lateral contraction, so every cross-section
+moves as one and the equations are those of the paper's 1-D elements: 40 free nodes, 0.1 m, 40 cm2.
+"""
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.scene.box import box, grid
+from validate.scene.material import Material
+from validate.scene.scene import Probe, Scene, Support
+from validate.scene.tool import Needle
+
+LENGTH = 0.1  # m, of the bar and of the blocks' sides
+AREA = 40e-4  # m^2
+DENSITY = 1000.0  # kg/m^3
+DAMPING = 6.5  # 1/s: the paper's 6.5 has no unit; as C = 6.5 M it gives its whole-model peaks
+PROBE = "probe"
+
+
+def pad_of(cells: int) -> float:
+    """Distance m within which the bar's end is one contact: its two nodes."""
+    return 1.01 * LENGTH / cells
+
+
+def bar(E: float, cells: int, damping: float = DAMPING) -> Scene:
+    """The bar with x = 0 held and the probe "probe" at its free end, pushing along -x."""
+    if cells < 2:
+        raise SceneError(f"bar of {cells} cells: at least 2")
+    side = LENGTH / cells
+    return Scene(
+        grid((LENGTH, side), (cells, 1)),
+        Material(E, 0.0, "linear", DENSITY, damping),
+        (Support("x0", (0, 1)), Support("y0", (1,)), Support("y1", (1,))),
+        plane="stress",
+        thickness=AREA / side,
+        tools=(Needle(PROBE, "x1", (LENGTH, side / 2), (-1.0, 0.0)),),
+        probes=(Probe("end", (LENGTH, 0.0)),),
+    )
+
+
+def block(E: float, cells: int, dimension: int, nu: float = 0.45) -> Scene:
+    """A block of `cells` a side, x = 0 held, touched in the middle of x = 0.1 m."""
+    size, split = (LENGTH,) * dimension, (cells,) * dimension
+    middle = LENGTH * (cells // 2) / cells
+    at = (LENGTH, *(middle,) * (dimension - 1))
+    axis = (-1.0, *(0.0,) * (dimension - 1))
+    return Scene(
+        box(size, split),
+        Material(E, nu, "linear", DENSITY, DAMPING),
+        (Support("x0", tuple(range(dimension))),),
+        thickness=LENGTH if dimension == 2 else 1.0,
+        tools=(Needle(PROBE, "x1", at, axis),),
+        probes=(Probe("end", at),),
+    )
+
+
+def impedance(E: float, spring: float, hz: Floats, damping: float = DAMPING) -> Floats:
+    """Peak force N per m of the probe at frequencies (k,) Hz: the continuous bar behind the spring.
+
+    k(w) = (EA/L) q cot q with q^2 = L^2 (w^2 - i c w) rho/E; F = |k ks / (k + ks)|: no mesh, no
+    step, no region in it.
+    """
+    w = 2 * np.pi * np.asarray(hz, dtype=np.float64)
+    static = np.full(w.shape, E * AREA / LENGTH, dtype=np.complex128)
+    q = LENGTH * np.sqrt((w**2 - 1j * damping * w) * DENSITY / E + 0j)
+    moving = np.abs(q) > 0
+    static[moving] *= q[moving] / np.tan(q[moving])
+    return np.asarray(np.abs(static * spring / (static + spring)))
+
+
+def chirp(t: Floats, amplitude: float, lowest: float, highest: float) -> Floats:
+    """A sine of rising frequency, lowest to highest Hz over t (nt,) s."""
+    rise = (highest - lowest) / (2 * t[-1])
+    return np.asarray(amplitude * np.sin(2 * np.pi * (lowest * t + rise * t**2)))
+
+
+def growing(t: Floats, amplitude: float, hz: float) -> Floats:
+    """A sine of rising amplitude over t (nt,) s."""
+    return np.asarray(amplitude * t / t[-1] * np.sin(2 * np.pi * hz * t))
