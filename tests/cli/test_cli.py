@@ -1,6 +1,7 @@
 """The command line from outside: exit codes, one-line errors, light help, files that appear."""
 
 import json
+import re
 import os
 import subprocess
 import sys
@@ -115,6 +116,15 @@ def test_a_run_without_an_accepted_method_fails_but_reports(tmp_path: Path) -> N
     assert f"{folder.name}/report.html" in done.stdout
     results = json.loads((folder / "results.json").read_text("utf-8"))
     assert [m["name"] for m in results["methods"]] == ["p1_fluid", "p1_loop"]
+
+
+@pytest.mark.slow
+def test_a_method_that_does_not_settle_says_why_in_a_line(tmp_path: Path) -> None:
+    arguments = ["run", "fluid_phantom", "--methods", "p1_dry,p1_loop", "--out", str(tmp_path)]
+    done = called(*arguments, *COARSE, "--set", "methods.p1_loop.gain=-10kPa", cwd=tmp_path)
+    printed = " ".join(done.stdout.split())
+    assert re.search(r"p1_loop: (not_converged|diverged) at step \d+: .*gain", printed)
+    assert "p1_dry: " not in printed
 
 
 @pytest.mark.slow

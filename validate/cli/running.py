@@ -113,6 +113,8 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     for method in result.methods:
         if method.checks:
             _checks(method)
+        if ended := next((r.outcome for r in method.runs if not r.finished), None):
+            say(f"{method.name}: {ended.state} at step {ended.step}: {ended.why}", indent="  ")
     if result.published:
         figures_table([figure_members(p) for p in result.published])
     say(f"\n{result.sentence}")

@@ -110,9 +110,10 @@ class Settling(LinearStepper):
         """The state of a root z; a failure when it is not on the branch that begins at P = 0."""
         if least_slope(self.responses, z, softness) > 0:
             return self._state(k, z, updates, ratios=ratios)
+        found = ", ".join(f"{P:.4g}" for P in z[self.responses.drives + 1 :])
         why = (
-            f"pressures {z[self.responses.drives + 1 :].tolist()} Pa are a spurious root: between "
-            "zero and there the volume falls as pressure grows; check the gain's sign and the load"
+            f"pressures {found} Pa are a spurious root: between zero and there the volume "
+            "falls as pressure grows; check the gain's sign and the load"
         )
         return self._state(k, z, updates, ("not_converged", why), ratios)
 

@@ -166,6 +166,11 @@ def _boxes(cavities: Cavities, h: float, nx: int, ny: int) -> list[tuple[slice, 
         raise SceneError(f"cavities.count = {cavities.count}: 1, 2 or 3")
     wide = _whole(cavities.width, h, "cavities.width")
     high = _whole(cavities.height, h, "cavities.height")
+    if cavities.count > 1 and not cavities.septum > 0:
+        raise SceneError(
+            f"cavities.septum = {1e3 * cavities.septum:g} mm: the {cavities.count} cavities touch "
+            "each other; leave a wall between them"
+        )
     apart = _whole(cavities.septum, h, "cavities.septum") if cavities.count > 1 else 0
     row = cavities.count * wide + (cavities.count - 1) * apart
     if row > nx - 2 or high > ny - 2:
