@@ -1,8 +1,8 @@
 """The command line from outside: exit codes, one-line errors, light help, files that appear."""
 
 import json
-import re
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
