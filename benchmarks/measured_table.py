@@ -1,0 +1,90 @@
+"""The README's table of measured experiments: fitted on what, predicted what, within what.
+
+python benchmarks/measured_table.py            prints it (some ten minutes; needs the recordings)
+python benchmarks/measured_table.py --write    puts it into README.md
+"""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from validate.compare.result import Result
+from validate.compare.verdict import Check
+from validate.datasets.home import found
+from validate.replay import compare, load
+from validate.report.numbers import with_unit
+
+ROOT = Path(__file__).resolve().parents[1]
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+HEAD = ("experiment", "fitted on", "predicted", "error E", "2 u_val", "verdict")
+_SHOWN = 3  # checks of an experiment, those that tell most
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An experiment with what was set, what its model was fitted on, and the method that is shown
+    (none: the first accepted)."""
+
+    name: str
+    fitted: str
+    values: Mapping[str, str] = field(default_factory=dict)
+    method: str = ""
+
+
+def rows_of(one: Measured) -> list[list[str]]:
+    """A row a check that is evidence or undecided, furthest off first."""
+    experiment = load(str(ROOT / "experiments" / f"{one.name}.py"))
+    result = compare(experiment, one.values)
+    return [
+        [_called(one) if i == 0 else "", one.fitted if i == 0 else "", *_cells(c)]
+        for i, c in enumerate(_told(result, one.method))
+    ]
+
+
+def _called(one: Measured) -> str:
+    more = f", {', '.join(f'{k} {v}' for k, v in one.values.items() if k != 'recording')}"
+    return f"`{one.name}`{more if len(more) > 2 else ''}"
+
+
+def _told(result: Result, method: str) -> list[Check]:
+    accepted = [m for m in result.methods if m.checks and method in ("", m.name)]
+    checks = [c for c in accepted[0].checks if c.count and c.verdict != "fitted"]
+    return sorted(checks, key=lambda c: -abs(c.value) / (c.u_val or 1.0))[:_SHOWN]
+
+
+def _cells(c: Check) -> tuple[str, ...]:
+    return (c.name, with_unit(c.value, c.unit), with_unit(2 * c.u_val, c.unit), c.verdict)
+
+
+def measured() -> tuple[Measured, ...]:
+    """The experiments on recordings made by others, as they ship and the beam's loaded case."""
+    loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
+    under = {"recording": str(loaded), "load.mass": "52g"}
+    return (
+        Measured("stylus_phantom", "the other landmarks"),
+        Measured("ultrasound_disk", "the centre, image by image"),
+        Measured("ecoflex_cylinder", "the first 5 % of strain of the same logs"),
+        Measured("silicone_beam", "its own ring-down; modulus declared by others"),
+        Measured("silicone_beam", "ring-down under gravity alone", under),
+        Measured("multimode", "uniaxial tension"),
+        Measured("rubber_strip", "steps up to 6 %", method="neo_coupled"),
+        Measured("gel_indentation", "the lower box"),
+        Measured("skin_pads", "force to 4 mm"),
+    )
+
+
+def main() -> None:
+    lines = [list(HEAD), ["---"] * len(HEAD)]
+    for one in measured():
+        lines += rows_of(one)
+    table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    print(table)
+    if "--write" in sys.argv[1:]:
+        readme = ROOT / "README.md"
+        before, rest = readme.read_text("utf-8").split(BEGIN)
+        readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
