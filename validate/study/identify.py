@@ -40,6 +40,7 @@ KIND = "identify"
 STARTS, QUICK_STARTS = 10, 4
 SEED = 1
 _ALONE = 10.0  # s: less work than this is done here, for workers take longer to begin
+_TRIED = 2  # cells that are done here first
 
 
 @dataclass(frozen=True)
@@ -88,13 +89,14 @@ class InCells:
         return Job(str(self._path), file_sha256(self._path), hashes, values, self._options.quick)
 
     def finished(self, plan: Plan[C, R]) -> list[R]:
-        """The cells' values in order; the first alone where its time says where the rest goes."""
-        first, done = replace(plan, cells=plan.cells[:1]), self._finish
+        """The cells' values in order; the first two here, whose quicker one says where the rest
+        goes: the very first also sets up what all share."""
+        first, done = replace(plan, cells=plan.cells[:_TRIED]), self._finish
         where = self._where
         if where.workers is None and not where.scheduler:
             begun = done(first, Where(0))
-            seconds = max(r.seconds for r in begun.records.values())
-            where = Where(0) if seconds * (len(plan.cells) - 1) < _ALONE else where
+            seconds = min(r.seconds for r in begun.records.values())
+            where = Where(0) if seconds * (len(plan.cells) - _TRIED) < _ALONE else where
         found = done(plan, where)
         return [_value(found, cell) for cell in plan.cells]
 
