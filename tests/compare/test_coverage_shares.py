@@ -40,8 +40,20 @@ def test_the_term_that_is_furthest_off_that_way_is_named() -> None:
     terms = [MEASURED, MESH, NARROW]
     assert find_fault(Share(9, 200), terms).word == "holds"
     wide, narrow = (find_fault(Share(n, 200), terms) for n in (0, 60))
-    assert (wide.word, wide.fault) == ("too wide", MESH)
+    assert (wide.word, wide.fault) == ("blunt", MESH)
     assert (narrow.word, narrow.fault) == ("too narrow", NARROW)
+
+
+@pytest.mark.parametrize("right", [MESH, Term("u_input (modulus)", 2.0, 1.65, 2.0)])
+def test_what_claims_rightly_more_than_it_shows_is_blunt_and_hides_no_term_that_does_not(
+    right: Term,
+) -> None:
+    assert find_fault(Share(0, 200), [MEASURED, right]).word == "blunt"
+    wide = Term("measurement", 2.0, 1.0, 1.0, "measurement")
+    found = find_fault(Share(0, 200), [wide, right])
+    assert (found.word, found.fault) == ("too wide", wide)
+    by_chance = find_fault(Share(3, 200), [MEASURED])
+    assert (by_chance.word, by_chance.fault) == ("too wide", None)
 
 
 def test_no_term_is_blamed_where_none_is_off() -> None:

@@ -1,16 +1,24 @@
 """Measurements made anew: exact readings leave nothing, noise is what is declared."""
 
+import importlib
+import pkgutil
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from validate import register
 from validate.arrays import Floats, Ints, rms
+from validate.fem.locate import barycentric_rows
 from validate.recording.types import Contours, Markers
+from validate.register.digitised import Digitised, TouchedLandmarks
+from validate.register.displacements import DisplacementObservation
 from validate.register.draws import Draw, Exact, from_rest, shifted
+from validate.register.dwell import Dwell
+from validate.register.landmarks import Match
 from validate.register.markers import MarkerObservation, Together, observe_markers
-from validate.register.observation import EVERYTHING, Selection, field_at
+from validate.register.observation import EVERYTHING, Observation, Selection, field_at
 from validate.register.outline_geometry import normals, polar_angles, ray_points
 from validate.register.outlines import observe_outlines
 from validate.register.round_outlines import RoundOutlines
@@ -213,3 +221,67 @@ def test_round_outlines_read_exactly_have_the_bodys_diameter() -> None:
     assert anew.diameters == pytest.approx(np.full(3, 0.012))
     off = np.array([seen.anew(seen.left(run), drawn(k)).diameters for k in range(300)]) - 0.012
     assert off.std() == pytest.approx(np.hypot(seen.wall, seen.scatter), rel=0.1)
+
+
+def test_displacements_read_exactly_leave_nothing_and_each_axis_has_its_noise() -> None:
+    points = np.random.default_rng(0).uniform(0.001, 0.009, (3000, 3))
+    sd = np.array([1e-5, 2e-5, 4e-5])
+    rows = barycentric_rows(MESH, points)
+    u = np.full(points.shape, 2e-3)
+    seen = DisplacementObservation("beads", "validates", T[-1:], points, u, rows, sd)
+    anew = seen.anew(seen.left(RUN), Exact())
+    assert anew.u == pytest.approx(np.full(points.shape, 4e-3))  # the last frame's, not the first's
+    for found in anew.deviations(RUN, Selection("at 2 s", np.array([2.0]))):
+        assert found.values == pytest.approx(np.zeros((3000, 1)), abs=1e-15)
+    off = seen.anew(seen.left(RUN), drawn()).u - anew.u
+    assert off.std(axis=0) == pytest.approx(sd, rel=0.05)
+
+
+LANDMARKS = 0.1 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1]])
+
+
+def touched(off: Floats, sd: float = 1e-4) -> TouchedLandmarks:
+    """Landmarks touched in another order than that of the list, `off` (6, 3) m their places."""
+    t, known = np.arange(2.0), np.array([3, 0, 5, 1, 4, 2])
+    parts = tuple(Dwell(0, 2, t, np.tile(x, (2, 1))) for x in LANDMARKS[known] + off)
+    names = tuple("abcdef")
+    match = Match(known, np.arange(6), 0.0)
+    seen = Digitised(t, LANDMARKS, parts, parts, names, LANDMARKS, match, sd)
+    return TouchedLandmarks(seen, np.linspace(0.5, 2.0, 6))
+
+
+def predicting(seen: TouchedLandmarks) -> Simulated:
+    """A rigid body that has each landmark at its instant where the others say."""
+    d = seen.digitised
+    x = d.places + d.left_out
+    traces = {f"{name}.{axis}": Trace(np.full(6, x[i, c]), "m")
+              for i, name in enumerate(d.touched) for c, axis in enumerate("xyz")}  # fmt: skip
+    return Simulated(traces, t=seen.t)
+
+
+def test_landmarks_touched_exactly_lie_where_all_others_say() -> None:
+    seen = touched(1e-3 * np.random.default_rng(3).standard_normal((6, 3)))
+    run = predicting(seen)
+    (found,) = seen.anew(seen.left(run), Exact()).deviations(run, EVERYTHING)
+    assert found.values == pytest.approx(np.zeros((6, 3)), abs=1e-9)
+
+
+def test_noise_of_a_landmark_is_its_own_and_that_of_the_poses_it_makes() -> None:
+    seen = touched(np.zeros((6, 3)))
+    run = predicting(seen)
+    off = [seen.anew(seen.left(run), drawn(k)).deviations(run, EVERYTHING)[0].values
+           for k in range(300)]  # fmt: skip
+    each = float(np.std(off))
+    assert each == pytest.approx(rms(seen.digitised.expected), rel=0.05)
+    assert each > 1.2 * seen.digitised.sd
+
+
+def test_every_observation_can_be_drawn_anew() -> None:
+    """Else an experiment that compares it has no coverage study."""
+    names = [m.name for m in pkgutil.iter_modules(register.__path__)]
+    modules = [importlib.import_module(f"{register.__name__}.{name}") for name in names]
+    found = [c for m in modules for c in vars(m).values()
+             if isinstance(c, type) and c.__module__ == m.__name__
+             and hasattr(c, "deviations") and c is not Observation]  # fmt: skip
+    assert TouchedLandmarks in found
+    assert [c.__name__ for c in found if not (hasattr(c, "left") and hasattr(c, "anew"))] == []

@@ -16,11 +16,13 @@ from validate.errors import ComparisonError, UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.report.store import schema
-from validate.study.coverage import Coverage, coverage
-from validate.study.coverage_bench import ExactReading
+from validate.study.coverage import Coverage, _alike, coverage
+from validate.study.coverage_bench import ExactReading, opened_here
 from validate.study.coverage_found import Quantity
-from validate.study.coverage_plan import World, in_world, true_method, wrong_paths
-from validate.study.job import Where
+from validate.study.coverage_page import sentence
+from validate.study.coverage_plan import World, draws_of, in_world, true_method, wrong_paths
+from validate.study.job import Where, job_of
+from validate.study.store import Record
 
 ROOT = Path(__file__).parents[2]
 HERE = Where(0)
@@ -99,10 +101,12 @@ def test_an_input_alone_never_leaves_its_uniform_range() -> None:
     found = studied(uncertain=0.2)
     for q in found.quantities:
         assert q.share.number == 0
-        assert q.finding.word == "too wide"
+        assert q.finding.word == "blunt"
         assert q.finding.fault is not None
         assert q.finding.fault.name == "u_input (modulus)"
         assert "uniform range ends" in q.finding.words
+    assert found.passed  # a blunt check raises no false alarm
+    assert "Blunt by u_input (modulus) (force" in sentence(found)
 
 
 @pytest.mark.slow
@@ -138,6 +142,30 @@ def test_readings_add_up_as_a_linear_body_does() -> None:
     assert finer.on(base).left[0] == pytest.approx([2.0, 4.0, 6.0])
     with pytest.raises(ComparisonError, match="8 numbers are measured there, 3 as judged"):
         ExactReading((np.zeros(8),), (t,)).on(base)
+
+
+def test_what_was_identified_is_drawn_as_noise_has_it_and_ranges_as_they_end() -> None:
+    own = written("drawn", uncertain=0.1)
+    assert own.uncertainty is not None
+    (one,) = own.uncertainty.inputs
+    both = replace(own.uncertainty, inputs=(one, replace(one, name="found", identified=True)))
+    z = draws_of(replace(own, uncertainty=both), 200, 1)
+    assert np.abs(z).max(axis=0) == pytest.approx([np.sqrt(3), 2.8], rel=0.01)
+    assert z.std(axis=0) == pytest.approx([1.0, 1.0], rel=0.02)
+    assert draws_of(replace(own, uncertainty=None), 20, 1).shape == (20, 0)
+
+
+def test_a_wrong_body_with_other_samples_has_no_power_and_says_why() -> None:
+    t = np.arange(3.0)
+    base, other = ExactReading((np.zeros(3),), (t,)), ExactReading((np.zeros(8),), (t,))
+    found = _alike(Record("key", other), base)
+    assert (found.value, found.why) == (None, "8 numbers are measured there, 3 as judged")
+    assert _alike(Record("key", base), base).value is not None
+
+
+def test_no_rival_is_opened() -> None:
+    bench, _ = opened_here(job_of(written("drawn")))
+    assert set(bench.road.methods) == {"fem"}
 
 
 def test_worlds_are_parameters() -> None:

@@ -2,8 +2,9 @@
 
 A perfect model is called different in 4.6 % of comparisons where E is normal with the standard
 uncertainty u_val. More than `MOST` says that a term is too narrow, fewer than `LEAST` that one is
-too wide. Each term is held against what the draws show of it alone: half of the |E| that 4.6 % of
-them exceed, which for a normal law is its standard deviation.
+too wide, or that the verdict is blunt: what claims more than the draws show is a uniform range, or
+mesh and step, and claims it rightly. Each term is held against what the draws show of it alone:
+half of the |E| that 4.6 % of them exceed, which for a normal law is its standard deviation.
 """
 
 from collections.abc import Sequence
@@ -20,8 +21,9 @@ LEAST, MOST = 0.02, 0.07
 U_NUM = "u_num"
 MEASUREMENT = "measurement"
 _ALIKE = 0.1  # relative: how far a shown term may lie off its part before it is another one
+_MUCH = 0.2  # of u_val squared: what a term claims beyond what it shows, 200 draws make it 0.14
 
-Word = Literal["holds", "too narrow", "too wide", "cannot decide", "no evidence"]
+Word = Literal["holds", "too narrow", "too wide", "blunt", "cannot decide", "no evidence"]
 
 
 @dataclass(frozen=True)
@@ -79,19 +81,28 @@ class Term:
         return self.shown**2 - self.part**2
 
     @property
+    def bounded(self) -> bool:
+        """Whether its spread is what is claimed, and only its ends are not those of a normal law:
+        a uniform range."""
+        alike = abs(self.spread - self.part) < _ALIKE * self.part
+        return self.kind == "input" and self.excess < 0 and alike
+
+    @property
+    def right(self) -> bool:
+        """Whether it claims no more than it should, though draws show less: a uniform range, or
+        mesh and step, which a model that is judged by itself cannot show."""
+        return self.bounded or self.kind == "numerical"
+
+    @property
     def words(self) -> str:
-        """What is wrong with it, with its numbers."""
+        """What it claims and what it shows, with its numbers."""
         if self.kind == "numerical":
             return (
                 f"{self.name}: {self.part:.3g} of mesh and step, of which a model judged by itself "
                 "on its own mesh shows nothing"
             )
         seen = f"{self.name}: {self.part:.3g} claimed, {self.shown:.3g} shown"
-        if (
-            self.kind == "input"
-            and self.excess < 0
-            and abs(self.spread - self.part) < (_ALIKE * self.part)
-        ):
+        if self.bounded:
             return f"{seen}: its spread is right, but a uniform range ends at 1.73 u"
         return seen
 
@@ -118,13 +129,25 @@ class Finding:
 
 
 def find_fault(share: Share, terms: Sequence[Term]) -> Finding:
-    """Holds within `LEAST` to `MOST`; else the term whose variance is furthest off that way."""
+    """Holds within `LEAST` to `MOST`; else the term whose variance is furthest off that way.
+
+    Fewer is blunt, and no fault, where what claims too much is only what is `right`.
+    """
     if share.inside:
         return Finding("holds", None, "")
-    wide = share.value < LEAST
-    worst = min(terms, key=lambda t: t.excess if wide else -t.excess, default=None)
-    word: Word = "too wide" if wide else "too narrow"
+    if share.value > MOST:
+        worst = max(terms, key=lambda t: t.excess, default=None)
+        return _named("too narrow", share, worst if worst and worst.excess > 0 else None)
+    much = -_MUCH * sum(t.part**2 for t in terms)
+    wrong = [t for t in terms if not t.right and t.excess < much]
+    right = [t for t in terms if t.right and t.excess < much]
+    worst = min(wrong or right or terms, key=lambda t: t.excess, default=None)
+    if worst is not None and worst.excess >= 0:
+        worst = None
+    return _named("blunt" if right and not wrong else "too wide", share, worst)
+
+
+def _named(word: Word, share: Share, worst: Term | None) -> Finding:
     chance = "; by chance? take more draws" if share.by_chance else ""
-    if worst is None or (worst.excess >= 0 if wide else worst.excess <= 0):
-        return Finding(word, None, f"no term by itself: they act together{chance}")
-    return Finding(word, worst, worst.words + chance)
+    said = worst.words if worst else "no term by itself: they act together"
+    return Finding(word, worst, said + chance)

@@ -5,13 +5,14 @@ What the pose was fitted on is no evidence of it. Left out one by one, every lan
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats, rms
+from validate.arrays import Floats, Ints, rms
 from validate.fem.locate import Rows
+from validate.register.draws import AnyDraw
 from validate.register.dwell import Dwell
 from validate.register.landmarks import Match
 from validate.register.measures import target_covariance
@@ -82,6 +83,13 @@ class Digitised:
             found.append(np.sqrt(self.sd**2 + np.trace(pose) / 3))
         return np.array(found)
 
+    def moved(self, by: Floats) -> "Digitised":
+        """With every landmark touched `by` (m, 3) m elsewhere."""
+        parts = list(self.parts)
+        for i, off in zip(self.match.seen, by, strict=True):
+            parts[i] = replace(parts[i], x=parts[i].x + off)
+        return replace(self, parts=tuple(parts))
+
     @property
     def poses(self) -> Floats:
         """The poses without each landmark (m, 6): rotation vector rad, translation m."""
@@ -104,13 +112,8 @@ class TouchedLandmarks:
     def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         d = self.digitised
         at = selection.samples(self.t, run.t, self.name)
-        steps = np.searchsorted(run.t, self.t[at])
-        shown = [
-            [run.traces[f"{d.touched[i]}.{axis}"].y[step] for axis in "xyz"]
-            for i, step in zip(at, steps, strict=True)
-        ]
         words = "predicted from all other landmarks less touched, along the frame's axes"
-        off = np.array(shown) - d.places[at]
+        off = self._shown(run, at) - d.places[at]
         # Every pose has six numbers of all landmarks: so many of the differences are not free.
         freedom = max(off.size - 6, 1)
         about = d.places[at] - d.places.mean(axis=0)
@@ -118,6 +121,26 @@ class TouchedLandmarks:
             Deviation(self.name, off, "m", rms(d.expected), 0.0, words, freedom=freedom,
                       reference=about),
         )  # fmt: skip
+
+    def left(self, run: Simulated) -> Floats:
+        """Where the run has each landmark less where it was touched, flat (m 3,) m."""
+        off = self._shown(run, np.arange(len(self.t))) - self.digitised.places
+        return np.asarray(off.ravel())
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "TouchedLandmarks":
+        """Touched where `left` (m 3,) m has them. A landmark's noise is drawn once: it moves its
+        own place and the poses that predict all others."""
+        exact = self.digitised.moved(self.digitised.residuals)  # as a rigid body has them
+        noise = draw.white(self.digitised.sd, exact.places.shape)
+        off = left.reshape(noise.shape) - exact.moved(noise).left_out
+        return replace(self, digitised=self.digitised.moved(off))
+
+    def _shown(self, run: Simulated, at: Ints) -> Floats:
+        """Places (k, 3) m of some landmarks, each at the instant of its own pose."""
+        steps = np.searchsorted(run.t, self.t[at])
+        names = [self.digitised.touched[i] for i in at]
+        pairs = list(zip(names, steps, strict=True))
+        return np.array([[run.traces[f"{n}.{a}"].y[step] for a in "xyz"] for n, step in pairs])
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return tuple(n for n in self.digitised.touched if f"{n}.x" not in run.traces)

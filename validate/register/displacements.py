@@ -1,12 +1,13 @@
 """Displacements measured at many points of a body at one instant, as of tracked particles."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.locate import Rows
+from validate.register.draws import AnyDraw, from_rest
 from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
 
 _AXES = "xyz"
@@ -48,6 +49,16 @@ class DisplacementObservation:
             )
             for c, quantity in enumerate(self.units)
         )  # fmt: skip
+
+    def left(self, run: Simulated) -> Floats:
+        """Exact displacements less measured ones, flat (k d,) m."""
+        moved = np.array([self.simulated(u).ravel() for u in run.u])
+        return np.asarray(from_rest(run.t[run.at], moved, self.t)[-1] - self.u.ravel())
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "DisplacementObservation":
+        """The points as far as `left` (k d,) m has them, noise drawn."""
+        exact = self.u + left.reshape(self.u.shape)
+        return replace(self, u=exact + draw.white(self.sd, exact.shape))
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return ()

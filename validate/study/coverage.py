@@ -6,13 +6,14 @@ print(found.passed, [(q.stated.name, q.share.value) for q in found.quantities])
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 
-from validate.compare.inputs import joint_draws
 from validate.errors import ComparisonError, UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
@@ -27,19 +28,21 @@ from validate.study.coverage_bench import (
     run_reading,
     run_terms,
 )
-from validate.study.coverage_cell import Draws, Given, run_draws
+from validate.study.coverage_cell import DrawBench, Draws, Given, run_draws
 from validate.study.coverage_found import JointShare, Power, Quantity, power, quantity, together
 from validate.study.coverage_plan import (
     BLOCK,
     BUDGET_S,
     CHECKS,
     DRAWS,
+    HERE_S,
     NUMBERS,
     QUICK_DRAWS,
     WRONG,
     DrawCell,
     TermsCell,
     World,
+    draws_of,
     inputs_of,
     reading_cells,
     steps_of,
@@ -51,6 +54,7 @@ from validate.study.job import C, Job, Plan, R, Where, job_of
 from validate.study.store import Record, key_of
 
 KIND = "coverage"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,7 @@ class _Study:
     report: Report | None
     bench: CoverageBench
     opening: Opening
+    opened: float
     draws: int
     seed: int
     noise: float
@@ -116,7 +121,9 @@ def coverage(
     if draws < BLOCK or not 0 < noise < 1e6:
         raise UsageError(f"{draws} draws of {noise:g} times the noise: at least {BLOCK}, above 0")
     job = job_of(found, values, quick)
+    start = perf_counter()
     bench, opening = opened_here(job)
+    opened = perf_counter() - start
     accepted = [
         m
         for m in bench.road.experiment.accepted
@@ -125,7 +132,7 @@ def coverage(
     if not accepted or not bench.road.experiment.accept:
         raise ComparisonError(f"{found.name} accepts no method or no quantity: nothing is judged")
     folder = study_folder(found, KIND, out) / CELLS
-    study = _Study(job, folder, where, report, bench, opening, draws, seed, noise)
+    study = _Study(job, folder, where, report, bench, opening, opened, draws, seed, noise)
     parts = [_of_method(study, method) for method in accepted]
     done = parts[0].done
     for part in parts[1:]:
@@ -156,27 +163,30 @@ class _Part:
 def _of_method(study: _Study, method: str) -> _Part:
     true = true_method(study.bench.road.experiment, method)
     stated = _terms(study, method)
-    z = joint_draws(study.draws, len(study.inputs), study.seed) if study.inputs else np.zeros(
-        (study.draws, 0)
-    )  # fmt: skip
+    z = draws_of(study.bench.road.experiment, study.draws, study.seed)
     base = _readings(study, true, (World(),))[World()]
     read = _needed(base, method)
-    steps = _readings(study, true, steps_of(study.inputs))
+    steps = _readings(study, true, steps_of(study.inputs), base.seconds)
+    # Of a body that is moved: the judged one's mesh and registration may stand in a cache.
+    each = max([base.seconds, *(r.seconds for r in steps.values())])
     whole = bool(study.inputs) and (
-        base.seconds * study.draws <= BUDGET_S and read.size * study.draws <= NUMBERS
+        each * study.draws <= BUDGET_S and read.size * study.draws <= NUMBERS
     )
     drawn = range(study.draws) if whole else range(CHECKS if study.inputs else 0)
     worlds = {k: World(tuple(zip(study.inputs, z[k].tolist(), strict=True))) for k in drawn}
-    solved = _readings(study, true, tuple(worlds.values()))
-    drawn_whole = {k: solved[w].value for k, w in worlds.items()}
-    several = {k: found.on(read) for k, found in drawn_whole.items() if found is not None}
+    found = _readings(study, true, tuple(worlds.values()), each)
+    solved = {w: _alike(r, read) for w, r in found.items()}
+    several = {k: r.value for k, w in worlds.items() if (r := solved[w]).value is not None}
     paths = tuple(p.path for p in wrong_paths(study.bench.road.parameters))
     wrong = {(p, by): World(wrong=(p, by)) for p in paths for by in WRONG}
-    mistaken = _readings(study, true, tuple(wrong.values()))
-    known = {w.label: r.value.on(read) for w, r in mistaken.items() if r.value is not None}
+    found = _readings(study, true, tuple(wrong.values()), each)
+    mistaken = {w: _alike(r, read) for w, r in found.items()}
+    known = {w.label: r.value for w, r in mistaken.items() if r.value is not None}
     moved = {k: r for k, r in known.items() if _moves(r, read)}
     sides = {
-        name: tuple(_needed(steps[World(((name, sign),))], method).on(read) for sign in (1.0, -1.0))
+        name: tuple(
+            _needed(_alike(steps[World(((name, sign),))], read), method) for sign in (1.0, -1.0)
+        )
         for name in study.inputs
     }
     given = Given(
@@ -212,14 +222,21 @@ def _terms(study: _Study, method: str) -> tuple[Stated, ...]:
 
 
 def _readings(
-    study: _Study, method: str, worlds: tuple[World, ...]
+    study: _Study, method: str, worlds: tuple[World, ...], seconds: float = 0.0
 ) -> dict[World, Record[ExactReading]]:
+    """`seconds` that one takes, where that is known."""
     if not worlds:
         return {}
     cells = reading_cells(study.job, method, worlds)
     plan = Plan(study.job, cells, study.opening, run_reading, ExactReading)
-    done = _finished(study, plan, Where(0) if len(cells) == 1 else study.where)
+    done = _finished(study, plan, _place(study, seconds * len(cells)))
     return {c.world: done.records[c.key] for c in cells}
+
+
+def _place(study: _Study, seconds: float) -> Where | None:
+    """This process for what takes less than starting workers, which all open the experiment."""
+    asked = study.where is not None and bool(study.where.scheduler)
+    return study.where if asked or seconds > HERE_S + 2 * study.opened else Where(0)
 
 
 def _finished(study: _Study, plan: Plan[C, R], where: Where | None) -> Finished[R]:
@@ -228,8 +245,18 @@ def _finished(study: _Study, plan: Plan[C, R], where: Where | None) -> Finished[
     return finish(plan, study.folder, where, study.report)
 
 
-def _kept(bench: CoverageBench, job: Job) -> CoverageBench:
+def _kept(bench: T, job: Job) -> T:
     return bench
+
+
+def _alike(record: Record[ExactReading], base: ExactReading) -> Record[ExactReading]:
+    """Its reading at the samples of another, or why not: another body may have other samples."""
+    if record.value is None:
+        return record
+    try:
+        return replace(record, value=record.value.on(base))
+    except ComparisonError as error:
+        return replace(record, value=None, refused=str(error))
 
 
 def _needed(record: Record[ExactReading], method: str) -> ExactReading:
@@ -244,8 +271,17 @@ def _draws(study: _Study, given: Given) -> Finished[Draws]:
     cells = tuple(
         DrawCell(given.method, k, min(BLOCK, study.draws - k), key_of(given.key, k)) for k in blocks
     )
-    plan = Plan(study.job, cells, given, run_draws, Draws)
-    return finish(plan, study.folder, study.where, study.report)
+    mine = study.bench.followed(given.method)
+    here = partial(_kept, DrawBench(given, study.bench.road, mine))
+    first = finish(
+        Plan(study.job, cells[:1], here, run_draws, Draws), study.folder, Where(0), study.report
+    )
+    left = first.records[cells[0].key].seconds * (len(cells) - 1)
+    where = _place(study, left)
+    opened = here if where == Where(0) else given
+    rest = Plan(study.job, cells[1:], opened, run_draws, Draws)
+    done = finish(rest, study.folder, where, study.report).and_also(first)
+    return replace(done, records={c.key: done.records[c.key] for c in cells})  # as they are drawn
 
 
 def _moves(reading: ExactReading, base: ExactReading) -> bool:

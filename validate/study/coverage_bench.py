@@ -15,7 +15,7 @@ from validate.identify.identification import Identification
 from validate.register.observation import Drawable, Observation
 from validate.replay.calibrated import here
 from validate.replay.checks import Terms, terms_of
-from validate.replay.experiment import Variant
+from validate.replay.experiment import Experiment, Variant
 from validate.replay.followed import Followed
 from validate.replay.options import Options
 from validate.replay.problem import Problem
@@ -27,6 +27,7 @@ from validate.study.coverage_plan import (
     TermsCell,
     in_world,
     numbered,
+    true_method,
 )
 from validate.study.job import Job
 from validate.study.store import key_of
@@ -112,8 +113,7 @@ class Opening:
     found: Mapping[int, Identification] = field(default_factory=dict, compare=False)
 
     def __call__(self, job: Job) -> CoverageBench:
-        options = Options(dict(job.values), (), job.quick)
-        out = set_out(job.experiment(), options, identify=self._identified)
+        out = set_out(*_judged(job), identify=self._identified)
         out.road.start(out.found.recordings)
         return CoverageBench(out.road)
 
@@ -129,9 +129,18 @@ def opened_here(job: Job) -> tuple[CoverageBench, Opening]:
         found[number] = here(number, problem)
         return found[number]
 
-    out = set_out(job.experiment(), Options(dict(job.values), (), job.quick), identify=identify)
+    out = set_out(*_judged(job), identify=identify)
     out.road.start(out.found.recordings)
     return CoverageBench(out.road), Opening(key_of(job, "opening"), found)
+
+
+def _judged(job: Job) -> tuple[Experiment, Options]:
+    """With the accepted methods and their truths alone: no rival is identified."""
+    experiment = job.experiment()
+    surrogate = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    each = [*experiment.accepted, *(true_method(experiment, n) for n in experiment.accepted)]
+    names = tuple(dict.fromkeys([*each, surrogate] if surrogate and each else each))
+    return experiment, Options(dict(job.values), names, job.quick)
 
 
 def drawable(o: Observation) -> Drawable:

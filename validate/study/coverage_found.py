@@ -42,7 +42,7 @@ class Quantity:
 
     @property
     def holds(self) -> bool:
-        return self.finding.word in ("holds", "no evidence")
+        return self.finding.word in ("holds", "blunt", "no evidence")
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,22 @@ def sentence(study: Coverage) -> str:
     words = Counter(q.finding.word for q in study.quantities)
     found = ", ".join(f"{n} {word}" for word, n in words.items())
     joint = ", ".join(f"{100 * t.share.value:.1f} % ({t.method})" for t in study.together)
-    worst = [q for q in study.quantities if q.finding.word == "too narrow"]
-    named = f" Too narrow: {'; '.join(f'{q.stated.name} ({q.finding.words})' for q in worst)}."
+    named = "".join(_named(study, word) for word in ("too narrow", "too wide", "blunt"))
     return (
         f"A perfect model in {study.draws} drawn recordings: of {len(study.quantities)} checks "
-        f"{found}; over all checks it differs in {joint}.{named if worst else ''}"
+        f"{found}; over all checks it differs in {joint}.{named}"
     )
+
+
+def _named(study: Coverage, word: str) -> str:
+    """The terms at fault, each once with its checks."""
+    found: dict[str, list[str]] = {}
+    for q in study.quantities:
+        if q.finding.word == word:
+            term = q.finding.fault.name if q.finding.fault else "no term by itself"
+            found.setdefault(term, []).append(q.stated.name)
+    said = (f"{term} ({', '.join(dict.fromkeys(names))})" for term, names in found.items())
+    return f" {word.capitalize()} by {'; '.join(said)}." if found else ""
 
 
 def document(study: Coverage) -> dict[str, Any]:

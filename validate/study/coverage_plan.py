@@ -4,6 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from scipy.special import ndtri
+
+from validate.arrays import Floats
+from validate.compare.inputs import REACH, joint_draws
 from validate.errors import ComparisonError
 from validate.parameters import Parameter, describe, with_values
 from validate.replay.experiment import Experiment, Input
@@ -13,13 +18,17 @@ from validate.study.store import key_of
 DRAWS, QUICK_DRAWS = 200, 40
 BLOCK = 10  # draws in one cell
 CHECKS = 6  # full solutions that a linear response is held against
-BUDGET_S = 60.0  # s of solving, beyond which inputs are taken to act linearly
+BUDGET_S = 30.0  # s of solving, beyond which inputs are taken to act linearly
+HERE_S = 8.0  # s of work for which no workers are started
 NUMBERS = 2_000_000  # that all readings of full solutions may hold
 WRONG = (0.05, 0.10, 0.20)  # by which a true parameter is larger than the judged one
 WRONG_DRAWS = 100  # of every wrong model
 FILTER_DRAWS = 20  # the same of a filter, which is run anew on each
-# Parameters that describe the twin, the ranges, the recording or the mesh, not the body.
-_OTHERS = ("twin.", "ranges.", "registration.", "mesh.", "clock.", "load.", "loading.", "loads")
+# Parameters that describe the twin, the ranges, the recording, what is judged of it, or the mesh.
+_OTHERS = (
+    "twin.", "ranges.", "registration.", "mesh.", "clock.", "load.", "loading.", "loads", "image.",
+    "voxel", "dwell.", "tip.sd", "box.", "bin", "fit_to", "predict_to", "limit_",
+)  # fmt: skip
 _MODULI, _LENGTHS, _FRICTIONS = ("Pa",), ("m",), ("N/m3", "N/m^3")
 
 
@@ -121,6 +130,16 @@ def inputs_of(experiment: Experiment) -> dict[str, Input]:
     """Uncertain inputs by name; another of the same name (an axis of a covariance) is numbered."""
     declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
     return dict(zip(numbered([i.name for i in declared]), declared, strict=True))
+
+
+def draws_of(experiment: Experiment, draws: int, seed: int) -> Floats:
+    """(draws, inputs) standard uncertainties: uniform ranges, a normal law of what was identified
+    from noise."""
+    declared = inputs_of(experiment).values()
+    if not declared:
+        return np.zeros((draws, 0))
+    z = joint_draws(draws, len(declared), seed)
+    return np.where([i.identified for i in declared], ndtri((1 + z / REACH) / 2), z)
 
 
 def numbered(names: Sequence[str]) -> list[str]:
