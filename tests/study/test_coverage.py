@@ -16,11 +16,20 @@ from validate.errors import ComparisonError, UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.report.store import schema
-from validate.study.coverage import Coverage, _alike, coverage
+from validate.study import coverage_worlds
+from validate.study.coverage import Coverage, coverage
 from validate.study.coverage_bench import ExactReading, opened_here
 from validate.study.coverage_found import Quantity
 from validate.study.coverage_page import sentence
-from validate.study.coverage_plan import World, draws_of, in_world, true_method, wrong_paths
+from validate.study.coverage_plan import (
+    World,
+    draws_of,
+    in_world,
+    steps_of,
+    true_method,
+    wrong_paths,
+)
+from validate.study.coverage_worlds import Study, _alike
 from validate.study.job import Where, job_of
 from validate.study.store import Record
 
@@ -161,6 +170,59 @@ def test_a_wrong_body_with_other_samples_has_no_power_and_says_why() -> None:
     found = _alike(Record("key", other), base)
     assert (found.value, found.why) == (None, "8 numbers are measured there, 3 as judged")
     assert _alike(Record("key", base), base).value is not None
+
+
+def at(value: float) -> ExactReading:
+    return ExactReading((np.full(3, value),), (np.arange(3.0),))
+
+
+def opened_study() -> Study:
+    job = job_of(written("drawn", uncertain=0.1))
+    bench, opening = opened_here(job)
+    return Study(job, Path(mkdtemp()), HERE, None, bench, opening, 0.0, 20, 1, 1.0)
+
+
+def test_an_input_without_solution_moves_as_the_surrogate_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of the surrogate 3 as judged, 5 at one u; of the method 10: 12 there."""
+    plus, minus = steps_of(("modulus",))
+    own = {plus: Record[ExactReading]("a", refused="no state there"), minus: Record("b", at(9.0))}
+    other = {World(): Record("c", at(3.0)), plus: Record("d", at(5.0))}
+    monkeypatch.setattr(coverage_worlds, "_readings", lambda study, method, worlds: other)
+    monkeypatch.setattr(coverage_worlds, "true_method", lambda experiment, name: "dear")
+    sides, (told,) = coverage_worlds._sides(opened_study(), "dear", own, at(10.0))
+    assert [side.left[0].tolist() for side in sides["modulus"]] == [[12.0] * 3, [9.0] * 3]
+    assert told == "dear: modulus +1 u by the surrogate's difference: no state there"
+
+
+def test_a_method_that_is_its_own_surrogate_has_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    plus, minus = steps_of(("modulus",))
+    own = {plus: Record[ExactReading]("a", refused="no state there"), minus: Record("b", at(9.0))}
+    with pytest.raises(ComparisonError, match="its own truth could not be run: no state there"):
+        coverage_worlds._sides(opened_study(), "fem", own, at(10.0))
+
+
+def test_dear_wrong_parameters_lie_on_a_line_through_the_one_that_is_solved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[World] = []
+
+    def solved(
+        study: Study, method: str, worlds: tuple[World, ...], seconds: float
+    ) -> dict[World, Record[ExactReading]]:
+        asked.extend(worlds)
+        return {w: Record("k", at(14.0)) for w in worlds}
+
+    monkeypatch.setattr(coverage_worlds, "_readings", solved)
+    study = opened_study()
+    wrong, found, (said,) = coverage_worlds._mistaken(study, "fem", ("E",), 1e3, at(10.0))
+    assert asked == [World(wrong=("E", 0.1))]
+    shown = {by: r.value.left[0][0] for (_, by), w in wrong.items() if (r := found[w]).value}
+    assert shown == pytest.approx({0.05: 12.0, 0.1: 14.0, 0.2: 18.0})
+    assert "solved at 10 % alone" in said
+    assert len(coverage_worlds._mistaken(study, "fem", ("E",), 0.1, at(10.0))[1]) == 3
+    assert len(asked) == 4
 
 
 def test_no_rival_is_opened() -> None:

@@ -17,7 +17,7 @@ from validate.study.store import key_of
 
 DRAWS, QUICK_DRAWS = 200, 40
 BLOCK = 10  # draws in one cell
-CHECKS = 6  # full solutions that a linear response is held against
+CHECKS, FEW_CHECKS = 6, 2  # full solutions that a linear response is held against
 BUDGET_S = 30.0  # s of solving, beyond which inputs are taken to act linearly
 HERE_S = 8.0  # s of work for which no workers are started
 NUMBERS = 2_000_000  # that all readings of full solutions may hold

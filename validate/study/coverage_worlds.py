@@ -1,0 +1,237 @@
+"""Exact readings of a judged method in all worlds of a coverage study, each solved once.
+
+What is dear is solved less often: inputs and wrong parameters then act by straight lines, and the
+study says so.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError
+from validate.replay.options import Report
+from validate.study.coverage_bench import CoverageBench, ExactReading, Opening, run_reading
+from validate.study.coverage_plan import (
+    BUDGET_S,
+    CHECKS,
+    FEW_CHECKS,
+    HERE_S,
+    NUMBERS,
+    WRONG,
+    World,
+    inputs_of,
+    reading_cells,
+    steps_of,
+    true_method,
+    wrong_paths,
+)
+from validate.study.engine import Finished, finish
+from validate.study.job import C, Job, Plan, R, Where
+from validate.study.store import Record
+
+T = TypeVar("T")
+Readings = Mapping[World, Record[ExactReading]]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What all parts of a study are told; opening the experiment took `opened` s."""
+
+    job: Job
+    folder: Path
+    where: Where | None
+    report: Report | None
+    bench: CoverageBench
+    opening: Opening
+    opened: float
+    draws: int
+    seed: int
+    noise: float
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return tuple(inputs_of(self.bench.road.experiment))
+
+
+@dataclass(frozen=True)
+class Worlds:
+    """Readings as judged, of each input to both sides, of draws by number (`whole`: all of them),
+    and of wrong parameters by path and share: those that could be read (`mistaken`), and by label
+    those that move anything. Parameters that stand `still` move nothing."""
+
+    base: ExactReading
+    sides: Mapping[str, tuple[ExactReading, ExactReading]]
+    drawn: Mapping[int, ExactReading]
+    whole: bool
+    wrong: Mapping[tuple[str, float], World]
+    mistaken: Readings
+    moved: Mapping[str, ExactReading]
+    still: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
+    """z (draws, inputs) standard uncertainties. Raises `ComparisonError` for a method whose own
+    truth cannot be run."""
+    true = true_method(study.bench.road.experiment, method)
+    base = _readings(study, true, (World(),))[World()]
+    read = _needed(base, method)
+    steps = _readings(study, true, steps_of(study.inputs), base.seconds)
+    sides, instead = _sides(study, method, steps, read)
+    # Of a body that is moved: the judged one's mesh and registration may stand in a cache.
+    each = max([base.seconds, *(r.seconds for r in steps.values())])
+    whole = bool(study.inputs) and (
+        each * study.draws <= BUDGET_S and read.size * study.draws <= NUMBERS
+    )
+    checks = CHECKS if each * CHECKS <= BUDGET_S else FEW_CHECKS
+    count = study.draws if whole else checks if study.inputs else 0
+    solved = _drawn(study, true, z[:count], each, read)
+    paths = tuple(p.path for p in wrong_paths(study.bench.road.parameters))
+    wrong, mistaken, lines = _mistaken(study, true, paths, each, read)
+    known = {w.label: r.value for w, r in mistaken.items() if r.value is not None}
+    moved = {k: r for k, r in known.items() if _moves(r, read)}
+    drawn = {k: r.value for k, r in enumerate(solved) if r.value is not None}
+    return Worlds(
+        read, sides, drawn, whole, wrong, mistaken, moved,
+        tuple(p for p in paths if _still(p, known, moved)),
+        (*instead, *_unsolved(method, [r.why for r in solved if r.value is None]), *lines),
+    )  # fmt: skip
+
+
+def _sides(
+    study: Study, method: str, steps: Readings, read: ExactReading
+) -> tuple[dict[str, tuple[ExactReading, ExactReading]], tuple[str, ...]]:
+    """Each input one standard uncertainty to both sides: by the surrogate, as u_input is found,
+    where the method itself has no solution; and what to say of that."""
+    found = {w: _alike(r, read) for w, r in steps.items()}
+    bad = {w: r.why for w, r in found.items() if r.value is None}
+    if bad:
+        found |= _by_surrogate(study, method, tuple(bad), read)
+    each = {
+        name: (
+            _needed(found[World(((name, 1.0),))], method),
+            _needed(found[World(((name, -1.0),))], method),
+        )
+        for name in study.inputs
+    }
+    told = (f"{method}: {w.label} by the surrogate's difference: {why}" for w, why in bad.items())
+    return each, tuple(told)
+
+
+def _by_surrogate(
+    study: Study, method: str, worlds: tuple[World, ...], read: ExactReading
+) -> Readings:
+    declared = study.bench.road.experiment.uncertainty
+    other = declared.surrogate if declared else ""
+    if not other or other == true_method(study.bench.road.experiment, method):
+        return {}
+    found = _readings(study, other, (World(), *worlds))
+    base = _needed(_alike(found[World()], read), other)
+    moved = {w: _alike(found[w], read) for w in worlds}
+    return {
+        w: r if r.value is None else replace(r, value=read.plus(1.0, r.value, base))
+        for w, r in moved.items()
+    }
+
+
+def _drawn(
+    study: Study, true: str, z: Floats, each: float, read: ExactReading
+) -> list[Record[ExactReading]]:
+    """With all inputs drawn, `each` s a solution."""
+    worlds = [World(tuple(zip(study.inputs, row, strict=True))) for row in z.tolist()]
+    found = _readings(study, true, tuple(worlds), each)
+    return [_alike(found[w], read) for w in worlds]
+
+
+def _mistaken(
+    study: Study, true: str, paths: tuple[str, ...], each: float, read: ExactReading
+) -> tuple[dict[tuple[str, float], World], dict[World, Record[ExactReading]], tuple[str, ...]]:
+    """Every wrong parameter by every share; where that takes too long by straight lines through
+    the middle one, and then says so."""
+    wrong = {(p, by): World(wrong=(p, by)) for p in paths for by in WRONG}
+    if each * len(wrong) <= BUDGET_S:
+        found = _readings(study, true, tuple(wrong.values()), each)
+        return wrong, {w: _alike(r, read) for w, r in found.items()}, ()
+    middle = WRONG[1]
+    found = _readings(study, true, tuple(wrong[p, middle] for p in paths), each)
+    solved = {p: _alike(found[wrong[p, middle]], read) for p in paths}
+    lines = {w: _scaled(solved[p], by / middle, read) for (p, by), w in wrong.items()}
+    said = f"{true}: wrong parameters were solved at {100 * middle:g} % alone, straight lines else"
+    return wrong, lines, (said,) if paths else ()
+
+
+def _scaled(record: Record[ExactReading], share: float, base: ExactReading) -> Record[ExactReading]:
+    if record.value is None:
+        return record
+    return replace(record, value=base.plus(share, record.value, base))
+
+
+def _readings(
+    study: Study, method: str, worlds: tuple[World, ...], seconds: float = 0.0
+) -> Readings:
+    """`seconds` that one takes, where that is known."""
+    if not worlds:
+        return {}
+    cells = reading_cells(study.job, method, worlds)
+    plan = Plan(study.job, cells, study.opening, run_reading, ExactReading)
+    done = finished(study, plan, place(study, seconds * len(cells)))
+    return {c.world: done.records[c.key] for c in cells}
+
+
+def place(study: Study, seconds: float) -> Where | None:
+    """This process for what takes less than starting workers, which all open the experiment."""
+    asked = study.where is not None and bool(study.where.scheduler)
+    return study.where if asked or seconds > HERE_S + 2 * study.opened else Where(0)
+
+
+def finished(study: Study, plan: Plan[C, R], where: Where | None) -> Finished[R]:
+    """All cells of a plan; in this process on the bench that is open."""
+    if where is not None and where.workers == 0 and not where.scheduler:
+        plan = Plan(plan.job, plan.cells, partial(kept, study.bench), plan.run, plan.kind)
+    return finish(plan, study.folder, where, study.report)
+
+
+def kept(bench: T, job: Job) -> T:
+    """The bench that is open already."""
+    return bench
+
+
+def _needed(record: Record[ExactReading], method: str) -> ExactReading:
+    """Raises `ComparisonError` for a truth that could not be run."""
+    if record.value is None:
+        raise ComparisonError(f"{method}: its own truth could not be run: {record.why}")
+    return record.value
+
+
+def _alike(record: Record[ExactReading], base: ExactReading) -> Record[ExactReading]:
+    """Its reading at the samples of another, or why not: another body may have other samples."""
+    if record.value is None:
+        return record
+    try:
+        return replace(record, value=record.value.on(base))
+    except ComparisonError as error:
+        return replace(record, value=None, refused=str(error))
+
+
+def _moves(reading: ExactReading, base: ExactReading) -> bool:
+    return not all(
+        np.allclose(a, b, rtol=1e-9, atol=0.0) for a, b in zip(reading.left, base.left, strict=True)
+    )
+
+
+def _unsolved(method: str, why: list[str]) -> tuple[str, ...]:
+    """A line where drawn inputs leave the truth without a solution: those draws are linear."""
+    if not why:
+        return ()
+    return (f"{method}: {len(why)} drawn truths have no solution, straight lines there: {why[0]}",)
+
+
+def _still(path: str, known: Mapping[str, ExactReading], moved: Mapping[str, ExactReading]) -> bool:
+    """Whether a parameter moves nothing that is measured."""
+    labels = [World(wrong=(path, by)).label for by in WRONG]
+    return any(k in known for k in labels) and not any(k in moved for k in labels)
