@@ -41,7 +41,8 @@ _MM = 1e3
 _WIDE: Mapping[str, Any] = {"color": ACCEPTED, "alpha": 0.45, "width": 0.014, "headwidth": 2.2,
                             "headlength": 2.2, "headaxislength": 2.2}  # fmt: skip
 _THIN: Mapping[str, Any] = {"color": MEASURED, "width": 0.005, "headwidth": 3.5, "headlength": 4}
-_PANEL, _ROOM = 2.9, 1.2  # inches of a row of panels, of labels and legend
+_PANEL, _ROOM = 2.9, 1.2  # inches of a row of panels at most, of labels and legend
+_FLAT, _TITLE = 0.8, 0.7  # inches of a row at least; of it, what is no panel
 _BANDS = 7  # groups of neighbours that a line joins
 
 
@@ -94,8 +95,15 @@ def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
         "the simulated ones as dots. About four dots in ten fall inside their circle when the "
         "model is right.",
         f"Marker displacement vectors and positions for {count} loads, measured and simulated.",
-        draw(lambda f: _panels(f, seen, judged), WIDTH, _PANEL * count + _ROOM),
+        draw(lambda f: _panels(f, seen, judged), WIDTH, _row_height(seen) * count + _ROOM),
     )
+
+
+def _row_height(seen: _Seen) -> float:
+    """Inches of a row, so that panels to scale fill it."""
+    places = seen.at(seen.rest)[:, seen.plane]
+    wide, high = np.maximum(np.nanmax(places, axis=0) - np.nanmin(places, axis=0), 1e-9)
+    return float(np.clip(WIDTH / 2 * high / wide + _TITLE, _FLAT + _TITLE, _PANEL))
 
 
 def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
