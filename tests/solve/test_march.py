@@ -115,6 +115,8 @@ def test_run_that_breaks_keeps_what_was_done(coarse: Responses) -> None:
     assert (run.outcome.state, run.outcome.step, run.outcome.why) == ("diverged", done, "as asked")
     assert np.array_equal(run.t, T[:done])
     assert run.at.tolist() == [0, 20]
+    assert run.seconds is not None
+    assert run.seconds.shape == (done,)
     assert np.array_equal(run.u, whole.u[:2])
     for name, trace in run.traces.items():
         assert np.array_equal(trace.y, whole.traces[name].y[:done])

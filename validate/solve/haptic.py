@@ -2,9 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from validate.arrays import Floats, checked
 from validate.errors import UsageError
 
 HAPTIC_HZ = 1000.0  # force updates that a stiff contact needs to feel steady (paper 003, 3.5)
+DEVICE_HZ = 512.0  # of paper 000's haptic device (section 5.2)
+QUANTILES = (0.5, 0.9, 0.99, 0.999)
 VISUAL_HZ = 30.0  # pictures a second (paper 003, 3.3)
 
 
@@ -36,3 +41,25 @@ class RealTime:
     def ratio(self) -> float:
         """dt over the critical step; a sound explicit run needs less than 1."""
         return self.dt / self.critical_dt
+
+
+@dataclass(frozen=True)
+class TickTimes:
+    """`seconds` (n,) from when a tick was due, or begun, until its force was there."""
+
+    seconds: Floats
+
+    def __post_init__(self) -> None:
+        given = checked(self.seconds, "tick times [s]", (None,), error=UsageError)
+        if not len(given):
+            raise UsageError("tick times: 0 ticks, nothing to tell")
+        object.__setattr__(self, "seconds", given)
+
+    def missed(self, deadline: float) -> int:
+        """How many took longer than `deadline` s."""
+        return int((self.seconds > deadline).sum())
+
+    @property
+    def quantiles(self) -> tuple[float, ...]:
+        """Seconds at `QUANTILES`, then the longest."""
+        return (*np.quantile(self.seconds, QUANTILES).tolist(), float(self.seconds.max()))

@@ -87,12 +87,11 @@ def march(
     traces |= _totals(stepper.scene, traces)
     traces |= probe_traces(stepper.scene, np.array(walk.probes))
     traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
-    seconds = np.array(walk.seconds)
-    seconds = seconds[_UNTIMED:] if done > 2 * _UNTIMED else seconds[:done]
-    times = _step_times(seconds) if done else None
+    seconds = np.array(walk.seconds)[:done]
+    times = _step_times(seconds[_UNTIMED if done > 2 * _UNTIMED else 0 :]) if done else None
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
-    return Run(method, t[:done], at[at < done], u, traces, outcome, setup_s, times, sd)
+    return Run(method, t[:done], at[at < done], u, traces, outcome, setup_s, times, sd, seconds)
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,8 @@ class Trace:
 class Run:
     """t (nt,) s of the steps done; u (no, n, d) m at the output steps `at`; traces by name.
 
-    `u` keeps the output frames only, and so does a filter's `sd`; `traces` every step.
+    `u` keeps the output frames only, and so does a filter's `sd`; `traces` every step, and
+    `seconds` (nt,) what each took, where it was timed.
     """
 
     method: str
@@ -124,6 +125,7 @@ class Run:
     setup_s: float
     step_s: StepTimes | None
     sd: Floats | None = None
+    seconds: Floats | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", checked(self.t, "run t [s]", (None,)))
