@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from validate import __version__
-from validate.cli.arguments import BAD_INPUT, BUG, EXPERIMENTS, FOLDER, INTERRUPTED, complain
+from validate.cli.arguments import BAD_INPUT, BUG, EXPERIMENTS, FILE, FOLDER, INTERRUPTED, complain
 from validate.cli.of_recordings import data_, import_, inspect, merge, new, record
 from validate.errors import UsageError, ValidateError
 from validate.places import of_the_place, why_not
@@ -282,6 +282,28 @@ def identify(name: str, **options: Any) -> int:
     from validate.cli import identifying
 
     return identifying.identifying(name, _common(options), **options)
+
+
+@cli.command("live")
+@click.argument("name", metavar="NAME|FILE.py")
+@EXPERIMENTS
+@click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
+@click.option("--method", default="", metavar="NAME", help="Which one (default: the judged one).")
+@click.option("--seconds", type=float, help="Stop after so many (default: where the path ends).")
+@click.option(
+    "--listen", type=click.IntRange(0, 65535), is_flag=False, flag_value=51200, metavar="[PORT]",
+    help="Places from UDP packets on 127.0.0.1 (51200; 0: any free port), not from the recording.",
+)  # fmt: skip
+@click.option(
+    "--realtime", is_flag=True, help="Before all other processes (Linux, with the right)."
+)
+@click.option("-o", "out", type=FILE, help="What it did (default: NAME-live.mcap in reports/).")
+@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+def live_(name: str, **options: Any) -> int:
+    """A needle's model against the clock, from its recorded path or from packets on loopback."""
+    from validate.cli import living
+
+    return living.run(name, **options)
 
 
 for _command in (inspect, import_, merge, new, record, data_):

@@ -1,0 +1,19 @@
+"""A model against the clock: from a recorded path, or from packets on this machine's loopback."""
+
+from validate.replay.live.clock import Lived, live, realtime
+from validate.replay.live.listener import Listener
+from validate.replay.live.path import RecordedPath
+from validate.replay.live.prepared import Prepared, prepared
+from validate.replay.live.written import LIVE, written
+
+__all__ = [
+    "LIVE",
+    "Listener",
+    "Lived",
+    "Prepared",
+    "RecordedPath",
+    "live",
+    "prepared",
+    "realtime",
+    "written",
+]
