@@ -25,7 +25,12 @@ def stamped(recording: Recording, parameters: Any) -> Recording:
 def synthetic(recording: Recording) -> bool:
     """Whether a recording says of itself that a model made it."""
     told = recording.metadata
-    return _RECORD in told or dict(told.get("provenance", {})).get("kind") == "twin"
+    return made_here(recording) or dict(told.get("provenance", {})).get("kind") == "twin"
+
+
+def made_here(recording: Recording) -> bool:
+    """Whether a recording says which parameters it was made with."""
+    return _RECORD in recording.metadata
 
 
 def made_by(

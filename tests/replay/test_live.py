@@ -1,0 +1,348 @@
+"""The live loop: against a clock that the test turns, over a real socket, and replayed."""
+
+import gc
+import math
+import os
+import socket
+import struct
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from validate.arrays import Floats
+from validate.cli.main import cli
+from validate.errors import UsageError
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.replay import load as experiment_named
+from validate.replay.live import (
+    Listener,
+    Lived,
+    Prepared,
+    RecordedPath,
+    live,
+    prepared,
+    realtime,
+    written,
+)
+from validate.replay.live.packets import (
+    CONTACT,
+    FADED,
+    LIMITED,
+    NO_ANSWER,
+    Position,
+    force_of,
+    newer,
+    position_bytes,
+    position_of,
+)
+from validate.replay.options import Options
+from validate.replay.road import compare
+from validate.solve.needle import NeedleStepper
+
+COARSE = {"mesh.plane": "10"}
+REST = (0.0031, 0.001)
+
+
+class Turned:
+    """A clock that stands until it is waited for; every reading costs `cost` s. At every wait
+    `device` is called with the time."""
+
+    def __init__(self, cost: float = 0.0, device: Callable[[float], None] | None = None) -> None:
+        self.now, self.cost, self.device = 0.0, cost, device
+
+    def __call__(self) -> float:
+        self.now += self.cost
+        return self.now
+
+    def wait(self, seconds: float) -> None:
+        self.now += seconds
+        if self.device:
+            self.device(self.now)
+
+
+@cache
+def made() -> Prepared:
+    return prepared(experiment_named("needle_pocket"), Options(COARSE), "p1_exact")
+
+
+def run(path: RecordedPath, clock: Turned, seconds: float | None = None) -> Lived:
+    return live(made().stepper, path, seconds, clock, clock.wait)
+
+
+# --- packets ----------------------------------------------------------------------------------
+
+
+def test_a_position_is_the_documented_struct() -> None:
+    packet = position_bytes(Position(7, 123, np.array([0.5, -2.0])))
+    assert packet == struct.pack("<4sIqdd", b"VLP1", 7, 123, 0.5, -2.0)
+    back = position_of(packet, 2)
+    assert isinstance(back, Position)
+    assert (back.sequence, back.ns, back.x.tolist()) == (7, 123, [0.5, -2.0])
+
+
+@pytest.mark.parametrize(
+    ("data", "fault"),
+    [
+        (b"", "short"),
+        (struct.pack("<4sIqd", b"VLP1", 1, 0, 0.0), "short"),
+        (struct.pack("<4sIqddd", b"VLP1", 1, 0, 0.0, 0.0, 0.0), "long"),
+        (b"x" * 65, "long"),
+        (struct.pack("<4sIqdd", b"NOPE", 1, 0, 0.0, 0.0), "wrong magic"),
+        (struct.pack("<4sIqdd", b"VLP1", 1, 0, math.nan, 0.0), "not finite"),
+        (struct.pack("<4sIqdd", b"VLP1", 1, 0, 0.0, -math.inf), "not finite"),
+    ],
+)
+def test_what_is_no_position_says_why(data: bytes, fault: str) -> None:
+    assert position_of(data, 2) == fault
+
+
+def test_sequence_numbers_begin_again() -> None:
+    assert newer(1, 0)
+    assert newer(0, 2**32 - 1)
+    assert not newer(5, 5)
+    assert not newer(2**32 - 1, 0)
+
+
+# --- against the clock ------------------------------------------------------------------------
+
+
+def test_the_path_is_walked_on_time_and_forces_are_those_of_the_stepper() -> None:
+    path = made().path
+    done = run(path, Turned())
+    assert done.ticks == len(path.t) == len(done.t)
+    assert done.missed == 0
+    assert np.array_equal(done.x, path.x)
+    assert done.due == pytest.approx(path.t - path.t[0])
+    assert np.abs(done.F).max() > 1
+    assert done.changed.sum() == 4
+
+
+def test_ticks_that_take_too_long_are_missed_and_none_is_left_out() -> None:
+    path = RecordedPath(made().path.t[:50], made().path.x[:50])
+    done = run(path, Turned(cost=0.003))
+    assert len(done.t) == 50
+    assert done.missed == 50
+    assert done.late.max() > 40 / 512
+
+
+def test_garbage_is_collected_again_afterwards() -> None:
+    path = RecordedPath(made().path.t[:3], made().path.x[:3])
+    run(path, Turned())
+    assert gc.isenabled()
+    assert gc.get_freeze_count() == 0
+
+
+def test_seconds_end_it() -> None:
+    assert run(made().path, Turned(), seconds=0.1).ticks == math.ceil(0.1 * 512)
+
+
+# --- packets on loopback ----------------------------------------------------------------------
+
+
+class Device:
+    """A client on a real socket: sends at every wait of the clock and reads the answers."""
+
+    def __init__(self, listener: Listener, packets: list[bytes]) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(5.0)
+        self.socket.connect(listener.address)
+        self.packets: Iterator[bytes] = iter(packets)
+        self.answers: list[tuple[int, Floats, int]] = []
+        self.waiting = False
+
+    def __call__(self, now: float) -> None:
+        if self.waiting:
+            self.answers.append(force_of(self.socket.recv(1024), 2))
+        packet = next(self.packets, None)
+        self.waiting = packet is not None
+        if packet is not None:
+            self.socket.send(packet)
+
+
+def talk(packets: list[bytes], seconds: float, stepper: NeedleStepper | None = None
+         ) -> tuple[Lived, Device]:  # fmt: skip
+    listener = Listener(*made().reach, 512.0)
+    device = Device(listener, packets)
+    clock = Turned(device=device)
+    try:
+        return live(stepper or made().stepper, listener, seconds, clock, clock.wait), device
+    finally:
+        device.socket.close()
+        listener.close()
+
+
+def at(k: int, y: float, ns: int | None = None) -> bytes:
+    when = round(k * 1e9 / 512) if ns is None else ns
+    return position_bytes(Position(k, when, np.array([REST[0], y])))
+
+
+def test_a_device_is_answered_with_the_force_of_its_place() -> None:
+    ys = [0.003, 0.001, -0.001, -0.003, -0.004]
+    done, device = talk([at(k + 1, y) for k, y in enumerate(ys)], 7 / 512)
+    assert done.findings["taken"] == 5
+    assert done.x[:, 1].tolist() == ys
+    assert [sequence for sequence, _, _ in device.answers] == [1, 2, 3, 4, 5]
+    assert np.array([force for _, force, _ in device.answers]) == pytest.approx(done.F)
+    assert [flags for _, _, flags in device.answers] == [0, 0, CONTACT, CONTACT, CONTACT]
+    assert done.F[-1, 1] > done.F[-2, 1] > 0
+
+
+def test_bad_packets_are_counted_and_end_nothing() -> None:
+    """Short, long, foreign, not finite, out of reach, old and late ones between sound ones."""
+    bad = [b"", b"x" * 900, struct.pack("<4sIqdd", b"EVIL", 9, 0, 0.0, 0.0),
+           struct.pack("<4sIqdd", b"VLP1", 9, 0, math.nan, 0.0), at(9, 1e300), at(1, -0.004),
+           at(10, -0.004, ns=-(10**18)), at(11, -0.004, ns=-(2**63))]  # fmt: skip
+    sound = [at(1, 0.003), at(2, -0.001), at(3, -0.002)]
+    done, _ = talk([sound[0], sound[1], *bad, at(12, -0.002)], 12 / 512)
+    wanted = {"short": 1, "long": 1, "wrong magic": 1, "not finite": 1, "out of reach": 1,
+              "out of order": 1, "late": 2, "taken": 3}  # fmt: skip
+    assert {k: done.findings[k] for k in wanted} == wanted
+    assert done.x[:, 1].tolist() == [0.003, -0.001, -0.002]
+
+
+def test_without_packets_the_force_is_held_fades_and_is_nothing() -> None:
+    ticks = 80
+    listener = Listener(*made().reach, 512.0)
+    given: list[tuple[Floats, int]] = []
+    keep = listener.give
+    listener.give = lambda F, flags: (given.append((F, flags)), keep(F, flags))[0]  # type: ignore[assignment, func-returns-value, method-assign]
+    device = Device(listener, [at(1, 0.003), at(2, -0.003), at(3, -0.005)])
+    clock = Turned(device=device)
+    done = live(made().stepper, listener, ticks / 512, clock, clock.wait)
+    device.socket.close()
+    listener.close()
+    sizes = [float(np.linalg.norm(F)) for F, _ in given]
+    last = max(sizes)
+    assert last > 1
+    first = sizes.index(last)
+    assert sizes[first + 9] == last  # 17.6 ms
+    assert 0 < sizes[first + 30] < last
+    assert sizes[first + 55 :] == [0.0] * (len(sizes) - first - 55)
+    assert given[-1][1] & FADED
+    assert done.findings["ticks without a new place"] == ticks - 3
+
+
+def test_no_force_beyond_the_limit_goes_out() -> None:
+    strict = prepared(
+        experiment_named("needle_pocket"), Options({**COARSE, "hand.limit": "5"}), "p1_exact"
+    ).stepper
+    ys = [0.003, *np.linspace(0.001, -0.049, 30)]
+    done, device = talk([at(k + 1, float(y)) for k, y in enumerate(ys)], 33 / 512, strict)
+    sizes = [float(np.linalg.norm(force)) for _, force, _ in device.answers]
+    assert len(sizes) == 31
+    assert max(sizes) == pytest.approx(5.0)
+    assert done.findings["force limited"] == sum(
+        bool(flags & LIMITED) for _, _, flags in device.answers
+    )
+
+
+def test_a_model_without_an_answer_gives_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As far as the reach goes the exact pressure may have no root: a count, and zero newtons."""
+    ys = [0.003, -0.001, -0.049, -0.095, -0.001]
+    lost = prepared(
+        experiment_named("needle_pocket"),
+        Options({**COARSE, "methods.paper.settings.gain": "1e12"}), "paper",
+    ).stepper  # fmt: skip
+    done, device = talk([at(k + 1, y) for k, y in enumerate(ys)], 7 / 512, lost)
+    silent = [force for _, force, flags in device.answers if flags & NO_ANSWER]
+    assert len(silent) == done.findings["no answer of the model"] > 0
+    assert not np.array(silent).any()
+
+
+def test_another_sender_is_not_heard_while_one_is() -> None:
+    listener = Listener(*made().reach, 512.0)
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,
+    ):
+        for k, device in ((1, one), (2, two)):
+            device.sendto(at(k, 0.003), listener.address)
+        listener.place(0, 0.0)
+        assert dict(listener.findings) == {"taken": 1, "another sender": 1}
+        two.sendto(at(1, 0.002), listener.address)
+        found = listener.place(1, 2.0)
+        assert found is not None
+        assert found[1] == 0.002
+    listener.close()
+
+
+def test_it_listens_on_loopback_alone_and_only_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    listener = Listener(*made().reach, 512.0)
+    assert listener.address[0] == "127.0.0.1"
+    with pytest.raises(UsageError, match="choose another port"):
+        Listener(*made().reach, 512.0, listener.address[1])
+    listener.close()
+
+    def refused(*_: object) -> None:
+        raise AssertionError("a socket was opened")
+
+    path = RecordedPath(made().path.t[:3], made().path.x[:3])
+    monkeypatch.setattr(socket, "socket", refused)
+    assert run(path, Turned()).kind == "path"
+
+
+# --- what it did, replayed --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("source", ["path", "udp"])
+def test_what_it_did_replays_to_the_same_numbers(source: str, tmp_path: Path) -> None:
+    if source == "path":
+        done = run(made().path, Turned())
+    else:
+        ys = 0.003 - 0.007 * np.sin(np.pi * np.arange(40) / 39)
+        done, _ = talk([at(k + 1, float(y)) for k, y in enumerate(ys)], 45 / 512)
+    file = tmp_path / "live.mcap"
+    write_recording(written(done, made(), 10**18), file)
+    again = read_recording(file)
+    assert again.record("live")["method"] == "p1_exact"
+    result = compare(
+        experiment_named("needle_pocket"),
+        Options({**COARSE, "recording": str(file)}, ("p1_exact",)),
+    )
+    (method,) = result.methods
+    traces = method.runs[0].traces
+    force = np.column_stack([traces["needle.force.x"].y, traces["needle.force.y"].y])
+    assert np.abs(done.F).max() > 1
+    assert np.array_equal(force[-len(done.F) :], done.F)
+    assert result.kind == "same model"
+    assert result.passed
+
+
+def test_the_command_runs_against_the_real_clock(tmp_path: Path) -> None:
+    file = tmp_path / "live.mcap"
+    given = ["live", "needle_pocket", "--set", "mesh.plane=10", "--method", "p1_exact",
+             "--seconds", "0.3", "-o", str(file), "--json"]  # fmt: skip
+    result = CliRunner().invoke(cli, given, standalone_mode=False)
+    assert result.exception is None
+    assert '"ticks": 154' in result.stdout
+    assert len(read_recording(file).signals["tick.work"].t) == 154
+
+
+def test_an_experiment_without_a_needle_is_refused() -> None:
+    with pytest.raises(UsageError, match="has no needle"):
+        prepared(experiment_named("fluid_block"), Options({}), "p1_exact")
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="no such scheduling here")
+def test_real_time_is_asked_for_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    before = os.sched_getscheduler(0)
+    monkeypatch.setattr(os, "sched_setscheduler", lambda _, policy, __: asked.append(policy))
+    with realtime(wanted=False):
+        pass
+    assert asked == []
+    with pytest.raises(ZeroDivisionError), realtime(wanted=True):
+        raise ZeroDivisionError
+    assert asked == [os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, before]
+
+    def refused(*_: object) -> None:
+        raise PermissionError("not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refused)
+    with pytest.raises(UsageError, match="--realtime: not permitted"), realtime(wanted=True):
+        pass

@@ -1,0 +1,131 @@
+"""A path of a needle as somebody recorded it: what of it can be walked, and what was wrong with it.
+
+The tip is recorded as signals `tip.x`, `tip.y`(, `tip.z`) in m, or as the only point of a stream of
+markers `tip` (positions that a tracker did not see are null there).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.types import Recording
+from validate.scene.mesh import Mesh
+
+_AXES = "xyz"
+_GAP = 3.0  # steps as long as this many median ones are gaps
+_FAR = 1.0  # body sizes away: such a place is no needle's at this body
+
+
+@dataclass(frozen=True)
+class Walkable:
+    """t (nt,) s, tip x (nt, d) m, the first one outside the body; sd m; `findings` with counts."""
+
+    t: Floats
+    x: Floats
+    sd: float
+    findings: tuple[str, ...]
+
+
+def walkable(recording: Recording, mesh: Mesh) -> Walkable:
+    """The recorded path against the box that the body fills.
+
+    Raises `RecordingError` where no path is there, it has other dimensions, or none of it can be
+    walked.
+    """
+    t, x, sd = _recorded(recording, mesh.dimension)
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    size = float((high - low).max())
+    seen = np.asarray(np.isfinite(x).all(axis=1))
+    near = seen & np.asarray(_beyond(np.where(seen[:, None], x, low), low, high) <= _FAR * size)
+    inside = np.asarray(near & ((x > low) & (x < high)).all(axis=1))
+    first = int(np.argmax(near & ~inside)) if (near & ~inside).any() else len(t)
+    kept = near & (np.arange(len(t)) >= first)
+    findings = [
+        _said(~seen, "is not seen: left out"),
+        _said(seen & ~near, f"lies over {1e3 * _FAR * size:.0f} mm outside the body: left out"),
+        _said(near & (np.arange(len(t)) < first),
+              "lies inside the body before the path was outside it: left out"),
+    ]  # fmt: skip
+    if kept.sum() < 2:
+        what = "; ".join(f for f in findings if f)
+        raise RecordingError(
+            f"{recording.name}: {int(kept.sum())} of {len(t)} samples of the tip can be walked: "
+            f"{what}; the path must begin outside the body and lie in its frame"
+        )
+    findings += [_gaps(t[kept]), _touch(x[kept], low, high), _left(x[kept], low, high)]
+    return Walkable(t[kept], x[kept], sd, tuple(f for f in findings if f))
+
+
+def _recorded(recording: Recording, d: int) -> tuple[Floats, Floats, float]:
+    if "tip" in recording.markers:
+        marker = recording.marker("tip")
+        x = marker.x[:, 0]
+        _require_dimension(recording, x.shape[1], d)
+        return marker.t, np.array(x), marker.sd
+    names = [f"tip.{a}" for a in _AXES]
+    there = sum(name in recording.signals for name in names)
+    parts = [recording.signal(name, "m") for name in names[: max(there, d)]] if there else []
+    if not parts:
+        raise RecordingError(
+            f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
+            f"{sorted(recording.streams)}"
+        )
+    _require_dimension(recording, len(parts), d)
+    if any(not np.array_equal(s.t, parts[0].t) for s in parts):
+        raise RecordingError(
+            f"{recording.name}: tip.x .. tip.{_AXES[d - 1]} have {[len(s.t) for s in parts]} "
+            "samples at different times; record them together"
+        )
+    return parts[0].t, np.hstack([s.y[:, :1] for s in parts]), max(s.sd for s in parts)
+
+
+def _require_dimension(recording: Recording, found: int, d: int) -> None:
+    if found != d:
+        space = "solid" if found == 3 else "plane"
+        raise RecordingError(
+            f"{recording.name}: a tip of {found} coordinates, a body of {d}; "
+            f"--set body.space={space}"
+        )
+
+
+def _beyond(x: Floats, low: Floats, high: Floats) -> Floats:
+    """How far (nt,) m outside the box."""
+    out = np.maximum(low - x, 0) + np.maximum(x - high, 0)
+    return np.asarray(np.linalg.norm(out, axis=1))
+
+
+def _said(which: NDArray[np.bool_], what: str) -> str:
+    return f"the tip of {int(which.sum())} of {len(which)} samples {what}" if which.any() else ""
+
+
+def _gaps(t: Floats) -> str:
+    steps = np.diff(t)
+    gaps = steps > _GAP * np.median(steps)
+    if not gaps.any():
+        return ""
+    return (
+        f"{int(gaps.sum())} gaps in the path, the longest {steps.max():.3g} s: the tip is taken to "
+        "have gone straight across"
+    )
+
+
+def _touch(x: Floats, low: Floats, high: Floats) -> str:
+    if ((x > low) & (x < high)).all(axis=1).any():
+        return ""
+    least = float(_beyond(x, low, high).min())
+    return (
+        f"none of {len(x)} samples of the tip lies in the body, the nearest {1e3 * least:.3g} mm "
+        "off: nothing is touched unless the path crosses the body between two samples"
+    )
+
+
+def _left(x: Floats, low: Floats, high: Floats) -> str:
+    """Through the body and out below or at a side."""
+    sides = [c for c in range(x.shape[1]) if c != 1]
+    below = (x[:, 1] < high[1]) & (
+        ((x[:, sides] < low[sides]) | (x[:, sides] > high[sides])).any(axis=1) | (x[:, 1] < low[1])
+    )
+    return _said(below, "lies below the touched face and beyond another one: it left the mesh")

@@ -1,0 +1,66 @@
+"""The shipped recording: a hand's path through a finer body of quadratic elements, and sensors."""
+
+import numpy as np
+
+from validate.errors import SceneError
+from validate.fem.system import build as build_system
+from validate.papers.needle_pocket.hand import Hand
+from validate.papers.needle_pocket.pocket import (
+    AXES,
+    POCKET,
+    TOOL,
+    NeedlePocket,
+    body_mesh,
+    pocket_scene,
+)
+from validate.recording.types import Recording, Source
+from validate.replay.experiment import Progress
+from validate.scene.material import Material
+from validate.solve.march import march
+from validate.solve.needle import NeedleLoop
+from validate.twin.sensors import signal, streams
+
+FRAME = "block"
+_START_NS = 1_080_345_600_000_000_000  # the year of the paper, an arbitrary moment
+_BESIDE = 0.0031  # m: off the pocket's middle, so that a mirrored path cannot pass
+_FREE = 1e6  # N: the twin's own force is not limited
+_SD_FORCE = {"plane": 0.2, "solid": 1e-3}  # N
+
+
+def hand_of(p: NeedlePocket) -> Hand:
+    """The path over the body's upper side."""
+    above = (_BESIDE, 0.0) if p.body.space == "plane" else (_BESIDE, 0.0, 0.6 * _BESIDE)
+    return Hand(p.twin.depth, above, p.twin.rate, p.twin.tremor, p.twin.seed)
+
+
+def record(p: NeedlePocket, progress: Progress) -> Recording:
+    """Path, force on the hand and pressure at every tick; seeded."""
+    progress("simulate")
+    twin, d = p.twin, p.body.dimension
+    t, x = hand_of(p).path()
+    t = np.round(t, 9)
+    mesh = body_mesh(p.body, twin.plane, twin.solid, 2)
+    scene = pocket_scene(mesh, Material(p.material.E, p.material.nu), tuple(x[0].tolist()))
+    stepper = NeedleLoop(grip=p.grip, limit=_FREE).prepare(build_system(scene))
+    run = march("twin", stepper, t, x - x[0], np.array([len(t) - 1]), 0.0)
+    if not run.finished:
+        raise SceneError(f"the twin: {run.outcome.why}")
+    progress("measure")
+    rng = streams(twin.seed, ("tip", "force", "pressure"))
+    sd = _SD_FORCE[p.body.space] if twin.sd_force is None else twin.sd_force
+    signals = {}
+    for c, a in enumerate(AXES[:d]):
+        y = run.traces[f"{TOOL}.force.{a}"].y
+        signals[f"tip.{a}"] = signal(t, x[:, c], "m", twin.sd_tip, FRAME, rng["tip"])
+        signals[f"force.{a}"] = signal(t, y, "N", sd, FRAME, rng["force"])
+    P = run.traces[f"{POCKET}.pressure"].y
+    signals["pressure"] = signal(t, P, "Pa", twin.sd_pressure, FRAME, rng["pressure"])
+    provenance = {
+        "kind": "twin", "law": "linear elasticity, small strain",
+        "element": f"{mesh.kind}, {len(mesh.nodes)} nodes", "fluid": "constant volume, exact",
+        "hand": "minimum-jerk moves with tremor, synthetic", "seed": str(twin.seed),
+    }  # fmt: skip
+    return Recording(
+        "needle_pocket", Source("needle_pocket", "", 0, "made in memory"), _START_NS,
+        signals=signals, metadata={"provenance": provenance},
+    )  # fmt: skip
