@@ -17,6 +17,7 @@ from validate.papers.fluid_inclusion.friction import friction_from_rise
 from validate.papers.fluid_inclusion.ladder import LADDER
 from validate.papers.fluid_inclusion.phantom import Phantom, build, load, place, read, record
 from validate.papers.fluid_inclusion.phantom import PhantomModel as Model
+from validate.papers.fluid_inclusion.stated import STATED
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified, Twin
 from validate.replay.method import Method
@@ -77,7 +78,7 @@ EXPERIMENT = Experiment(
     uncertainty=UNCERTAINTY,
     effects=EFFECTS,
     sensors=ADDED_SENSORS,
-    published=FIGURES,
+    published=(*FIGURES, *STATED),
     identify=identify,
     ladder=LADDER,
     quick=_quick,

@@ -13,7 +13,8 @@ DECLARED = {
     "ecoflex_cylinder": 3,
     "ekf_cone": 10,
     "ekf_cube": 27,
-    "fluid_phantom": 19,
+    "fluid_block": 22,
+    "fluid_phantom": 48,
     "fluid_phantom_large": 0,
     "kf_cube": 11,
     "kf_cube_inertia": 0,
@@ -21,8 +22,11 @@ DECLARED = {
 }
 # Every number of a paper's tables and results that one of our experiments could stand beside.
 PRINTED = {
+    "fluid_block": (8000, 1, 0.05, 0.012, 34e3, 0.35, 0.003, 0.15, 0.01, 0.7, 1.3),  # paper 000
     "fluid_phantom": (  # paper 000
         8000, 1, 1328, 3984, 80, 3.3e-3, 3.71e-3, 0.41e-3, 1e-3, 15.2e3, 0.15, 512, 0.001, 3000,
+        0.01, 500, 70, 64, 0.5, 0.10, 0.13, 0.03, 0.485, 12e6, 0.040, 0.002, 0.003, 0.006, 0.009,
+        512e6, 82,
     ),
     "kf_cube": (200, 672, 0.0116, 10, 0.1735, 0.0158, 63, 25),  # paper 001
     "bending_rod": (4.2,),  # paper 002

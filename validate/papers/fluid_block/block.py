@@ -24,7 +24,7 @@ from validate.replay.cards import shipped
 from validate.replay.experiment import Progress
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
-from validate.scene.scene import Cavity, Drive, PlaneState, Scene, Support
+from validate.scene.scene import Cavity, Drive, Pin, PlaneState, Scene, Support
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
 from validate.twin.sensors import signal, streams
@@ -212,10 +212,13 @@ def slab(
     mesh = block_mesh(body, cavities, squares)
     supports: tuple[Support, ...] = (Support("bottom", (0, 1)),)
     drives = () if tool is None else (_drive(tool),)
-    if tool and body.plates == "bonded":
+    pins: tuple[Pin, ...] = ()
+    if tool == "needle" and body.plates == "bonded":
+        pins = (Pin((0.0, 0.0), (0,)),)
+    elif tool and body.plates == "bonded":
         supports += (Support("top" if tool == "plate" else "patch", (0,)),)
     return Scene(
-        quadratic(mesh) if order == 2 else mesh, material, supports, drives=drives,
+        quadratic(mesh) if order == 2 else mesh, material, supports, pins, drives,
         cavities=tuple(Cavity(f"cavity{k}", f"cavity{k}") for k in range(cavities.count)),
         plane=body.plane,
     )  # fmt: skip

@@ -139,6 +139,17 @@ def curve_exhibit(curves: Sequence[tuple[str, PressureCurve]]) -> Exhibit:
     return Exhibit("curve", "Pressure against volume", words, (table,), (chart,))
 
 
+def kept(p: FluidBlock, r: Responses) -> dict[str, float]:
+    """V/V0 of the first cavity in Fig. 3, pressed without and with its pressure."""
+    drive = np.array([_PRESSED * p.body.height])
+    found: dict[str, float] = {}
+    for name, scheme in (("empty", NoFluid()), ("full", ExactPressure())):
+        stepper = scheme.on(r)
+        state = stepper.step(stepper.rest(), drive)
+        found[f"ratio.{name}"] = state.numbers["cavity0.volume_ratio"]
+    return found
+
+
 def shapes_exhibit(p: FluidBlock, r: Responses) -> Exhibit:
     """Fig. 3 (rest, pressed empty, pressed full) and 4b, 4c (70 and 130 % of volume)."""
     maps = []

@@ -10,6 +10,7 @@ from validate.papers.fluid_block.curves import (
     condensed_block,
     curve_exhibit,
     curve_of,
+    kept,
     shapes_exhibit,
 )
 from validate.papers.fluid_block.exactness import exactness_exhibit
@@ -21,6 +22,8 @@ from validate.papers.fluid_block.updates import (
 )
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases
+from validate.solve.pressure_curve import RATIOS
+from validate.solve.pressure_loop import PressureLoop
 
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
@@ -42,11 +45,30 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "gain": first.gain,
         **counted, **{f"radius.{k}": v for k, v in radii.items()}, **errors,
     }  # fmt: skip
-    shapes = shapes_exhibit(p, pressed(p, "plate"))
+    plate = pressed(p, "plate")
+    shapes = shapes_exhibit(p, plate)
+    numbers |= {"off.line": first.off, "P70": float(first.fixed[0]), "P130": float(first.fixed[-1]),
+                **kept(p, plate)}  # fmt: skip
     return Told((curve_exhibit(curves), shapes, updates, several, laws_exhibit(p), exact), numbers)
 
 
 _ASSUMED = "cavity, boundary, plane state and tool are not printed: ours"
+_INPUT = "an input, taken as printed"
+_P = FluidBlock()
+
+
+def _taken(name: str, theirs: float, ours: float, unit: str, reason: str = _INPUT) -> Figure:
+    return Figure(
+        name, lambda _: ours, theirs, None, unit, "not comparable", reason, "section 3.3", ours,
+        1e-12,
+    )  # fmt: skip
+
+
+def _drawn(name: str, number: str, theirs: float | None, unit: str, source: str,
+           reason: str = f"drawn, no number is printed; {_ASSUMED}") -> Figure:  # fmt: skip
+    return Figure(name, f"told:{number}", theirs, None, unit, "not comparable", reason, source)
+
+
 FIGURES = (
     Figure(
         "Fig. 4a: axis of the pressure at 70..130 % volume", "told:largest", 8000.0, None, "Pa",
@@ -60,5 +82,38 @@ FIGURES = (
     Figure(
         "updates to 1 %, cold start, .3..15 % strain, under a plate", "told:plate.cold", 1.0, 0.0,
         "1", "not reproduced", f"more at 10 to 15 % of strain; {_ASSUMED}", "section 3.3",
+    ),
+    _drawn("updates to 1 %, cold start, .3..15 % strain, under a patch", "patch.cold", 1.0, "1",
+           "section 3.3", _ASSUMED),
+    _taken("width of the block", 0.05, _P.body.width, "m"),
+    _taken("height of the block", 0.05, _P.body.height, "m"),
+    Figure(
+        "thickness of the block", None, 0.012, None, "m", "not comparable",
+        "plane: forces are per metre, and a thickness changes neither pressure nor volume ratio",
+        "section 3.3",
+    ),
+    _taken("modulus of the block", 34e3, _P.material.E, "Pa"),
+    _taken("Poisson ratio of the block", 0.35, _P.material.nu, "1"),
+    _taken("least strain", 0.003, _P.strains[0], "1", "read as displacement over height"),
+    _taken("largest strain", 0.15, _P.strains[-1], "1", "read as displacement over height"),
+    _taken("tolerance of the volume", 0.01, PressureLoop().tolerance, "1"),
+    _taken("least volume of the curve", 0.7, float(RATIOS[0]), "1"),
+    _taken("largest volume of the curve", 1.3, float(RATIOS[-1]), "1"),
+    _drawn("Fig. 4a: the curve is not linear, largest departure", "off.line", None, "Pa",
+           "section 3.3, Fig. 4a"),
+    _drawn("Fig. 4a: R2 of its line", "r_squared", None, "1", "section 3.3, Fig. 4a",
+           f"'a very good approximation' in words; {_ASSUMED}"),
+    _drawn("slope of the line, Kp", "gain", None, "Pa", "section 3.3",
+           f"used and not printed; {_ASSUMED}"),
+    _drawn("Fig. 4b: pressure at 70 % of volume", "P70", None, "Pa", "section 3.3, Fig. 4b"),
+    _drawn("Fig. 4c: pressure at 130 % of volume", "P130", None, "Pa", "section 3.3, Fig. 4c"),
+    Figure("Fig. 3a: at rest, without load", None, None, None, "1", "not comparable",
+           "a picture without numbers: the mesh in the report", "section 3.3, Fig. 3a"),
+    _drawn("Fig. 3b: volume under load, pressure zero", "ratio.empty", None, "1",
+           "section 3.3, Fig. 3b", "drawn: 'decreased'; its load is not printed, ours is 15 %"),
+    Figure(
+        "Fig. 3c: volume under load, pressure added", "told:ratio.full", 1.0, 0.01, "1",
+        "reproduced", "the same volume as at rest; its load is not printed, ours is 15 %",
+        "section 3.3, Fig. 3c",
     ),
 )  # fmt: skip
