@@ -118,3 +118,17 @@ def test_a_file_of_ones_own_is_taken_or_refused(tmp_path: Path) -> None:
         found(FOLDER, FILE, tmp_path, str(tmp_path / "nowhere.c3d"))
     with pytest.raises(RecordingError, match=r"^no folder .*own\.c3d$"):
         found(FOLDER, None, tmp_path, str(own))
+
+
+def test_another_file_of_the_set_is_found_by_its_bare_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    beside, here = tmp_path / "p" / "experiments", tmp_path / "here"
+    other = put(tmp_path / "shared" / "data" / FOLDER / "other.c3d")
+    assert found(FOLDER, FILE, beside, "other.c3d") == other
+    here.mkdir()
+    monkeypatch.chdir(here)
+    put(here / "other.c3d")
+    assert found(FOLDER, FILE, beside, "other.c3d") == Path("other.c3d")
+    with pytest.raises(RecordingError, match=r"^no file none\.c3d$"):
+        found(FOLDER, FILE, beside, "none.c3d")

@@ -18,8 +18,9 @@ from validate.papers.released_beam.cards import (
     ReleasedBeam,
     SwingTimes,
 )
+from validate.papers.released_beam.expected import doubted, expected
 from validate.papers.released_beam.figures import figures
-from validate.papers.released_beam.recorded import REST, SWING, named, released
+from validate.papers.released_beam.recorded import REST, SWING, load, named, released
 from validate.papers.released_beam.swing import DAMPING, FREQUENCY, Swing, quantity_of
 from validate.recording.clocks import clock_of
 from validate.recording.types import Markers, Recording, Source
@@ -46,11 +47,11 @@ def swung(x: np.ndarray, names: tuple[str, ...] = tuple(LAYOUT)) -> Recording:
     return Recording("swing", Source("x", "", 0, "made"), 0, {"markers": markers}, clock=clock)
 
 
-def falling(at: float = 1.0, drop: float = 0.007) -> np.ndarray:
+def falling(at: float = 1.0, drop: float = 0.007, decay: float = 8.0) -> np.ndarray:
     """Tips that fall and ring down; noise of 10 um."""
     layout = np.array([list(v) for v in LAYOUT.values()])
     late = np.maximum(T - at, 0.0)
-    fall = drop * (1 - np.cos(2 * np.pi * 8 * late) * np.exp(-8 * late))
+    fall = drop * (1 - np.cos(2 * np.pi * 8 * late) * np.exp(-decay * late))
     x = layout + 1e-5 * np.random.default_rng(1).normal(size=(len(T), 6, 3))
     x[:, :3, 2] -= fall[:, None]
     return x
@@ -161,6 +162,31 @@ def test_what_the_base_does_is_a_median_of_its_markers() -> None:
     assert base_moved(moved) == pytest.approx(0.3e-3)
 
 
+def test_a_bare_beam_should_ring_as_a_cantilever_does() -> None:
+    """Rayleigh's quotient is above Bernoulli's 1.8751^2 sqrt(E I / rho A L^4), by 1.5 %."""
+    E, rho, L, h = 263_824.0, 1070.0, 0.1, 0.03
+    exact = 1.8751**2 * np.sqrt(E * h**2 / 12 / (rho * L**4)) / (2 * np.pi)
+    assert expected(ReleasedBeam()) / exact == pytest.approx(1.0147, abs=2e-4)
+    heavy = expected(ReleasedBeam(load=HungMass(5.0)))  # its own mass is then nothing
+    assert heavy == pytest.approx(np.sqrt(3 * E * h**4 / 12 / L**3 / 5.0) / (2 * np.pi), rel=3e-3)
+
+
+def test_a_mass_that_does_not_ring_like_the_recording_is_doubted(shared_data: Path) -> None:
+    made = released(swung(falling(decay=3.0)))  # 8 Hz
+    assert doubted(made, ReleasedBeam()) == ()
+    (said,) = doubted(made, ReleasedBeam(load=HungMass(0.052)))
+    assert "rings at 8.00 Hz, where a beam with load.mass = 52 g should at 4.26 Hz; 0 g wou" in said
+    soft = replace(ReleasedBeam(), material=BeamSilicone(E=1e5))
+    assert "no mass would, but a stiffer beam" in doubted(made, soft)[0]
+    p = ReleasedBeam(recording=str(shared_data / BEAM.format("load52_V2_a")))
+    recording = load(p, shared_data)[0]
+    assert "49 g would: check load.mass" in doubted(recording, p)[0]
+    assert doubted(recording, replace(p, load=HungMass(0.052))) == ()
+    still = np.array([list(v) for v in LAYOUT.values()]) * np.ones((300, 1, 1))
+    still[T > 1, :3, 2] -= 0.007  # falls, and does not ring
+    assert doubted(released(swung(still)), ReleasedBeam(load=HungMass(1.0))) == ()
+
+
 # --- the swing ------------------------------------------------------------------------------------
 
 DT = 0.005
@@ -241,6 +267,7 @@ def test_cards_refuse_what_is_no_swing_and_open_branches_are_none() -> None:
     with pytest.raises(UsageError, match=r"swing\.dt = 0\.1 s"):
         SwingTimes(dt=0.1)
     assert Relaxation(fast=None, slow=0.0).prony.g == ()
+    assert Relaxation(fast=0.2, fast_time=None, slow=0.0).prony.g == ()
     assert Relaxation(fast=0.2, slow=0.05).prony.tau == (0.025, 1.0)
 
 

@@ -113,6 +113,16 @@ def test_only_the_laws_that_are_run_are_identified_and_none_left_is_an_error() -
         compare(none, Options({}))
 
 
+def test_what_is_shared_is_identified_whichever_law_is_run_and_ends_all() -> None:
+    first, second = laws(1.2, 1.2).calibrations
+    made = replace(laws(1.2, 1.2), calibrations=(replace(first, shared=True), second))
+    both = compare(made, Options({}, methods=("neo",)))
+    assert {s.name for s in both.identified} == {"svk", "neo"}
+    lost = replace(made, calibrations=(replace(calibration("svk", 1e6), shared=True), second))
+    with pytest.raises(ComparisonError, match="svk is not identifiable"):
+        compare(lost, Options({}))
+
+
 def test_an_identification_alone_tells_who_has_no_answer_and_goes_on() -> None:
     made = laws(2.0, 1.5)
     free = tuple(c.free for c in made.calibrations)

@@ -14,10 +14,11 @@ from validate.errors import ComparisonError, UsageError
 from validate.recording.types import Recording
 from validate.register.sensing import ForceSensing
 from validate.replay.calibration import Calibrates, Calibration, Free
+from validate.replay.experiment import Input, Uncertainty
 from validate.replay.options import Options
 from validate.replay.own_body import own_body
 from validate.replay.reused import rests_on
-from validate.replay.road import compare
+from validate.replay.road import compare, set_out
 
 
 def test_bounds_are_two_finite_numbers_in_order() -> None:
@@ -166,6 +167,20 @@ def test_several_recordings_calibrate_at_once() -> None:
     (single,), (double,) = (_inputs(r) for r in (one, two))
     assert double == pytest.approx(single / np.sqrt(2), rel=5e-3)
     assert "force@0.1mm of moved and force@0.1mm of a repeat" in two.sentence
+
+
+def test_a_declared_range_of_what_was_identified_gives_way_to_its_covariance() -> None:
+    """A range that moves anything besides stays, and so does one of what was not identified."""
+    ranges = (
+        Input("modulus", lambda p, z: replace(p, E=p.E * (1 + 0.1 * z)), "E", "assumed"),
+        Input("both", lambda p, z: replace(p, E=p.E * (1 + z), nu=p.nu + z), "both", "assumed"),
+        Input("Poisson ratio", lambda p, z: replace(p, nu=p.nu + 0.01 * z), "nu", "assumed"),
+    )
+    asked = replace(OPEN, uncertainty=Uncertainty(None, ranges, "fem"))
+    kept = [i.name for i in set_out(asked, Options({})).experiment.uncertainty.inputs]
+    assert kept == ["both", "Poisson ratio", "identified E"]
+    given = set_out(replace(asked, parameters=Open(E=9e3)), Options({}))
+    assert given.experiment.uncertainty.inputs == ranges
 
 
 def _inputs(result: Result) -> list[float]:

@@ -19,11 +19,12 @@ def found(
 
     `folder` is the data set's, as in `markers/silicone-beam`; `beside` the folder of the experiment
     that asks, for a shared folder that lies next to its project; `own` a path that its user gave
-    for the parameter `by`, which is taken as it is. Raises `RecordingError` naming the command that
-    brings it.
+    for the parameter `by`, which is taken as it is, or the bare name of another file of the data
+    set. Raises `RecordingError` naming the command that brings it.
     """
     if own:
-        return _own(Path(own), name)
+        sibling = sought(folder, own, beside) if name and Path(own).name == own else None
+        return sibling if sibling and not Path(own).exists() else _own(Path(own), name)
     path = sought(folder, name, beside)
     if path is None:
         raise RecordingError(_absent(folder, name, by or ("recording" if name else "data")))

@@ -158,8 +158,10 @@ def identified(
         try:
             done.append(Calibrated(problem, identify(number, problem)))
         except ComparisonError as error:
-            failed[problem.calibration.method] = str(error)
-            if not _each_by_itself(experiment) or len(failed) == sum(map(bool, asked)):
+            name = problem.calibration.method
+            failed[name] = str(error)
+            alone = name in _each_by_itself(experiment)
+            if not alone or len(failed) == sum(map(bool, asked)):
                 raise
             continue
         parameters = with_free(parameters, done[-1].values)
@@ -189,7 +191,7 @@ def calibrated(
     alone = _each_by_itself(experiment)
     for number, free in enumerate(open_free(experiment, parameters)):
         name = experiment.calibrations[number].method
-        if not free or (alone and wanted and name not in wanted):
+        if not free or (name in alone and wanted and name not in wanted):
             continue
         problem = problem_of(experiment, number, free, parameters, methods, shipped)
         require_apart(experiment.accept, problem)
@@ -199,7 +201,7 @@ def calibrated(
                 require_identified(experiment, one)
         except ComparisonError as error:
             refused[name] = str(error)
-            if not alone or set(refused) >= (set(wanted) or alone):
+            if name not in alone or set(refused) >= (set(wanted) or alone):
                 raise
             continue
         done.append(one)
@@ -208,8 +210,9 @@ def calibrated(
 
 
 def _each_by_itself(experiment: Experiment) -> set[str]:
-    """The methods that are calibrated where there are several; none where one serves all."""
-    methods = {c.method for c in experiment.calibrations}
+    """The methods that are calibrated where there are several; none where one serves all, as
+    those do whose findings are `shared`."""
+    methods = {c.method for c in experiment.calibrations if not c.shared}
     return methods if len(methods) > 1 else set()
 
 
@@ -254,14 +257,26 @@ def served(fitted: Iterable[Calibrated]) -> tuple[str, ...]:
 
 
 def with_inputs(experiment: Experiment, fitted: Sequence[Calibrated]) -> Experiment:
-    """The experiment with the covariance of what was identified among its uncertain inputs."""
+    """The experiment with the covariance of what was identified among its uncertain inputs, in
+    place of declared ranges of the same parameters."""
     inputs = tuple(i for one in fitted for i in inputs_of(one))
     if not inputs:
         return experiment
     declared = experiment.uncertainty or Uncertainty(surrogate=fitted[0].problem.calibration.method)
     surrogate = declared.surrogate or fitted[0].problem.calibration.method
-    more = replace(declared, inputs=(*declared.inputs, *inputs), surrogate=surrogate)
+    kept = (i for i in declared.inputs if not _replaced(i, fitted))
+    more = replace(declared, inputs=(*kept, *inputs), surrogate=surrogate)
     return replace(experiment, uncertainty=more)
+
+
+def _replaced(declared: Input, fitted: Sequence[Calibrated]) -> bool:
+    """Whether a declared range moves nothing but what was identified."""
+    values = {path: value for one in fitted for path, value in one.values.items()}
+    here = with_free(fitted[0].problem.parts[0].parameters, values)
+    before = {p.path: p.default for p in describe(here)}
+    after = {p.path: p.default for p in describe(declared.move(here, 1.0))}
+    moved = {path for path, value in after.items() if value != before[path]}
+    return bool(moved) and moved <= set(values)
 
 
 def inputs_of(one: Calibrated) -> tuple[Input, ...]:
@@ -309,5 +324,5 @@ def identified_by(
     opening = "; ".join([headlines(fitted), *([own.headline] if own.headline else [])])
     return Identified(
         own.parameters, (*scores(fitted), *own.scores), told, opening,
-        (*served(fitted), *own.calibrated),
+        (*served(fitted), *own.calibrated), own.doubts,
     )  # fmt: skip

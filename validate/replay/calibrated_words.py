@@ -18,11 +18,13 @@ _SHOWN = 4  # predictions in a sentence
 
 def headlines(fitted: Sequence[Calibrated]) -> str:
     """Fitted on what; of several methods without their values, which stand below."""
-    methods = [one.problem.calibration.method for one in fitted]
-    if len(set(methods)) == 1:
+    apart = [one for one in fitted if not one.problem.calibration.shared]
+    methods = [one.problem.calibration.method for one in apart]
+    if len(set(methods)) <= 1:
         return "; ".join(map(headline, fitted))
-    on = " and ".join(dict.fromkeys(one.on for one in fitted))
-    return f"Fitted: {', '.join(methods)}, each by itself on {on}"
+    on = " and ".join(dict.fromkeys(one.on for one in apart))
+    shared = [headline(one) for one in fitted if one not in apart]
+    return "; ".join([*shared, f"Fitted: {', '.join(methods)}, each by itself on {on}"])
 
 
 def headline(one: Calibrated) -> str:

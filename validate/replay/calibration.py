@@ -68,6 +68,7 @@ class Calibrates:
 class Calibration:
     """What is identified, by which method, on what; the parameters are those that stand open.
 
+    `shared`: what it finds is every method's, whichever else are calibrated each by itself.
     Raises `UsageError` for a calibration without parameters or residuals, and for a parameter that
     stands twice.
     """
@@ -75,6 +76,7 @@ class Calibration:
     method: str
     free: tuple[Free, ...]
     on: tuple[Calibrates, ...]
+    shared: bool = False
 
     def __post_init__(self) -> None:
         if not self.free or not any(on.quantities for on in self.on):

@@ -116,7 +116,8 @@ class Identified:
     """What was identified from the recordings: parameters to use, scores, and sentences to show.
 
     `headline` opens the verdict. `calibrated` names the residuals (a quantity, or quantity@load)
-    whose data served: checks on them are fitted, and no evidence.
+    whose data served: checks on them are fitted, and no evidence. `doubts` of what was given are
+    shown as warnings.
     """
 
     parameters: Any
@@ -124,6 +125,7 @@ class Identified:
     notes: tuple[str, ...]
     headline: str = ""
     calibrated: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,10 @@ def _compared(
     published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
     parameters_used = marked(experiment, options, found, _settings(road.parameters, methods))
-    warnings = doubts(parameters_used, found.stated, found.recordings, first)
+    warnings = (
+        *(identified.doubts if identified else ()),
+        *doubts(parameters_used, found.stated, found.recordings, first),
+    )
     return Result(
         name=experiment.name,
         title=experiment.title,

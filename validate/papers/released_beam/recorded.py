@@ -84,14 +84,14 @@ def _is(theirs: str, name: str) -> bool:
 def _release(name: str, tips: Floats, t: Floats) -> int:
     """The last sample at which the tips (nt, k, 3) m are held, before they fall for good."""
     start = over(np.nanmedian, tips[t < t[0] + _BEFORE / 2], 0)
-    drop = _drop(tips - start)
+    drop = fallen(tips - start)
     whole = float(np.percentile(drop[np.isfinite(drop)], 90)) if np.isfinite(drop).any() else 0.0
     if not whole > _MOVED:
         raise RecordingError(
             f"{name}: no marker at the tip moves by {1e3 * _MOVED:g} mm: the beam is not let go"
         )
-    fallen = int(np.argmax(drop > _FALLEN * whole))
-    held = np.flatnonzero(drop[: fallen + 1] < _HELD * whole)
+    let_go = int(np.argmax(drop > _FALLEN * whole))
+    held = np.flatnonzero(drop[: let_go + 1] < _HELD * whole)
     at = int(held[-1]) if len(held) else 0
     if t[at] - t[0] < _BEFORE / 2:
         raise RecordingError(
@@ -101,7 +101,7 @@ def _release(name: str, tips: Floats, t: Floats) -> int:
     return at
 
 
-def _drop(moved: Floats) -> Floats:
+def fallen(moved: Floats) -> Floats:
     """Motion (nt,) m of the markers (nt, k, 3) along where they go farthest, in the median."""
     mean = over(np.nanmean, moved, 1)
     lengths = np.linalg.norm(mean, axis=1)
@@ -113,11 +113,11 @@ def _drop(moved: Floats) -> Floats:
 def _settled(tips: Floats, t: Floats, at: int) -> Floats:
     """The samples (nt,) of the last second in which the fallen tips are still, or simply the last:
     a hand may lift the beam again."""
-    fallen = over(np.nanmedian, tips[t > t[at] + _SETTLING], 0) - tips[at]
+    sunk = over(np.nanmedian, tips[t > t[at] + _SETTLING], 0) - tips[at]
     for first in np.flatnonzero((t > t[at] + _SETTLING) & (t <= t[-1] - _AFTER))[::-1]:
         window = (t > t[first]) & (t <= t[first] + _AFTER)
-        off = over(np.nanmean, tips[window], 0) - tips[at] - fallen
-        lifted = float(np.nanmax(np.abs(off), initial=0.0)) > _FALLEN * np.nanmax(np.abs(fallen))
+        off = over(np.nanmean, tips[window], 0) - tips[at] - sunk
+        lifted = float(np.nanmax(np.abs(off), initial=0.0)) > _FALLEN * np.nanmax(np.abs(sunk))
         if not lifted and over(np.nanstd, tips[window], 0).max() < _STILL:
             return np.asarray(window)
     return np.asarray(t > t[-1] - _AFTER)
