@@ -120,6 +120,38 @@ def test_a_residual_that_is_not_there_is_named_with_those_that_are() -> None:
         compare(wrong, Options({}))
 
 
+def test_a_load_that_is_not_there_is_named_with_those_that_are() -> None:
+    """Beside one that is there, too: it compared nothing, and nothing is said of how far off."""
+    absent = replace(OPEN, accept=(Accept("force", 0.1, "ours", ("0.3mm", "9mm")),))
+    result = compare(absent, Options({"E": "10kPa"}))
+    (there, not_there) = result.checks
+    assert there.name == "force@0.3mm"
+    assert (not_there.name, not_there.count) == ("force@9mm", 0)
+    assert not_there.why == (
+        "compared nothing: no such load of force; there are 0.1mm, 0.2mm, 0.3mm"
+    )
+
+
+def test_a_marker_that_is_never_seen_calibrates_nothing() -> None:
+    def unseen(p: Open, folder: Path) -> tuple[Recording, ...]:
+        (recording,) = OPEN.load(p, folder)
+        markers = recording.markers["markers"]
+        x = markers.x.copy()
+        x[:, markers.names.index("node_B")] = np.nan
+        return (replace(recording, markers={"markers": replace(markers, x=x)}),)
+
+    on = (Calibrates(("node_B", "force@0.1mm")),)
+    blind = replace(OPEN, load=unseen, calibrations=(Calibration("fem", (E,), on),))
+    with pytest.raises(ComparisonError, match=r"no residual 'node_B'.*0 matched.*force@0\.1mm"):
+        compare(replace(blind, accept=OPEN.accept[1:]), Options({}))
+
+
+def test_what_repeats_the_model_is_not_said_to_have_served_to_fit() -> None:
+    repeats = replace(OPEN, accept=OPEN.accept[:1])
+    sentence = compare(repeats, Options({})).sentence
+    assert "predicted: nothing, for 3 of 3 checks only repeat the model itself. " in sentence
+
+
 def test_a_sensor_is_identified_beside_the_material() -> None:
     """A cell that reads .2 N of nothing: the force's slope over the holds is the modulus'."""
     bias = Free("cell.bias", -1.0, 1.0, "assumed")

@@ -1,6 +1,10 @@
 """`validate identify` on the benchmark's block in eight boxes: kept cells, bounds, errors."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -95,6 +99,8 @@ def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
     assert "bounds 100000 to 1000" in line
     line = refused(*common, "--parameters", "E,E")
     assert "E stands twice" in line
+    line = refused(*common, "--parameters", "methods.newton.tolerance=1e-9:1e-3")
+    assert "a setting of a method, which has nothing to identify" in line
     line = refused(*common, "--seeds", "0")
     assert "--seeds 0: at least one start" in line
 
@@ -118,3 +124,26 @@ def test_finished_cells_are_not_run_again(block: Path, tmp_path: Path) -> None:
     (first,), (second,) = ([c.found.estimates[0] for c in f.calibrated] for f in (one, more))
     assert first.value == pytest.approx(second.value, rel=1e-4)
     assert first.low < 20e3 < first.high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("by", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_what_is_stopped_goes_on_where_it_was(
+    block: Path, tmp_path: Path, by: signal.Signals, code: int
+) -> None:
+    command = [sys.executable, "-m", "validate", "identify", str(block), "--workers", "0"]
+    stopped = subprocess.Popen([*command, "--out", str(tmp_path)], stderr=subprocess.PIPE)
+    cells = tmp_path / "identified_block" / "study-identify" / "cells"
+    end = time.monotonic() + 100
+    while len(kept := list(cells.glob("*.json"))) < 2:
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.02)
+    stopped.send_signal(by)
+    words = stopped.communicate()[1].decode()
+    assert stopped.returncode == code
+    if by == signal.SIGINT:
+        assert "finished cells are kept; the same command goes on from there" in words
+    written = {f: f.stat().st_mtime_ns for f in kept}
+    found = identification(load_file(block), out=tmp_path, where=Where(0))
+    assert 2 <= found.done.reused < len(found.done.records) == 12
+    assert {f: f.stat().st_mtime_ns for f in kept} == written

@@ -97,6 +97,8 @@ class PoseShift:
         A motion of the rest with the rest leaves displacements as they are but for their direction.
         Raises `UsageError` for markers in a plane.
         """
+        if self == PoseShift():
+            return seen
         d = seen.x.shape[2]
         if d != 3:
             raise UsageError(f"markers in {d} dimensions: a pose has three")

@@ -56,6 +56,11 @@ def _shared_out(experiment: Experiment, parameters: Any, named: Sequence[Free]) 
 
 def _parsed(experiment: Experiment, parameters: Any, text: str) -> Free:
     path, sign, bounds = (part.strip() for part in text.partition("="))
+    if path.startswith("methods."):
+        raise UsageError(
+            f"--parameters {path}: a setting of a method, which has nothing to identify; give one "
+            f"of the experiment's own parameters, `validate list {experiment.name}` has them"
+        )
     declared = {f.path: f for c in experiment.calibrations for f in c.free}
     if not sign:
         with_values(parameters, {path: "0"} if path not in declared else {})

@@ -1,5 +1,6 @@
 """What an identification says: fitted on what, how surely, and what the recording leaves open."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from validate.compare.result import MethodResult
@@ -52,10 +53,19 @@ def predicted(results: Sequence[MethodResult]) -> str:
         if c.count and (c.evidence or c.verdict == "cannot decide")
     ]  # fmt: skip
     if not found:
-        return "predicted: nothing, for all that is judged served to fit"
+        return f"predicted: nothing, for {_no_evidence(results)}"
     each = (_within(*one) for one in found[:_SHOWN])
     more = f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else ""
     return f"predicted: {', '.join(each)}{more}"
+
+
+def _no_evidence(results: Sequence[MethodResult]) -> str:
+    """Why none of the checks is evidence: what they are, most of them first."""
+    kinds = Counter(c.verdict if c.count else "no match" for m in results for c in m.checks)
+    words = {"fitted": "served to fit", "repeats itself": "only repeat the model itself"}
+    each = (f"{n} of {kinds.total()} checks {words.get(kind, 'compared nothing')}"
+            for kind, n in kinds.most_common())  # fmt: skip
+    return ", ".join(each) or "nothing is judged"
 
 
 def _within(c: Check, by: str) -> str:

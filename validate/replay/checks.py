@@ -1,6 +1,6 @@
 """Verdicts of the accepted methods: u_num from meshes and steps, u_input from declared inputs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,9 +75,8 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
     """
     found: list[Check] = []
     for accept, terms in terms_of(road, mine):
-        found += [_classed(road, own.judge(mine.residuals[key])) for key, own in terms.items()] or [
-            _nothing(accept, mine)
-        ]
+        found += [_classed(road, own.judge(mine.residuals[key])) for key, own in terms.items()]
+        found += _nothing(accept, mine, terms)
     return tuple(found)
 
 
@@ -211,16 +210,27 @@ def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
     return found
 
 
-def _nothing(accept: Accept, mine: Followed) -> Check:
-    """A check that compared nothing, in the unit of what it should have compared."""
-    units = {q: unit for seen in mine.seen.compared for q, unit in seen.units.items()}
-    said = (f"{r.outcome.state}: {r.outcome.why}" for r in mine.runs if not r.finished)
-    ends = "; ".join(dict.fromkeys(said))
-    why = f"compared nothing: {ends or 'no such quantity in the recording'}"
-    unit = units.get(accept.quantity, _NO_UNIT)
-    return Check(
-        accept.quantity, 0.0, accept.limit, 0.0, 0.0, 0.0, 0.0, unit, 0, "cannot decide", why
+def _nothing(accept: Accept, mine: Followed, judged: Collection[str]) -> list[Check]:
+    """Checks that compared nothing, in the unit of what they should have compared: of the quantity,
+    or of every load that is named and not there."""
+    there = [r.load for r in mine.residuals.values() if r.quantity == accept.quantity]
+    ends = "; ".join(
+        dict.fromkeys(f"{r.outcome.state}: {r.outcome.why}" for r in mine.runs if not r.finished)
     )
+    if accept.loads and there:
+        why = ends or f"no such load of {accept.quantity}; there are {', '.join(there)}"
+        absent = [f"{accept.quantity}@{load}" for load in accept.loads if load not in there]
+        return [_empty(accept, name, why, mine) for name in absent]
+    why = ends or "no such quantity in the recording"
+    return [] if judged else [_empty(accept, accept.quantity, why, mine)]
+
+
+def _empty(accept: Accept, name: str, why: str, mine: Followed) -> Check:
+    units = {q: unit for seen in mine.seen.compared for q, unit in seen.units.items()}
+    return Check(
+        name, 0.0, accept.limit, 0.0, 0.0, 0.0, 0.0, units.get(accept.quantity, _NO_UNIT), 0,
+        "cannot decide", f"compared nothing: {why}",
+    )  # fmt: skip
 
 
 # --- effects --------------------------------------------------------------------------------------

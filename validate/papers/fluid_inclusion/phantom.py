@@ -3,7 +3,7 @@
 Frame "phantom": x from the probe plate (0) to the stage plate, y up, z lateral; metres.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -24,9 +24,12 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.fitting import MarkerFit
 from validate.register.markers import Sampling, Together
+from validate.register.observation import Observation
 from validate.register.outlines import Corner
 from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
+from validate.register.sensing import ForceSensing, PressureSensing
+from validate.register.signals import SignalObservation
 from validate.register.sweep import Stack
 from validate.replay.experiment import Progress
 from validate.replay.inclusion import (
@@ -106,6 +109,17 @@ class PhantomRanges(InclusionRanges):
 
 
 @dataclass(frozen=True)
+class Sensors:
+    load_cell: ForceSensing = field(default_factory=ForceSensing)
+    pressure: PressureSensing = field(default_factory=PressureSensing)
+
+    def of(self, seen: Observation) -> Observation:
+        """What was there, of what a sensor read."""
+        own = getattr(self, seen.name, None)
+        return own.of(seen) if own and isinstance(seen, SignalObservation) else seen
+
+
+@dataclass(frozen=True)
 class Phantom:
     """Everything that can be set; `recording` is a path."""
 
@@ -115,6 +129,7 @@ class Phantom:
     membrane: WallCard = WallCard()
     mesh: PhantomGrid = PhantomGrid()
     registration: Placing = Placing()
+    sensors: Sensors = field(default_factory=Sensors)
     ranges: PhantomRanges = PhantomRanges()
     twin: PhantomTwin = PhantomTwin()
     plates: Literal["as_method", "slip", "partial", "bonded"] = quantity(
@@ -188,7 +203,9 @@ def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered
         corners=(TOP_LEFT,), how=how, sampling=how.sampling,
     )  # fmt: skip
     told = (off_circles(_stack(recording, p)),) if p.inclusion.shape == "sweep" else ()
-    return replace(seen, findings=(*told, *_misplaced(found, inclusion(recording, p))))
+    observations = tuple(map(p.sensors.of, seen.observations))
+    misplaced = _misplaced(found, inclusion(recording, p))
+    return replace(seen, observations=observations, findings=(*told, *misplaced))
 
 
 STREAMS, IMAGES = Streams(), "b_mode"

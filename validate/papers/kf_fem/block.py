@@ -5,7 +5,7 @@ Places are given on that grid, whatever cells the block has.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +15,9 @@ from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.fitting import MarkerFit
 from validate.register.follow import follow_signal
+from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
+from validate.register.sensing import PoseShift
 from validate.replay.cards import DampedTissue, TimeSteps, TrackedTwin
 from validate.replay.experiment import Progress
 from validate.replay.followed import Truth, truth_of
@@ -80,6 +82,7 @@ class PulledBlock:
     clock: TimeSteps = TimeSteps(0.002, 500)
     twin: LayeredTwin = LayeredTwin()
     registration: MarkerFit = MarkerFit()
+    camera: PoseShift = field(default_factory=PoseShift)
     recording: str = quantity("", "1", "the recording")
 
 
@@ -98,7 +101,10 @@ def _scene(p: PulledBlock, material: Material) -> Scene:
 
 
 def place(recording: Recording, p: PulledBlock, scene: Scene) -> Registered:
-    return follow_signal(recording, scene.mesh, "pull", "N", p.registration)
+    seen = follow_signal(recording, scene.mesh, "pull", "N", p.registration)
+    pull, markers = seen.observations
+    assert isinstance(markers, MarkerObservation)
+    return replace(seen, observations=(pull, p.camera.of(markers)))
 
 
 def sets(p: PulledBlock, seen: Registered) -> Mapping[str, Any]:

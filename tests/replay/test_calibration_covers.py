@@ -1,0 +1,59 @@
+"""Intervals of a modulus and a Poisson ratio of a finite-element body, over 200 whole twins."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calibrating import NU, OPEN, E, Open, built
+from tiny import FIDUCIALS, LOADS, STEPS
+
+from validate.fem.system import build
+from validate.identify.identification import InTurn, identify
+from validate.recording.types import Recording
+from validate.replay.calibrated import problem_of
+from validate.replay.calibration import Calibrates, Calibration
+from validate.scene.scene import Scene
+from validate.solve.fluid import NoFluid
+from validate.solve.march import march, output_frames
+from validate.solve.types import Run
+from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+
+TRUTH = (10e3, 0.3)
+STAGE = np.linspace(0, LOADS[-1], STEPS + 1)[1:]
+BOTH = replace(
+    OPEN,
+    parameters=Open(nu=None),
+    calibrations=(Calibration("fem", (E, NU), (Calibrates(("force", "node_B")),)),),
+)
+
+
+def moved(true: Scene) -> Run:
+    t = np.arange(1.0, STEPS + 1)
+    stepper = NoFluid().prepare(build(true))
+    return march("twin", stepper, t, STAGE[:, None], output_frames(STEPS, 2), 0.0)
+
+
+def recorded(true: Scene, run: Run, seed: int) -> Recording:
+    """Noise of the cell and the camera, and of the markers it is registered by."""
+    force = Reading(run.traces["stage.force"].y, "N", 1e-4)
+    at = {name: np.array(x) for name, x in FIDUCIALS.items()}
+    camera, readings = Camera(1e-6, 1, still=10_000), {"stage": Reading(STAGE, "m"), "cell": force}
+    return record_tracked(Origin("moved", seed, True), points_of(run, true), at, camera, readings)
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_of_two_hundred_twins_of_a_body() -> None:
+    """Force on the stage and a marker's motion; 190 and 194 of 200."""
+    (shipped,) = OPEN.load(Open(), Path())
+    true = built(shipped, Open(*TRUTH), None)
+    run, held = moved(true), np.zeros(2)
+    first = recorded(true, run, 0)
+    problem = problem_of(BOTH, 0, (E, NU), BOTH.parameters, BOTH.methods, (first,))
+    for seed in range(200):
+        part = replace(problem.parts[0], recordings=(recorded(true, run, seed),))
+        drawn = replace(problem, parts=(part,))
+        found = identify(drawn.space, InTurn(drawn.residual), starts=1)
+        held += [e.low <= v <= e.high for e, v in zip(found.estimates, TRUTH, strict=True)]
+    assert (held >= 0.92 * 200).all()
+    assert (held <= 0.98 * 200).all()
