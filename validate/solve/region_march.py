@@ -170,8 +170,9 @@ def _outside(K: sparse.csr_array, at: Ints) -> sparse.csr_array:
 def carried(old: Coupled, motion: Motion, new: Coupled) -> Motion:
     """The motion in other regions: what is seen stays, and so does every node's velocity.
 
-    A region keeps the histories of the nodes that it had. One that it takes over is put on the line
-    through what it shows now, with its velocity: no displacement jumps, nothing at rest moves.
+    A region keeps the histories of the nodes that it had. One that it takes over stands where it is
+    shown until the region's next solve, with its velocity for that solve: no displacement jumps
+    (put back to where it was at the last solve, borders made 4 kJ out of 4 J on the paper's bar).
     """
     speed = np.zeros_like(motion.visible)
     for zone, piece in zip(old.zones, motion.pieces, strict=True):
@@ -182,12 +183,9 @@ def carried(old: Coupled, motion: Motion, new: Coupled) -> Motion:
 
 
 def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) -> Piece:
-    zone, k = new.zones[i], motion.k
-    since = k % zone.ratio if new.border == "delayed" else 0
-    u = motion.visible[zone.wide] - since * speed[zone.wide]
+    zone = new.zones[i]
+    u, start = motion.visible[zone.wide], motion.visible[zone.own]
     before = u - zone.ratio * speed[zone.wide]
-    share = since / zone.ratio
-    start = (motion.visible[zone.own] - share * u[zone.shown]) / (1 - share)
     if i < len(old.zones) and old.zones[i].ratio == zone.ratio:
         kept = np.isin(zone.wide, old.zones[i].wide)
         from_ = np.searchsorted(old.zones[i].wide, zone.wide[kept])

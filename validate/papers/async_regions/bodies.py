@@ -5,6 +5,7 @@ moves as one and the equations are those of the paper's 1-D elements: 40 free no
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import SceneError
@@ -36,7 +37,7 @@ def bar(E: float, cells: int, damping: float = DAMPING) -> Scene:
         (Support("x0", (0, 1)), Support("y0", (1,)), Support("y1", (1,))),
         plane="stress",
         thickness=AREA / side,
-        tools=(Needle(PROBE, "x1", (LENGTH, side / 2), (-1.0, 0.0)),),
+        tools=(Needle(PROBE, "x1", (LENGTH, 0.0), (-1.0, 0.0)),),
         probes=(Probe("end", (LENGTH, 0.0)),),
     )
 
@@ -57,18 +58,35 @@ def block(E: float, cells: int, dimension: int, nu: float = 0.45) -> Scene:
     )
 
 
-def impedance(E: float, spring: float, hz: Floats, damping: float = DAMPING) -> Floats:
-    """Peak force N per m of the probe at frequencies (k,) Hz: the continuous bar behind the spring.
+def transfer(
+    E: float, spring: float, hz: Floats, damping: float = DAMPING
+) -> NDArray[np.complex128]:
+    """Force on the hand, N per m of the probe, at frequencies (k,) Hz: the continuous bar behind
+    the spring. No mesh, no step and no region is in it.
 
-    k(w) = (EA/L) q cot q with q^2 = L^2 (w^2 - i c w) rho/E; F = |k ks / (k + ks)|: no mesh, no
-    step, no region in it.
+    k(w) = (EA/L) q cot q with q^2 = L^2 (w^2 - i c w) rho/E; F = k ks / (k + ks).
     """
     w = 2 * np.pi * np.asarray(hz, dtype=np.float64)
     static = np.full(w.shape, E * AREA / LENGTH, dtype=np.complex128)
     q = LENGTH * np.sqrt((w**2 - 1j * damping * w) * DENSITY / E + 0j)
     moving = np.abs(q) > 0
     static[moving] *= q[moving] / np.tan(q[moving])
-    return np.asarray(np.abs(static * spring / (static + spring)))
+    return np.asarray(static * spring / (static + spring))
+
+
+def impedance(E: float, spring: float, hz: Floats) -> Floats:
+    """Peak force N of a probe that swings by a metre, at frequencies (k,) Hz."""
+    return np.abs(transfer(E, spring, hz))
+
+
+def exact_force(E: float, spring: float, t: Floats, depth: Floats, damping: float) -> Floats:
+    """Force (nt,) N of the continuous bar under a probe's `depth` (nt,) m at even times t (nt,) s,
+    by the frequency domain; 20 s of rest after the end let it die down."""
+    h = float(t[1] - t[0])
+    n = len(t) + round(20.0 / h)
+    hz: Floats = np.arange(n // 2 + 1, dtype=np.float64) / (n * h)
+    F = transfer(E, spring, hz, damping) * np.fft.rfft(depth, n)
+    return np.asarray(np.fft.irfft(F, n)[: len(t)])
 
 
 def chirp(t: Floats, amplitude: float, lowest: float, highest: float) -> Floats:
