@@ -202,8 +202,12 @@ def test_stresses_read_exactly_leave_nothing_and_their_noise_is_relative() -> No
     anew = seen.anew(seen.left(run), Exact())
     assert anew.y[:, 0] == pytest.approx([0.0, 100.0, 200.0])
     off = np.array([seen.anew(seen.left(run), drawn(k)).y[:, 0] for k in range(400)]) - anew.y[:, 0]
-    assert off[:, 2] == pytest.approx(2 * off[:, 1])  # one axis of one figure
-    assert rms(off[:, 1]) == pytest.approx(5.0, rel=0.1)
+    assert off[:, 2] == pytest.approx(210 / 90 * off[:, 1])  # one axis of one figure
+    assert rms(off[:, 1]) == pytest.approx(4.5, rel=0.1)
+    (judged,) = seen.anew(seen.left(run) + [0, 9, 21], Exact()).deviations(run, EVERYTHING)
+    assert judged.values == pytest.approx(np.full((2, 1), -0.1))  # of 90 and 210 Pa, as measured
+    fallen = seen.anew(seen.left(run) - [0, 99.9, 0], Exact())
+    assert fallen.loaded.tolist() == [False, True, True]
     other = Simulated({})
     assert seen.left(other) == pytest.approx(np.zeros(3))
 

@@ -26,6 +26,7 @@ class StressObservation:
 
     A residual is simulated less measured over the larger stress of its row. `sd` is the relative
     standard deviation of a row's reading, `shared` that of all rows together (a figure's axis).
+    `against` (nt,) Pa is what every row is relative to; none: its own larger stress.
     """
 
     name: str
@@ -35,6 +36,7 @@ class StressObservation:
     sd: float
     shared: float
     quantity: str
+    against: Floats | None = None
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -46,8 +48,8 @@ class StressObservation:
 
     @property
     def scale(self) -> Floats:
-        """The larger stress (nt,) Pa of every row."""
-        return np.asarray(np.abs(self.y).max(axis=1))
+        """What an error of every row is relative to (nt,) Pa."""
+        return np.abs(self.y).max(axis=1) if self.against is None else self.against
 
     @property
     def loaded(self) -> NDArray[np.bool_]:
@@ -86,10 +88,13 @@ class StressObservation:
         return np.asarray((from_rest(run.t, exact, self.t) - self.y).ravel())
 
     def anew(self, left: Floats, draw: AnyDraw) -> "StressObservation":
-        """The rows with `left` (nt c,) Pa; readings and the figure's axis drawn, both relative."""
+        """The rows with `left` (nt c,) Pa; readings and the figure's axis drawn.
+
+        Noise and errors stay relative to what was measured: the terms of u_val are.
+        """
         exact = self.y + left.reshape(self.y.shape)
         off = draw.white(self.sd, exact.shape) + draw.white(self.shared, (1,))
-        return replace(self, y=exact + np.abs(exact).max(axis=1, keepdims=True) * off)
+        return replace(self, y=exact + self.scale[:, None] * off, against=self.scale)
 
     def unanswered(self, run: Simulated) -> tuple[str, ...]:
         return tuple(name for name in self.traces if name not in run.traces)

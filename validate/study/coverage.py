@@ -137,9 +137,11 @@ def _of_method(study: Study, method: str) -> _Part:
     )  # fmt: skip
     done = _draws(study, given)
     records = [r.value for r in done.records.values() if r.value is not None]
-    if not records:
-        why = next(r.why for r in done.records.values())
-        raise ComparisonError(f"{method}: no draw could be judged: {why}")
+    if missing := [r.why for r in done.records.values() if r.value is None]:
+        raise ComparisonError(
+            f"{method}: {len(missing)} of {len(done.records)} blocks of {BLOCK} draws could not be "
+            f"judged: {missing[0]}"
+        )
     return _Part(
         tuple(quantity(given, s, records, whole) for s in stated),
         together(given, records),
