@@ -73,6 +73,19 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     assert (result.passed, result.warnings) == (True, ())
 
 
+@pytest.mark.slow
+def test_verdicts_of_a_new_experiment_are_covered(tmp_path: Path) -> None:
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")
+    code, output = in_folder(
+        tmp_path, "study", "coverage", "my_gel", "--quick", "--workers", "0", "--json"
+    )
+    found = {q["name"]: q for q in json.loads(output)["study"]["checks"]}
+    assert found["force.rms@fit"]["verdict"] == "no evidence"  # it served to identify
+    assert found["force.rms@beyond"]["fault"] == "u_input (modulus)"
+    assert code == 0  # blunt: the modulus is a uniform range
+
+
 def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> None:
     write_recording(log(), tmp_path / "gel.mcap")
     assert in_folder(tmp_path, "new", "bare", "--from", "gel.mcap")[0] == 0

@@ -52,6 +52,8 @@ def test_what_claims_rightly_more_than_it_shows_is_blunt_and_hides_no_term_that_
     wide = Term("measurement", 2.0, 1.0, 1.0, "measurement")
     found = find_fault(Share(0, 200), [wide, right])
     assert (found.word, found.fault) == ("too wide", wide)
+    little = Term("u_num (mesh)", 0.2, 0.0, 0.0, "numerical")
+    assert find_fault(Share(3, 200), [MEASURED, little]).word == "blunt"
     by_chance = find_fault(Share(3, 200), [MEASURED])
     assert (by_chance.word, by_chance.fault) == ("too wide", None)
 

@@ -140,11 +140,10 @@ def find_fault(share: Share, terms: Sequence[Term]) -> Finding:
         return _named("too narrow", share, worst if worst and worst.excess > 0 else None)
     much = -_MUCH * sum(t.part**2 for t in terms)
     wrong = [t for t in terms if not t.right and t.excess < much]
-    right = [t for t in terms if t.right and t.excess < much]
-    worst = min(wrong or right or terms, key=lambda t: t.excess, default=None)
-    if worst is not None and worst.excess >= 0:
-        worst = None
-    return _named("blunt" if right and not wrong else "too wide", share, worst)
+    worst = min(wrong or terms, key=lambda t: t.excess, default=None)
+    if worst is None or worst.excess >= 0:
+        return _named("too wide", share, None)
+    return _named("blunt" if worst.right else "too wide", share, worst)
 
 
 def _named(word: Word, share: Share, worst: Term | None) -> Finding:

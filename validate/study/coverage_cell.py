@@ -159,7 +159,7 @@ def run_draws(bench: DrawBench, cell: DrawCell) -> Draws:
         overall[label] = tuple(judge_all(list(c.values())).word for c in checks)
     first = cell.first == 0
     return Draws(
-        worlds, overall, _measured(bench, numbers),
+        worlds, overall, _measured(bench, numbers) if given.steps else _of_all(worlds[PERFECT]),
         _alone(bench) if first else {}, _off(bench) if first else {},
     )  # fmt: skip
 
@@ -196,6 +196,11 @@ def _measured(bench: DrawBench, numbers: Sequence[int]) -> dict[str, tuple[float
         for name, residual in bench.residuals(bench.given.base, bench.noise(k)).items():
             found[name].append(error_of(residual).E)
     return {name: tuple(errors) for name, errors in found.items()}
+
+
+def _of_all(judged: Mapping[str, Judged]) -> dict[str, tuple[float, ...]]:
+    """E where no input is uncertain: the measurement is all that is drawn."""
+    return {name: tuple(e for e in one.E if e is not None) for name, one in judged.items()}
 
 
 def _alone(bench: DrawBench) -> dict[str, dict[str, tuple[float, ...]]]:
