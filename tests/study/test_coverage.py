@@ -182,6 +182,23 @@ def opened_study() -> Study:
     return Study(job, Path(mkdtemp()), HERE, None, bench, opening, 0.0, 20, 1, 1.0)
 
 
+def truth(method: str, by: str) -> coverage_worlds._Truth:
+    return coverage_worlds._Truth(opened_study(), method, by, at(10.0))
+
+
+def test_what_stands_in_for_a_slow_method_takes_it_to_other_worlds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (plus, _) = steps_of(("modulus",))
+    cheap = {World(): Record("c", at(3.0)), plus: Record("d", at(5.0))}
+    monkeypatch.setattr(coverage_worlds, "_readings", lambda study, method, worlds, s=0.0: cheap)
+    found = truth("slow", "cheap").in_worlds((plus,), 0.0)[plus].value
+    assert found is not None
+    assert found.left[0].tolist() == [12.0] * 3
+    assert "differences of cheap" in truth("slow", "cheap").notes[0]
+    assert truth("slow", "slow").notes == ()
+
+
 def test_an_input_without_solution_moves_as_the_surrogate_does(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -189,9 +206,8 @@ def test_an_input_without_solution_moves_as_the_surrogate_does(
     plus, minus = steps_of(("modulus",))
     own = {plus: Record[ExactReading]("a", refused="no state there"), minus: Record("b", at(9.0))}
     other = {World(): Record("c", at(3.0)), plus: Record("d", at(5.0))}
-    monkeypatch.setattr(coverage_worlds, "_readings", lambda study, method, worlds: other)
-    monkeypatch.setattr(coverage_worlds, "true_method", lambda experiment, name: "dear")
-    sides, (told,) = coverage_worlds._sides(opened_study(), "dear", own, at(10.0))
+    monkeypatch.setattr(coverage_worlds, "_readings", lambda study, method, worlds, s=0.0: other)
+    sides, (told,) = coverage_worlds._sides(truth("dear", "dear"), own)
     assert [side.left[0].tolist() for side in sides["modulus"]] == [[12.0] * 3, [9.0] * 3]
     assert told == "dear: modulus +1 u by the surrogate's difference: no state there"
 
@@ -200,7 +216,7 @@ def test_a_method_that_is_its_own_surrogate_has_no_other(monkeypatch: pytest.Mon
     plus, minus = steps_of(("modulus",))
     own = {plus: Record[ExactReading]("a", refused="no state there"), minus: Record("b", at(9.0))}
     with pytest.raises(ComparisonError, match="its own truth could not be run: no state there"):
-        coverage_worlds._sides(opened_study(), "fem", own, at(10.0))
+        coverage_worlds._sides(truth("fem", "fem"), own)
 
 
 def test_dear_wrong_parameters_lie_on_a_line_through_the_one_that_is_solved(
@@ -215,13 +231,13 @@ def test_dear_wrong_parameters_lie_on_a_line_through_the_one_that_is_solved(
         return {w: Record("k", at(14.0)) for w in worlds}
 
     monkeypatch.setattr(coverage_worlds, "_readings", solved)
-    study = opened_study()
-    wrong, found, (said,) = coverage_worlds._mistaken(study, "fem", ("E",), 1e3, at(10.0))
+    own = truth("fem", "fem")
+    wrong, found, (said,) = coverage_worlds._mistaken(own, ("E",), 1e3)
     assert asked == [World(wrong=("E", 0.1))]
     shown = {by: r.value.left[0][0] for (_, by), w in wrong.items() if (r := found[w]).value}
     assert shown == pytest.approx({0.05: 12.0, 0.1: 14.0, 0.2: 18.0})
     assert "solved at 10 % alone" in said
-    assert len(coverage_worlds._mistaken(study, "fem", ("E",), 0.1, at(10.0))[1]) == 3
+    assert len(coverage_worlds._mistaken(own, ("E",), 0.1)[1]) == 3
     assert len(asked) == 4
 
 

@@ -105,7 +105,7 @@ def coverage(
         tuple(q for p in parts for q in p.quantities),
         tuple(p.together for p in parts),
         tuple(row for p in parts for row in p.power),
-        tuple(dict.fromkeys(path for p in parts for path in p.still)),
+        tuple(k for k in parts[0].still if all(k in p.still for p in parts)),
         tuple(note for p in parts for note in p.notes),
         done, draws, noise, quick,
     )  # fmt: skip

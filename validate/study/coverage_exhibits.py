@@ -67,8 +67,9 @@ def _shares(study: Coverage) -> Exhibit:
 def _told(study: Coverage) -> Iterator[str]:
     yield (
         f"{study.draws} recordings were drawn in which the judged model itself is the truth: its "
-        "inputs uniform within their declared ranges, noise, registration and clocks as declared, "
-        "read where and when the real recording was. Each was judged as a recording is. E normal "
+        "inputs uniform within their declared ranges, what was identified by its normal "
+        "covariance, noise, registration and clocks as declared, read where and when the real "
+        "recording was. Each was judged as a recording is. E normal "
         "with u_val differs in 4.6 %; 2 to 7 % holds. More is too narrow: false alarms. Fewer is "
         "too wide where a term claims more than it should, and blunt where none does: a uniform "
         "range by itself never reaches 2 u, and a model judged by itself shows nothing of its own "

@@ -35,7 +35,7 @@ from validate.study.job import C, Job, Plan, R, Where
 from validate.study.store import Record
 
 T = TypeVar("T")
-Readings = Mapping[World, Record[ExactReading]]
+Records = Mapping[World, Record[ExactReading]]
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Worlds:
     drawn: Mapping[int, ExactReading]
     whole: bool
     wrong: Mapping[tuple[str, float], World]
-    mistaken: Readings
+    mistaken: Records
     moved: Mapping[str, ExactReading]
     still: tuple[str, ...]
     notes: tuple[str, ...]
@@ -81,88 +81,112 @@ def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
     true = true_method(study.bench.road.experiment, method)
     base = _readings(study, true, (World(),))[World()]
     read = _needed(base, method)
-    steps = _readings(study, true, steps_of(study.inputs), base.seconds)
-    sides, instead = _sides(study, method, steps, read)
+    truth = _Truth(study, true, _stand_in(study, true), read)
+    steps = truth.in_worlds(steps_of(study.inputs), base.seconds)
+    sides, instead = _sides(truth, steps)
     # Of a body that is moved: the judged one's mesh and registration may stand in a cache.
-    each = max([base.seconds, *(r.seconds for r in steps.values())])
+    each = max((r.seconds for r in steps.values()), default=base.seconds)
     whole = bool(study.inputs) and (
         each * study.draws <= BUDGET_S and read.size * study.draws <= NUMBERS
     )
     checks = CHECKS if each * CHECKS <= BUDGET_S else FEW_CHECKS
     count = study.draws if whole else checks if study.inputs else 0
-    solved = _drawn(study, true, z[:count], each, read)
+    solved = _drawn(truth, z[:count], each)
     paths = tuple(p.path for p in wrong_paths(study.bench.road.parameters))
-    wrong, mistaken, lines = _mistaken(study, true, paths, each, read)
+    wrong, mistaken, lines = _mistaken(truth, paths, each)
     known = {w.label: r.value for w, r in mistaken.items() if r.value is not None}
     moved = {k: r for k, r in known.items() if _moves(r, read)}
     drawn = {k: r.value for k, r in enumerate(solved) if r.value is not None}
+    unsolved = _unsolved(method, [r.why for r in solved if r.value is None])
     return Worlds(
         read, sides, drawn, whole, wrong, mistaken, moved,
         tuple(p for p in paths if _still(p, known, moved)),
-        (*instead, *_unsolved(method, [r.why for r in solved if r.value is None]), *lines),
+        (*truth.notes, *instead, *unsolved, *lines),
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Truth:
+    """A method's readings `read` as judged; `by` is the method whose differences take them to other
+    worlds: itself, or what stands in for it where it is too slow."""
+
+    study: Study
+    method: str
+    by: str
+    read: ExactReading
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        if self.by == self.method:
+            return ()
+        return (f"{self.method}: other worlds by differences of {self.by}, which stands in for it",)
+
+    def in_worlds(self, worlds: tuple[World, ...], seconds: float) -> Records:
+        """`seconds` that one takes, where that is known."""
+        if self.by == self.method:
+            found = _readings(self.study, self.by, worlds, seconds)
+            return {w: _alike(r, self.read) for w, r in found.items()}
+        first = _readings(self.study, self.by, (World(),))[World()]
+        base = _needed(_alike(first, self.read), self.by)
+        found = _readings(self.study, self.by, worlds, first.seconds)
+        return {w: self._from(base, _alike(r, self.read)) for w, r in found.items()}
+
+    def _from(self, base: ExactReading, record: Record[ExactReading]) -> Record[ExactReading]:
+        if record.value is None:
+            return record
+        return replace(record, value=self.read.plus(1.0, record.value, base))
+
+
+def _stand_in(study: Study, method: str) -> str:
+    declared = study.bench.road.experiment.uncertainty
+    return declared.stand_in.get(method, method) if declared else method
+
+
 def _sides(
-    study: Study, method: str, steps: Readings, read: ExactReading
+    truth: _Truth, steps: Records
 ) -> tuple[dict[str, tuple[ExactReading, ExactReading]], tuple[str, ...]]:
     """Each input one standard uncertainty to both sides: by the surrogate, as u_input is found,
     where the method itself has no solution; and what to say of that."""
-    found = {w: _alike(r, read) for w, r in steps.items()}
-    bad = {w: r.why for w, r in found.items() if r.value is None}
-    if bad:
-        found |= _by_surrogate(study, method, tuple(bad), read)
+    declared = truth.study.bench.road.experiment.uncertainty
+    bad = {w: r.why for w, r in steps.items() if r.value is None}
+    if bad and declared and declared.surrogate not in ("", truth.by):
+        other = replace(truth, by=declared.surrogate)
+        steps = {**steps, **other.in_worlds(tuple(bad), 0.0)}
     each = {
         name: (
-            _needed(found[World(((name, 1.0),))], method),
-            _needed(found[World(((name, -1.0),))], method),
+            _needed(steps[World(((name, 1.0),))], truth.method),
+            _needed(steps[World(((name, -1.0),))], truth.method),
         )
-        for name in study.inputs
+        for name in truth.study.inputs
     }
-    told = (f"{method}: {w.label} by the surrogate's difference: {why}" for w, why in bad.items())
+    told = (
+        f"{truth.method}: {w.label} by the surrogate's difference: {why}" for w, why in bad.items()
+    )
     return each, tuple(told)
 
 
-def _by_surrogate(
-    study: Study, method: str, worlds: tuple[World, ...], read: ExactReading
-) -> Readings:
-    declared = study.bench.road.experiment.uncertainty
-    other = declared.surrogate if declared else ""
-    if not other or other == true_method(study.bench.road.experiment, method):
-        return {}
-    found = _readings(study, other, (World(), *worlds))
-    base = _needed(_alike(found[World()], read), other)
-    moved = {w: _alike(found[w], read) for w in worlds}
-    return {
-        w: r if r.value is None else replace(r, value=read.plus(1.0, r.value, base))
-        for w, r in moved.items()
-    }
-
-
-def _drawn(
-    study: Study, true: str, z: Floats, each: float, read: ExactReading
-) -> list[Record[ExactReading]]:
+def _drawn(truth: _Truth, z: Floats, each: float) -> list[Record[ExactReading]]:
     """With all inputs drawn, `each` s a solution."""
-    worlds = [World(tuple(zip(study.inputs, row, strict=True))) for row in z.tolist()]
-    found = _readings(study, true, tuple(worlds), each)
-    return [_alike(found[w], read) for w in worlds]
+    worlds = [World(tuple(zip(truth.study.inputs, row, strict=True))) for row in z.tolist()]
+    found = truth.in_worlds(tuple(worlds), each)
+    return [found[w] for w in worlds]
 
 
 def _mistaken(
-    study: Study, true: str, paths: tuple[str, ...], each: float, read: ExactReading
-) -> tuple[dict[tuple[str, float], World], dict[World, Record[ExactReading]], tuple[str, ...]]:
+    truth: _Truth, paths: tuple[str, ...], each: float
+) -> tuple[dict[tuple[str, float], World], Records, tuple[str, ...]]:
     """Every wrong parameter by every share; where that takes too long by straight lines through
     the middle one, and then says so."""
     wrong = {(p, by): World(wrong=(p, by)) for p in paths for by in WRONG}
     if each * len(wrong) <= BUDGET_S:
-        found = _readings(study, true, tuple(wrong.values()), each)
-        return wrong, {w: _alike(r, read) for w, r in found.items()}, ()
+        return wrong, truth.in_worlds(tuple(wrong.values()), each), ()
     middle = WRONG[1]
-    found = _readings(study, true, tuple(wrong[p, middle] for p in paths), each)
-    solved = {p: _alike(found[wrong[p, middle]], read) for p in paths}
-    lines = {w: _scaled(solved[p], by / middle, read) for (p, by), w in wrong.items()}
-    said = f"{true}: wrong parameters were solved at {100 * middle:g} % alone, straight lines else"
-    return wrong, lines, (said,) if paths else ()
+    found = truth.in_worlds(tuple(wrong[p, middle] for p in paths), each)
+    lines = {
+        w: _scaled(found[wrong[p, middle]], by / middle, truth.read) for (p, by), w in wrong.items()
+    }
+    alone = f"wrong parameters were solved at {100 * middle:g} % alone, straight lines else"
+    return wrong, lines, (f"{truth.method}: {alone}",)
 
 
 def _scaled(record: Record[ExactReading], share: float, base: ExactReading) -> Record[ExactReading]:
@@ -173,8 +197,7 @@ def _scaled(record: Record[ExactReading], share: float, base: ExactReading) -> R
 
 def _readings(
     study: Study, method: str, worlds: tuple[World, ...], seconds: float = 0.0
-) -> Readings:
-    """`seconds` that one takes, where that is known."""
+) -> Records:
     if not worlds:
         return {}
     cells = reading_cells(study.job, method, worlds)
