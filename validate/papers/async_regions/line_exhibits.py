@@ -48,9 +48,9 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
 
 
 _BORDERS = (
-    "Made energy is what body and spring have beyond what the hand put in and damping took. That of "
-    "the whole solve is the spring's, whose force is that of the tick's begin; the rest is made by "
-    "borders.",
+    "Made energy is what body and spring have beyond what the hand put in and damping took. That "
+    "of the whole solve is the spring's, whose force is that of the tick's begin; the rest is made "
+    "by borders.",
     "Growth is the spectral radius over a common period, per tick, with the probe held: above 1 "
     "some motion grows without bound.",
 )
