@@ -5,8 +5,6 @@ slides, pulls and lets go. The recording is a twin of quadratic elements on a fi
 synthetic path. A path of your own: `--set recording=FILE`; in 3-D: `--set body.space=solid`.
 """
 
-from pathlib import Path
-
 from validate.compare.verdict import Accept
 from validate.papers.needle_pocket.judged import follows
 from validate.papers.needle_pocket.pocket import (
@@ -26,8 +24,6 @@ from validate.replay.experiment import Experiment, Input, MeshLadder, Twin, Unce
 from validate.replay.method import Method
 from validate.solve.needle import NeedleLoop
 
-RECORDING = Path(__file__).parents[1] / "recordings" / "needle_pocket.mcap"
-PARAMETERS = NeedlePocket(recording=str(RECORDING))
 PAPER = NeedleLoop(update="proportional", at="node", force="reaction")
 METHODS = {
     "p2_exact": Method("P2, exact pressure", NeedleLoop(), Model(2)),
@@ -46,7 +42,7 @@ EXPERIMENT = Experiment(
     name="needle_pocket",
     title="A needle at haptic rate against a body with a fluid pocket",
     source="Gosline, Salcudean, Yan (2004), section 5.2",
-    parameters=PARAMETERS,
+    parameters=NeedlePocket(),
     methods=METHODS,
     accepted=("p2_exact",),
     accept=(

@@ -15,11 +15,11 @@ import numpy as np
 from validate.papers.fluid_block.block import Cavities, PlaneBlock, block_mesh
 from validate.papers.needle_pocket.recorded import walkable
 from validate.parameters import Ranges, quantity
+from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, validating
-from validate.replay.cards import shipped
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
@@ -96,7 +96,7 @@ class NeedlePocket:
     hand: HandCard = field(default_factory=HandCard)
     ranges: PocketRanges = field(default_factory=PocketRanges)
     twin: PocketTwin = field(default_factory=PocketTwin)
-    recording: str = quantity("", "1", "MCAP file with the path of the tip")
+    recording: str | None = quantity(None, "1", "MCAP file with the tip's path; none: shipped")
 
     @property
     def grip(self) -> float:
@@ -157,7 +157,10 @@ def pocket_scene(
 
 
 def load(p: NeedlePocket, folder: Path) -> tuple[Recording, ...]:
-    return shipped(p, folder)
+    """The recording that is named, else the shipped one of that space."""
+    name = "needle_pocket" if p.body.space == "plane" else "needle_pocket_solid"
+    own = folder.parent / "recordings" / f"{name}.mcap"
+    return (read_recording(Path(p.recording) if p.recording else own),)
 
 
 def build(recording: Recording, p: NeedlePocket, model: PocketModel) -> Scene:

@@ -16,6 +16,7 @@ from validate.scene.mesh import Mesh
 
 _AXES = "xyz"
 _GAP = 3.0  # steps as long as this many median ones are gaps
+_LINEAR = 0.15  # of the body's height: the strain to which paper 000 takes its law as linear
 _FAR = 1.0  # body sizes away: such a place is no needle's at this body
 
 
@@ -55,7 +56,13 @@ def walkable(recording: Recording, mesh: Mesh) -> Walkable:
             f"{recording.name}: {int(kept.sum())} of {len(t)} samples of the tip can be walked: "
             f"{what}; the path must begin outside the body and lie in its frame"
         )
-    findings += [_gaps(t[kept]), _touch(x[kept], low, high), _left(x[kept], low, high)]
+    deep = x[kept, 1] < high[1] - _LINEAR * (high - low)[1]
+    findings += [
+        _gaps(t[kept]),
+        _touch(x[kept], low, high),
+        _said(deep, f"lies deeper than {100 * _LINEAR:g} % of the body's height: beyond linearity"),
+        _left(x[kept], low, high),
+    ]
     return Walkable(t[kept], x[kept], sd, tuple(f for f in findings if f))
 
 
