@@ -64,7 +64,9 @@ def plan(
     """
     if experiment.twin is None or experiment.twin.truth is None:
         raise UsageError(
-            f"'{experiment.name}' has no twin whose truth is known: filters are ranked against one"
+            f"'{experiment.name}' has no twin whose truth is known: filters are ranked against "
+            f"one; declare it (`Twin(..., truth=...)`), or `validate run {experiment.name}` judges "
+            "what its filters predict"
         )
     parameters, _ = configure(experiment, Options(options.values, (), options.quick))
     methods = _methods(experiment, options.methods, axes)
