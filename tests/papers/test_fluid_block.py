@@ -10,13 +10,15 @@ from validate.errors import SceneError, UsageError
 from validate.papers.fluid_block.block import (
     Cavities,
     FluidBlock,
+    FluidLaws,
     PlaneBlock,
     PlaneGrid,
     block_mesh,
     record,
 )
 from validate.papers.fluid_block.curves import condensed_block, curve_exhibit, curve_of
-from validate.papers.fluid_block.updates import laws_exhibit, several_exhibit, updates_exhibit
+from validate.papers.fluid_block.other_laws import laws_exhibit
+from validate.papers.fluid_block.updates import several_exhibit, updates_exhibit
 from validate.replay import load as experiment_named
 from validate.replay.options import Options
 from validate.replay.road import compare
@@ -42,6 +44,9 @@ def test_the_curve_of_the_note() -> None:
     assert len(small.nodes) == 40
     assert curve.slope == pytest.approx(9832.3, abs=0.06)
     assert curve.gain == pytest.approx(9857.3, abs=0.06)
+    assert curve.terms[0] == pytest.approx(1.017051e-4, rel=1e-6)
+    c1, c2 = curve.terms
+    assert 1 + c1 * curve.fixed + c2 * curve.fixed**2 == pytest.approx(RATIOS, rel=1e-12)
     assert curve.fixed[[0, -1]] == pytest.approx([-3095.85, 2827.77], abs=0.01)
     assert curve.follower[[0, -1]] == pytest.approx([-3321.5, 2575.1], abs=0.06)
     assert curve.follower[30] == pytest.approx(0.0, abs=1e-9)
@@ -131,8 +136,11 @@ def test_the_printed_claim_by_tool() -> None:
     assert numbers["needle.cold"] == 1
     assert numbers["plate.cold"] == 2
     names = [t.name for t in shown.tables]
-    assert names == ["updates_needle", "updates_patch", "updates_plate", "updates_warm"]
-    rows = {row[:2]: row[2:4] for row in shown.tables[2].rows}
+    assert names == [f"updates_{w}{t}" for t in ("needle", "patch", "plate") for w in ("", "warm_")]
+    rows = {row[:2]: row[2:4] for row in shown.tables[4].rows}
+    warm = {row[:2]: row[2:4] for row in shown.tables[5].rows}
+    assert set(warm) == set(rows)  # every law, every tolerance
+    assert warm["proportional", "0.001"][1] <= rows["proportional", "0.001"][1]
     assert rows["newton", "1e-12"] <= (4, 4)
     assert rows["newton", "1e-12"][1] < rows["proportional", "1e-12"][1]
 
@@ -142,15 +150,47 @@ def test_scalar_gains_weaken_as_the_septum_thins() -> None:
     own = [radii[f"2.{share}.own"] for share in ("2", "1", "0.5", "0.25")]
     assert own == sorted(own)
     assert radii["2.0.25.matrix"] < 0.5 * own[-1]
-    assert any(row[-1] != "settled" for row in shown.tables[0].rows)
+    assert max(radii[f"{n}.{s}.own"] for n in (2, 3) for s in ("0.25", "0.5", "1")) < 1
+    ends = {row[:3]: row[-2:] for row in shown.tables[0].rows}
+    diverged = ends[3, 1.25, "one cavity's"]
+    assert radii["3.0.25.one cavity's"] > 1
+    assert diverged[0] is None
+    assert diverged[1].startswith(("diverged: ", "not_converged: "))
 
 
 def test_substitution_diverges_beyond_the_slope_and_newton_does_not() -> None:
     shown = laws_exhibit(SMALL)
-    rows = [row for row in shown.tables[0].rows if str(row[0]).startswith("P = -B")]
+    rows = [row for row in shown.tables[0].rows if "slopes" in str(row[0])]
     assert [row[-1] is None for row in rows] == [False, False, False, True, True, True]
+    assert {row[4] for row in rows} == {"settled"}
     assert all(isinstance(row[3], int) and row[3] <= 5 for row in rows)
-    assert "beyond 0.7 to 1.3" in shown.words[0]
+    assert shown.words[0].startswith("Warning: a pulse of 80 to 120 mmHg, 70 a minute leaves")
+
+
+def test_other_laws_are_those_that_are_set() -> None:
+    """A soft pulse stays in range; a reservoir that feeds itself has no root, and that is a row."""
+    laws = FluidLaws(preset=100.0, stiffness=-5e4, pulse_low=500.0, pulse_high=1000.0)
+    shown = laws_exhibit(replace(SMALL, laws=laws))
+    assert "stays within 0.7 to 1.3" in shown.words[0]
+    (own,) = (row for row in shown.tables[0].rows if "B = -5e+04 Pa" in str(row[0]))
+    assert own[1:4] == (None, None, None)
+    assert "unstable" in str(own[4])
+    by = {row[0]: row[1] for row in shown.tables[0].rows}
+    assert by["compressible, bulk modulus 2.2e+09 Pa"] == pytest.approx(by["incompressible"], 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("laws", "words"),
+    [
+        ({"stiffness": 0.0}, "stiffness 0 Pa: both finite"),
+        ({"bulk_modulus": -1.0}, "a fluid's is positive"),
+        ({"pulse_rate": -1.0}, "a rate of 0 or more"),
+        ({"pulse_high": float("nan")}, "finite numbers"),
+    ],
+)
+def test_other_laws_without_sense_are_refused(laws: dict[str, float], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        FluidLaws(**laws)
 
 
 def test_a_curve_is_shown_with_its_units() -> None:

@@ -137,15 +137,38 @@ def test_an_elastic_reservoir_of_two_cavities(two_cavities: Responses) -> None:
     assert pressures(state) == pytest.approx(300.0 - 2e4 * (V - 1), rel=1e-9)
 
 
-def test_a_reservoir_that_feeds_itself_beyond_the_bodys_stiffness_has_no_root(
-    phantom: Responses,
+def test_a_reservoir_that_feeds_itself_beyond_the_bodys_stiffness_has_no_stable_root(
+    phantom: Responses, two_cavities: Responses
 ) -> None:
+    """dP/dV of the law against that of the body: below it a little more volume brings too little
+    pressure to stay, above it too much."""
     slope = float(phantom.rest_volumes[0] / (3 * phantom.volumes[0, 0, 0, 2]))
-    mild = stepped(ElasticPressure(100.0, -4 * slope), phantom, NINE)
-    wild = stepped(ElasticPressure(100.0, -0.5 * slope), phantom, NINE)
+    mild = stepped(ElasticPressure(100.0, -0.5 * slope), phantom, 0.001)
+    wild = stepped(ElasticPressure(100.0, -4 * slope), phantom, 0.001)
     assert mild.failure is None
+    V = volume_ratios(phantom, mild)[0]
+    assert pressures(mild)[0] == pytest.approx(100.0 + 0.5 * slope * (V - 1), rel=1e-9)
     assert wild.failure is not None
     assert wild.failure[0] == "not_converged"
+    assert "unstable: it grows faster" in wild.failure[1]
+    mild, wild = (stepped(ElasticPressure(100.0, B), two_cavities, 0.0005) for B in (-1e3, -1e6))
+    assert mild.failure is None
+    assert wild.failure is not None
+    assert "unstable: they grow faster" in wild.failure[1]
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 0.9])
+def test_a_mild_reservoir_is_what_substitution_tends_to(phantom: Responses, share: float) -> None:
+    """P <- Pe - B (V/V0 - 1) settles exactly where the law is weaker than the body."""
+    slope = float(phantom.rest_volumes[0] / (3 * phantom.volumes[0, 0, 0, 2]))
+    B, P, z = -share * slope, 0.0, np.array([1.0, 0.0, 0.0])
+    for _ in range(2000):
+        z[2] = P
+        V = float(phantom.volumes[0] @ z @ z @ z) / float(phantom.rest_volumes[0])
+        P = 20.0 - B * (V - 1)
+    state = stepped(ElasticPressure(20.0, B), phantom, 0.0)
+    assert state.failure is None
+    assert pressures(state)[0] == pytest.approx(P, rel=1e-8)
 
 
 def test_a_pulse_is_the_pressure_asked_for(phantom: Responses) -> None:

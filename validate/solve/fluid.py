@@ -74,8 +74,9 @@ class ElasticPressure:
     """P = preset - stiffness (V/V0 - 1): a cavity joined to an elastic reservoir, or a gas.
 
     A negative stiffness is a pressure that grows with the volume; where it outweighs the body's own
-    there is no stable root, which is an outcome. Newton takes 3 to 4 steps where substitution
-    diverges (stiffness beyond the slope of the pressure-volume curve). Beyond paper 000.
+    (-B beyond the slope of the pressure-volume curve) no root is stable, which is an outcome.
+    Newton takes 3 to 4 steps where substitution diverges (stiffness beyond that slope). Beyond
+    paper 000.
     """
 
     handles: ClassVar[Handles] = FLUID
@@ -112,7 +113,9 @@ class Settling(LinearStepper):
             return self._state(k, z, updates, ratios=ratios)
         found = ", ".join(f"{P:.4g}" for P in z[self.responses.drives + 1 :])
         why = (
-            f"pressures {found} Pa are a spurious root: between zero and there the volume "
+            f"pressures {found} Pa are unstable: they grow faster with the volume than the body's"
+            if softness < 0
+            else f"pressures {found} Pa are a spurious root: between zero and there the volume "
             "falls as pressure grows; check the gain's sign and the load"
         )
         return self._state(k, z, updates, ("not_converged", why), ratios)

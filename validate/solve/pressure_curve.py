@@ -101,7 +101,8 @@ def root_of(
     softness: float = 0.0,
 ) -> Root:
     """Where the cubic `terms` is (ratio - softness P) V0, by Newton from `start` Pa, on the branch
-    through P = 0; softness in 1/Pa."""
+    through P = 0; softness in 1/Pa. A negative softness is a pressure that grows with the volume:
+    stable where the body's own grows faster, which is where the left side falls with P."""
     a, b, own, V = terms
     c, d = own + softness * V0, V - ratio * V0
     scale = V0 * max(1.0, abs(ratio)) if softness else V0 * ratio
@@ -118,7 +119,9 @@ def root_of(
             break
     if not abs(error) <= 1e-9 * scale:
         failed = f"error {error / scale:.2%} after {updates} Newton steps"
-    elif not rises(a, b, c, P):
+    elif softness < 0 and not rises(-a, -b, -c, P):
+        failed = f"P = {P:.4g} Pa is unstable: it grows faster with the volume than the body's own"
+    elif softness >= 0 and not rises(a, b, c, P):
         failed = f"P = {P:.4g} Pa is a spurious root: volume falls as pressure grows before it"
     return Root(P, updates, ((a * P + b) * P + own) * P + V, failed)
 
@@ -132,15 +135,18 @@ def rises(a: float, b: float, c: float, P: float) -> bool:
 
 def least_slope(responses: Responses, z: Floats, softness: float = 0.0) -> float:
     """The least dV_i/dP_i of any cavity, `softness` V0 m^3/Pa added, on the way t P, 0 <= t <= 1:
-    a quadratic in t, exactly."""
+    a quadratic in t, exactly. Of a negative softness it is what that leaves: less than 0 where a
+    pressure that grows with the volume outweighs the body."""
     drives = responses.drives
     empty = z.copy()
     empty[drives + 1 :] = 0
-    least = np.inf
+    least, sign = np.inf, -1.0 if softness < 0 else 1.0
     for i, (form, V0) in enumerate(zip(responses.volumes, responses.rest_volumes, strict=True)):
         own = form[drives + 1 + i]
         more = softness * float(V0) / 3
-        start, middle, end = (float(y @ own @ y) + more for y in (empty, (empty + z) / 2, z))
+        start, middle, end = (
+            sign * (float(y @ own @ y) + more) for y in (empty, (empty + z) / 2, z)
+        )
         b, c = 4 * middle - 3 * start - end, 2 * (start + end) - 4 * middle
         t = min(max(-b / (2 * c), 0.0), 1.0) if c > 0 else 0.0
         least = min(least, start, end, start + t * (b + t * c))

@@ -25,8 +25,9 @@ from validate.replay.experiment import Progress
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
 from validate.scene.scene import Cavity, Drive, Pin, PlaneState, Scene, Support
-from validate.solve.fluid import ExactPressure
+from validate.solve.fluid import ElasticPressure, ExactPressure
 from validate.solve.march import march
+from validate.solve.pulse import MMHG, PulsePressure
 from validate.twin.sensors import signal, streams
 
 ToolName = Literal["needle", "patch", "plate"]
@@ -84,6 +85,23 @@ class SlabTwin:
 
 
 @dataclass(frozen=True)
+class FluidLaws:
+    """The other laws that the report shows, under the plate; the pulse without a tool."""
+
+    preset: float = quantity(0.0, "Pa", "Pe of a reservoir, P = Pe - B (V/V0 - 1)")
+    stiffness: float = quantity(5e3, "Pa", "B of the reservoir")
+    bulk_modulus: float = quantity(2.2e9, "Pa", "of a compressible fluid")
+    pulse_low: float = quantity(80 * MMHG, "Pa", "least pressure of the pulse")
+    pulse_high: float = quantity(120 * MMHG, "Pa", "largest pressure of the pulse")
+    pulse_rate: float = quantity(70 / 60, "1/s", "pulses a second")
+
+    def __post_init__(self) -> None:
+        ElasticPressure(self.preset, self.stiffness)  # which refuse what has no sense
+        ExactPressure(1.0, self.bulk_modulus)
+        PulsePressure(self.pulse_low, self.pulse_high, self.pulse_rate)
+
+
+@dataclass(frozen=True)
 class FluidBlock:
     """`strains` are tool displacements over the block's height."""
 
@@ -93,6 +111,7 @@ class FluidBlock:
     mesh: PlaneGrid = PlaneGrid()
     ranges: SlabRanges = SlabRanges()
     twin: SlabTwin = SlabTwin()
+    laws: FluidLaws = FluidLaws()
     tool: ToolName = quantity("plate", "1", "what presses the upper side: one node, a patch, all")
     strains: tuple[float, ...] = quantity(
         (0.003, 0.01, 0.03, 0.05, 0.08, 0.10, 0.12, 0.15), "1", "displacement over height"

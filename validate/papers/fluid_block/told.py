@@ -14,8 +14,8 @@ from validate.papers.fluid_block.curves import (
     shapes_exhibit,
 )
 from validate.papers.fluid_block.exactness import exactness_exhibit
+from validate.papers.fluid_block.other_laws import laws_exhibit
 from validate.papers.fluid_block.updates import (
-    laws_exhibit,
     pressed,
     several_exhibit,
     updates_exhibit,
