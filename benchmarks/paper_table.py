@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-EXPERIMENTS = ("fluid_block", "fluid_phantom")
+EXPERIMENTS = ("fluid_block", "fluid_phantom", "needle_pocket")
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "paper-000.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 HEAD = ("paper", "what", "theirs", "ours", "verdict", "why", "experiment")

@@ -23,6 +23,7 @@ from validate.papers.needle_pocket.pocket import (
     place,
 )
 from validate.papers.needle_pocket.recorded import walkable
+from validate.papers.needle_pocket.told import half
 from validate.papers.needle_pocket.twin import record
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -30,7 +31,7 @@ from validate.recording.types import Markers, Recording, Signal, Source
 from validate.replay import load as experiment_named
 from validate.replay.options import Options
 from validate.replay.road import compare
-from validate.scene.mesh import Mesh
+from validate.scene.mesh import Mesh, cell_volumes
 
 COARSE = NeedlePocket(mesh=PocketGrid(10, 6), twin=PocketTwin(plane=10, solid=6))
 SHIPPED = Path(__file__).parents[2] / "recordings" / "needle_pocket.mcap"
@@ -212,3 +213,16 @@ def test_limits_follow_the_space() -> None:
     space = {a.quantity: a.limit for a in follows(experiment, [made], solid).accept}
     assert plane["force.y"] == 25 * space["force.y"]
     assert plane["pressure"] == space["pressure"]
+
+
+def test_the_cube_is_drawn_cut_at_the_needle_and_turned_up() -> None:
+    mesh = body_mesh(replace(COARSE.body, space="solid"), 10, 6, 1)
+    moved_up = np.tile([0.0, 1e-3, 0.0], (len(mesh.nodes), 1))
+    shown, u = half(mesh, moved_up, 0.0)
+    assert len(shown.cells) < 0.6 * len(mesh.cells)
+    assert u == pytest.approx(np.tile([0.0, 0.0, 1e-3], (len(u), 1)))
+    assert shown.nodes[:, 2].max() == pytest.approx(0, abs=1e-12)  # y = 0 is on top
+    assert cell_volumes(shown).min() > 0
+    same, v = half(block(), np.zeros_like(block().nodes), 0.0)
+    assert same is block()
+    assert v.shape == block().nodes.shape

@@ -142,14 +142,26 @@ def _shapes(main: Mapping[str, Followed]) -> list[NodeMap]:
 
 def _shape(name: str, followed: Followed, what: str, k: int, force: float) -> NodeMap:
     run, mesh = followed.run, followed.body.mesh
-    u = run.u[k]
     unit = "N/m" if mesh.dimension == 2 else "N"
+    cut = ", cut at the needle" if mesh.dimension == 3 else ""
+    mesh, u = half(mesh, run.u[k], followed.body.tools[0].tip[-1])
     return NodeMap(
         f"{what}_{name}",
         f"{followed.label}, {what}: {force:.3g} {unit} on the hand at {run.t[run.at[k]]:.3g} s",
         Mesh(mesh.nodes + u, mesh.cells, mesh.kind), 1e3 * np.linalg.norm(u, axis=1), "mm",
-        f"displacements in {what}", "the deformed body",
+        f"displacements in {what}", f"the deformed body{cut}",
     )  # fmt: skip
+
+
+def half(mesh: Mesh, u: Floats, z: float) -> tuple[Mesh, Floats]:
+    """In 3-D what lies beyond the needle's plane z m, y turned up for whoever looks at it."""
+    if mesh.dimension == 2:
+        return mesh, u
+    beyond = mesh.nodes[mesh.cells].mean(axis=1)[:, 2] > z
+    used, cells = np.unique(mesh.cells[beyond], return_inverse=True)
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # x, -z, y of a row x, y, z
+    shown = Mesh(mesh.nodes[used] @ turn, cells.reshape(-1, mesh.cells.shape[1]), mesh.kind)
+    return shown, u[used] @ turn
 
 
 # --- a live loop replayed -------------------------------------------------------------------------
