@@ -7,6 +7,7 @@ import pytest
 
 from validate.errors import SceneError
 from validate.fem.system import build
+from validate.papers.async_regions import touched_block
 from validate.papers.async_regions.bodies import (
     AREA,
     LENGTH,
@@ -19,6 +20,7 @@ from validate.papers.async_regions.bodies import (
     pad_of,
 )
 from validate.papers.async_regions.line import HapticProbe, LoadCell, TouchedLine, place, record
+from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import growth, off, peak, pushed
 from validate.papers.async_regions.sizes import HEADS, reduced, size_rows, size_table
 from validate.solve.regions import AsyncRegions
@@ -122,6 +124,22 @@ def test_the_krylov_model_follows_the_whole_block() -> None:
     held = np.minimum(np.arange(1, 3001) / 1000, 1.0) * 5e-3
     statics = reduced(scene, near, 1).walk(held, near.spring)[0][-1]
     assert statics == pytest.approx(pushed(scene, near, held).force[-1], rel=1e-5)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_blocks_recording_is_its_whole_solve_and_says_so(dimension: int) -> None:
+    p = touched_block.TouchedBlock(
+        body=touched_block.BlockBody(dimension, 2), probe=HapticProbe(seconds=0.2), twin=LoadCell()
+    )
+    recording = touched_block.record(p, lambda _: None)
+    assert recording.metadata["provenance"]["same_model"] == "true"
+    scene = touched_block.build(recording, p, None)
+    seen = touched_block.place(recording, p, scene)
+    assert seen.inputs.shape == (200, dimension)
+    whole = pushed(scene, BLOCK["whole"].given(touched_block.sets(p, seen)), -seen.inputs[:, 0])
+    measured = recording.signal("force", "N").y[1:, 0]
+    assert measured == pytest.approx(whole.force[9::10], abs=5 * p.twin.noise)
+    assert np.abs(whole.force).max() > 5 * p.twin.noise
 
 
 def test_sizes_stand_in_one_table() -> None:

@@ -9,6 +9,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.method import WALK_UNRECORDED
 
 DECLARED = {
+    "async_block": 0,
     "async_line": 23,
     "bending_rod": 7,
     "ecoflex_cylinder": 3,

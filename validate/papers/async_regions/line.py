@@ -66,23 +66,31 @@ def record(p: TouchedLine, progress: Progress) -> Recording:
     t: Floats = p.dt * np.arange(round(p.probe.seconds / p.dt) + 1, dtype=np.float64)
     depth = chirp(t, p.probe.depth, p.probe.lowest, p.probe.highest)
     force = exact_force(p.body.E, p.probe.spring, t, depth, p.body.damping)
-    seed = streams(p.twin.seed, ("force",))["force"]
-    some = slice(None, None, p.twin.every)
-    path = np.stack([-depth, np.zeros(len(t))], axis=1).round(9)  # a nanometre: short files
+    path = np.stack([-depth, np.zeros(len(t))], axis=1)
+    law = "continuous linear bar, frequency domain"
+    return probed("async_line", t, path, force, p.twin, same=False, law=law)
+
+
+def probed(
+    name: str, t: Floats, path: Floats, force: Floats, cell: LoadCell, *, same: bool, law: str
+) -> Recording:
+    """A recording of a probe's path (nt, d) m at t (nt,) s and the force (nt,) N on the hand."""
+    rng = streams(cell.seed, ("force",))["force"]
+    some = slice(None, None, cell.every)
     return Recording(
-        "async_line",
-        Source("async_line", "", 0, "made in memory"),
+        name,
+        Source(name, "", 0, "made in memory"),
         START_NS,
         signals={
-            PROBE: Signal(t, path, "m", 0.0, "scene"),
-            "force": signal(t[some], force[some], "N", p.twin.noise, "scene", seed),
+            PROBE: Signal(t, path.round(9), "m", 0.0, "scene"),  # a nanometre: short files
+            "force": signal(t[some], force[some], "N", cell.noise, "scene", rng),
         },
         metadata={
             "provenance": {
                 "kind": "twin",
-                "same_model": "false",
-                "seed": str(p.twin.seed),
-                "law": "continuous linear bar, frequency domain",
+                "same_model": str(same).lower(),
+                "seed": str(cell.seed),
+                "law": law,
             }
         },
     )

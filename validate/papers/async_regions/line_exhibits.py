@@ -27,7 +27,9 @@ _RATIOS = (1, 2, 5, 10, 20, 50, 100, 200)
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """Both tables, the oracle beside, energies of borders, and growth over the step ratio."""
     p, main = cast(TouchedLine, parameters), cases[""]
-    first, numbers = _table_1(p, main)
+    middle = p.probe.seconds / 2
+    title = f"Table 1: peak force within {_HALF:g} s of {middle:g} s, against the whole solve."
+    first, numbers = force_table("table_1", title, main, middle, _HALF)
     progress("growing push")
     second, more = _table_2(p)
     progress("energy of borders")
@@ -56,26 +58,27 @@ _BORDERS = (
 )
 
 
-def _table_1(p: TouchedLine, main: Mapping[str, Followed]) -> tuple[NumberTable, dict[str, float]]:
-    """Peak, error, phase and ticks of every method; the numbers of the printed rows."""
-    runs = {name: f.run for name, f in main.items() if f.run.finished}
-    whole, middle = runs.get("whole"), p.probe.seconds / 2
+def force_table(
+    name: str, title: str, main: Mapping[str, Followed], middle: float, within: float
+) -> tuple[NumberTable, dict[str, float]]:
+    """Peak (in `middle` +- `within` s), error, phase and ticks of every method, and as numbers."""
+    runs = {key: f.run for key, f in main.items() if f.run.finished}
+    whole = runs.get("whole")
     rows: list[tuple[Entry, ...]] = []
     numbers: dict[str, float] = {}
-    for name, run in runs.items():
-        top = peak(run.traces[_FORCE].y, run.t, middle, _HALF)
+    for key, run in runs.items():
+        top = peak(run.traces[_FORCE].y, run.t, middle, within)
         mean, worst = _ticks(run)
-        row: list[Entry] = [main[name].label, top, None, None, 1e3 * mean, 1e3 * worst]
-        numbers |= {f"peak.{name}": top, f"tick.{name}": 1e3 * mean}
+        row: list[Entry] = [main[key].label, top, None, None, 1e3 * mean, 1e3 * worst]
+        numbers |= {f"peak.{key}": top, f"tick.{key}": 1e3 * mean}
         if whole is not None:
-            error = 100 * (top / peak(whole.traces[_FORCE].y, whole.t, middle, _HALF) - 1)
+            error = 100 * (top / peak(whole.traces[_FORCE].y, whole.t, middle, within) - 1)
             row[2:4] = [error, 100 * off(run.traces[_FORCE].y, whole.traces[_FORCE].y)]
             gain = 100 * (1 - mean / _ticks(whole)[0])
-            numbers |= {f"error.{name}": error, f"gain.{name}": gain}
+            numbers |= {f"error.{key}": error, f"gain.{key}": gain}
         rows.append(tuple(row))
     heads = ("method", "peak / N", "error / %", "rms / %", "median tick / ms", "worst tick / ms")
-    title = f"Table 1: peak force within {_HALF:g} s of {middle:g} s, against the whole solve."
-    return NumberTable("table_1", title, heads, tuple(rows)), numbers
+    return NumberTable(name, title, heads, tuple(rows)), numbers
 
 
 def _ticks(run: Run) -> tuple[float, float]:
