@@ -1,11 +1,12 @@
 """Paper 004's bodies, oracle and tables: known numbers first, then the road of its experiments."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from validate.errors import SceneError
+from validate.errors import SceneError, UsageError
 from validate.fem.system import build
 from validate.papers.async_regions import touched_block
 from validate.papers.async_regions.bodies import (
@@ -20,9 +21,12 @@ from validate.papers.async_regions.bodies import (
     pad_of,
 )
 from validate.papers.async_regions.line import HapticProbe, LoadCell, TouchedLine, place, record
+from validate.papers.async_regions.line_exhibits import spring_words
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import growth, off, peak, pushed
 from validate.papers.async_regions.sizes import HEADS, reduced, size_rows, size_table
+from validate.replay.find import load_file
+from validate.replay.ladder_default import body_of, trial_of
 from validate.solve.regions import AsyncRegions
 
 E, KS, H = 5e3, 1000.0, 1e-3
@@ -124,6 +128,23 @@ def test_the_krylov_model_follows_the_whole_block() -> None:
     held = np.minimum(np.arange(1, 3001) / 1000, 1.0) * 5e-3
     statics = reduced(scene, near, 1).walk(held, near.spring)[0][-1]
     assert statics == pytest.approx(pushed(scene, near, held).force[-1], rel=1e-5)
+
+
+def test_a_spring_that_is_too_stiff_is_warned_of() -> None:
+    """The limit of the paper's bar at 5 kPa is 26.8 kN/m (an independent reconstruction)."""
+    for spring, warned in ((1e3, False), (26e3, False), (28e3, True)):
+        words = spring_words(TouchedLine(probe=HapticProbe(spring=spring)))
+        assert bool(words) is warned
+    assert "spring of 28000 N/m is too stiff for ticks of 0.001 s" in words[0]
+
+
+def test_studies_that_have_no_rung_for_a_probe_say_so(project_root: Path) -> None:
+    experiment = load_file(project_root / "experiments" / "async_block.py")
+    for study in (lambda: trial_of(experiment, True), lambda: body_of(experiment)):
+        with pytest.raises(UsageError, match="is touched by the probe 'probe', which no solver"):
+            study()
+    with pytest.raises(SceneError, match="block of 6 cells in 6 dimensions"):
+        block(E, 6, 6)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -87,7 +87,17 @@ class _Loading:
         return np.stack(columns, axis=1)
 
 
+def _require_no_tools(own: OwnBody) -> None:
+    """Raises `UsageError` for a scene that a probe touches: no rung of the ladders holds it."""
+    if own.scene.tools:
+        raise UsageError(
+            f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which "
+            "no solver of a derived ladder takes; run the experiment, or declare its ladder"
+        )
+
+
 def _trial(own: OwnBody, quick: bool) -> Trial:
+    _require_no_tools(own)
     meshes, reference = _meshes(own, _QUICK_UNKNOWNS if quick else _UNKNOWNS, quick)
     loading = _loading(own)
     dt, frames = _steps_and_frames(loading, quick)
@@ -236,6 +246,7 @@ def _spread(points: Floats) -> Floats:
 
 def _body(own: OwnBody) -> StabilityBody:
     """The body without its fluid, in linear cells, on meshes whose modes can all be taken."""
+    _require_no_tools(own)
     fitting = [n for n in own.levels(_LEVELS) if linear(own.at(n).mesh).nodes.size <= LARGEST]
     if not fitting:
         raise UsageError(

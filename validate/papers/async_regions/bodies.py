@@ -44,6 +44,8 @@ def bar(E: float, cells: int, damping: float = DAMPING) -> Scene:
 
 def block(E: float, cells: int, dimension: int, nu: float = 0.45) -> Scene:
     """A block of `cells` a side, x = 0 held, touched in the middle of x = 0.1 m."""
+    if dimension not in (2, 3) or cells < 2:
+        raise SceneError(f"block of {cells} cells in {dimension} dimensions: at least 2, in 2 or 3")
     size, split = (LENGTH,) * dimension, (cells,) * dimension
     middle = LENGTH * (cells // 2) / cells
     at = (LENGTH, *(middle,) * (dimension - 1))

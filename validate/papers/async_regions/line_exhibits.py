@@ -44,7 +44,11 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     )
     tables = Exhibit("tables", "Tables 1 and 2", words, (first, second))
     bounds = Exhibit(
-        "borders", "What borders do", _BORDERS, (_impedances(p, main), energy), heats=(maps,)
+        "borders",
+        "What borders do",
+        (*_BORDERS, *spring_words(p)),
+        (_impedances(p, main), energy),
+        heats=(maps,),
     )
     return Told((tables, bounds), {**numbers, **more})
 
@@ -56,6 +60,19 @@ _BORDERS = (
     "Growth is the spectral radius over a common period, per tick, with the probe held: above 1 "
     "some motion grows without bound.",
 )
+
+
+def spring_words(p: TouchedLine) -> tuple[str, ...]:
+    """A warning where the probe's spring is too stiff for the whole solve: it oscillates."""
+    whole = AsyncRegions(p.dt, (), (), spring=p.probe.spring, pad=pad_of(p.body.cells))
+    grows = growth(bar(p.body.E, p.body.cells, p.body.damping), whole)
+    if grows <= 1:
+        return ()
+    return (
+        f"Warning: the spring of {p.probe.spring:g} N/m is too stiff for ticks of {p.dt:g} s: with "
+        f"the probe held the whole solve grows by {grows:.4g} a tick, the force oscillates; take a "
+        "softer spring or shorter ticks.",
+    )
 
 
 def force_table(
