@@ -24,6 +24,7 @@ from validate.papers.released_beam.recorded import REST, SWING, load, named, rel
 from validate.papers.released_beam.swing import DAMPING, FREQUENCY, Swing, quantity_of
 from validate.recording.clocks import clock_of
 from validate.recording.types import Markers, Recording, Source
+from validate.register.draws import Draw
 from validate.register.observation import Selection
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
@@ -240,6 +241,20 @@ def test_another_frequency_is_found_and_a_marker_that_is_lost_is_left_out() -> N
     assert whole[FREQUENCY].values[0, 0] == pytest.approx(0.5, abs=0.005)
     assert whole[FREQUENCY].measured == pytest.approx(7.2, abs=0.005)
     assert np.sqrt((whole["swing.tip_1"].values ** 2).sum(axis=1).mean()) > 0.05
+
+
+def test_a_swing_is_drawn_anew_about_a_run() -> None:
+    """Of another frequency, with a gap: then nothing but what was drawn is left."""
+    swing = seen(f=7.2)
+    swing.moved[10:20, 1] = np.nan
+    run = run_of(rung(STEPS))
+    drawn = swing.anew(swing.left(run), Draw(np.random.default_rng(1)))
+    assert np.isnan(drawn.moved[10:20, 1]).all()
+    found = {d.quantity: d for d in drawn.deviations(run, LOOKED)}
+    tip, span = found["swing.tip_1"], drawn.span[0]
+    assert 1e-5 < span * np.sqrt((tip.values**2).mean()) < 3e-4  # shared .1 mm, noise 10 um
+    assert span * tip.values.std(axis=0).max() < 1e-4  # the release fits some of what is shared
+    assert abs(found[FREQUENCY].values[0, 0]) < 0.01
 
 
 def test_what_stands_still_has_no_ringing() -> None:

@@ -29,7 +29,7 @@ from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central import lumped_damping
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
-from validate.solve.types import State, Stepper
+from validate.solve.types import State
 
 RateRule = Literal["average", "backward_euler"]
 _HALVINGS = 6  # of a Newton correction that inverts cells
@@ -55,7 +55,7 @@ class NewtonDynamics:
                 "iterations: all must be positive"
             )
 
-    def prepare(self, system: System) -> Stepper:
+    def prepare(self, system: System) -> "ImplicitStepper":
         """Raises `SceneError` for a linear law, cavities, or a missing density."""
         scene = system.scene
         require_handled(scene, self)
@@ -96,7 +96,8 @@ class Settled:
 @dataclass(frozen=True)
 class ImplicitStepper:
     """`M` kg and `C` N s/m are (N, N); `order` (free,) is that of elimination; `branches` are those
-    of a viscoelastic body."""
+    of a viscoelastic body. `held` (k + l,) are inputs whose loads act from 0 s on, when a body is
+    let go; None: they come with the first step."""
 
     settings: NewtonDynamics
     system: System
@@ -105,6 +106,7 @@ class ImplicitStepper:
     C: sparse.csr_array
     order: Ints
     branches: Branches | None = None
+    held: Floats | None = None
 
     @property
     def scene(self) -> Scene:
@@ -118,7 +120,18 @@ class ImplicitStepper:
     def rest(self) -> State:
         u, inputs = np.zeros(len(self.system.moves)), np.zeros(len(self.scene.inputs))
         memory = self.branches.at_rest(self.body.weights.shape) if self.branches else None
-        return State(0, Settled(u, u, u, inputs, memory), numbers=self._numbers(u, u, u, inputs))
+        a = self._released()
+        return State(0, Settled(u, u, a, inputs, memory), numbers=self._numbers(u, u, u, inputs))
+
+    def _released(self) -> Floats:
+        """Acceleration (N,) of the undeformed body at 0 s: M a = f."""
+        a, free = np.zeros(len(self.system.moves)), self.system.free
+        if self.held is None:
+            return a
+        f = self.system.loads @ self.held[len(self.scene.drives) :]
+        factor = factorise_indefinite(sparse.csr_array(self.M)[free][:, free], self.order)
+        a[free] = factor.solve(f[free])
+        return a
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""

@@ -1,7 +1,7 @@
 """A body that is let go: its swing under constant loads, and the state that it comes to rest in.
 
-The swing is stepped by `NewtonDynamics`; rest is `StaticNewton`'s, of the relaxed law, at the last
-instant: what lies between is not stepped through.
+The swing is stepped by `NewtonDynamics`, its loads in full from 0 s on; rest is `StaticNewton`'s,
+of the relaxed law, at the last instant: what lies between is not stepped through.
 """
 
 from dataclasses import dataclass, replace
@@ -49,6 +49,7 @@ class LetGo:
         swing = NewtonDynamics(
             self.dt, "average", "consistent", self.tolerance, self.max_iterations
         ).prepare(build(scene))
+        swing = replace(swing, held=inputs[0])
         setup, every = perf_counter() - start, np.arange(len(t) - 1)
         moving = march("", swing, t[:-1], inputs[:-1], every, setup)
         if not moving.finished:

@@ -8,7 +8,7 @@ and no matter of that shift.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -18,6 +18,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.identify.ringing import Ringing, ringing
 from validate.papers.released_beam.gaps import over
+from validate.register.draws import AnyDraw
 from validate.register.observation import Deviation, Role, Selection, Simulated
 
 LABEL = "swing"
@@ -99,6 +100,22 @@ class Swing:
         found = minimize_scalar(off, bounds=(near - step, near + step), method="bounded",
                                 options={"xatol": 1e-6})  # fmt: skip
         return float(found.x), curve(np.clip(t - found.x, 0.0, None))
+
+    def left(self, run: Simulated) -> Floats:
+        """Exact displacement less measured one, flat (nt k 3,) m; 0 where a marker was not seen,
+        and where nothing is compared."""
+        off, there = np.zeros_like(self.moved), self.compared
+        if all(f"{n}.x" in run.traces for n in self.names):
+            shown = _curve(run, self.names)(self.t[there])
+            off[there] = np.nan_to_num(shown - self.moved[there])
+        return off.ravel()
+
+    def anew(self, left: Floats, draw: AnyDraw) -> "Swing":
+        """The markers where `left` (nt k 3,) m has them; what a marker's samples share, and noise,
+        drawn."""
+        exact = self.moved + left.reshape(self.moved.shape)
+        shared = draw.white(1.0, (3,)) * self.shared[:, None]
+        return replace(self, moved=exact + shared + draw.white(self.sd, self.moved.shape))
 
     def rung(self, moved: Floats) -> Ringing | None:
         """How the mean vertical motion of markers moved (m, k, 3) m rings, or None where it does
