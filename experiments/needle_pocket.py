@@ -17,6 +17,7 @@ from validate.papers.needle_pocket.pocket import (
     sets,
 )
 from validate.papers.needle_pocket.pocket import PocketModel as Model
+from validate.papers.needle_pocket.stated import STATED
 from validate.papers.needle_pocket.told import FIGURES, tell
 from validate.papers.needle_pocket.twin import record
 from validate.replay.cards import moved
@@ -61,7 +62,7 @@ EXPERIMENT = Experiment(
     axis="y",
     reference="paper",
     exhibits=tell,
-    published=FIGURES,
+    published=(*FIGURES, *STATED),
     follows=follows,
     twin=Twin(
         record,

@@ -21,6 +21,7 @@ DECLARED = {
     "kf_cube": 11,
     "kf_cube_inertia": 0,
     "needle_block": 13,
+    "needle_pocket": 12,
 }
 # Every number of a paper's tables and results that one of our experiments could stand beside.
 PRINTED = {
@@ -30,6 +31,7 @@ PRINTED = {
         0.01, 500, 70, 64, 0.5, 0.10, 0.13, 0.03, 0.485, 12e6, 0.040, 0.002, 0.003, 0.006, 0.009,
         512e6, 82,
     ),
+    "needle_pocket": (512, 0.001, 1, 30, 2.0e9, 2.4e9, 3000),  # paper 000
     "kf_cube": (200, 672, 0.0116, 10, 0.1735, 0.0158, 63, 25),  # paper 001
     "bending_rod": (4.2,),  # paper 002
     "needle_block": (1e-6, 1 / 30, 1),

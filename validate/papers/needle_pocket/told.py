@@ -64,6 +64,7 @@ def _scope(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
         made = paper.run.traces["updates"].y
         numbers = {
             "volume.kept": float((np.abs(off[_PAPER]) <= 0.1).mean()),
+            "volume.largest": float(np.abs(off[_PAPER]).max()) / _PERCENT,
             "updates.most": float(made.max()),
         }
     words = (
