@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -43,6 +44,7 @@ from validate.replay.live.packets import (
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.solve.needle import NeedleStepper
+from validate.solve.types import State
 
 COARSE = {"mesh.plane": "10"}
 REST = (0.0031, 0.001)
@@ -241,17 +243,30 @@ def test_no_force_beyond_the_limit_goes_out() -> None:
     )
 
 
-def test_a_model_without_an_answer_gives_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As far as the reach goes the exact pressure may have no root: a count, and zero newtons."""
-    ys = [0.003, -0.001, -0.049, -0.095, -0.001]
-    lost = prepared(
-        experiment_named("needle_pocket"),
-        Options({**COARSE, "methods.paper.settings.gain": "1e12"}), "paper",
-    ).stepper  # fmt: skip
-    done, device = talk([at(k + 1, y) for k, y in enumerate(ys)], 7 / 512, lost)
-    silent = [force for _, force, flags in device.answers if flags & NO_ANSWER]
-    assert len(silent) == done.findings["no answer of the model"] > 0
-    assert not np.array(silent).any()
+class Fails(NeedleStepper):
+    """Has no answer where the tip is deeper than 4 mm."""
+
+    def step(self, state: State, inputs: Floats) -> State:
+        made = super().step(state, inputs)
+        deep = self.tool.tip[1] + inputs[1] < -0.004
+        return replace(made, failure=("not_converged", "as asked")) if deep else made
+
+
+def test_a_model_without_an_answer_gives_no_force() -> None:
+    """Counted, zero newtons, and the model goes on from where it last had an answer."""
+    whole = made().stepper
+    lost = Fails(whole.settings, whole.small, whole.tool, whole.surface)
+    ys = [0.003, -0.001, -0.003, -0.005, -0.006, -0.0035]
+    done, device = talk([at(k + 1, y) for k, y in enumerate(ys)], 8 / 512, lost)
+    sizes = [float(np.linalg.norm(force)) for _, force, _ in device.answers]
+    assert sizes[2] > 1
+    assert sizes[3:5] == [0.0, 0.0]
+    assert sizes[5] > sizes[2]
+    assert [bool(flags & NO_ANSWER) for _, _, flags in device.answers] == [
+        False, False, False, True, True, False
+    ]  # fmt: skip
+    assert done.findings["no answer of the model"] == 2
+    assert done.x[:, 1].tolist() == [0.003, -0.001, -0.003, -0.0035]
 
 
 def test_another_sender_is_not_heard_while_one_is() -> None:

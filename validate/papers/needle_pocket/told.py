@@ -155,11 +155,13 @@ def _shape(name: str, followed: Followed, what: str, k: int, force: float) -> No
 
 
 def half(mesh: Mesh, u: Floats, z: float) -> tuple[Mesh, Floats]:
-    """In 3-D what lies beyond the needle's plane z m, y turned up for whoever looks at it."""
+    """In 3-D what lies behind the layer of nodes nearest to z m, with y turned up."""
     if mesh.dimension == 2:
         return mesh, u
-    beyond = mesh.nodes[mesh.cells].mean(axis=1)[:, 2] > z
-    used, cells = np.unique(mesh.cells[beyond], return_inverse=True)
+    layers = np.unique(mesh.nodes[mesh.facets["top"], 2].round(9))
+    plane = layers[np.argmin(np.abs(layers - z))]
+    behind = mesh.nodes[mesh.cells].mean(axis=1)[:, 2] < plane
+    used, cells = np.unique(mesh.cells[behind], return_inverse=True)
     turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # x, -z, y of a row x, y, z
     shown = Mesh(mesh.nodes[used] @ turn, cells.reshape(-1, mesh.cells.shape[1]), mesh.kind)
     return shown, u[used] @ turn
