@@ -5,7 +5,12 @@ known: displacement alone sees the Poisson ratio and no modulus. The ratio is id
 box of small strain and predicts an upper one. Another pair: `--set data=FOLDER`.
 """
 
+import math
+from functools import partial
+from pathlib import Path
+
 from validate.compare.verdict import Accept
+from validate.papers.gel.between import of_other_boxes, smoothed
 from validate.papers.gel.box import GelIndentation, build, load, place, stated
 from validate.papers.gel.box import GelModel as Model
 from validate.papers.gel.exhibits import tell
@@ -27,6 +32,12 @@ METHODS = {
 }
 AXES = tuple(f"inside.{axis}" for axis in "xyz")
 IN_LOWER = changed("box", which="lower")
+DRAWS = tuple(
+    Input(f"faces, {name} draw", moved("faces", **{name: lambda p, z: z / math.sqrt(3)}),
+          "noise of the particles that move the faces; three draws, their mean square counts",
+          "their residuals about local fits")
+    for name in ("first", "second", "third")
+)  # fmt: skip
 UNCERTAINTY = Uncertainty(
     MeshLadder(
         (changed("mesh", along=4, up=2), changed("mesh", along=6, up=3)),
@@ -34,8 +45,12 @@ UNCERTAINTY = Uncertainty(
         order=3.0,
     ),
     (
-        Input("faces", moved("faces", noise=lambda p, z: p.faces.noise + z),
-              "noise of the particles that move the faces", "their residuals about local fits"),
+        *DRAWS,
+        Input("smoothing", moved("faces", smoothing=smoothed),
+              "neighbours of the fits at the faces, half to twice", "assumed"),
+        Input("box", moved("material", nu=of_other_boxes),
+              "the Poisson ratio of another lower box, or of other faces",
+              "scatter of ratios fitted in several boxes"),
     ),
     surrogate="linear",
 )  # fmt: skip
@@ -58,11 +73,11 @@ EXPERIMENT = Experiment(
             "linear",
             (Free("material.nu", 0.0, 0.4995, "no volume grows when pressed; displacement elements",
                   "a wider box, or particles with less noise along z"),),
-            (Calibrates(tuple(f"{axis}@lower" for axis in AXES), IN_LOWER, "the lower box"),),
+            (Calibrates(tuple(f"{axis}@lower" for axis in AXES), IN_LOWER, "this one lower box"),),
         ),
     ),
     uncertainty=UNCERTAINTY,
     identify=fitted_box,
-    exhibits=tell,
+    exhibits=partial(tell, methods=METHODS, home=Path(__file__).parent),
     locates=("data", "before", "after"),
 )  # fmt: skip

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.register.scattered import local_fit, noise
+from validate.register.scattered import best_neighbours, local_fit, noise
 
 X = np.random.default_rng(3).uniform(size=(800, 3))
 
@@ -43,3 +43,12 @@ def test_others_leave_the_place_itself_out() -> None:
     u[5] = 1
     assert local_fit(X, u, X[5:6], 20, 1, others=True).values == pytest.approx(0, abs=1e-9)
     assert local_fit(X, u, X[5:6], 20, 1).values > 0.02
+
+
+def test_noise_asks_for_more_neighbours_and_structure_for_fewer() -> None:
+    rng = np.random.default_rng(7)
+    rows = np.flatnonzero((np.abs(X - 0.5) < 0.3).all(axis=1))
+    quiet = np.sin(9 * X[:, [0]]) + 0.001 * rng.standard_normal((800, 1))
+    loud = quadratic(X) + rng.standard_normal((800, 2))
+    assert best_neighbours(X, quiet, rows, (20, 60, 180)) == 20
+    assert best_neighbours(X, loud, rows, (20, 60, 180)) == 180

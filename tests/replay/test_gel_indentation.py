@@ -8,11 +8,17 @@ import pytest
 from scipy.io import savemat
 
 from validate.errors import RecordingError, UsageError
-from validate.papers.gel.box import GelIndentation, load, stated
+from validate.papers.gel.between import RATIOS, best_ratio, solved
+from validate.papers.gel.box import FACES, GelIndentation, _axis, load, stated
 from validate.papers.gel.pair import motion, side_of
 from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.scene.box import grid
+from validate.scene.material import Material
+from validate.scene.mesh import quadratic
+from validate.scene.scene import Scene
+from validate.scene.select import nodes_of
 
 
 def pair(folder: Path, count: int = 3000) -> Path:
@@ -44,6 +50,37 @@ def test_another_pair_is_linked_in_the_scale_that_is_said(tmp_path: Path) -> Non
     ends = stated(recording)
     assert ends["box.x"] == pytest.approx(75e-6, abs=15e-6)
     assert ends["box.bottom"] < ends["box.middle"] < ends["box.top"] < x[:, 2].max()
+
+
+def test_a_small_deep_contact_beside_the_indenter_does_not_draw_the_axis() -> None:
+    rng = np.random.default_rng(6)
+    x = rng.uniform(0, (400, 400, 200), (4000, 3))
+    wide, small = (
+        ((x[:, :2] - at) ** 2).sum(axis=1) / (2 * r**2) for at, r in ((220, 70), ((120, 290), 18))
+    )
+    u = np.zeros_like(x)
+    u[:, 2] = -((x[:, 2] / 200) ** 2) * (10 * np.exp(-wide) + 20 * np.exp(-small))
+    low, high = np.array([100.0, 100, 0]), np.array([300.0, 300, 200])
+    assert _axis(x, u, low, high, 50) == pytest.approx((220, 220), abs=20)
+
+
+@pytest.mark.parametrize("nu", [0.2, 0.45])
+def test_the_ratio_that_moved_a_box_is_found_in_it(nu: float) -> None:
+    mesh = quadratic(grid((1.0, 1.0, 0.5), (2, 2, 2)))
+    rng = np.random.default_rng(5)
+    held = nodes_of(mesh, FACES)
+    moved = [1e-2 * rng.standard_normal((len(held), 3))]
+    fields = [solved(Scene(mesh, Material(1.0, v)), held, moved)[0] for v in (nu, *RATIOS)]
+    seen = fields[0] + 1e-4 * rng.standard_normal(fields[0].shape)
+    found, sd, left = best_ratio(np.stack([u - seen for u in fields[1:]]), np.full(3, 1e-4))
+    assert found == pytest.approx(nu, abs=0.01)
+    assert sd is not None
+    assert left == pytest.approx(1e-4 * 3**0.5, rel=0.2)
+
+
+def test_a_ratio_at_its_bound_has_no_standard_deviation() -> None:
+    errors = np.linspace(1, 2, len(RATIOS))[:, None, None] * np.ones((1, 10, 3))
+    assert best_ratio(errors, np.ones(3))[:2] == (0.0, None)
 
 
 def test_which_files_are_a_pair_is_asked_for(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError, UsageError
@@ -18,7 +19,7 @@ from validate.recording.types import Recording
 from validate.register.displacements import DisplacementObservation
 from validate.register.observation import Selection
 from validate.register.registered import Registered
-from validate.register.scattered import local_fit, noise
+from validate.register.scattered import best_neighbours, local_fit, noise
 from validate.register.signals import SignalObservation
 from validate.scene.box import grid
 from validate.scene.laws import Coefficients
@@ -33,9 +34,11 @@ _SIDES: list[Site] = [Labelled(f"{axis}{end}") for axis in "xyz" for end in (0, 
 FACES: Chosen = reduce(or_, _SIDES).faces
 _FEWEST = 50  # particles to compare
 _SMALL, _LARGE = 0.06, 0.2  # strain norms a spacing below the tops of the boxes
+_COUNTS = (40, 80, 160, 320, 640)  # neighbours tried at the faces
 _SMOOTH = 80  # neighbours of the affine fit that a strain is read from
 _WIDE, _FLOOR = 0.5, 2.0  # side of a box over the volume's; spacings from the volume's bottom
 _DENSE, _ROOM = 0.6, 2.5  # share of the height with few links lost; spacings that a box is high
+_DEEPEST = 0.03  # share of the discs whose middle is the axis
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,9 @@ class GelMaterial:
     E: float = quantity(1000.0, "Pa", "modulus; no displacement depends on it: any will do")
     nu: float | None = quantity(None, "1", "Poisson ratio; none: identified in the lower box")
     coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
+    between: float = quantity(
+        0.0, "1", "standard deviation of nu between boxes; 0: found by fitting it in several"
+    )
 
 
 @dataclass(frozen=True)
@@ -82,8 +88,17 @@ class GelBoxes:
 
 @dataclass(frozen=True)
 class GelFaces:
-    neighbours: int = quantity(80, "1", "particles of the local quadratic fit at a node of a face")
-    noise: float = quantity(0.0, "1", "standard deviations of noise added before, of one seed")
+    neighbours: int | None = quantity(
+        None, "1", "of the local quadratic at a node; none: those that predict particles left out"
+    )
+    smoothing: float = quantity(1.0, "1", "times as many of these neighbours")
+    first: float = quantity(0.0, "1", "standard deviations of noise added before, a first draw")
+    second: float = quantity(0.0, "1", "as first, a second draw")
+    third: float = quantity(0.0, "1", "as first, a third draw")
+
+    @property
+    def draws(self) -> tuple[float, ...]:
+        return self.first, self.second, self.third
 
 
 @dataclass(frozen=True)
@@ -130,7 +145,8 @@ def stated(recording: Recording) -> Mapping[str, float]:
     low, size = x.min(axis=0), np.ptp(x, axis=0)
     spacing = float(recording.record("linking")["spacing_m"])
     side = _WIDE * float(size[:2].min())
-    axis = _axis(x, u, low + side / 2 + 2 * spacing, low + size - side / 2 - 2 * spacing)
+    room = side / 2 + 2 * spacing
+    axis = _axis(x, u, low + room, low + size - room, side / 4)
     bottom = float(low[2]) + _FLOOR * spacing
     within = (np.abs(x[:, :2] - axis) < side / 2).all(axis=1) & (x[:, 2] > bottom)
     highest = float(x[:, 2].max()) - spacing
@@ -151,13 +167,16 @@ def stated(recording: Recording) -> Mapping[str, float]:
     return {f"box.{name}": value for name, value in names.items()}
 
 
-def _axis(x: Floats, u: Floats, low: Floats, high: Floats) -> Floats:
-    """Where the gel sinks most: the middle of the deepest 3 % of the lower part, where few
-    links are lost; kept so that a column about it lies inside."""
+def _axis(x: Floats, u: Floats, low: Floats, high: Floats, reach: float) -> Floats:
+    """Middle of the discs of radius `reach` that sink most, of the lower part, where few links are
+    lost; a column about it lies inside. Wide discs: a smaller contact beside the indenter, however
+    deep, does not draw the axis."""
     dense = x[:, 2] < x[:, 2].min() + _DENSE * np.ptp(x[:, 2])
-    sinks = local_fit(x, u[:, [2]], x[dense], _SMOOTH, 1, robust=True).values[:, 0]
-    deep = x[dense][sinks <= np.quantile(sinks, 0.03)]
-    return np.asarray(np.clip(np.median(deep[:, :2], axis=0), low[:2], high[:2]))
+    plane, sinks = x[dense, :2], u[dense, 2]
+    at = plane[((plane >= low[:2]) & (plane <= high[:2])).all(axis=1)]
+    around = cKDTree(plane).query_ball_point(at, reach)
+    means = np.array([sinks[rows].mean() for rows in around])
+    return np.asarray(np.median(at[means <= np.quantile(means, _DEEPEST)], axis=0))
 
 
 def _height(x: Floats, u: Floats, rows: Ints, spacing: float, strain: float) -> float:
@@ -182,7 +201,7 @@ def build(recording: Recording, parameters: GelIndentation, model: GelModel) -> 
     p = parameters
     if p.material.nu is None:
         raise UsageError("material.nu is open: identify it, or --set material.nu=0.45")
-    mesh, moved = _faces(_Same(recording), p.box, p.faces, p.mesh, model.order)
+    mesh, moved = faces_of(Same(recording), p.box, p.faces, p.mesh, model.order)
     material = Material(
         p.material.E, p.material.nu, model.law,
         coefficients=p.material.coefficients.known_to(model.law),
@@ -195,17 +214,18 @@ def build(recording: Recording, parameters: GelIndentation, model: GelModel) -> 
 
 def place(recording: Recording, parameters: GelIndentation, scene: Scene) -> Registered:
     """The faces' largest motion drives; the particles inside are compared, under the box's name."""
-    p, end, whose = parameters, np.array([1.0]), _Same(recording)
-    _, moved = _faces(whose, p.box, p.faces, p.mesh, scene.mesh.order)
+    p, end, whose = parameters, np.array([1.0]), Same(recording)
+    _, moved = faces_of(whose, p.box, p.faces, p.mesh, scene.mesh.order)
     most = np.array([[float(np.abs(moved).max())]])
     faces = SignalObservation("faces", "drives", end, most, "m", 0.0)
-    seen = _inside(whose, p.box, p.mesh, scene.mesh.order)
+    seen = inside_of(whose, p.box, p.mesh, scene.mesh.order)
     hold = Selection(p.box.which, end, "after indentation")
-    return Registered((faces, seen), (hold,), findings=(_links(recording), _corners(p)))
+    told = (_links(recording), _corners(p, whose))
+    return Registered((faces, seen), (hold,), findings=told)
 
 
 @dataclass(frozen=True)
-class _Same:
+class Same:
     """A recording that is known again by its hash: what depends on it and the box alone is found
     once, not for every Poisson ratio."""
 
@@ -223,22 +243,34 @@ def _mesh(box: GelBoxes, cells: GelGrid, order: int) -> Mesh:
 
 
 @lru_cache(maxsize=8)
-def _faces(
-    whose: _Same, box: GelBoxes, faces: GelFaces, cells: GelGrid, order: int
+def faces_of(
+    whose: Same, box: GelBoxes, faces: GelFaces, cells: GelGrid, order: int
 ) -> tuple[Mesh, Floats]:
     """The mesh, and displacements (k, 3) m of its faces' nodes: local quadratics of the particles
     around."""
     x, u = motion(whose.recording)
-    if faces.noise:
+    if any(faces.draws):
         _, sd = noise(x, u)
-        u = u + faces.noise * sd * np.random.default_rng(1).standard_normal(u.shape)
+        for seed, share in enumerate(faces.draws, 1):
+            u = u + share * sd * np.random.default_rng(seed).standard_normal(u.shape)
     mesh, (low, _) = _mesh(box, cells, order), box.ends()
     at = mesh.nodes[nodes_of(mesh, FACES)] + low
-    return mesh, local_fit(x, u, at, faces.neighbours, robust=True).values
+    count = round((faces.neighbours or neighbours_of(whose, box)) * faces.smoothing)
+    return mesh, local_fit(x, u, at, count, robust=True).values
+
+
+@lru_cache(maxsize=32)
+def neighbours_of(whose: Same, box: GelBoxes) -> int:
+    """Neighbours whose local quadratics predict the particles of the box best that are left out."""
+    x, u = motion(whose.recording)
+    low, high = box.ends()
+    inside = np.flatnonzero(((x > low) & (x < high)).all(axis=1))
+    _require(len(inside), box, 0.0)
+    return best_neighbours(x, u, inside, _COUNTS)
 
 
 @lru_cache(maxsize=8)
-def _inside(whose: _Same, box: GelBoxes, cells: GelGrid, order: int) -> DisplacementObservation:
+def inside_of(whose: Same, box: GelBoxes, cells: GelGrid, order: int) -> DisplacementObservation:
     """The linked particles in the box, as far off its faces as is asked for.
 
     Raises `RegistrationError` for too few.
@@ -247,18 +279,21 @@ def _inside(whose: _Same, box: GelBoxes, cells: GelGrid, order: int) -> Displace
     low, high = box.ends()
     clear = box.clear * float(whose.recording.record("linking")["spacing_m"])
     inside = ((x > low + clear) & (x < high - clear)).all(axis=1)
-    if inside.sum() < _FEWEST:
-        raise RegistrationError(
-            f"{int(inside.sum())} linked particles in the {box.which} box more than "
-            f"{1e6 * clear:.1f} um off its faces, {_FEWEST} are needed; make it larger: "
-            "--set box.side=200um"
-        )
+    _require(int(inside.sum()), box, clear)
     at, mesh = x[inside] - low, _mesh(box, cells, order)
     _, sd = noise(x[inside], u[inside])
     return DisplacementObservation(
         "particles", "validates", np.array([1.0]), at, u[inside], barycentric_rows(mesh, at), sd,
         "inside",
     )  # fmt: skip
+
+
+def _require(count: int, box: GelBoxes, clear: float) -> None:
+    if count < _FEWEST:
+        raise RegistrationError(
+            f"{count} linked particles in the {box.which} box more than {1e6 * clear:.1f} um off "
+            f"its faces, {_FEWEST} are needed; make it larger: --set box.side=200um"
+        )
 
 
 def _links(recording: Recording) -> str:
@@ -270,9 +305,10 @@ def _links(recording: Recording) -> str:
     )
 
 
-def _corners(p: GelIndentation) -> str:
+def _corners(p: GelIndentation, whose: Same) -> str:
     ends = ", ".join(
         f"{axis} {1e6 * a:.1f} to {1e6 * b:.1f}"
         for axis, a, b in zip("xyz", *p.box.ends(), strict=True)
     )
-    return f"The {p.box.which} box: {ends} µm."
+    count = p.faces.neighbours or neighbours_of(whose, p.box)
+    return f"The {p.box.which} box: {ends} µm; its faces are fitted with {count} neighbours."

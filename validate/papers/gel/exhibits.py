@@ -1,69 +1,48 @@
-"""What `gel_indentation` shows: errors over strain and height against the floor, and a map.
-
-The floor is what no smooth prediction falls below: the rms of measured displacements about a local
-quadratic through each particle and its nearest, 20 in all, which fits a part of the noise itself.
-"""
+"""What `gel_indentation` shows: both boxes' errors against the floor, what the choice of a box does
+to the Poisson ratio, and how far the links are to be trusted."""
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
-
-import numpy as np
-from numpy.typing import NDArray
+from pathlib import Path
 
 from validate.arrays import Floats, rms
-from validate.compare.exhibit import Entry, Exhibit, Heat, NumberTable
-from validate.papers.gel.box import GelIndentation, strain_norms
+from validate.compare.exhibit import Exhibit, NumberTable
+from validate.papers.gel.between import GelRatio, between
+from validate.papers.gel.box import GelIndentation, Same, load
+from validate.papers.gel.judged import GelErrors, strains
+from validate.papers.gel.links import checked_links
+from validate.papers.gel.lower import in_lower
+from validate.papers.gel.pair import files, side_of
 from validate.register.displacements import DisplacementObservation
-from validate.register.scattered import local_fit, noise
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
+from validate.replay.method import Method
 
-Errors = Mapping[str, Floats]  # (k, 3) m by method
-
-BANDS = (0.0, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)  # strain norms
-_SMOOTH = 40  # particles that a strain is read from
-_HEIGHTS, _ACROSS, _FEW = 4, 10, 5  # layers, columns of a map; fewest particles of a number
-_UM = 1e6
+_OVER = "rms errors of displacement vectors over the"
 
 
-def tell(parameters: GelIndentation, cases: Cases, progress: Progress) -> Told:
-    """Tables and maps of the particles judged, and the ratios of prediction to floor."""
-    progress("errors inside")
+def tell(
+    parameters: GelIndentation,
+    cases: Cases,
+    progress: Progress,
+    *,
+    methods: Mapping[str, Method],
+    home: Path,
+) -> Told:
+    """Tables and maps of the particles judged, and the ratios of prediction to floor. `methods`
+    are those of the lower box; `home` is the experiment's folder."""
+    p = parameters
+    whose = Same(load(p, home)[0])
     main = {name: f for name, f in cases[""].items() if f.run.finished}
+    (seen,) = next(iter(main.values())).seen.of(DisplacementObservation)
     errors = {name: _errors(f) for name, f in main.items()}
-    inside = _Inside(next(iter(main.values())))
-    maps = (_map(name, main[name].label, e, inside.seen) for name, e in errors.items())
-    shown = Exhibit(
-        "inside", "Errors inside the body", inside.words(errors), inside.tables(errors),
-        heats=tuple(maps),
-    )  # fmt: skip
-    return Told((shown,), {f"ratio.{n}": rms(e) / rms(inside.floor) for n, e in errors.items()})
-
-
-class _Inside:
-    """The particles of one box: floor, noise and strain there."""
-
-    def __init__(self, followed: Followed) -> None:
-        (self.seen,) = followed.registered[0].of(DisplacementObservation)
-        x, u = self.seen.points, self.seen.u
-        self.floor, self.sd = noise(x, u)
-        self.strain = strain_norms(local_fit(x, u, x, min(_SMOOTH, len(x)), 1).slopes)
-
-    def tables(self, errors: Errors) -> tuple[NumberTable, ...]:
-        z = _UM * self.seen.points[:, 2]
-        edges = np.linspace(z.min(), z.max() + 1e-9, _HEIGHTS + 1)
-        bands = [(f"{a:g} to {b:g}", (self.strain >= a) & (self.strain < b))
-                 for a, b in pairwise(BANDS)]  # fmt: skip
-        layers = [(f"{a:.1f} to {b:.1f}", (z >= a) & (z < b)) for a, b in pairwise(edges)]
-        return (
-            _table("errors_over_strain", "Over the strain norm", "strain norm (1)", bands,
-                   errors, self.floor),
-            _table("errors_over_height", "Over the height in the box", "z (µm)", layers,
-                   errors, self.floor),
-        )  # fmt: skip
-
-    def words(self, errors: Errors) -> tuple[str, ...]:
-        return _words(errors, self.floor, self.sd, self.strain)
+    judged = GelErrors(seen, errors, strains(whose, p.box, seen))
+    progress("errors inside")
+    shown = (
+        _inside(judged, p.box.which, main),
+        _calibrated(in_lower(whose, p, methods), between(whose, p.box)),
+        _linked(whose, p, home, progress),
+    )
+    return Told(shown, {f"ratio.{n}": rms(e) / rms(judged.floor) for n, e in errors.items()})
 
 
 def _errors(followed: Followed) -> Floats:
@@ -71,65 +50,51 @@ def _errors(followed: Followed) -> Floats:
     return seen.simulated(followed.run.u[-1]) - seen.u
 
 
-def _words(errors: Errors, floor: Floats, sd: Floats, strain: Floats) -> tuple[str, ...]:
-    best = min(errors, key=lambda name: rms(errors[name]))
-    least = rms(errors[best])
-    noise_alone = float(np.linalg.norm(sd))
-    left = float(np.sqrt(max(least**2 - noise_alone**2, 0.0)))
-    bias = _UM * errors[best].mean(axis=0)
-    return (
-        f"{len(floor)} linked particles inside, strain norms {strain.min():.3f} to "
-        f"{strain.max():.3f} (affine fits of {_SMOOTH} neighbours). Noise of a displacement: "
-        f"{', '.join(f'{_UM * s:.3f}' for s in sd)} µm along x, y, z (standard deviations), "
-        f"{_UM * noise_alone:.3f} µm in all; about a local quadratic of 20 neighbours "
-        f"{_UM * rms(floor):.3f} µm are left: the floor.",
-        f"Best is '{best}', rms {_UM * least:.3f} µm, {least / rms(floor):.2f} floors. A "
-        f"perfect model would show the noise, {noise_alone / rms(floor):.2f} floors; what is left "
-        f"beyond it is {_UM * left:.3f} µm, of mean {', '.join(f'{b:+.3f}' for b in bias)} µm "
-        "along x, y, z.",
+def _inside(judged: GelErrors, which: str, main: Mapping[str, Followed]) -> Exhibit:
+    unknown = (
         "Displacement alone sees the Poisson ratio and no modulus: every force is in a unit that "
-        "nobody stated.",
+        "nobody stated."
     )
-
-
-def _table(
-    name: str,
-    title: str,
-    heading: str,
-    parts: Sequence[tuple[str, NDArray[np.bool_]]],
-    errors: Errors,
-    floor: Floats,
-) -> NumberTable:
-    """Rms errors and their ratio to the floor, of every part with enough particles."""
-    rows: list[tuple[Entry, ...]] = []
-    for text, those in (*parts, ("all", np.ones(len(floor), dtype=bool))):
-        if those.sum() < _FEW:
-            continue
-        least = rms(floor[those])
-        each = [rms(e[those]) for e in errors.values()]
-        shown = [x for e in each for x in (round(_UM * e, 4), round(e / least, 3))]
-        rows.append((text, int(those.sum()), round(_UM * least, 4), *shown))
-    heads = [h for m in errors for h in (f"{m} (µm)", f"{m} / floor (1)")]
-    return NumberTable(
-        name, f"{title}: rms errors of displacement vectors",
-        (heading, "particles (1)", "floor (µm)", *heads), tuple(rows),
+    return Exhibit(
+        "inside", f"Errors inside the {which} box", (*judged.words(), unknown),
+        (judged.over_strain("errors_over_strain", f"The {which} box: {_OVER} strain norm"),
+         judged.over_height("errors_over_height", f"The {which} box: {_OVER} height")),
+        heats=tuple(judged.map(name, f.label) for name, f in main.items()),
     )  # fmt: skip
 
 
-def _map(name: str, label: str, error: Floats, seen: DisplacementObservation) -> Heat:
-    """Rms error over x and z, of particles at all y."""
-    x, z = seen.points[:, 0], seen.points[:, 2]
-    xs, zs = (np.linspace(c.min(), c.max() + 1e-12, n + 1) for c, n in
-              ((x, _ACROSS), (z, _HEIGHTS)))  # fmt: skip
-    values = np.full((_HEIGHTS, _ACROSS), np.nan)
-    for i in range(_HEIGHTS):
-        for j in range(_ACROSS):
-            here = (z >= zs[i]) & (z < zs[i + 1]) & (x >= xs[j]) & (x < xs[j + 1])
-            if here.sum() >= _FEW:
-                values[i, j] = _UM * rms(error[here])
-    return Heat(
-        f"map_{name}", f"Where the errors are: {label}", "x in the box (µm)", "z in the box (µm)",
-        tuple(f"{_UM * (a + b) / 2:.0f}" for a, b in pairwise(xs)),
-        tuple(f"{_UM * (a + b) / 2:.1f}" for a, b in pairwise(zs)),
-        values, "rms error (µm)",
+def _calibrated(judged: GelErrors, found: Sequence[GelRatio]) -> Exhibit:
+    rows = tuple(
+        (
+            f.box,
+            f.neighbours,
+            f.count,
+            round(f.nu, 3),
+            None if f.sd is None else round(f.sd, 4),
+            round(f.over_floor, 3),
+        )
+        for f in found
+    )
+    table = NumberTable(
+        "nu_between_boxes", "The Poisson ratio fitted in other boxes (linear law)",
+        ("box", "neighbours (1)", "particles (1)", "nu (1)", "standard deviation (1)",
+         "error / floor (1)"), rows,
+        note="The standard deviation is that of noise and misfit in that box, none where the ratio "
+        "ended at a bound; the scatter from row to row is what the input 'box' holds. A coarser "
+        "mesh than the prediction's.",
     )  # fmt: skip
+    return Exhibit(
+        "lower", "The lower box, and others: fitted, no evidence", judged.words(),
+        (judged.over_strain("lower_over_strain", f"The lower box: {_OVER} strain norm"), table),
+    )  # fmt: skip
+
+
+def _linked(whose: Same, p: GelIndentation, home: Path, progress: Progress) -> Exhibit:
+    progress("links backward, and of a known pair")
+    pair = files(p.data, (p.before, p.after), home)
+    table = checked_links(whose.recording, pair, side_of(p.voxel, pair[0]))
+    words = (
+        "Linked backward, from after to before, a particle should find the one it was found by. On "
+        "a pair whose links are known every wrong one is counted.",
+    )
+    return Exhibit("links", "Are the links right?", words, (table,))

@@ -2,41 +2,72 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from validate.arrays import rms
 from validate.compare.score import Score
-from validate.papers.gel.box import GelIndentation, build, place
+from validate.papers.gel.between import GelRatio, between, scatter
+from validate.papers.gel.box import GelIndentation, Same, build, place
+from validate.papers.gel.judged import GelErrors, strains
 from validate.recording.types import Recording
 from validate.register.displacements import DisplacementObservation
-from validate.register.scattered import noise
 from validate.replay.experiment import Identified
 from validate.replay.method import Method
 from validate.solve.march import run_scheme
 
 _WORDS = "rms error of displacement vectors in the lower box over that about local quadratics"
+_SPREAD = "standard deviation of the ratios fitted in several boxes, with faces smoothed otherwise"
 
 
 def fitted_box(
     recordings: Sequence[Recording], parameters: GelIndentation, methods: Mapping[str, Method]
 ) -> Identified:
-    """Errors over the floor in the lower box, under the Poisson ratio that was found there."""
-    lower = replace(parameters, box=replace(parameters.box, which="lower"))
-    found, count, last = {}, 0, np.zeros(1, dtype=np.int64)
-    for name, method in methods.items():
-        scene = build(recordings[0], lower, method.scene)
-        placed = place(recordings[0], lower, scene)
+    """Errors over the floor in the lower box, under the Poisson ratio that was found there, and
+    the scatter of that ratio between boxes, which goes on as an uncertainty."""
+    whose = Same(recordings[0])
+    judged = in_lower(whose, parameters, methods)
+    count, least = len(judged.floor), rms(judged.floor)
+    over = {name: rms(e) / least for name, e in judged.errors.items()}
+    found = between(whose, parameters.box)
+    spread = parameters.material.between or scatter(found)
+    scores = (
+        *(Score(f"lower.over_floor.{name}", ratio, "1", count, "what calibrates", _WORDS)
+          for name, ratio in over.items()),
+        Score("nu.between_boxes", spread, "1", len(found), "what calibrates", _SPREAD),
+    )  # fmt: skip
+    each = ", ".join(f"{name} {ratio:.2f}" for name, ratio in over.items())
+    note = f"In the lower box, {count} particles, errors over the floor there: {each} (fitted)."
+    used = replace(parameters, material=replace(parameters.material, between=spread))
+    return Identified(used, scores, (note, _scatters(found, spread)))
+
+
+def _scatters(found: Sequence[GelRatio], spread: float) -> str:
+    ratios = [f.nu for f in found]
+    return (
+        f"The interval of material.nu is of this one box. In {len({f.box for f in found})} boxes, "
+        f"faces smoothed in {len({f.neighbours for f in found})} ways, it is fitted as "
+        f"{min(ratios):.3f} to {max(ratios):.3f}, standard deviation {spread:.3f}: input 'box'."
+    )
+
+
+def in_lower(whose: Same, parameters: GelIndentation, methods: Mapping[str, Method]) -> GelErrors:
+    """The lower box as every method that comes to an end has it."""
+    p = replace(parameters, box=replace(parameters.box, which="lower"))
+    p = replace(p, material=replace(p.material, between=0.0))
+    return _run(whose, p, tuple(methods.items()))
+
+
+@lru_cache(maxsize=2)
+def _run(whose: Same, p: GelIndentation, methods: tuple[tuple[str, Method], ...]) -> GelErrors:
+    errors = {}
+    for name, method in methods:
+        scene = build(whose.recording, p, method.scene)
+        placed = place(whose.recording, p, scene)
+        last = np.zeros(1, dtype=np.int64)
         run = run_scheme(name, method.settings, scene, placed.t, placed.inputs, last)
         (seen,) = placed.of(DisplacementObservation)
         if run.finished:
-            floor, _ = noise(seen.points, seen.u)
-            found[name] = rms(seen.simulated(run.u[-1]) - seen.u) / rms(floor)
-            count = len(floor)
-    scores = tuple(
-        Score(f"lower.over_floor.{name}", ratio, "1", count, "what calibrates", _WORDS)
-        for name, ratio in found.items()
-    )
-    each = ", ".join(f"{name} {ratio:.2f}" for name, ratio in found.items())
-    note = f"In the lower box, {count} particles, errors over the floor there: {each} (fitted)."
-    return Identified(parameters, scores, (note,))
+            errors[name] = seen.simulated(run.u[-1]) - seen.u
+    return GelErrors(seen, errors, strains(whose, p.box, seen))

@@ -61,7 +61,7 @@ def side_of(voxel: float | None, before: Path) -> float:
 def linked_pair(before: Path, after: Path, voxel: float) -> Recording:
     """Linked particles at 0 s (before) and 1 s (after: the instants have no times), m, with counts
     in the record `linking`. What `link` and the reader raise."""
-    clouds = [_cloud(path, voxel) for path in (before, after)]
+    clouds = [cloud(path, voxel) for path in (before, after)]
     links = link(clouds[0][0], clouds[1][0])
     x = np.stack([cloud[links.pairs[:, k]] for k, (cloud, _) in enumerate(clouds)])
     sources = [source for _, source in clouds]
@@ -82,7 +82,7 @@ def linked_pair(before: Path, after: Path, voxel: float) -> Recording:
     )
 
 
-def _cloud(path: Path, voxel: float) -> tuple[Floats, Source]:
+def cloud(path: Path, voxel: float) -> tuple[Floats, Source]:
     recording = recognised(path).read(path, {"unit": repr(voxel)})
     if len(recording.markers) != 1:
         raise RecordingError(f"{path.name}: {len(recording.markers)} clouds of points, one needed")

@@ -1,0 +1,119 @@
+"""One box's particles with what every method leaves there: against the floor, over strain and
+height, and where.
+
+The floor is what no smooth prediction falls below: the rms of measured displacements about a local
+quadratic through each particle and its nearest, 20 in all, which fits a part of the noise itself.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats, rms
+from validate.compare.exhibit import Entry, Heat, NumberTable
+from validate.papers.gel.box import GelBoxes, Same, strain_norms
+from validate.papers.gel.pair import motion
+from validate.register.displacements import DisplacementObservation
+from validate.register.scattered import local_fit, noise
+
+BANDS = (0.0, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)  # strain norms
+SMOOTH = 80  # particles that a strain is read from
+_HEIGHTS, _ACROSS, _FEW = 4, 10, 5  # layers, columns of a map; fewest particles of a number
+_UM = 1e6
+
+
+def strains(whose: Same, box: GelBoxes, seen: DisplacementObservation) -> Floats:
+    """Strain norms (k,) at the particles judged, by local quadratics of all linked ones."""
+    x, u = motion(whose.recording)
+    low, _ = box.ends()
+    return strain_norms(local_fit(x, u, seen.points + low, SMOOTH).slopes)
+
+
+@dataclass(frozen=True)
+class GelErrors:
+    """Particles `seen` in one box, `errors` (k, 3) m by method, `strain` norms (k,) there."""
+
+    seen: DisplacementObservation
+    errors: Mapping[str, Floats]
+    strain: Floats
+
+    @cached_property
+    def _noise(self) -> tuple[Floats, Floats]:
+        return noise(self.seen.points, self.seen.u)
+
+    @property
+    def floor(self) -> Floats:
+        return self._noise[0]
+
+    @property
+    def sd(self) -> Floats:
+        return self._noise[1]
+
+    def over_strain(self, name: str, title: str) -> NumberTable:
+        parts = [(f"{a:g} to {b:g}", (self.strain >= a) & (self.strain < b))
+                 for a, b in pairwise(BANDS)]  # fmt: skip
+        return self._table(name, title, "strain norm (1)", parts)
+
+    def over_height(self, name: str, title: str) -> NumberTable:
+        z = _UM * self.seen.points[:, 2]
+        edges = np.linspace(z.min(), z.max() + 1e-9, _HEIGHTS + 1)
+        parts = [(f"{a:.1f} to {b:.1f}", (z >= a) & (z < b)) for a, b in pairwise(edges)]
+        return self._table(name, title, "z in the box (µm)", parts)
+
+    def _table(
+        self, name: str, title: str, heading: str, parts: Sequence[tuple[str, NDArray[np.bool_]]]
+    ) -> NumberTable:
+        """Rms errors and their ratio to the floor, of every part with enough particles."""
+        rows: list[tuple[Entry, ...]] = []
+        for text, those in (*parts, ("all", np.ones(len(self.floor), dtype=bool))):
+            if those.sum() < _FEW:
+                continue
+            least = rms(self.floor[those])
+            each = [rms(e[those]) for e in self.errors.values()]
+            shown = [x for e in each for x in (round(_UM * e, 4), round(e / least, 3))]
+            rows.append((text, int(those.sum()), round(_UM * least, 4), *shown))
+        heads = [h for m in self.errors for h in (f"{m} (µm)", f"{m} / floor (1)")]
+        return NumberTable(
+            name, title, (heading, "particles (1)", "floor (µm)", *heads), tuple(rows)
+        )
+
+    def words(self) -> tuple[str, ...]:
+        best = min(self.errors, key=lambda name: rms(self.errors[name]))
+        least, floor = rms(self.errors[best]), rms(self.floor)
+        noise_alone = float(np.linalg.norm(self.sd))
+        left = float(np.sqrt(max(least**2 - noise_alone**2, 0.0)))
+        bias = _UM * self.errors[best].mean(axis=0)
+        return (
+            f"{len(self.floor)} linked particles inside, strain norms {self.strain.min():.3f} to "
+            f"{self.strain.max():.3f} (local quadratics of {SMOOTH} neighbours, in the box or "
+            f"not). Noise of a displacement: {', '.join(f'{_UM * s:.3f}' for s in self.sd)} µm "
+            f"along x, y, z (standard deviations), {_UM * noise_alone:.3f} µm in all; about a "
+            f"local quadratic of 20 neighbours {_UM * floor:.3f} µm are left: the floor.",
+            f"Best is '{best}', rms {_UM * least:.3f} µm, {least / floor:.2f} floors. A perfect "
+            f"model would show the noise, {noise_alone / floor:.2f} floors; what is left beyond "
+            f"it is {_UM * left:.3f} µm, of mean {', '.join(f'{b:+.3f}' for b in bias)} µm along "
+            "x, y, z.",
+        )
+
+    def map(self, name: str, label: str) -> Heat:
+        """Rms error over x and z, of particles at all y."""
+        x, z = self.seen.points[:, 0], self.seen.points[:, 2]
+        xs, zs = (np.linspace(c.min(), c.max() + 1e-12, n + 1) for c, n in
+                  ((x, _ACROSS), (z, _HEIGHTS)))  # fmt: skip
+        values = np.full((_HEIGHTS, _ACROSS), np.nan)
+        for i in range(_HEIGHTS):
+            for j in range(_ACROSS):
+                here = (z >= zs[i]) & (z < zs[i + 1]) & (x >= xs[j]) & (x < xs[j + 1])
+                if here.sum() >= _FEW:
+                    values[i, j] = _UM * rms(self.errors[name][here])
+        return Heat(
+            f"map_{name}", f"Where the errors are: {label}", "x in the box (µm)",
+            "z in the box (µm)",
+            tuple(f"{_UM * (a + b) / 2:.0f}" for a, b in pairwise(xs)),
+            tuple(f"{_UM * (a + b) / 2:.1f}" for a, b in pairwise(zs)),
+            values, "rms error (µm)",
+        )  # fmt: skip
