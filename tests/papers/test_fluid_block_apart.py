@@ -159,3 +159,11 @@ def test_slopes_of_the_note(squares: int, order: int, slope: float) -> None:
     material = Material(p.material.E, p.material.nu)
     r = responses(build_system(slab(p.body, p.cavities, squares, order, material, None)))
     assert 1 / float(slopes(r, still(r))[0, 0]) == pytest.approx(slope, abs=0.06)
+
+
+def test_a_bonded_needle_holds_its_own_node_alone() -> None:
+    """Of a block that is its own mirror image that node does not move aside anyway."""
+    p = set_up({"body.plates": "bonded"})
+    scene = slab(p.body, p.cavities, 20, 1, Material(p.material.E, p.material.nu), "needle")
+    assert [(pin.point, pin.components) for pin in scene.pins] == [((0.0, 0.0), (0,))]
+    assert [s.facets for s in scene.supports] == ["bottom"]

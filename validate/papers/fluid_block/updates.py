@@ -134,7 +134,7 @@ def _warm_table(tool: str, r: Responses, p: FluidBlock) -> NumberTable:
         rows.append((name, f"{tolerance:g}", *counts, ends))
     heads = ("law", "tolerance of V/V0", *(f"{100 * s:g} %" for s in p.strains), "outcome")
     return NumberTable(f"updates_warm_{tool}", f"Under a {tool}, each begun at the last pressure.",
-                       heads, tuple(rows))  # fmt: skip
+                       heads, tuple(rows), folded=True)  # fmt: skip
 
 
 # --- several cavities -----------------------------------------------------------------------------
