@@ -2,6 +2,7 @@
 
 import fcntl
 import io
+import math
 import os
 import pty
 import struct
@@ -11,8 +12,10 @@ import termios
 import pytest
 from commands import here
 
+from validate.cli import running
 from validate.cli.arguments import complain
 from validate.cli.layout import laid, width, wrapped
+from validate.compare.verdict import Check
 
 HEAD = ("name", "value", "why it is so")
 ROWS = (
@@ -98,3 +101,9 @@ def test_a_complaint_is_one_line_in_a_pipe_and_breaks_between_words_on_a_termina
     assert shown[1] == [
         "validate: unknown experiment", "  'fluid_phatom'; nearest:", "  fluid_phantom",
     ]  # fmt: skip
+
+
+def test_a_check_that_nothing_bounds_is_a_row_all_the_same() -> None:
+    """Meshes that say nothing of convergence leave u_num, and with it u_val, infinite."""
+    check = Check("force", 1.0, 2.0, math.inf, 0.1, math.inf, 0.1, "N", 3, "cannot decide", "why")
+    assert running._row(check, "why")[:4] == ["force", "1.000 N", "no bound", "2.000 N"]

@@ -1,6 +1,7 @@
 """`validate run`."""
 
 import json
+import math
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -135,6 +136,8 @@ def _checks(method: MethodResult) -> None:
 
 
 def _row(check: Check, why: str) -> list[str]:
-    error, doubt = error_shown(check_members(check)), shown(2 * check.u_val, check.unit)
+    bounded = math.isfinite(check.u_val)
+    error = error_shown(check_members(check))
+    doubt = shown(2 * check.u_val, check.unit) if bounded else "no bound"
     limit = shown(check.limit, check.unit)
     return [check.name, error, doubt, limit, str(check.count), check.verdict, why]
