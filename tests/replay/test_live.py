@@ -336,6 +336,7 @@ def test_the_command_runs_against_the_real_clock(tmp_path: Path) -> None:
     assert result.exception is None
     assert '"ticks": 154' in result.stdout
     assert len(read_recording(file).signals["tick.work"].t) == 154
+    assert "validate run needle_pocket --set mesh.plane=10 --set recording=" in result.stdout
 
 
 def test_an_experiment_without_a_needle_is_refused() -> None:

@@ -1,6 +1,7 @@
 """`validate live`: a needle's model against the clock."""
 
 import json
+import shlex
 import time
 from contextlib import closing
 from pathlib import Path
@@ -54,6 +55,10 @@ def run(
     if len(done.t):
         write_recording(written(done, made, start), file)
         said["recording"] = str(file)
+        given = (*values, f"recording={relative(file)}")
+        said["replay"] = shlex.join(
+            ["validate", "run", name, *(w for v in given for w in ("--set", v))]
+        )
     if as_json:
         print(json.dumps(said, indent=1, ensure_ascii=False))
     else:
@@ -103,7 +108,6 @@ def _told(done: Lived, said: dict[str, Any]) -> None:
         table("Found", ["what", "count"], [[k, str(v)] for k, v in said["findings"].items() if v])
     if said["recording"]:
         file = relative(Path(said["recording"]))
-        say(f"\nwritten: {file}; replay it by `validate run {said['experiment']} --set "
-            f"recording={file}`")  # fmt: skip
+        say(f"\nwritten: {file}; replay it by `{said['replay']}`")
     else:
         say("\nnothing was answered, so that nothing is recorded")
