@@ -344,9 +344,5 @@ def _local_axes(tool: Needle, imposes: Literal["all", "axis"]) -> Floats:
     axis = np.array(tool.axis)
     if imposes == "axis":
         return axis[None]
-    return np.asarray(np.linalg.svd(axis[None])[2] * _handed(axis))
-
-
-def _handed(axis: Floats) -> float:
-    """The sign for which the first row of V^T is the axis."""
-    return float(np.sign(np.linalg.svd(axis[None])[2][0] @ axis))
+    basis = np.linalg.svd(axis[None])[2]
+    return np.asarray(basis * np.sign(basis[0] @ axis))
