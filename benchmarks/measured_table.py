@@ -18,7 +18,7 @@ from validate.report.numbers import with_unit
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 HEAD = ("experiment", "fitted on", "predicted", "error E", "2 u_val", "verdict")
-_SHOWN = 3  # checks of an experiment, those that tell most
+_SHOWN = 3  # kinds of quantity of an experiment, of each the check that is furthest off
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,14 @@ def _called(one: Measured) -> str:
 def _told(result: Result, method: str) -> list[Check]:
     accepted = [m for m in result.methods if m.checks and method in ("", m.name)]
     checks = [c for c in accepted[0].checks if c.count and c.verdict != "fitted"]
-    return sorted(checks, key=lambda c: -abs(c.value) / (c.u_val or 1.0))[:_SHOWN]
+    checks.sort(key=lambda c: -abs(c.value) / (c.u_val or 1.0))
+    first = {c.name.split(".")[0]: c for c in reversed(checks)}  # the furthest off of every kind
+    return [c for c in checks if c in first.values()][:_SHOWN]
 
 
 def _cells(c: Check) -> tuple[str, ...]:
-    return (c.name, with_unit(c.value, c.unit), with_unit(2 * c.u_val, c.unit), c.verdict)
+    error = with_unit(c.value, c.unit) if c.value else "within noise"
+    return (c.name, error, with_unit(2 * c.u_val, c.unit), c.verdict)
 
 
 def measured() -> tuple[Measured, ...]:
