@@ -4,13 +4,14 @@ import json
 from datetime import UTC, datetime
 from pathlib import Path
 
+from validate.cli.arguments import pairs
 from validate.cli.display import say, table
-from validate.recording.preflight import Inspection, Topic, inspect_recording
+from validate.recording.preflight import Inspection, Topic, inspect_file
 
 
-def inspect(file: Path, as_json: bool) -> None:
-    """Prints what an MCAP file holds."""
-    found = inspect_recording(file)
+def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> None:
+    """Prints what a file of any format holds."""
+    found = inspect_file(file, kind, pairs(mapping, "--map"))
     if as_json:
         print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
     else:
@@ -22,7 +23,7 @@ def _print(found: Inspection) -> None:
     rows = [_row(topic) for topic in found.topics]
     say(found.source.path, "bold")
     table("", [*head, "schema (encoding)"], rows)
-    say(_head(found), indent="  ")
+    say(_head(found) if found.chunks or found.read_as == "mcap" else _other(found), indent="  ")
     for line in found.clock_offsets:
         say(line, indent="  ")
     say(f"defects: {len(found.defects)}")
@@ -35,11 +36,21 @@ def _row(topic: Topic) -> list[str]:
     duration = "-" if clock is None else f"{clock.duration:.3f}"
     rate = "-" if clock is None or clock.rate_hz is None else f"{clock.rate_hz:.4g}"
     gaps = "-" if clock is None else str(clock.gaps)
-    schema = f"{topic.schema or '-'} ({topic.schema_encoding or '-'}/{topic.message_encoding})"
+    encoding = f"({topic.schema_encoding or '-'}/{topic.message_encoding})"
+    schema = f"{topic.schema or '-'} {encoding}" if topic.message_encoding else "-"
     return [
         topic.name, topic.kind, str(topic.count), duration, rate, gaps, topic.unit or "-",
         topic.frame or "-", schema,
     ]  # fmt: skip
+
+
+def _other(found: Inspection) -> str:
+    source = found.source
+    told = "".join(f"{line}\n" for line in found.facts)
+    return (
+        f"\nread as {found.read_as}\n{told}{source.bytes} bytes; integrity: {source.integrity}; "
+        f"sha256 {source.sha256}"
+    )
 
 
 def _head(found: Inspection) -> str:

@@ -9,13 +9,15 @@ from validate.cli.arguments import EXPERIMENTS, FILE
 
 
 @click.command()
-@click.argument("file", type=FILE)
+@click.argument("file", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def inspect(file: Path, as_json: bool) -> None:
-    """What a recording holds: topics, clocks, rates, gaps, units, defects."""
+@click.option("--as", "kind", metavar="KIND", help="The format, as of `validate import`.")
+@click.option("--map", "mapping", multiple=True, metavar="KEY=VALUE", help="As of `import`.")
+def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> None:
+    """What a recording of any format holds: topics, clocks, rates, gaps, units, defects."""
     from validate.cli import inspecting
 
-    inspecting.inspect(file, as_json)
+    inspecting.inspect(file, as_json, kind, mapping)
 
 
 @click.command("import")
@@ -24,7 +26,7 @@ def inspect(file: Path, as_json: bool) -> None:
     "--as",
     "kind",
     metavar="KIND",
-    help="c3d, instron, matlab, mcap, metaimage, nrrd or png-stack; else as shown.",
+    help="As mcap, c3d, trc, vicon, ndi, instron (an unknown one lists all); else as it shows.",
 )
 @click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
 @click.option(
@@ -40,7 +42,7 @@ def inspect(file: Path, as_json: bool) -> None:
 def import_(
     file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
 ) -> None:
-    """Turn a testing machine's export, C3D, MATLAB 5 or a folder of PNG images into a recording."""
+    """Turn a file of another program into a recording: motion capture, trackers, images, logs."""
     from validate.cli import recordings
 
     recordings.import_file(file, kind, out, mapping, given)

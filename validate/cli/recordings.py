@@ -9,6 +9,7 @@ from validate.cli.display import say
 from validate.errors import UsageError
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
+from validate.recording.formats.text_rows import LEFT_OUT
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
@@ -26,8 +27,19 @@ def import_file(
     said = {key: str(value) for key, value in given.items() if value is not None}
     recording = reader.read(file, pairs(mapping, "--map") | said)
     write_recording(recording, out)
+    why = "as said" if kind else f"because {reader.sign}"
+    say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
     written(recording, out)
+    for line in _besides(recording):
+        complain(line)
     ask_back(recording)
+
+
+def _besides(recording: Recording) -> list[str]:
+    """What of the file did not become a stream."""
+    left = [r[LEFT_OUT] for r in recording.metadata.values() if r.get(LEFT_OUT)]
+    unread = [f"{topic}: {why}" for topic, why in recording.unread.items()]
+    return [f"not read: {text}" for text in (*left, *unread)]
 
 
 def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:

@@ -1,4 +1,6 @@
-"""What an MCAP file holds and what is wrong with it, whoever wrote it: the pre-flight check.
+"""What a file holds and what is wrong with it, whoever wrote it: the pre-flight check.
+
+An MCAP file is inspected as it is; one of another format by what its reader makes of it.
 
 Encodings of others are listed, not decoded. Every defect is one line in `Inspection.defects`; only
 a file that cannot be read to its end is a `RecordingError`.
@@ -22,9 +24,10 @@ from validate.recording.mcap.records import Channel
 from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
 from validate.recording.mcap.streams import Collected, fill, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
-from validate.recording.readers import READERS
+from validate.recording.reader import Options, require_known
+from validate.recording.readers import READERS, named, recognised
 from validate.recording.scales import odd_stream
-from validate.recording.types import Clock, Source
+from validate.recording.types import Clock, Frames, Recording, Signal, Source
 
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
 _KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours", IMAGE: "frames"}
@@ -66,13 +69,58 @@ class Inspection:
     topics: tuple[Topic, ...]
     defects: tuple[str, ...]
     clock_offsets: tuple[str, ...] = ()  # streams that were moved, one line each
+    read_as: str = "mcap"
+    facts: tuple[str, ...] = ()  # what the reader of another format told, one line each
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts, lists, texts and finite numbers for JSON; None where nothing is known."""
         plain = asdict(self)
-        for name in ("compressions", "metadata", "topics", "defects", "clock_offsets"):
+        for name in ("compressions", "metadata", "topics", "defects", "clock_offsets", "facts"):
             plain[name] = list(plain[name])
         return plain
+
+
+def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
+    """Inspect a file of any format, of the `kind` that it shows where none is said.
+
+    `options` is what the file does not say itself. Raises as its reader does.
+    """
+    reader = named(kind) if kind else recognised(path)
+    if reader is MCAP:
+        require_known(options, ())
+        return inspect_recording(path)
+    recording = reader.read(path, options)
+    topics = [_stream_topic(name, recording) for name in recording.streams]
+    never = [_unread_topic(name, why) for name, why in recording.unread.items()]
+    facts = [f"{k}: {v}" for r in recording.metadata.values() for k, v in r.items() if v]
+    return Inspection(
+        source=recording.source,
+        profile="", library="", compressions=(), chunks=0,
+        messages=sum(topic.count for topic, _ in topics),
+        attachments=0,
+        metadata=tuple(recording.metadata),
+        topics=(*(topic for topic, _ in topics), *never),
+        defects=tuple(line for _, found in topics for line in found),
+        read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
+        facts=tuple(facts),
+    )  # fmt: skip
+
+
+def _stream_topic(name: str, recording: Recording) -> tuple[Topic, list[str]]:
+    stream, clock = recording.streams[name], recording.clock[name]
+    ns = np.rint(1e9 * stream.t).astype(np.int64) + recording.t0_ns
+    unit = stream.unit if isinstance(stream, Signal) else "m"
+    topic = Topic(
+        name, type(stream).__name__.lower(), "", "", "", len(stream.t), int(ns[0]), int(ns[-1]),
+        "grey level" if isinstance(stream, Frames) else unit, stream.frame, clock,
+    )  # fmt: skip
+    odd = odd_stream(stream)
+    found = [f"{name!r}: {odd}"] if odd else []
+    return topic, [*found, *_clock_defects(name, clock, ns)]
+
+
+def _unread_topic(name: str, why: str) -> Topic:
+    return Topic(name, f"not read: {why}", "", "", "", 0, None, None, "", "", None)
 
 
 def inspect_recording(path: Path) -> Inspection:

@@ -17,7 +17,7 @@ Options = Mapping[str, str]  # what a file does not say itself: `--map KEY=VALUE
 
 @dataclass(frozen=True)
 class Reader:
-    """One format; `name` is the KIND of `validate import --as KIND`.
+    """One format; `name` is the KIND of `validate import --as KIND`, `sign` what it is known by.
 
     `recognises` looks at a path and its first bytes and raises nothing. `read` gives a `Recording`
     or raises one `ValidateError` of one line: for a path that cannot be read, a file that is empty,
@@ -28,6 +28,7 @@ class Reader:
     doc: str
     recognises: Callable[[Path], bool]
     read: Callable[[Path, Options], Recording]
+    sign: str
 
 
 def head(path: Path, count: int = 4096) -> bytes:

@@ -8,12 +8,22 @@ from validate.recording.exports.instron import INSTRON
 from validate.recording.formats.c3d import C3D
 from validate.recording.formats.matlab import MATLAB
 from validate.recording.formats.metaimage import METAIMAGE
+from validate.recording.formats.ndi import NDI
 from validate.recording.formats.nrrd import NRRD
+from validate.recording.formats.optitrack import OPTITRACK
+from validate.recording.formats.qualisys import QUALISYS
+from validate.recording.formats.slicer import FCSV, MARKUPS
+from validate.recording.formats.trc import TRC
+from validate.recording.formats.vicon import VICON
 from validate.recording.images.png_stack import PNG_STACK
 from validate.recording.mcap.read import MCAP
 from validate.recording.reader import Reader
 
-READERS: tuple[Reader, ...] = (MCAP, C3D, METAIMAGE, NRRD, INSTRON, MATLAB, PNG_STACK)
+# Any text may be a testing machine's: its reader is asked after all that know their own.
+READERS: tuple[Reader, ...] = (
+    MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
+    INSTRON, PNG_STACK,
+)  # fmt: skip
 
 
 def named(kind: str) -> Reader:

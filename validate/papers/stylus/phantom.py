@@ -16,7 +16,7 @@ from validate.datasets.home import found, sought
 from validate.errors import RecordingError
 from validate.parameters import quantity
 from validate.recording.formats.device_set import DeviceSet, read_device_set
-from validate.recording.formats.sequence import ROTATION, TRANSLATION
+from validate.recording.formats.poses import ROTATION, TRANSLATION
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
 from validate.register.digitised import Digitised, TouchedLandmarks

@@ -8,6 +8,7 @@ them. So each candidate is decoded, and the one in which the words of testing ma
 import codecs
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.exports.vocabulary import evidence, is_ideographic, plain
@@ -65,6 +66,17 @@ def decode(data: bytes, said: str | None = None) -> Text:
     if not text.strip():
         raise RecordingError(f"an empty file ({len(data)} bytes)")
     return Text(text.strip("\x1a").removeprefix("\ufeff"), encoding, why)
+
+
+def whole_file(path: Path) -> bytes:
+    """The bytes of a text of bounded size; `UsageError` where it cannot be read."""
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise RecordingError(f"{path.name}: {size} bytes, the limit is {MAX_BYTES}")
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
 
 def _named(said: str) -> str:

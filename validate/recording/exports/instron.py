@@ -29,7 +29,7 @@ from validate.recording.exports.consistency import (
     check_swapped,
     check_time,
 )
-from validate.recording.exports.encoding import MAX_BYTES
+from validate.recording.exports.encoding import whole_file
 from validate.recording.exports.geometry import loaded_area, specimen_of
 from validate.recording.exports.repeats import without_repeats
 from validate.recording.exports.signs import Signs, kind_of_test, signs
@@ -75,17 +75,6 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         return _recording(path, data, table, said, label)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
-
-
-def whole_file(path: Path) -> bytes:
-    """The bytes of a text of bounded size; `UsageError` where it cannot be read."""
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise RecordingError(f"{path.name}: {size} bytes, the limit is {MAX_BYTES}")
-        return path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror}") from error
 
 
 def _recording(
@@ -207,4 +196,10 @@ def _is_text(path: Path) -> bool:
     return wide or (bool(start) and not re.search(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]", start))
 
 
-INSTRON = Reader("instron", "a testing machine's export, text", _is_text, read_instron)
+INSTRON = Reader(
+    "instron",
+    "a testing machine's export, text",
+    _is_text,
+    read_instron,
+    "text that no other format claims",
+)

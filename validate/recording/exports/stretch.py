@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.exports.blocks import parse_tables
-from validate.recording.exports.instron import whole_file
+from validate.recording.exports.encoding import whole_file
 from validate.recording.exports.table import Column, Table
 from validate.recording.exports.vocabulary import words
 from validate.recording.types import Recording, Signal, Source

@@ -5,21 +5,18 @@ meet in a point, not a standard deviation: it is told, never used as one.
 """
 
 import struct
-from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validate.arrays import Floats
-from validate.errors import RecordingError, UsageError
-from validate.recording.clocks import clock_of
+from validate.errors import RecordingError
 from validate.recording.formats.apart import decoded
+from validate.recording.formats.options import metres, spread
+from validate.recording.formats.recorded import distinct, recorded
 from validate.recording.reader import Options, Reader, head, require_known, source_of
-from validate.recording.types import Clock, Markers, Record, Recording, Signal
-from validate.units import in_si, split
+from validate.recording.types import Markers, Record, Recording, Signal
 
 MARKERS = "markers"
 _BLOCK = 512  # bytes
@@ -41,19 +38,13 @@ def read_c3d(path: Path, options: Options) -> Recording:
     if not (np.isfinite(rate) and rate > 0):
         raise RecordingError(f"{path.name}: {rate:g} frames a second stated; expected above 0")
     frame = options.get("frame", "capture")
-    factor, stated = _metres(path, found["unit"], options)
-    markers = _markers(found, rate, factor, _sd(options), frame)
+    unit = str(found["unit"][0]) if len(found["unit"]) else ""
+    factor, stated = metres(options, unit, path.name)
+    markers = _markers(found, rate, factor, spread(options), frame)
     signals = {} if analog_rate <= 0 else _signals(found, analog_rate, frame)
-    streams: dict[str, Markers | Signal] = {MARKERS: markers, **signals}
-    return Recording(
-        name=path.stem,
-        source=source_of(path, "C3D keeps no checksum: integrity not provable"),
-        t0_ns=0,
-        markers={MARKERS: markers},
-        signals=signals,
-        clock={topic: _clock(topic, s.t) for topic, s in streams.items()},
-        metadata={"provenance": _told(found, rate, analog_rate, factor, stated, markers)},
-    )
+    source = source_of(path, "C3D keeps no checksum: integrity not provable")
+    told = _told(found, rate, analog_rate, factor, stated, markers)
+    return recorded(path.stem, source, {MARKERS: markers, **signals}, told)
 
 
 def _require_whole(path: Path) -> None:
@@ -75,35 +66,16 @@ def _require_whole(path: Path) -> None:
         )
 
 
-def _metres(path: Path, unit: NDArray[Any], options: Options) -> tuple[float, str]:
-    """Metres in the file's unit of length, and who said so."""
-    own = str(unit[0]) if len(unit) else ""
-    text = options.get("unit", own)
-    factor = in_si(1.0, text, "m") if text else None
-    if factor is None:
-        states = f"states the unit '{own}'" if own else "states no unit"
-        raise UsageError(f"{path.name}: {states} of length; say it: --map unit=mm")
-    return factor, f"{text} ({'entered' if 'unit' in options else 'stated'})"
-
-
-def _sd(options: Options) -> float:
-    number, unit = split(options.get("sd", "0")) or (np.nan, "")
-    value = in_si(number, unit or "m", "m")
-    if value is None or not value >= 0:
-        raise UsageError(f"--map sd={options['sd']}: expected a length, as 0.3mm")
-    return value
-
-
 def _markers(found: dict[str, Any], rate: float, factor: float, sd: float, frame: str) -> Markers:
     points, missing = found["points"], found["residuals"] < 0
     x = np.where(missing[..., None], np.nan, factor * points)
-    names = _distinct(found["labels"], points.shape[1])
+    names = distinct(found["labels"], points.shape[1])
     return Markers(np.arange(len(points)) / rate, names, x, sd, frame)
 
 
 def _signals(found: dict[str, Any], rate: float, frame: str) -> dict[str, Signal]:
     values: Floats = found["analog"]
-    names = _distinct(found["channels"], values.shape[1])
+    names = distinct(found["channels"], values.shape[1])
     units = [str(u) for u in found["channel_units"]]
     units += [""] * (len(names) - len(units))
     t = np.arange(len(values)) / rate
@@ -111,24 +83,6 @@ def _signals(found: dict[str, Any], rate: float, frame: str) -> dict[str, Signal
         f"analog/{name}": Signal(t, values[:, [i]], units[i] or "not stated", 0.0, frame)
         for i, name in enumerate(names)
     }
-
-
-def _distinct(labels: Sequence[str], count: int) -> tuple[str, ...]:
-    """A name for each of `count`: the file's, numbered where one stands twice or is missing."""
-    told = [str(s) for s in labels[:count]]
-    told += [""] * (count - len(told))
-    named = [s or f"unnamed {i + 1}" for i, s in enumerate(told)]
-    often, seen = Counter(named), Counter[str]()
-    out = []
-    for name in named:
-        seen[name] += 1
-        out.append(f"{name} ({seen[name]})" if often[name] > 1 else name)
-    return tuple(out)
-
-
-def _clock(topic: str, t: Floats) -> Clock:
-    ns = np.rint(1e9 * t).astype(np.int64)
-    return clock_of(topic, None, ns, ns)
 
 
 def _told(
@@ -147,4 +101,10 @@ def _told(
     }
 
 
-C3D = Reader("c3d", "motion capture (C3D)", lambda p: head(p, 2)[1:2] == bytes([_KEY]), read_c3d)
+C3D = Reader(
+    "c3d",
+    "motion capture (C3D)",
+    lambda p: head(p, 2)[1:2] == bytes([_KEY]),
+    read_c3d,
+    "its second byte is 80",
+)

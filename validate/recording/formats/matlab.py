@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.clocks import clock_of
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
+from validate.recording.formats.options import above_zero, length, spread
+from validate.recording.formats.recorded import recorded
 from validate.recording.reader import Options, Reader, head, require_known, source_of
-from validate.recording.types import Clock, Frames, Markers, Recording, by_kind
-from validate.units import in_si, split
+from validate.recording.types import Frames, Markers, Recording
 
 Variable = NDArray[Any]
 
@@ -43,15 +42,8 @@ def read_matlab(path: Path, options: Options) -> Recording:
             f"{path.name}: neither points (n, 2 or 3) nor uint8 images (h, w, nt); "
             f"it holds {unread or 'nothing'}"
         )
-    return Recording(
-        name=path.stem,
-        source=source_of(path, integrity),
-        t0_ns=0,
-        **by_kind(read),
-        clock={name: _clock(name, s.t) for name, s in read.items()},
-        metadata={"provenance": {"kind": "MATLAB 5", **options}},
-        unread=unread,
-    )
+    told = {"kind": "MATLAB 5", **options}
+    return recorded(path.stem, source_of(path, integrity), read, told, unread)
 
 
 def _integrity(path: Path) -> str:
@@ -81,47 +73,32 @@ def _stream(path: Path, name: str, values: Variable, options: Options) -> Marker
 
 
 def _points(what: str, values: Variable, options: Options) -> Markers:
-    unit = _length(what, "unit", "mm", options)
-    sd = _length(what, "sd", "0.3mm", {"sd": "0", **options})
+    _said(what, "unit", "mm", options, "unit of length")
+    unit = length(options, "unit", "mm")
     names = tuple(str(i + 1) for i in range(len(values)))
     x = unit * values[None].astype(np.float64)
-    return Markers(np.zeros(1), names, x, sd, options.get("frame", "matlab"))
+    return Markers(np.zeros(1), names, x, spread(options), options.get("frame", "matlab"))
 
 
 def _frames(what: str, values: Variable, options: Options) -> Frames:
-    side = _length(what, "m_per_px", "0.1mm", options)
+    _said(what, "m_per_px", "0.1mm", options, "unit of length")
+    side = length(options, "m_per_px", "0.1mm")
     images = tuple(np.moveaxis(np.atleast_3d(values), -1, 0))
-    t = np.arange(len(images)) / (_rate(what, options) if len(images) > 1 else 1.0)
+    if len(images) > 1:
+        _said(what, "rate", "10", options, "times")
+    t = np.arange(len(images)) / (above_zero(options, "rate") if len(images) > 1 else 1.0)
     return Frames(t, images, (side, side), np.eye(4), options.get("frame", "matlab"))
 
 
-def _length(what: str, key: str, example: str, options: Options) -> float:
-    """Metres of an option: a length with its unit, a bare unit, or a number of metres."""
+def _said(what: str, key: str, example: str, options: Options, lacks: str) -> None:
     if key not in options:
-        raise UsageError(f"{what} states no unit of length; say it: --map {key}={example}")
-    text = options[key]
-    number, unit = split(text) or (1.0, text)
-    value = in_si(number, unit or "m", "m")
-    if value is None or not (0 < value < np.inf or (key == "sd" and value == 0)):
-        raise UsageError(f"--map {key}={text}: expected a length, as {example}")
-    return value
+        raise UsageError(f"{what} states no {lacks}; say it: --map {key}={example}")
 
 
-def _rate(what: str, options: Options) -> float:
-    if "rate" not in options:
-        raise UsageError(f"{what} states no times; say the frames a second: --map rate=10")
-    try:
-        value = float(options["rate"])
-    except ValueError:
-        value = 0.0
-    if not 0 < value < np.inf:
-        raise UsageError(f"--map rate={options['rate']}: expected a number above 0")
-    return value
-
-
-def _clock(topic: str, t: Floats) -> Clock:
-    ns = np.rint(1e9 * t).astype(np.int64)
-    return clock_of(topic, None, ns, ns)
-
-
-MATLAB = Reader("matlab", "MATLAB 5", lambda p: head(p, len(MAGIC)) == MAGIC, read_matlab)
+MATLAB = Reader(
+    "matlab",
+    "MATLAB 5",
+    lambda p: head(p, len(MAGIC)) == MAGIC,
+    read_matlab,
+    "it begins with 'MATLAB 5.0'",
+)

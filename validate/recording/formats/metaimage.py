@@ -134,4 +134,10 @@ def _recognises(path: Path) -> bool:
     return bool(sign) and key.strip() in _KNOWN
 
 
-METAIMAGE = Reader("metaimage", "tracked sequence (MetaImage)", _recognises, read_metaimage)
+METAIMAGE = Reader(
+    "metaimage",
+    "tracked sequence (MetaImage)",
+    _recognises,
+    read_metaimage,
+    "it begins with fields of MetaImage, as ObjectType",
+)

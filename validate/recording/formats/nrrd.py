@@ -49,4 +49,4 @@ def _recognises(path: Path) -> bool:
     return head(path, len(_MAGIC)) == _MAGIC
 
 
-NRRD = Reader("nrrd", "tracked sequence (NRRD)", _recognises, read_nrrd)
+NRRD = Reader("nrrd", "tracked sequence (NRRD)", _recognises, read_nrrd, "it begins with NRRD")

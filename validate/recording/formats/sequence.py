@@ -7,7 +7,7 @@ and `ImageStatus`. Only what is OK enters the recording: a tool that was not see
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.clocks import clock_of
+from validate.recording.formats.options import above_zero, length
+from validate.recording.formats.poses import pose_signals
+from validate.recording.formats.recorded import begun
+from validate.recording.formats.recorded import recorded as of_streams
 from validate.recording.reader import Options, require_known, source_of
-from validate.recording.types import Frames, Recording, Signal, Stream, by_kind
-from validate.units import in_si, split
+from validate.recording.types import Frames, Recording, Signal, Stream
 
 IMAGES = "images"
-ROTATION, TRANSLATION = "rotation", "translation"
 MAX_PIXELS = 400 * 2**20  # bytes of all images of one sequence
 _MM = 1e-3  # m: PLUS writes millimetres
 _FIELD = re.compile(r"Seq_Frame(\d{1,9})_(\w+)")
@@ -74,9 +75,7 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
             f"{path.name}: {len(t)} frames, no image and no transform in them is OK; "
             f"never seen: {', '.join(never) or 'none'}"
         )
-    begin = min(float(s.t[0]) for s in streams.values())
-    streams = {name: replace(s, t=s.t - begin) for name, s in streams.items()}
-    ns = {name: np.rint(1e9 * s.t).astype(np.int64) for name, s in streams.items()}
+    streams = begun(streams)
     told = {
         "kind": held.kind,
         "frames": str(len(t)),
@@ -84,15 +83,9 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
             f"{n}: {len(t) - len(s.t)}" for n, s in streams.items() if len(s.t) < len(t)
         ),
     }
-    return Recording(
-        name=path.name.partition(".")[0],
-        source=source_of(path, f"{held.kind} keeps no checksum: integrity not provable"),
-        t0_ns=0,
-        clock={name: clock_of(name, None, times, times) for name, times in ns.items()},
-        metadata={"provenance": told},
-        unread=dict.fromkeys(never, "never seen"),
-        **by_kind(streams),
-    )
+    source = source_of(path, f"{held.kind} keeps no checksum: integrity not provable")
+    unread = dict.fromkeys(never, "never seen")
+    return of_streams(path.name.partition(".")[0], source, streams, told, unread)
 
 
 def _times(path: Path, held: Sequence, options: Options) -> Floats:
@@ -114,15 +107,9 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
 
 
 def _rate(path: Path, options: Options) -> float:
-    try:
-        rate = float(options["rate"])
-    except KeyError:
-        raise UsageError(f"{path.name}: its frames have no times; say --map rate=HZ") from None
-    except ValueError:
-        rate = 0.0
-    if not 0 < rate < np.inf:
-        raise UsageError(f"--map rate={options['rate']}: expected a number of Hz above 0")
-    return rate
+    if "rate" not in options:
+        raise UsageError(f"{path.name}: its frames have no times; say --map rate=HZ")
+    return above_zero(options, "rate")
 
 
 def _numbers(path: Path, text: str, count: int, frame: int) -> Floats:
@@ -152,11 +139,8 @@ def _tool(path: Path, held: Sequence, tool: str, t: Floats) -> dict[str, Signal]
     if wrong.any():
         i = list(texts)[int(wrong.argmax())]
         raise RecordingError(f"{path.name}: frame {i}: the last row of {key} is not 0 0 0 1")
-    at, frame = t[list(texts)], tool.rpartition("To")[2]
-    return {
-        f"{tool}/{ROTATION}": Signal(at, T[:, :3, :3].reshape(-1, 9), "1", 0.0, frame),
-        f"{tool}/{TRANSLATION}": Signal(at, _MM * T[:, :3, 3], "m", 0.0, frame),
-    }
+    frame = tool.rpartition("To")[2]
+    return pose_signals(tool, t[list(texts)], T[:, :3, :3], _MM * T[:, :3, 3], frame)
 
 
 def _images(path: Path, held: Sequence, t: Floats, options: Options) -> dict[str, Frames]:
@@ -173,10 +157,7 @@ def _images(path: Path, held: Sequence, t: Floats, options: Options) -> dict[str
 def _pixel(path: Path, held: Sequence, options: Options) -> tuple[float, float]:
     """Sides of a pixel, m."""
     if "m_per_px" in options:
-        number, unit = split(options["m_per_px"]) or (0.0, "")
-        side = in_si(number, unit or "m", "m")
-        if side is None or side <= 0:
-            raise UsageError(f"--map m_per_px={options['m_per_px']}: expected a length, as 0.1mm")
+        side = length(options, "m_per_px", "0.1mm")
         return side, side
     if held.spacing == (1.0, 1.0):
         raise UsageError(

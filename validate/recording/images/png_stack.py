@@ -125,4 +125,10 @@ def _recognises(path: Path) -> bool:
         return False
 
 
-PNG_STACK = Reader("png-stack", "a folder of PNG images", _recognises, read_png_stack)
+PNG_STACK = Reader(
+    "png-stack",
+    "a folder of PNG images",
+    _recognises,
+    read_png_stack,
+    "a folder that holds PNG files",
+)

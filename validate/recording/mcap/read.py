@@ -81,4 +81,10 @@ def _read(path: Path, options: Options) -> Recording:
     return read_recording(path)
 
 
-MCAP = Reader("mcap", "an MCAP file", lambda path: head(path, len(MAGIC)) == MAGIC, _read)
+MCAP = Reader(
+    "mcap",
+    "an MCAP file",
+    lambda path: head(path, len(MAGIC)) == MAGIC,
+    _read,
+    "its first 8 bytes are MCAP's",
+)

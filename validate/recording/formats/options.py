@@ -1,0 +1,49 @@
+"""What a file does not say itself, as users say it: `--map KEY=VALUE`."""
+
+import numpy as np
+
+from validate.errors import UsageError
+from validate.recording.reader import Options
+from validate.units import in_si, split
+
+
+def length(options: Options, key: str, example: str, *, zero: bool = False) -> float:
+    """Metres of a length with its unit, of a bare unit, or of a number of metres.
+
+    Raises `UsageError` for anything else, and for 0 where `zero` is not allowed.
+    """
+    text = options[key]
+    number, unit = split(text) or (1.0, text)
+    value = in_si(number, unit or "m", "m")
+    if value is None or not (0 < value < np.inf or (zero and value == 0)):
+        raise UsageError(f"--map {key}={text}: expected a length, as {example}")
+    return value
+
+
+def spread(options: Options) -> float:
+    """Standard deviation `sd` of a coordinate, m; 0: not stated."""
+    return length({"sd": "0m", **options}, "sd", "0.3mm", zero=True)
+
+
+def above_zero(options: Options, key: str) -> float:
+    """A number above 0; raises `UsageError` for anything else."""
+    try:
+        value = float(options[key])
+    except ValueError:
+        value = 0.0
+    if not 0 < value < np.inf:
+        raise UsageError(f"--map {key}={options[key]}: expected a number above 0")
+    return value
+
+
+def metres(options: Options, stated: str, what: str) -> tuple[float, str]:
+    """Metres in the unit of length that a file states, or the user, and who said so.
+
+    Raises `UsageError` where nobody does.
+    """
+    text = options.get("unit", stated)
+    factor = in_si(1.0, text, "m") if text else None
+    if factor is None:
+        states = f"states the unit '{stated}'" if stated else "states no unit"
+        raise UsageError(f"{what}: {states} of length; say it: --map unit=mm")
+    return factor, f"{text} ({'entered' if 'unit' in options else 'stated'})"

@@ -1,0 +1,155 @@
+"""Landmarks of 3D Slicer: FCSV, and markups as JSON (.mrk.json). Points at one instant, in mm."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.errors import RecordingError
+from validate.recording.exports.encoding import whole_file
+from validate.recording.formats.options import length, spread
+from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.text_rows import Row, TextRows, text_rows
+from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.types import Markers, Recording
+
+TOPIC = "landmarks"
+_FCSV = b"# Markups fiducial file version"
+_SYSTEMS = {"0": "RAS", "1": "LPS", "2": "IJK"}  # of files before version 4.11
+_COLUMNS = ("id", "x", "y", "z", "ow", "ox", "oy", "oz", "vis", "sel", "lock", "label", "desc",
+            "associatedNodeID")  # fmt: skip
+_STATUS = len(_COLUMNS)  # a column after the named ones, in newer files
+_DEFINED = ("", "2")
+_LARGEST = 64 * 2**20  # bytes of a JSON file
+_OPTIONS = ("sd", "frame", "unit")
+_Point = tuple[str, Sequence[float]]
+
+
+def read_fcsv(path: Path, options: Options) -> Recording:
+    """Landmarks (1, k, 3) m under their labels, in the frame that the file names: RAS or LPS.
+
+    A point that was placed and taken back is "not seen". Options: `sd` of a coordinate (0: not
+    stated), `unit` in place of Slicer's mm, `frame` in place of the file's. Raises
+    `RecordingError` for a file of voxel indices (IJK), one that is no FCSV, or damaged.
+    """
+    require_known(options, _OPTIONS)
+    held = text_rows(path)
+    if not held.rows or not held.rows[0].cell(0).startswith(_FCSV.decode()):
+        raise RecordingError(f"{path.name}: no FCSV: its first line is not '{_FCSV.decode()}'")
+    stated = [r.cells for r in held.rows if r.cell(0).startswith("#")]
+    header = dict(c[0].lstrip("# ").partition(" = ")[::2] for c in stated)
+    system = header.get("CoordinateSystem", header.get("coordinateSystem", "0"))
+    names = _columns(stated)
+    rows = [r for r in held.rows if any(r.cells) and not r.cell(0).startswith("#")]
+    _require_whole(held, rows)
+    points = [_point(held, row, names) for row in rows]
+    return _landmarks(path, points, _SYSTEMS.get(system, system), "landmarks (FCSV)", options)
+
+
+def _columns(stated: Sequence[Sequence[str]]) -> Sequence[str]:
+    for cells in stated:
+        if cells[0].startswith("# columns = "):
+            return (cells[0].removeprefix("# columns = "), *cells[1:])
+    return _COLUMNS
+
+
+def _require_whole(held: TextRows, rows: Sequence[Row]) -> None:
+    cells = [len(r.cells) for r in rows]
+    if held.open_end and cells and cells[-1] < max(cells):
+        raise RecordingError(
+            f"{held.name}: line {rows[-1].line} has {cells[-1]} cells, others {max(cells)}; cut"
+        )
+
+
+def _point(held: TextRows, row: Row, names: Sequence[str]) -> _Point:
+    at = {name: i for i, name in enumerate(names)}
+    label = row.cell(at.get("label", 0))
+    if row.cell(_STATUS) not in _DEFINED:
+        return label, (np.nan, np.nan, np.nan)
+    return label, _three(f"{held.name}: line {row.line}", [row.cell(at.get(c, -1)) for c in "xyz"])
+
+
+def _three(what: str, values: Any) -> Sequence[float]:
+    try:
+        x = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        x = np.zeros(0)
+    if x.shape != (3,) or not np.isfinite(x).all():
+        raise RecordingError(f"{what}: {str(values)[:60]} is no point of 3 finite numbers; damaged")
+    return tuple(x.tolist())
+
+
+def read_markups(path: Path, options: Options) -> Recording:
+    """Control points of all lists of the file as landmarks (1, k, 3) m; as `read_fcsv`."""
+    require_known(options, _OPTIONS)
+    lists = _lists(path)
+    systems = {str(m.get("coordinateSystem", "LPS")) for m in lists}
+    units = {str(m.get("coordinateUnits", "mm")) for m in lists}
+    if len(systems) > 1 or len(units) > 1:
+        raise RecordingError(
+            f"{path.name}: lists in {sorted(systems)} and {sorted(units)}; save them apart"
+        )
+    points = [_control(path, p) for m in lists for p in m.get("controlPoints", ())]
+    unit = units.pop()
+    system = _SYSTEMS.get(next(iter(systems)), next(iter(systems)))
+    given = {"unit": unit, **options}
+    return _landmarks(path, points, system, "landmarks (markups JSON)", given)
+
+
+def _lists(path: Path) -> list[Mapping[str, Any]]:
+    data = whole_file(path)
+    try:
+        if len(data) > _LARGEST:
+            raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
+        found = json.loads(data)["markups"]
+        if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
+            raise ValueError("its 'markups' is no list of lists")
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise RecordingError(f"{path.name}: no markups JSON ({error}); damaged") from None
+    return found
+
+
+def _control(path: Path, point: Any) -> _Point:
+    if not isinstance(point, dict):
+        raise RecordingError(f"{path.name}: a control point that is no object; damaged")
+    label = str(point.get("label", ""))
+    if point.get("positionStatus", "defined") != "defined":
+        return label, (np.nan, np.nan, np.nan)
+    return label, _three(f"{path.name}: '{label}'", point.get("position"))
+
+
+def _landmarks(
+    path: Path, points: Sequence[_Point], system: str, kind: str, options: Options
+) -> Recording:
+    if not points:
+        raise RecordingError(f"{path.name}: no point in it; cut or empty")
+    if system not in ("RAS", "LPS"):
+        raise RecordingError(
+            f"{path.name}: coordinates in '{system}', which are no lengths; save them as LPS or RAS"
+        )
+    factor = length({"unit": "mm", **options}, "unit", "mm")
+    x = factor * np.array([p for _, p in points])[None]
+    names = distinct([label for label, _ in points], len(points))
+    frame = options.get("frame", system)
+    markers = Markers(np.zeros(1), names, x, spread(options), frame)
+    told = {"kind": kind, "frame": system, "points_not_seen": str(int(np.isnan(x[0, :, 0]).sum()))}
+    source = source_of(path, "text file: integrity not provable")
+    return recorded(path.name.partition(".")[0], source, {TOPIC: markers}, told)
+
+
+FCSV = Reader(
+    "fcsv",
+    "landmarks of 3D Slicer (FCSV)",
+    lambda p: head(p, len(_FCSV)) == _FCSV,
+    read_fcsv,
+    "its first line says so",
+)
+MARKUPS = Reader(
+    "markups",
+    "landmarks of 3D Slicer (JSON)",
+    lambda p: b'"@schema"' in (start := head(p)) and b"markups" in start,
+    read_markups,
+    "JSON with the schema of markups",
+)

@@ -1,0 +1,152 @@
+"""Tables of coordinates as motion capture and trackers write them: rows of cells and numbers.
+
+A blank cell, `nan` or `-` is "not seen". Programs that log write line by line: where one was ended
+the last line is cut. It is left out then, and the recording says so; every other odd line is an
+error that names it.
+"""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.exports.encoding import decode, whole_file
+
+LEFT_OUT = "left out"  # a record's key: what of the file did not become data
+_ABSENT = {"", "nan", "NaN", "NAN", "-"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """The cells of a line, counted from 1."""
+
+    line: int
+    cells: tuple[str, ...]
+
+    def cell(self, i: int) -> str:
+        """Empty beyond the end."""
+        return self.cells[i] if i < len(self.cells) else ""
+
+
+@dataclass(frozen=True)
+class TextRows:
+    """All lines as cells; `open_end`: the last line has no line end."""
+
+    name: str
+    rows: tuple[Row, ...]
+    open_end: bool
+    told: dict[str, str] = field(default_factory=dict)
+
+
+def text_rows(path: Path) -> TextRows:
+    """The file split at tabs, else at semicolons or commas, whichever its first lines have most of.
+
+    Raises `UsageError` for a file that cannot be read, `RecordingError` for one that is no text.
+    """
+    data = whole_file(path)
+    try:
+        text = decode(data).text
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from None
+    lines = text.splitlines()
+    begin = "\n".join(lines[:8])
+    separator = max("\t;,", key=begin.count)
+    cells = csv.reader(lines, delimiter=separator, skipinitialspace=True, quoting=csv.QUOTE_MINIMAL)
+    try:
+        rows = tuple(Row(i + 1, tuple(c.strip() for c in found)) for i, found in enumerate(cells))
+    except csv.Error as error:
+        raise RecordingError(f"{path.name}: no table of cells ({error})") from None
+    return TextRows(path.name, rows, not text.endswith(("\n", "\r")))
+
+
+def numbers(
+    held: TextRows, rows: Sequence[Row], width: int, columns: Sequence[int] | None = None
+) -> tuple[Floats, tuple[Row, ...], tuple[str, ...]]:
+    """Numbers (n, k) of k columns (all `width` where none are named), NaN where a cell is blank,
+    the rows that they stand in, and what was left out.
+
+    A row may be longer by blank cells. The last line of an unfinished file is left out where it has
+    fewer cells, or its last number fewer decimals, than all others. Raises `RecordingError` for a
+    cell that is no number, one too many, and without rows.
+    """
+    whole, left = _whole(held, rows, width)
+    if not whole:
+        raise RecordingError(f"{held.name}: no row of numbers below its header; cut or damaged")
+    for row in whole:
+        extra = [c for c in row.cells[width:] if c]
+        if extra:
+            raise RecordingError(
+                f"{held.name}: line {row.line} has {len(row.cells)} cells, its header {width}; "
+                f"'{extra[0][:20]}' belongs to no column"
+            )
+    wanted = range(width) if columns is None else columns
+    texts = [[_plain(row.cell(i)) for i in wanted] for row in whole]
+    try:
+        found = np.array(texts, dtype=np.float64)
+    except ValueError:
+        raise RecordingError(f"{held.name}: {_first_odd(whole, wanted)}") from None
+    if np.isinf(found).any():
+        at = int(np.argmax(np.isinf(found).any(axis=1)))
+        raise RecordingError(f"{held.name}: line {whole[at].line} has an infinite number")
+    return found, tuple(whole), left
+
+
+def _plain(cell: str) -> str:
+    return "nan" if cell in _ABSENT else cell
+
+
+def _first_odd(rows: Sequence[Row], columns: Sequence[int]) -> str:
+    for row in rows:
+        for i in columns:
+            try:
+                float(_plain(row.cell(i)))
+            except ValueError:
+                return f"line {row.line}: '{row.cell(i)[:40]}' is no number; mend or remove it"
+    return "a cell is no number"
+
+
+def _whole(
+    held: TextRows, rows: Sequence[Row], width: int
+) -> tuple[Sequence[Row], tuple[str, ...]]:
+    """The rows without an unfinished last one."""
+    if not rows or not held.open_end or rows[-1] is not held.rows[-1]:
+        return rows, ()
+    last, others = rows[-1], rows[:-1]
+    fewest = min((len(r.cells) for r in others), default=width)
+    if len(last.cells) < min(fewest, width):
+        return others, (f"line {last.line}, cut: {len(last.cells)} of {width} cells",)
+    cells = [r.cell(len(last.cells) - 1) for r in others]
+    if cells and _decimals(last.cells[-1]) < min(map(_decimals, cells)):
+        return others, (f"line {last.line}, cut: its last number is '{last.cells[-1]}'",)
+    return rows, ()
+
+
+def _decimals(cell: str) -> int:
+    found = re.fullmatch(r"[-+]?\d*\.(\d*)(?:[eE].*)?", cell)
+    return len(found[1]) if found else 0
+
+
+def whole_points(held: TextRows, x: Floats, names: Sequence[str], rows: Sequence[Row]) -> Floats:
+    """Coordinates (nt, k, 3), where a point with one that is blank has none.
+
+    Raises `RecordingError` naming line and point: a damaged line, not a point that was not seen.
+    """
+    absent = np.isnan(x)
+    torn = absent.any(axis=2) & ~absent.all(axis=2)
+    if torn.any():
+        i, k = (int(j) for j in np.argwhere(torn)[0])
+        raise RecordingError(
+            f"{held.name}: line {rows[i].line}: point '{names[k]}' has "
+            f"{3 - int(absent[i, k].sum())} of 3 coordinates; damaged"
+        )
+    return x
+
+
+def told_left(left: Sequence[str]) -> dict[str, str]:
+    """The record's entry about what was left out; none where nothing was."""
+    return {LEFT_OUT: "; ".join(left)} if left else {}

@@ -1,0 +1,99 @@
+"""TRC, the marker trajectories of OpenSim and of motion capture: tabs or commas."""
+
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.formats.options import above_zero, metres, spread
+from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.text_rows import (
+    Row,
+    TextRows,
+    numbers,
+    text_rows,
+    told_left,
+    whole_points,
+)
+from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.types import Markers, Recording
+
+_MAGIC = b"PathFileType"
+_OPTIONS = ("unit", "sd", "frame", "rate")
+_BEFORE = 2  # columns before the first coordinate: frame, time
+
+
+def read_trc(path: Path, options: Options) -> Recording:
+    """Points as `markers` (nt, k, 3) m; a blank or NaN is "not seen".
+
+    Options: `unit` in place of the file's, `sd` of a coordinate (0: not stated), `rate` (Hz) in
+    place of its times, `frame` (default capture). Raises `UsageError` without a unit of length,
+    `RecordingError` for a table that is no TRC, or damaged.
+    """
+    require_known(options, _OPTIONS)
+    held = text_rows(path)
+    header = _header(held)
+    names = _names(held, header)
+    values, rows, left = numbers(held, _rows(held), _BEFORE + 3 * len(names))
+    x = whole_points(held, values[:, _BEFORE:].reshape(len(values), -1, 3), names, rows)
+    factor, stated = metres(options, header.get("Units", ""), path.name)
+    t = _times(held, values, options)
+    markers = Markers(t, names, factor * x, spread(options), options.get("frame", "capture"))
+    told = {
+        "kind": "marker trajectories (TRC)",
+        "unit": stated,
+        "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
+        "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
+        "rows": f"{len(values)}, the header states {header.get('NumFrames', 'none')}",
+    }
+    source = source_of(path, "text file: integrity not provable")
+    return recorded(path.stem, source, {"markers": markers}, told | told_left(left))
+
+
+def _header(held: TextRows) -> dict[str, str]:
+    if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
+        raise RecordingError(f"{held.name}: no TRC file: its first cell is not PathFileType")
+    keys, values = held.rows[1].cells, held.rows[2].cells
+    return {k: v for k, v in zip(keys, values, strict=False) if k}
+
+
+def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
+    """Every third cell of the fourth line; where programs left no blanks between, all of them."""
+    cells = held.rows[3].cells[_BEFORE:]
+    named = [c for c in cells if c]
+    stated = header.get("NumMarkers", "")
+    if stated.isdigit() and int(stated) != len(named):
+        raise RecordingError(
+            f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
+        )
+    if not named:
+        raise RecordingError(f"{held.name}: line 4 names no point; no TRC file, or damaged")
+    return distinct(named, len(named))
+
+
+def _rows(held: TextRows) -> list[Row]:
+    """From the first that begins with a number, blank lines apart."""
+    body = held.rows[4:]
+    begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))
+    return [r for r in body[begin:] if any(r.cells)]
+
+
+def _times(held: TextRows, values: Floats, options: Options) -> Floats:
+    """Seconds from the first row."""
+    if "rate" in options:
+        return np.arange(len(values)) / above_zero(options, "rate")
+    t = values[:, 1]
+    if np.isnan(t).any():
+        raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; say "
+                             "--map rate=HZ")  # fmt: skip
+    return np.asarray(t - t[0])
+
+
+TRC = Reader(
+    "trc",
+    "marker trajectories (TRC)",
+    lambda p: head(p, 12) == _MAGIC,
+    read_trc,
+    "its first cell is PathFileType",
+)

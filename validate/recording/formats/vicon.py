@@ -1,0 +1,174 @@
+"""Vicon's CSV: one block of lines for trajectories, devices and models each.
+
+A block is its title, its rate in Hz, a line of names, one of columns, one of units, then a row a
+frame (devices: a row a sub-frame) until a blank line.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.formats.options import metres, spread
+from validate.recording.formats.recorded import begun, distinct, recorded
+from validate.recording.formats.text_rows import (
+    Row,
+    TextRows,
+    numbers,
+    text_rows,
+    told_left,
+    whole_points,
+)
+from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.types import Markers, Recording, Signal, Stream
+
+_POINTS, _DEVICES = "Trajectories", "Devices"
+_TITLES = (_POINTS, _DEVICES, "Segments", "Joints", "Model Outputs", "Events", "Force Plates")
+_OPTIONS = ("unit", "sd", "frame")
+_BEFORE = 2  # columns before the first value: frame, sub-frame
+
+
+@dataclass(frozen=True)
+class Block:
+    """`rate` Hz; names (k,) above their first columns, columns and units (w,), and the rows."""
+
+    rate: float
+    names: tuple[str, ...]
+    columns: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    @property
+    def width(self) -> int:
+        return len(self.columns)
+
+
+def read_vicon(path: Path, options: Options) -> Recording:
+    """Trajectories as `markers`, each channel of a device as `analog/<device>.<channel>`.
+
+    Times are frame numbers over the block's rate, from the first frame of all. Options: `unit` of
+    length in place of the file's, `sd` of a coordinate (0: not stated), `frame` (default capture).
+    Other blocks are listed as unread. Raises `UsageError` without a unit of length,
+    `RecordingError` for a file without trajectories and devices, or damaged.
+    """
+    require_known(options, _OPTIONS)
+    held = text_rows(path)
+    blocks = _blocks(held)
+    streams: dict[str, Stream] = {}
+    told = {"kind": "motion capture (Vicon CSV)"}
+    if _POINTS in blocks:
+        markers, more = _points(held, blocks[_POINTS], options)
+        streams["markers"] = markers
+        told |= more
+    if _DEVICES in blocks:
+        signals, more = _signals(held, blocks[_DEVICES], options)
+        streams |= signals
+        told |= more
+    if not streams:
+        raise RecordingError(
+            f"{path.name}: neither trajectories nor devices; it has {', '.join(blocks) or 'none'}"
+        )
+    unread = {
+        title: f"a block of {len(b.rows)} rows that is not read"
+        for title, b in blocks.items()
+        if title not in (_POINTS, _DEVICES)
+    }
+    source = source_of(path, "text file: integrity not provable")
+    return recorded(path.stem, source, begun(streams), told, unread)
+
+
+def _blocks(held: TextRows) -> dict[str, Block]:
+    """Blocks by title; one without rows is left out."""
+    begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
+    ends = [*begins[1:], len(held.rows)]
+    found = {}
+    for begin, end in zip(begins, ends, strict=True):
+        block = _block(held, held.rows[begin:end])
+        if block is not None:
+            found[held.rows[begin].cell(0)] = block
+    return found
+
+
+def _lone(row: Row) -> bool:
+    return not any(row.cells[1:])
+
+
+def _block(held: TextRows, rows: tuple[Row, ...]) -> Block | None:
+    if len(rows) < 6:
+        return None
+    _, rate, names, columns, units, *values = rows
+    try:
+        hz = float(rate.cell(0))
+    except ValueError:
+        hz = 0.0
+    if not 0 < hz < np.inf:
+        raise RecordingError(
+            f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is no rate in Hz; damaged"
+        )
+    end = next((i for i, r in enumerate(values) if not any(r.cells)), len(values))
+    width = max((i + 1 for i, c in enumerate(columns.cells) if c), default=0)
+    return Block(hz, names.cells, columns.cells[:width], units.cells, tuple(values[:end]))
+
+
+def _points(held: TextRows, block: Block, options: Options) -> tuple[Markers, Mapping[str, str]]:
+    """Named triples X, Y, Z; derivatives (X', X'') are passed over."""
+    axes = tuple(c.upper() for c in block.columns)
+    at = [i for i in range(_BEFORE, block.width - 2) if axes[i : i + 3] == ("X", "Y", "Z")]
+    if not at:
+        raise RecordingError(f"{held.name}: trajectories without columns X, Y, Z; damaged")
+    names = distinct([block.names[i] if i < len(block.names) else "" for i in at], len(at))
+    values, rows, left = numbers(held, block.rows, block.width)
+    columns = np.array(at)[:, None] + np.arange(3)
+    x = whole_points(held, values[:, columns], names, rows)
+    unit = next((u for u in block.units[_BEFORE:] if u), "")
+    factor, stated = metres(options, unit, held.name)
+    markers = Markers(
+        values[:, 0] / block.rate, names, factor * x, spread(options),
+        options.get("frame", "capture"),
+    )  # fmt: skip
+    missing = f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}"
+    return markers, {"unit": stated, "rate_hz": repr(block.rate), "points_not_seen": missing,
+                     **told_left(left)}  # fmt: skip
+
+
+def _signals(
+    held: TextRows, block: Block, options: Options
+) -> tuple[dict[str, Signal], dict[str, str]]:
+    """Channels of devices; one with blank cells is left out and told."""
+    values, _, left = numbers(held, block.rows, block.width)
+    t = _sub_frames(values) / block.rate
+    device, found, gone = "device", {}, list(left)
+    for i in range(_BEFORE, block.width):
+        device = block.names[i] if i < len(block.names) and block.names[i] else device
+        topic = f"analog/{device}.{block.columns[i]}"
+        if np.isnan(values[:, i]).any():
+            gone.append(f"{topic}: {int(np.isnan(values[:, i]).sum())} blank cells")
+            continue
+        unit = block.units[i] if i < len(block.units) else ""
+        frame = options.get("frame", "capture")
+        found[topic] = Signal(t, values[:, [i]], unit or "not stated", 0.0, frame)
+    return found, {"analog_rate_hz": repr(block.rate), **told_left(gone)}
+
+
+def _sub_frames(values: Floats) -> Floats:
+    """Samples counted from frame 0: the block's rate is that of its rows, so that a frame has as
+    many samples as it has sub-frames."""
+    each = values[:, 1].max() + 1
+    return np.asarray(values[:, 0] * each + values[:, 1])
+
+
+def _recognises(path: Path) -> bool:
+    first = head(path, 64).removeprefix(b"\xef\xbb\xbf").splitlines()
+    return bool(first) and first[0].rstrip(b",;\t\r ").decode("ascii", "replace") in _TITLES
+
+
+VICON = Reader(
+    "vicon",
+    "motion capture (Vicon CSV)",
+    _recognises,
+    read_vicon,
+    "its first cell is the title of a block, as Trajectories",
+)
