@@ -25,7 +25,7 @@ from validate.papers.needle_pocket.hand import Hand
 from validate.papers.needle_pocket.pocket import PocketBody, body_mesh, pocket_scene
 from validate.replay import load
 from validate.replay.live import Lived, RecordedPath, live, prepared, realtime
-from validate.replay.live.clock import quiet, warm
+from validate.replay.live.clock import quiet
 from validate.replay.options import Options
 from validate.scene.material import Material
 from validate.solve.haptic import DEVICE_HZ, QUANTILES, TickTimes
@@ -95,7 +95,7 @@ def as_fast_as_it_goes() -> None:
     stepper = large()
     rest = np.array(stepper.tool.tip)
     _, x = Hand(0.004, (0.0031, 0.0, 0.002), DEVICE_HZ, 2e-5, 1).path()
-    warm(stepper)
+    stepper.warm()
     seconds, changed, touching = [], [], []
     with quiet():
         state = stepper.rest()

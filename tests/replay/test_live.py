@@ -255,6 +255,7 @@ class Fails(NeedleStepper):
 def test_a_model_without_an_answer_gives_no_force() -> None:
     """Counted, zero newtons, and the model goes on from where it last had an answer."""
     whole = made().stepper
+    assert isinstance(whole, NeedleStepper)
     lost = Fails(whole.settings, whole.small, whole.tool, whole.surface)
     ys = [0.003, -0.001, -0.003, -0.005, -0.006, -0.0035]
     done, device = talk([at(k + 1, y) for k, y in enumerate(ys)], 8 / 512, lost)

@@ -1,4 +1,4 @@
-"""`validate live`: a needle's model against the clock."""
+"""`validate live`: a model under a hand's tool against the clock."""
 
 import json
 import shlex
@@ -21,7 +21,7 @@ from validate.replay.live import Listener, Lived, Prepared, live, prepared, writ
 from validate.replay.live import realtime as scheduled
 from validate.replay.named_run import reports_of
 from validate.replay.options import Options
-from validate.solve.haptic import DEVICE_HZ, QUANTILES, TickTimes
+from validate.solve.haptic import QUANTILES, TickTimes
 
 
 def run(
@@ -69,7 +69,7 @@ def run(
 def _lived(made: Prepared, seconds: float | None, listen: int | None) -> Lived:
     if listen is None:
         return live(made.stepper, made.path, seconds)
-    with closing(Listener(*made.reach, DEVICE_HZ, listen)) as source:
+    with closing(Listener(*made.reach, made.stepper.rate, listen)) as source:
         host, port = source.address
         complain(f"listens on {host} port {port} (UDP), see docs/live.md; Ctrl-C ends it")
         return live(made.stepper, source, seconds)
@@ -77,12 +77,11 @@ def _lived(made: Prepared, seconds: float | None, listen: int | None) -> Lived:
 
 def _members(done: Lived, made: Prepared) -> dict[str, Any]:
     """What is told, SI."""
-    limit = made.stepper.settings.limit
     said: dict[str, Any] = {
         "experiment": made.experiment.name, "method": made.method, "source": done.kind,
         "rate_hz": done.rate, "ticks": done.ticks, "missed": done.missed,
         "answered": len(done.t), "findings": dict(sorted(done.findings.items())),
-        "force_limit": limit, "times": {}, "recording": None,
+        "force_limit": made.stepper.limit, "times": {}, "recording": None,
     }  # fmt: skip
     groups = {"due to force": done.late, "work": done.work,
               "work, changes of contact": done.work[done.changed > 0]}  # fmt: skip

@@ -300,7 +300,7 @@ def identify(name: str, **options: Any) -> int:
 @click.option("-o", "out", type=FILE, help="What it did (default: NAME-live.mcap in reports/).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def live_(name: str, **options: Any) -> int:
-    """A needle's model against the clock, from its recorded path or from packets on loopback."""
+    """A model under a tool against the clock, from its recorded path or packets on loopback."""
     from validate.cli import living
 
     return living.run(name, **options)

@@ -7,6 +7,7 @@ their interface.
 
 import math
 import os
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
@@ -120,8 +121,17 @@ class ExplicitBody:
         springs = sparse.csr_array((self.size, self.size))
         for foundation in scene.foundations:
             springs = sparse.csr_array(springs + foundation_stiffness(mesh, foundation))
+        self._spring(springs)
+
+    def _spring(self, springs: sparse.csr_array) -> None:
         self.springs, self._own_springs = springs, np.asarray(springs.diagonal())
         self._rows = springs.indptr.astype(np.int32), springs.indices.astype(np.int32), springs.data
+
+    def sprung(self, springs: sparse.csr_array) -> "ExplicitBody":
+        """The same body with more linear springs (N, N) N/m; both share one workspace."""
+        other = copy(self)
+        other._spring(sparse.csr_array(self.springs + springs))
+        return other
 
     def force(self, u: Floats) -> Floats:
         """Internal nodal forces (N,) N."""

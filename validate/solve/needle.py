@@ -30,12 +30,15 @@ from validate.scene.select import facets_of
 from validate.scene.tool import Needle
 from validate.solve.entry import Entry, Surface
 from validate.solve.handles import Handles, require_handled
+from validate.solve.haptic import DEVICE_HZ
 from validate.solve.pressure_curve import RATIOS, Root, cubic, pressure_of, root_of
 from validate.solve.types import Ending, State, Stepper
 from validate.solve.working_set import Imposed, WorkingSet, along, between
 
 _AXES = "xyz"
 _ROUNDING = 1e-9  # N: a pull of no account
+_ON = 1e-9  # m: as near as that is rounding
+_WARM = 40  # ticks of a way in and out that is forgotten
 _RUNAWAY = 1e3  # volume error at which the paper's law has left all bounds
 
 
@@ -105,7 +108,7 @@ class NeedleLoop:
 
 def _require_outside(scene: Scene, tool: Needle) -> None:
     rows = barycentric_rows(scene.mesh, np.array([tool.tip]))
-    if float(rows.outside[0]) == 0:
+    if float(rows.outside[0]) < _ON:
         at = ", ".join(f"{1e3 * c:.3g}" for c in tool.tip)
         raise SceneError(f"needle '{tool.name}' starts inside the body at ({at}) mm: move it out")
 
@@ -187,6 +190,23 @@ class NeedleStepper:
     def _apart(self) -> Floats:
         """The pocket's volume polynomial in the pressure while nothing touches."""
         return self._form(self.small.fields)
+
+    @property
+    def rate(self) -> float:
+        """Ticks a second."""
+        return DEVICE_HZ
+
+    @property
+    def limit(self) -> float:
+        return self.settings.limit
+
+    def warm(self) -> None:
+        """A way into the body and out again that is forgotten: kernels compiled, columns kept."""
+        size = float(np.ptp(self.scene.mesh.nodes, axis=0).max())
+        down = 0.2 * size * np.sin(np.pi * np.linspace(0, 1, _WARM))
+        state = self.rest()
+        for depth in down.tolist():
+            state = self.step(state, depth * np.array(self.tool.axis))
 
     def rest(self) -> State:
         return self._told(0, Tick(np.array(self.tool.tip)), None, changed=False)

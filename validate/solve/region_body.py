@@ -53,6 +53,10 @@ class RegionBody:
         body = RegionMatrices(K, system.masses[free], c, node, scene.mesh.nodes[nodes])
         return cls(body, node_graph(K, node), nodes, surface, node * d + free % d, d)
 
+    @property
+    def places(self) -> Floats:
+        return self.body.places
+
     @cached_property
     def still(self) -> Floats:
         return np.zeros(len(self.at))

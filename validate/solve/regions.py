@@ -29,9 +29,9 @@ from validate.solve.handles import Handles, require_handled
 from validate.solve.region_body import RegionBody, RegionPlan, Regions
 from validate.solve.region_map import ratios
 from validate.solve.region_march import BorderName, Motion, carried
-from validate.solve.region_probe import Hold, SpringProbe
 from validate.solve.region_size import PrimarySize, SizeName
 from validate.solve.region_solvers import EXPLICIT, SolverName
+from validate.solve.spring_probe import Hold, SpringProbe
 from validate.solve.types import Ending, State, Stepper
 
 _AXES = "xyz"
@@ -109,7 +109,7 @@ class AsyncRegions:
         every, words = ratios(self.rates, self.dt)
         plan = RegionPlan(body, self.dt, self.layers, every, self.solvers, self.border,
                           self.overlap, {})  # fmt: skip
-        probe = SpringProbe(body, np.array(tool.tip), self.spring, self.reach, self.pad, self.grip,
+        probe = SpringProbe(body, np.array(tool.axis), self.spring, self.reach, self.pad, self.grip,
                       self.slides)  # fmt: skip
         return RegionStepper(self, system, tool, body, plan, probe, words)
 

@@ -7,6 +7,7 @@ from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.handles import Handles
+from validate.solve.haptic_loop import HapticLoop
 from validate.solve.harmonic import Harmonic
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.let_go import LetGo
@@ -43,6 +44,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
     ContactNewton,
     NeedleLoop,
     AsyncRegions,
+    HapticLoop,
 )
 
 # What solves a whole scene at once.
@@ -67,7 +69,7 @@ LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities and "needle" no
 INERTIAL = schemes_that(lambda h: h.law == ("linear",) and h.loads)
 
 # Dynamics at large strain of drives and loads, without cavities.
-LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia)
+LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia and h.loads)
 
 # Bodies that touch rigid ones.
 TOUCHING = schemes_that(lambda h: "rigid" in h.contact)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 from validate.arrays import Floats, Ints, checked
 from validate.fem.system import System
 from validate.scene.scene import Scene
+from validate.scene.tool import Needle
 from validate.solve.handles import Handles
 
 Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]
@@ -54,6 +55,26 @@ class Stepper(Protocol):
     def step(self, state: State, inputs: Floats) -> State: ...
 
     def field(self, state: State) -> Floats: ...
+
+
+@runtime_checkable
+class HandStepper(Stepper, Protocol):
+    """A stepper at a hand: displacements (d,) m of a `tool` in, its numbers `<tool>.force.x` .. N,
+    `.contact`, `.changed` and `.clipped` out, `rate` times a second. No force is beyond `limit` N.
+    """
+
+    @property
+    def tool(self) -> Needle: ...
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def limit(self) -> float: ...
+
+    def warm(self) -> None:
+        """What a first touch costs, paid before the clock starts."""
+        ...
 
 
 @runtime_checkable

@@ -19,11 +19,9 @@ from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.replay.live.packets import CONTACT, FADED, LIMITED, NO_ANSWER
 from validate.solve.haptic import TickTimes
-from validate.solve.needle import NeedleStepper
-from validate.solve.types import State
+from validate.solve.types import HandStepper, State
 
 _HELD, _ZERO = 0.02, 0.10  # s without a new place: the force is held, then fades to nothing
-_WARM = 40  # ticks before the clock starts
 _AXES = "xyz"
 
 
@@ -123,24 +121,15 @@ def realtime(*, wanted: bool) -> Iterator[None]:
         os.sched_setscheduler(0, policy, before)
 
 
-def warm(stepper: NeedleStepper) -> None:
-    """A way into the body and out again that is forgotten: kernels compiled, columns in caches."""
-    size = float(np.ptp(stepper.scene.mesh.nodes, axis=0).max())
-    down = 0.2 * size * np.sin(np.pi * np.linspace(0, 1, _WARM))
-    state = stepper.rest()
-    for depth in down.tolist():
-        state = stepper.step(state, depth * np.array(stepper.tool.axis))
-
-
 def live(
-    stepper: NeedleStepper,
+    stepper: HandStepper,
     source: Places,
     seconds: float | None = None,
     clock: Callable[[], float] = perf_counter,
     wait: Callable[[float], None] = sleep,
 ) -> Lived:
     """Runs until the source ends, or for so many seconds; an interruption ends it, too."""
-    warm(stepper)
+    stepper.warm()
     kept, skipped = _Ticked(), 0
     with quiet():
         try:
@@ -185,7 +174,7 @@ def _run(
 class _Model:
     """The stepper, its state, and the force (d,) N on the hand."""
 
-    def __init__(self, stepper: NeedleStepper, kept: _Ticked) -> None:
+    def __init__(self, stepper: HandStepper, kept: _Ticked) -> None:
         self.stepper, self.kept = stepper, kept
         self.state: State = stepper.rest()
         self.rest = np.array(stepper.tool.tip)

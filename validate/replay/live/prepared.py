@@ -1,4 +1,4 @@
-"""An experiment's needle, ready for the clock: the method as `validate run` would prepare it."""
+"""An experiment's tool, ready for the clock: the method as `validate run` would prepare it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ from validate.replay.live.path import RecordedPath
 from validate.replay.options import Options
 from validate.replay.road import set_out
 from validate.scene.meshless import Meshless
-from validate.solve.needle import NeedleStepper
+from validate.solve.types import HandStepper
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Prepared:
     experiment: Experiment
     method: str
     parameters: Any
-    stepper: NeedleStepper
+    stepper: HandStepper
     path: RecordedPath
     findings: tuple[str, ...]
 
@@ -40,7 +40,7 @@ class Prepared:
 def prepared(experiment: Experiment, options: Options, method: str = "") -> Prepared:
     """Prepares a method (none: the first one accepted).
 
-    Raises `UsageError` for an experiment without a needle, and what the road raises.
+    Raises `UsageError` for an experiment without a tool, and what the road raises.
     """
     name = method or next(iter(experiment.accepted), "")
     if name not in experiment.methods:
@@ -52,12 +52,12 @@ def prepared(experiment: Experiment, options: Options, method: str = "") -> Prep
     scene = out.experiment.build(recording, road.parameters, chosen.scene)
     if isinstance(scene, Meshless) or len(scene.tools) != 1:
         raise UsageError(
-            f"experiment '{experiment.name}' has no needle: live is for those with one"
+            f"experiment '{experiment.name}' has no needle or probe: live is for those with one"
         )
     seen = out.experiment.place(recording, road.parameters, scene)
     given = out.experiment.sets(road.parameters, seen)
     stepper = chosen.prepare(build_system(scene), seen, given)
-    if not isinstance(stepper, NeedleStepper):
-        raise UsageError(f"method '{name}' of '{experiment.name}' does not step a needle")
+    if not isinstance(stepper, HandStepper):
+        raise UsageError(f"method '{name}' of '{experiment.name}' is no loop for a hand")
     path = RecordedPath(seen.t, seen.inputs + np.array(stepper.tool.tip))
     return Prepared(out.experiment, name, road.parameters, stepper, path, seen.findings)

@@ -1,11 +1,29 @@
-"""The haptic probe of paper 004, section 3: a spring to the surface node nearest to it."""
+"""The probe of paper 004, section 3: a spring to the surface node nearest to it."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from validate.arrays import Floats
-from validate.solve.region_body import RegionBody
+from validate.arrays import Floats, Ints
+
+
+class Touchable(Protocol):
+    """A body as a probe knows it: `places` (n, d) m of its nodes at rest, `surface` (k,) those that
+    may be touched, `at` (m,) where the unknowns stand among the n d components."""
+
+    @property
+    def places(self) -> Floats: ...
+
+    @property
+    def surface(self) -> Ints: ...
+
+    @property
+    def at(self) -> Ints: ...
+
+    def spread(self, u: Floats) -> Floats:
+        """Displacements (n, d) m of the nodes."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -20,10 +38,11 @@ class Hold:
 
 @dataclass(frozen=True)
 class SpringProbe:
-    """A spring N/m; see `AsyncRegions` for the rest. `tip` (d,) m at rest."""
+    """A spring N/m, of a probe that points along the unit `axis` (d,); see `AsyncRegions` for the
+    rest."""
 
-    body: RegionBody
-    tip: Floats
+    body: Touchable
+    axis: Floats
     spring: float
     reach: float
     pad: float
@@ -40,7 +59,7 @@ class SpringProbe:
 
     def _nearest(self, tip: Floats, u: Floats) -> tuple[int, float, Floats]:
         """The surface node nearest to the tip, how far it is, and all nodes' places."""
-        places = self.body.body.places + self.body.spread(u)
+        places = self.body.places + self.body.spread(u)
         away = np.linalg.norm(places[self.body.surface] - tip, axis=1)
         i = int(np.argmin(away))
         return int(self.body.surface[i]), float(away[i]), places
@@ -49,39 +68,45 @@ class SpringProbe:
         node, away, places = self._nearest(tip, u)
         if away > self.reach:
             return None
-        return Hold(node, self._pad(node), tip - places[node])
+        pad = self._pad(node)
+        return Hold(node, pad, tip - self._hung(node, pad, places))
 
     def _pad(self, node: int) -> tuple[int, ...]:
-        rest = self.body.body.places
+        rest = self.body.places
         near = np.linalg.norm(rest[self.body.surface] - rest[node], axis=1) <= self.pad
         return tuple(np.union1d(self.body.surface[near], [node]).tolist())
+
+    def _hung(self, node: int, pad: tuple[int, ...], places: Floats) -> Floats:
+        """Where the spring hangs (d,) m: the node, moved as the mean of its pad."""
+        rest = self.body.places
+        return np.asarray(rest[node] + (places - rest)[list(pad)].mean(axis=0))
 
     def _moved(self, held: Hold, tip: Floats, u: Floats) -> Hold:
         """The hold at the nearest node, with the force that the spring has."""
         node, _, places = self._nearest(tip, u)
         if node == held.node or not self.spring:
             return held
-        stretch = self.force(held, tip, u) / self.spring
-        return Hold(node, self._pad(node), tip - places[node] - stretch)
+        stretch, pad = self.force(held, tip, u) / self.spring, self._pad(node)
+        return Hold(node, pad, tip - self._hung(node, pad, places) - stretch)
+
+    def slack_at(self, held: Hold, u: Floats) -> Floats:
+        """Where the probe (d,) m would feel nothing."""
+        places = self.body.places + self.body.spread(u)
+        return np.asarray(self._hung(held.node, held.pad, places) + held.slack)
 
     def force(self, held: Hold | None, tip: Floats, u: Floats) -> Floats:
         """Of the spring on the body (d,) N; it pulls at the mean of the pad."""
         if held is None:
             return np.zeros(len(tip))
-        places = self.body.body.places[held.node] + self._mean(held, u)
-        return np.asarray(self.spring * (tip - places - held.slack))
+        return np.asarray(self.spring * (tip - self.slack_at(held, u)))
 
     def nodal(self, held: Hold | None, tip: Floats, u: Floats) -> Floats:
-        """That force on the free unknowns (m,), equal on the pad's nodes."""
-        f = np.zeros((len(self.body.nodes), self.body.d))
+        """That force on the unknowns (m,), equal on the pad's nodes."""
+        f = np.zeros(self.body.places.shape)
         if held is not None:
             f[list(held.pad)] = self.force(held, tip, u) / len(held.pad)
-        return f.ravel()[self.body.at]
-
-    def _mean(self, held: Hold, u: Floats) -> Floats:
-        return np.asarray(self.body.spread(u)[list(held.pad)].mean(axis=0))
+        return np.asarray(f.ravel()[self.body.at])
 
     def _pulled(self, held: Hold, tip: Floats, u: Floats) -> float:
-        """How hard the probe pulls outward, N: along the line from the body's middle."""
-        out = self.body.body.places[held.node] - self.body.body.places.mean(axis=0)
-        return float(self.force(held, tip, u) @ out / np.linalg.norm(out))
+        """How hard the probe pulls back out, N."""
+        return float(self.force(held, tip, u) @ -self.axis)
