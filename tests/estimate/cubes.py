@@ -73,6 +73,14 @@ class Case:
         names = ("top.x", "top.y", "top.z")
         return Measurements(self.t[every - 1 :: every], self.rows(), z, np.full(3, sd), names)
 
+    def two_measured(self, seed: int, sd: float = SD) -> Measurements:
+        """The top node and a corner at every step."""
+        shown = np.hstack([self.probe(TOP), self.probe(CORNER)])
+        z = shown + sd * np.random.default_rng(seed).normal(size=shown.shape)
+        H = sparse.csr_array(sparse.vstack([self.rows(TOP), self.rows(CORNER)]))
+        names = tuple(f"{m}.{c}" for m in (TOP, CORNER) for c in "xyz")
+        return Measurements(self.t, H, z, np.full(6, sd), names)
+
     def nrmse(self, run: Run, name: str = TOP) -> float:
         """RMSE of u_z over all steps, by the range of the truth over steps 1 to nt."""
         z = self.probe(name)[:, 2]

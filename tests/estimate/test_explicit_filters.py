@@ -93,6 +93,50 @@ def test_seeing_nothing_an_explicit_filter_is_the_plain_run(settings: Filter, pu
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_an_explicit_filter_that_no_measurement_reaches_is_invalid(
+    settings: Filter, pushed: Case
+) -> None:
+    system, measured, inputs, _ = pushed
+    closed = replace(settings, gate=1e-300)  # type: ignore[type-var]
+    blind = replace(measured, z=np.full_like(measured.z, np.nan))
+    for filter_, given, says in (
+        (settings, blind, "0 of 30 measurements reached the filter (30 have all components"),
+        (closed, measured, "0 of 30 measurements reached the filter (30 were met, and the gate"),
+    ):
+        found = run(filter_.prepare(system, given), H, inputs)
+        assert found.outcome.state == "invalid"
+        assert found.outcome.why.startswith(says)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_an_explicit_filters_gate_takes_an_outlier_for_missing(
+    settings: Filter, pushed: Case
+) -> None:
+    """And what a clock is unsure of widens the claim; without doubt it changes nothing."""
+    system, measured, inputs, _ = pushed
+    z, gone = measured.z.copy(), measured.z.copy()
+    z[10, 0] += 1.0
+    gone[10] = np.nan
+    gated = replace(settings, gate=1 - 1e-9)  # type: ignore[type-var]
+    jumped, missing = (
+        run(gated.prepare(system, replace(measured, z=y)), H, inputs) for y in (z, gone)
+    )
+    assert np.array_equal(jumped.u, missing.u)
+    assert jumped.sd is not None
+    assert np.array_equal(jumped.sd, missing.sd)
+    assert jumped.traces["gate.rejected"].y[21] == 1
+    follows = run(settings.prepare(system, replace(measured, z=z)), H, inputs)
+    assert not np.allclose(follows.u[: len(missing.u)], missing.u[: len(follows.u)], atol=1e-3)
+    plain = run(settings.prepare(system, measured), H, inputs)
+    late = replace(measured, sd_t=0.01)
+    sure = run(replace(settings, clock=0.0).prepare(system, late), H, inputs)  # type: ignore[type-var]
+    assert np.array_equal(plain.u, sure.u)
+    wide = run(settings.prepare(system, late), H, inputs)
+    name = f"innovation.{measured.names[0]}.sd"
+    assert wide.traces[name].y[-1] > 1.01 * plain.traces[name].y[-1]
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
 def test_an_explicit_filter_sees_no_future(settings: Filter, pushed: Case) -> None:
     """Another future leaves the past as it is; another present moves the estimate."""
     system, measured, inputs, _ = pushed

@@ -1,6 +1,7 @@
 """The contract of every filter: prepare, rest, step, field, sd, traces; it never sees the truth."""
 
 import ast
+import re
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from cubes import DT, Case, case
 
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.estimate.filters import LINEAR_FILTERS, Filter
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.measurements import Measurements
@@ -86,6 +87,90 @@ def test_without_a_measurement_a_filter_is_its_model(settings: Filter, pulled: C
     exact = isinstance(settings, KfFem | ModalKf)
     off = np.abs(plain.u - pulled.truth.u).max() / np.abs(pulled.truth.u).max()
     assert off < (1e-10 if exact else 0.02)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_a_filter_that_no_measurement_reaches_is_invalid(settings: Filter, pulled: Case) -> None:
+    """All missing, all too late, all rejected: an outcome that says so, not a plain run."""
+    seen = pulled.measured(1)
+    closed = replace(settings, gate=1e-300)  # type: ignore[type-var]
+    why = "measurements reached the filter"
+    for filter_, given, says in (
+        (settings, without(seen), rf"0 of 60 {why} \(60 have all components missing\): "),
+        (settings, replace(seen, t=seen.t + 60 * DT), rf"0 of 60 {why} \(60 come after the last"),
+        (settings, replace(seen, t=seen.t - 60 * DT), rf"0 of 60 {why} \(60 lie at the start"),
+        (closed, seen, rf"0 of 60 {why} \(60 were met, and the gate rejected 60 looks"),
+    ):
+        if "start" in says and getattr(settings, "gains", "") == "steady":
+            continue  # without any look there is nothing that it could settle on
+        run = pulled.march(filter_.prepare(pulled.system, given))
+        assert run.outcome.state == "invalid"
+        assert re.match(says, run.outcome.why), run.outcome.why
+        assert run.traces["nis.dof"].y.max() == 0
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_a_gated_outlier_changes_as_much_as_a_missing_look(settings: Filter, pulled: Case) -> None:
+    """A marker that jumps by 1 m for one look, beside another that does not; without a gate the
+    estimate follows it."""
+    seen = pulled.two_measured(1)
+    z, gone = seen.z.copy(), seen.z.copy()
+    z[20, 4] += 1.0
+    gone[20, 3:] = np.nan
+    gated = replace(settings, gate=0.9999)  # type: ignore[type-var]
+    jumped, missing = (
+        pulled.march(gated.prepare(pulled.system, replace(seen, z=y)), at=(19, 20, 21, 59))
+        for y in (z, gone)
+    )
+    assert np.array_equal(jumped.u, missing.u)
+    assert jumped.sd is not None
+    assert np.array_equal(jumped.sd, missing.sd)
+    far = jumped.traces["gate.far.corner"].y
+    assert far[20] > 100
+    assert missing.traces["gate.far.corner"].y[20] == 0
+    rejected = [run.traces["gate.rejected"].y for run in (jumped, missing)]
+    assert rejected[0][20] == 1 + rejected[1][20]
+    assert jumped.traces["gate.tested"].y.sum() == 120
+    free = pulled.march(settings.prepare(pulled.system, replace(seen, z=z)), at=(20,))
+    assert np.abs(free.u[0] - missing.u[1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_a_sure_clock_changes_nothing_and_a_doubtful_one_the_claims(
+    settings: Filter, pulled: Case
+) -> None:
+    """The recording's own sd_t is used unless the filter has one; at the start the top moves."""
+    seen = pulled.measured(1)
+    doubtful = replace(seen, sd_t=0.01)
+    sure = replace(settings, clock=0.0)  # type: ignore[type-var]
+    plain, same, wide = (
+        pulled.march(f.prepare(pulled.system, m), at=(5,))
+        for f, m in ((settings, seen), (sure, doubtful), (settings, doubtful))
+    )
+    assert np.array_equal(plain.u, same.u)
+    assert all(np.array_equal(t.y, same.traces[name].y) for name, t in plain.traces.items())
+    name = "innovation.top.z.sd"
+    assert wide.traces[name].y[5] > 1.05 * plain.traces[name].y[5]
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=repr)
+def test_an_open_gate_leaves_the_estimate(settings: Filter, pulled: Case) -> None:
+    """Gains as they go are those beforehand, to what `settled` leaves."""
+    seen = pulled.measured(1, every=2)
+    wide = replace(settings, gate=1 - 1e-15)  # type: ignore[type-var]
+    runs = [pulled.march(f.prepare(pulled.system, seen), at=(9, 59)) for f in (settings, wide)]
+    assert runs[0].u == pytest.approx(runs[1].u, rel=1e-4, abs=1e-8)
+    assert runs[1].traces["gate.rejected"].y.sum() == 0
+
+
+def test_a_gate_and_a_clock_that_are_none_are_refused(pulled: Case) -> None:
+    seen = pulled.measured(1)
+    for wrong, says in (
+        ({"gate": 1.0}, "gate = 1: a share of good looks between 0 and 1"),
+        ({"clock": -1.0}, "clock = -1 s: a standard deviation"),
+    ):
+        with pytest.raises(UsageError, match=says):
+            ReducedKf(**wrong).prepare(pulled.system, seen)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=repr)

@@ -159,7 +159,8 @@ def test_overflow_of_the_covariance_is_an_outcome_and_never_a_nan(
     assert 500 <= stopped.outcome.step <= 620
     assert "a^(2k)" in stopped.outcome.why
     held = run(replace(settings, overflow="hold").prepare(system, unmeasured(system)), H, inputs)
-    assert held.finished
+    assert held.outcome.state == "invalid"  # nothing was measured
+    assert held.outcome.step == 700
     assert held.traces["covariance.held"].y[500] == 0
     assert held.traces["covariance.held"].y[-1] > 0
     assert np.array_equal(held.u[: len(stopped.u)], stopped.u)
@@ -170,7 +171,7 @@ def test_the_companion_form_keeps_variances_small(system: System) -> None:
     inputs = np.zeros((2000, 1))
     settings = NodeEKF(H, block="companion")
     found = run(settings.prepare(system, unmeasured(system)), H, inputs)
-    assert found.finished
+    assert found.outcome.step == 2000
     assert found.sd is not None
     squares = found.sd.reshape(2000, -1).max(axis=1) ** 2
     assert squares[-1] < 1e-2  # m^2, where the printed form passes 1e300

@@ -34,6 +34,11 @@ class Recursion(Protocol):
     @property
     def H(self) -> Floats: ...
 
+    @property
+    def R(self) -> Floats:
+        """Variances (m,) m^2 of the components."""
+        ...
+
     def start(self) -> Claim:
         """What is claimed before the first step."""
         ...
@@ -42,7 +47,9 @@ class Recursion(Protocol):
         """What is claimed so many steps >= 1 later, nothing measured."""
         ...
 
-    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]: ...
+    def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
+        """By the components that are seen; `late` as in `noise`."""
+        ...
 
 
 class Covariance(Recursion, Protocol):
@@ -54,6 +61,11 @@ class Covariance(Recursion, Protocol):
     def matrix(self, claim: Claim) -> Floats:
         """P (n, n) with the last update in it."""
         ...
+
+
+def noise(R: Floats, late: Floats | None) -> Floats:
+    """R (m, m) m^2 from variances (m,), and from what a late look (m,) m moves together."""
+    return np.diag(R) if late is None else np.diag(R) + np.outer(late, late)
 
 
 def claimed(P: Floats, PHt: Floats) -> Claim:
@@ -90,9 +102,10 @@ class Dense:
         P = propagated(claim.P, *self.over(steps))
         return claimed(P, P @ self.H.T)
 
-    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
-        gain, i = best_gain(claim.PHt, self.H @ claim.PHt + np.diag(self.R), seen), np.array(seen)
-        P = joseph(claim.P, gain.G, self.H[i], np.diag(self.R[i]))
+    def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
+        R, i = noise(self.R, late), np.array(seen)
+        gain = best_gain(claim.PHt, self.H @ claim.PHt + R, seen)
+        P = joseph(claim.P, gain.G, self.H[i], R[np.ix_(i, i)])
         return gain, claimed((P + P.T) / 2, claim.PHt)
 
     def matrix(self, claim: Claim) -> Floats:
@@ -114,14 +127,18 @@ class Steady:
     def H(self) -> Floats:
         return self.covariance.H
 
+    @property
+    def R(self) -> Floats:
+        return self.covariance.R
+
     def start(self) -> Claim:
         return self.covariance.start()
 
     def predict(self, claim: Claim, steps: int = 1) -> Claim:
         return self.prior
 
-    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
-        return self.covariance.update(claim, seen)
+    def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
+        return self.covariance.update(claim, seen, late)
 
 
 @dataclass(frozen=True)
@@ -142,8 +159,9 @@ class Decoupled:
             claim = claimed(*advance(claim.P, claim.G, claim.B, self.f, self.Q, self.H))
         return claim
 
-    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
-        gain, i = best_gain(claim.PHt, self.H @ claim.PHt + np.diag(self.R), seen), np.array(seen)
+    def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
+        i = np.array(seen)
+        gain = best_gain(claim.PHt, self.H @ claim.PHt + noise(self.R, late), seen)
         B = gain.G @ gain.S_yy[np.ix_(i, i)] / 2 - claim.PHt[:, i]
         return gain, Claim(claim.P, claim.PHt, gain.G, np.ascontiguousarray(B))
 

@@ -5,7 +5,7 @@ velocity and acceleration are inputs, recursed beside the filter and not part of
 knows nothing of them. Its transition J^-1 A alone decides P, hence the gains need no data.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol
@@ -14,6 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.covariance import Claim, Covariance
 from validate.estimate.gains import Claims, GainSequence
 from validate.estimate.kalman import (
@@ -164,7 +165,8 @@ class DisplacementStepper(InertialStepper):
     """One filter step: predict, correct where something was measured, recurse v and a.
 
     With `gains` they were computed before; without, the covariance is recursed at every step. It
-    is recursed in the coordinates `claimed`; `excitation` is in `coordinates`.
+    is recursed in the coordinates `claimed`; `excitation` is in `coordinates`. With `care` gains
+    depend on what is measured, so there are none beforehand.
     """
 
     coordinates: Coordinates
@@ -176,6 +178,7 @@ class DisplacementStepper(InertialStepper):
     recursion: Recursion
     claimed: Coordinates
     settled: float
+    care: Care | None
     _claims: Claims = field(init=False)
     _spread: "Spread" = field(init=False)
 
@@ -186,7 +189,12 @@ class DisplacementStepper(InertialStepper):
     @property
     def units(self) -> Mapping[str, str]:
         """NIS with its degrees, innovations with their sd, and the drives' forces."""
-        return {**innovation_units(self.sensor.names), **super().units}
+        gate = gate_units(self.care)
+        return {**innovation_units(self.sensor.names), **gate, **super().units}
+
+    def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
+        """Why no measurement reached the estimate; empty where one did."""
+        return self.sensor.table.unheard(len(numbers), numbers)
 
     def rest(self) -> State:
         zeros = np.zeros(len(self.covariance.P0))
@@ -199,14 +207,14 @@ class DisplacementStepper(InertialStepper):
         k, of = state.k + 1, self.coordinates
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
         prior = of.predict(last.x, last.v, a, f)
-        gain, claim = self._gain(k, last.claim)
-        x, seen = self._corrected(prior, gain, k, moved.q)
+        corrected = self._heeded if self.care else self._corrected
+        x, claim, seen = corrected(prior, k, last, moved)
         towards = prior if self.recursion == "prior" else x
         v, a = of.rates(towards, last.x, last.v, a)
         inner = Estimate(x, v, a, moved, claim)
         if not np.isfinite(a.sum() + x.sum()):
             return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
-        numbers = {**seen.numbers(self.sensor.names)}
+        numbers = {**seen.numbers(self.sensor.names), **gate_numbers(self.care, seen)}
         if self.reactions.names:
             numbers |= self.forces(of.free(x), of.free(v), of.free(a), moved)
         return State(k, inner, numbers=numbers)
@@ -219,13 +227,36 @@ class DisplacementStepper(InertialStepper):
         return (None, prior) if seen is None else self.covariance.update(prior, seen)
 
     def _corrected(
-        self, prior: Floats, gain: Gain | None, step: int, driven: Floats
-    ) -> tuple[Floats, Innovation]:
+        self, prior: Floats, step: int, last: Estimate, inputs: Inputs
+    ) -> tuple[Floats, Claim | None, Innovation]:
+        gain, claim = self._gain(step, last.claim)
         z = self.sensor.table.at(step)
         if z is None or gain is None:
-            return prior, nothing(len(self.sensor.names))
-        found = innovation(z, self.sensor.H @ prior + self.sensor.driven @ driven, gain)
-        return prior + gain.G @ found.y[np.array(gain.seen)], found
+            return prior, claim, nothing(len(self.sensor.names))
+        found = innovation(z, self._shown(prior, inputs), gain)
+        return prior + gain.G @ found.y[np.array(gain.seen)], claim, found
+
+    def _heeded(
+        self, prior: Floats, step: int, last: Estimate, inputs: Inputs
+    ) -> tuple[Floats, Claim | None, Innovation]:
+        """With a gain of this very look."""
+        assert self.care is not None
+        assert last.claim is not None
+        z, claim = self.sensor.table.at(step), self.covariance.predict(last.claim)
+        if z is None:
+            return prior, claim, nothing(len(self.sensor.names))
+        shown = self._shown(prior, inputs)
+        moved = shown - self._shown(last.x, last.inputs)
+        gain, claim, found, _ = self.care.update(self.covariance, claim, z, shown, moved)
+        if gain is None:
+            return prior, claim, found
+        dx = gain.G @ found.y[np.array(gain.seen)]
+        nodal = isinstance(self.coordinates, Nodal)
+        return prior + (self.claimed.free(dx) if nodal else dx), claim, found
+
+    def _shown(self, x: Floats, inputs: Inputs) -> Floats:
+        """Measured components (m,) m of a state and its drives."""
+        return self.sensor.H @ x + self.sensor.driven @ inputs.q
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""

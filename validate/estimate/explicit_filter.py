@@ -1,6 +1,6 @@
 """The stepper of filters that predict with the explicit step, around a core that they bring."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.estimate import node_ekf_kernel as kernel
+from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.explicit_step import ExplicitStep
 from validate.estimate.kalman import Innovation, innovation_units, nothing
 from validate.estimate.measurements import Timetable
@@ -66,6 +67,7 @@ class ExplicitFilterStepper:
     names: tuple[str, ...]
     times: Timetable
     refusal: str
+    care: Care | None
 
     @property
     def scene(self) -> Scene:
@@ -74,7 +76,11 @@ class ExplicitFilterStepper:
     @property
     def units(self) -> Mapping[str, str]:
         """NIS with its degrees, innovations with their sd, and the core's own."""
-        return {**innovation_units(self.names), **self.core.units}
+        return {**innovation_units(self.names), **gate_units(self.care), **self.core.units}
+
+    def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
+        """Why no measurement reached the estimate; empty where one did."""
+        return self.times.unheard(len(numbers) * self.explicit.parts, numbers)
 
     def rest(self) -> State:
         """U_0 = U_{-h} = 0."""
@@ -94,8 +100,9 @@ class ExplicitFilterStepper:
             z = self.times.at(number)
             if z is not None:
                 memory, new = core.correct(memory, number, z)
-                found = replace(new, nis=found.nis + new.nis, dof=found.dof + new.dof)
-        numbers = {**found.numbers(self.names), **core.numbers(memory)}
+                found = new.after(found)
+        numbers = {**found.numbers(self.names), **gate_numbers(self.care, found)}
+        numbers |= core.numbers(memory)
         return State(state.k + 1, AtInputs(memory, inputs), numbers=numbers)
 
     def _failure(self, memory: Memory) -> tuple[Ending, str] | None:

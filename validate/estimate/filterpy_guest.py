@@ -13,6 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting
 from validate.estimate.filterpy_names import (
     EnsembleKalmanFilter,
     KalmanFilter,
@@ -132,6 +133,8 @@ class Guest:
     load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     seed: int = quantity(0, "1", "of filters that draw")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
@@ -143,8 +146,10 @@ class Guest:
         with seeded(self.seed):
             first = _made(self.make)(reduced.model)
         require_shapes(first, reduced.model)
-        core = GuestCore(reduced, first, self.seed)
-        return CoreStepper(system, core, measurements.names, timetable(measurements, self.dt))
+        care = care_of(measurements, self.gate, self.clock, self.dt)
+        core = GuestCore(reduced, first, self.seed, care)
+        table = timetable(measurements, self.dt)
+        return CoreStepper(system, core, measurements.names, table, care)
 
 
 def _made(make: Make | str) -> Make:
@@ -194,6 +199,7 @@ class GuestCore:
     reduced: ReducedModel
     first: Any
     seed: int
+    care: Care | None = None
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -210,12 +216,22 @@ class GuestCore:
             guest.predict(u=loads)
             if z is None or not np.isfinite(z).all():
                 return Visit(guest), nothing(len(model.H))
-            PHt = guest.P @ model.H.T
-            gain = best_gain(PHt, model.H @ PHt + model.R)
-            found = innovation(z, model.H @ guest.x, gain)
-            guest.update(z)
+            found = self._update(guest, z, model.H @ (guest.x - inner.guest.x))
         require_shapes(guest, model)
         return Visit(guest), found
+
+    def _update(self, guest: Any, z: Floats, moved: Floats) -> Innovation:
+        """Changes the guest, unless a gate rejects part of z (m,) m."""
+        H, R, gated = self.reduced.model.H, self.reduced.model.R, None
+        PHt, shown = guest.P @ H.T, H @ guest.x
+        if self.care is not None:
+            R = R + self.care.together(moved)
+            z, gated = self.care.passed(z, shown, H @ PHt + R)
+        if not np.isfinite(z).all():
+            return replace(nothing(len(H)), gated=gated)
+        gain = best_gain(PHt, H @ PHt + R)
+        guest.update(z, R=R) if self.care else guest.update(z)
+        return replace(innovation(z, shown, gain), gated=gated)
 
     def free(self, inner: Visit) -> Floats:
         return np.asarray(self.reduced.lift @ inner.guest.x)

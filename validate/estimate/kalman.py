@@ -70,16 +70,38 @@ def joseph(P: Floats, G: Floats, H: Floats, R: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+class Gated:
+    """Markers whose looks a gate `tested` and `rejected`; `far` (k,) tells by how many standard
+    deviations each rejected one lay off, zero for the others."""
+
+    far: Floats
+    tested: int
+    rejected: int
+
+    def and_then(self, other: "Gated") -> "Gated":
+        far, rejected = np.maximum(self.far, other.far), self.rejected + other.rejected
+        return Gated(far, self.tested + other.tested, rejected)
+
+
+@dataclass(frozen=True)
 class Innovation:
     """y = z - H u_prior (m,) m, zero where nothing was measured; sd (m,) m, zero there too.
 
-    `nis` = y^T S_yy^-1 y of the `dof` components that were measured.
+    `nis` = y^T S_yy^-1 y of the `dof` components that were measured, and passed the gate if there
+    is one.
     """
 
     y: Floats
     sd: Floats
     nis: float
     dof: int
+    gated: Gated | None = None
+
+    def after(self, other: "Innovation") -> "Innovation":
+        """This one, with the counts and sums of another in the same step before it."""
+        gated = (self.gated and other.gated and other.gated.and_then(self.gated)) or self.gated
+        nis, dof = self.nis + other.nis, self.dof + other.dof
+        return Innovation(self.y, self.sd, nis, dof, gated)
 
     def numbers(self, names: tuple[str, ...]) -> Mapping[str, float]:
         """By trace name, for `State.numbers`."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting
 from validate.estimate.covariance import Covariance, Decoupled, Dense
 from validate.estimate.displacement_filter import (
     Coordinates,
@@ -68,6 +69,8 @@ class DisplacementNoise:
     rule: RuleName = quantity("average", "1", "Newmark's rule")
     settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
 
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt)
@@ -77,6 +80,9 @@ class DisplacementNoise:
         if self.R is not None and not (np.isfinite(self.R) and self.R > 0):
             raise SceneError(f"variance R = {self.R:g} m2: a number above 0 (1 mm2 is 1e-6)")
 
+    def care(self, measurements: Measurements) -> Care | None:
+        return care_of(measurements, self.gate, self.clock, self.dt)
+
 
 @dataclass(frozen=True)
 class KfFem(DisplacementNoise):
@@ -84,7 +90,9 @@ class KfFem(DisplacementNoise):
 
     `gains`: "every_step" multiplies dense matrices at every step, as printed: a baseline, whose
     cost is of the order n^3. "shared" computes the same gains beforehand (in modal coordinates
-    where damping lets it), and a step costs what a step of the finite elements does.
+    where damping lets it), and a step costs what a step of the finite elements does. With a gate or
+    a doubtful clock gains depend on what is measured: both recurse at every step, the latter in
+    modes.
     """
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
@@ -97,6 +105,8 @@ class KfFem(DisplacementNoise):
             covariance = self._dense(system, measurements, nodal)
             return stepper_of(self, system, measurements, nodal, covariance, nodal, None)
         claimed, covariance = self._shared(system, measurements, nodal)
+        if self.care(measurements):
+            return stepper_of(self, system, measurements, nodal, covariance, claimed, None)
         gains = shared_gains(covariance, timetable(measurements, self.dt), self.settled)
         in_nodes = gains.mapped(claimed.free)
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
@@ -185,6 +195,7 @@ def stepper_of(
         settings.recursion,
         claimed,
         settings.settled,
+        settings.care(measurements),
     )
 
 

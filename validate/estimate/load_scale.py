@@ -14,6 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting
 from validate.estimate.displacement_filter import load_shapes
 from validate.estimate.kalman import Gaussian, Innovation, kf_predict, kf_update, nothing
 from validate.estimate.measurements import Measurements, timetable
@@ -38,6 +39,8 @@ class LoadScale:
     walk: float = quantity(0.0, "1/s^0.5", "random walk of the scale")
     Q: float = quantity(1e-14, "m2", "variance that a step adds to the amplitude")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
@@ -46,11 +49,15 @@ class LoadScale:
             raise SceneError(f"{len(system.scene.loads)} loads: one shape is for one load")
         H = measurements.free(system.free)
         shape = load_shapes(system, H)[:, 0]
-        core = _core(self, system, shape, H @ shape, measurements.variances(self.R))
-        return CoreStepper(system, core, measurements.names, timetable(measurements, self.dt))
+        care = care_of(measurements, self.gate, self.clock, self.dt)
+        core = _core(self, system, shape, H @ shape, measurements.variances(self.R), care)
+        table = timetable(measurements, self.dt)
+        return CoreStepper(system, core, measurements.names, table, care)
 
 
-def _core(settings: LoadScale, system: System, s: Floats, seen: Floats, R: Floats) -> "ScaleCore":
+def _core(
+    settings: LoadScale, system: System, s: Floats, seen: Floats, R: Floats, care: Care | None
+) -> "ScaleCore":
     free = system.free
     m, c, k = (float(s @ (X[free][:, free] @ s)) for X in (system.M, system.C, system.K))
     ratio = c / (2 * np.sqrt(m * k))
@@ -60,7 +67,7 @@ def _core(settings: LoadScale, system: System, s: Floats, seen: Floats, R: Float
             f"needs {_OVERDAMPED:g}; use ReducedKf"
         )
     per_newton = float(s @ system.loads[free, 0]) / k
-    return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton)
+    return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton, care)
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,7 @@ class ScaleCore:
     R: Floats
     keep: float
     per_newton: float
+    care: Care | None = None
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -90,7 +98,11 @@ class ScaleCore:
         prior = kf_predict(inner, A, np.diag([s.Q, s.walk**2 * s.dt]))
         if z is None:
             return prior, nothing(len(self.seen))
-        update = kf_update(prior, z, np.outer(self.seen, [1.0, 0.0]), np.diag(self.R))
+        H, R = np.outer(self.seen, [1.0, 0.0]), np.diag(self.R)
+        if self.care is not None:
+            moved = self.seen * (prior.x[0] - inner.x[0])
+            return self.care.linear_update(prior, z, H, R, moved)
+        update = kf_update(prior, z, H, R)
         return update.posterior, update.innovation
 
     def free(self, inner: Gaussian) -> Floats:

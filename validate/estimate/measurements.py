@@ -1,6 +1,6 @@
 """What a filter is given: measurements of displacements, and the steps on which they land."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -24,8 +24,9 @@ class Measurements:
     """Displacements z (nt, m) m at times t (nt,) s, NaN = missing; H (m, N) reads them from u (N,).
 
     Unknowns are node-major; sd (m,) m are standard deviations of white noise, independent between
-    components; names (m,) such as "top.z". Raises `ComparisonError` for shapes that do not fit,
-    times that do not rise, and an sd that is not positive.
+    components; names (m,) such as "top.z"; sd_t s is how uncertain their clock is. Raises
+    `ComparisonError` for shapes that do not fit, times that do not rise, and an sd that is not
+    positive.
     """
 
     t: Floats
@@ -33,6 +34,7 @@ class Measurements:
     z: Floats
     sd: Floats
     names: tuple[str, ...]
+    sd_t: float = 0.0
 
     def __post_init__(self) -> None:
         m, nt = self.H.shape[0], len(self.t)
@@ -60,9 +62,7 @@ class Measurements:
         if absent:
             known = ", ".join(dict.fromkeys(owners))
             raise ComparisonError(f"marker '{absent[0]}' was not measured; there are {known}")
-        pick = [i for i, owner in enumerate(owners) if owner in markers]
-        names = tuple(self.names[i] for i in pick)
-        return Measurements(self.t, self.H[pick], self.z[:, pick], self.sd[pick], names)
+        return self._only(np.array([i for i, owner in enumerate(owners) if owner in markers]))
 
     def moving(self, free: Ints) -> "Measurements":
         """The components that any free unknown moves: what is held or driven teaches a filter
@@ -74,8 +74,12 @@ class Measurements:
         pick = np.flatnonzero(reach > 0)
         if len(pick) == 0:
             raise ComparisonError("every measured component is held or driven: nothing to estimate")
+        return self._only(pick)
+
+    def _only(self, pick: Ints) -> "Measurements":
         names = tuple(self.names[i] for i in pick)
-        return Measurements(self.t, self.H[pick], self.z[:, pick], self.sd[pick], names)
+        H, z, sd = self.H[pick], self.z[:, pick], self.sd[pick]
+        return Measurements(self.t, H, z, sd, names, self.sd_t)
 
     def variances(self, R: float | None) -> Floats:
         """R (m,) m^2 of the components: the one that is given, else their own sd squared."""
@@ -89,14 +93,37 @@ class Measurements:
 @dataclass(frozen=True)
 class Timetable:
     """Measured displacements (m,) m by step number (1, 2, ...); `at_rest` counts those at t = 0,
-    where the state is known."""
+    where the state is known, `missing` those later on in which every component is."""
 
     z: Mapping[int, Floats]
     at_rest: int = 0
+    missing: int = 0
 
     def at(self, step: int) -> Floats | None:
         """What was measured at a step, NaN = missing; None where nothing was: predict only."""
         return self.z.get(step)
+
+    def unheard(self, steps: int, numbers: Sequence[Mapping[str, float]]) -> str:
+        """Why no measurement reached a filter in so many of these steps, by the numbers that its
+        states told; empty where one did."""
+        if any(told["nis.dof"] > 0 for told in numbers):
+            return ""
+        late = sum(k > steps for k in self.z)
+        met = len(self.z) - late
+        gated = int(sum(told.get("gate.rejected", 0.0) for told in numbers))
+        reasons = (
+            (self.missing, "have all components missing"),
+            (self.at_rest, "lie at the start, where the state is known"),
+            (late, f"come after the last of {steps} steps"),
+            (met, f"were met, and the gate rejected {gated} looks of markers" if gated
+             else "were met in part only, which this filter does not take"),
+        )  # fmt: skip
+        told = ", ".join(f"{count} {words}" for count, words in reasons if count)
+        total = self.missing + self.at_rest + len(self.z)
+        return (
+            f"0 of {total} measurements reached the filter ({told}): what ran is the model alone; "
+            "compare it with a method without markers"
+        )
 
 
 def timetable(measurements: Measurements, dt: float) -> Timetable:
@@ -120,7 +147,8 @@ def timetable(measurements: Measurements, dt: float) -> Timetable:
         )
     seen = np.isfinite(measurements.z).any(axis=1) & (steps > 0)
     rows = {int(steps[i]): measurements.z[i] for i in np.flatnonzero(seen)}
-    return Timetable(MappingProxyType(rows), int((steps <= 0).sum()))
+    later = steps > 0
+    return Timetable(MappingProxyType(rows), int((~later).sum()), int(later.sum()) - len(rows))
 
 
 def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:
@@ -167,7 +195,7 @@ def measurements(registered: Registered, mesh: Mesh) -> Measurements:
     t, z, sd = on_steps(
         seen.t, z, np.tile([seen.along([c]) for c in range(d)], len(seen.names)), registered.t
     )
-    return Measurements(t, H, z, sd, names)
+    return Measurements(t, H, z, sd, names, seen.sd_t)
 
 
 def on_steps(t: Floats, z: Floats, sd: Floats, steps: Floats) -> tuple[Floats, Floats, Floats]:

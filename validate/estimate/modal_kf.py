@@ -26,7 +26,8 @@ from validate.solve.types import Stepper
 
 @dataclass(frozen=True)
 class ModalKf(DisplacementNoise):
-    """`gains`: "every_step" is the exact recursion as it goes, "shared" the same beforehand."""
+    """`gains`: "every_step" is the exact recursion as it goes, "shared" the same beforehand; with a
+    gate or a doubtful clock, as it goes."""
 
     gains: Gains = quantity("every_step", "1", "computed beforehand, or at every step")
 
@@ -40,6 +41,7 @@ class ModalKf(DisplacementNoise):
     ) -> DisplacementStepper:
         """`prepare` with modes that are known: many settings of one system share them."""
         covariance = modal_covariance(self, system, measurements, modes)
+        beforehand = self.gains == "shared" and self.care(measurements) is None
         table = timetable(measurements, self.dt)
-        gains = shared_gains(covariance, table, self.settled) if self.gains == "shared" else None
+        gains = shared_gains(covariance, table, self.settled) if beforehand else None
         return stepper_of(self, system, measurements, modes, covariance, modes, gains)

@@ -17,6 +17,8 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, UsageError
 from validate.estimate import node_ekf_kernel as kernel
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.covariance import noise
 from validate.estimate.explicit_filter import ExplicitFilterStepper
 from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
 from validate.estimate.kalman import Innovation
@@ -36,6 +38,9 @@ class NodeEKF:
     """Settings. `block`: a scalar filter per component (as printed), one per node (3 x 3), or one
     per component of (U_t, U_{t-dt}) together, whose P grows like a polynomial.
 
+    Every block takes a look's variance alone: of what a doubtful `clock` moves together it sees the
+    variances, and only a gate the rest.
+
     `correct_previous` shifts U_{t-dt} with U_t ("companion" estimates it anyway). `overflow`: at
     variances beyond 1e300 m^2 the run stops, or they are held there and counted.
     """
@@ -52,6 +57,8 @@ class NodeEKF:
     correct_previous: bool = quantity(False, "1", "shift U_{t-dt} with U_t")
     overflow: Literal["stop", "hold"] = quantity("stop", "1", "what to do when P overflows")
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1):
@@ -67,10 +74,11 @@ class NodeEKF:
         free = np.zeros(len(system.moves))
         free[system.free] = 1.0
         rows, R = _components(measurements), measurements.variances(self.Qm)
-        core = NodeCore(self, explicit, rows, R, free, self.Qp * free)
+        care = care_of(measurements, self.gate, self.clock, explicit.h)
+        core = NodeCore(self, explicit, rows, R, free, self.Qp * free, care)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
         times = timetable(measurements, explicit.h)
-        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal)
+        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal, care)
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,7 @@ class NodeCore:
     R: Floats
     free: Floats
     Q: Floats
+    care: Care | None
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -134,15 +143,33 @@ class NodeCore:
 
     def correct(self, memory: NodeMemory, number: int, z: Floats) -> tuple[NodeMemory, Innovation]:
         """Eqs 37-39 at the measured nodes; u and P are changed in place, this step made them."""
+        if self.care is None:
+            return self._corrected(memory, z, self.R)
+        shown, late = memory.u[self.rows], self.care.late((memory.u - memory.before)[self.rows])
+        S_yy = self._predicted(memory.P) + noise(self.R, late)
+        z, gated = self.care.passed(z, shown, S_yy)
+        R = self.R if late is None else self.R + late**2
+        memory, found = self._corrected(memory, z, R)
+        return memory, replace(found, gated=gated)
+
+    def _predicted(self, P: Floats) -> Floats:
+        """H P H^T (m, m) m^2: only components of one node are correlated, if blocks are nodes."""
+        if self.settings.block != "node":
+            return np.diag(P[0, self.rows])
+        node, axis = np.divmod(self.rows, 3)
+        same = node[:, None] == node
+        return np.where(same, P[kernel.ROW[axis[:, None], axis], node[:, None]], 0.0)
+
+    def _corrected(self, memory: NodeMemory, z: Floats, R: Floats) -> tuple[NodeMemory, Innovation]:
         c, u, P, m = self.settings, memory.u, memory.P, len(z)
         y, sd, joseph = np.empty(m), np.empty(m), c.covariance == "joseph"
         before = memory.before.copy()
-        dof = kernel.innovations(u, P, self.rows, z, self.R, y, sd)
+        dof = kernel.innovations(u, P, self.rows, z, R, y, sd)
         if c.block == "companion":
-            nis = kernel.correct_companions(u, before, P, self.rows, z, self.R, joseph)
+            nis = kernel.correct_companions(u, before, P, self.rows, z, R, joseph)
         else:
             update = kernel.correct_nodes if c.block == "node" else kernel.correct_components
-            nis = update(u, before, P, self.rows, z, self.R, joseph, c.correct_previous)
+            nis = update(u, before, P, self.rows, z, R, joseph, c.correct_previous)
         return NodeMemory(u, before, P, memory.held), Innovation(y, sd, nis, dof)
 
     def sd(self, memory: NodeMemory, number: int) -> Floats:

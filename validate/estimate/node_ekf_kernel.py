@@ -12,7 +12,7 @@ from validate.fem.compiled import compiled
 
 HUGE = 1e300  # m^2: beyond it the next products would leave the number range
 
-_ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
+ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
 _compiled = compiled(error_model="numpy")
 
 
@@ -185,20 +185,20 @@ def correct_nodes(
             continue
         y, S = z[m] - u[rows[m]], P[i, n] + R[m]
         for j in range(3):
-            G[j] = P[_ROW[i, j], n] / S
+            G[j] = P[ROW[i, j], n] / S
             u[3 * n + j] += G[j] * y
             if shift:
                 before[3 * n + j] += G[j] * y
         for j in range(3):
             for k in range(3):
                 own = (1 - G[i]) if j == i else 1.0
-                gone = 0.0 if j == i else G[j] * P[_ROW[i, k], n]
-                T[j, k] = own * P[_ROW[j, k], n] - gone
+                gone = 0.0 if j == i else G[j] * P[ROW[i, k], n]
+                T[j, k] = own * P[ROW[j, k], n] - gone
         for j in range(3):
             for k in range(j, 3):
-                P[_ROW[j, k], n] = T[j, k]
+                P[ROW[j, k], n] = T[j, k]
                 if joseph:
-                    P[_ROW[j, k], n] += G[j] * R[m] * G[k] - T[j, i] * G[k]
+                    P[ROW[j, k], n] += G[j] * R[m] * G[k] - T[j, i] * G[k]
         nis += y / S * y
     return nis
 

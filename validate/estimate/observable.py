@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.covariance import Claim, Decoupled, Recursion, claimed
+from validate.estimate.covariance import Claim, Decoupled, Recursion, claimed, noise
 from validate.estimate.kalman import Gain, Seen, best_gain
 
 _LEFT = 1e-12  # share of A^k H^T outside the space that is taken as none
@@ -43,8 +43,8 @@ class Observed:
             PV = self.f[:, None] * (PV @ self.T) + self.QV
         return claimed(PV, PV @ self.rows.T)
 
-    def update(self, claim: Claim, seen: Seen) -> tuple[Gain, Claim]:
-        gain = best_gain(claim.PHt, self.H @ claim.PHt + np.diag(self.R), seen)
+    def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
+        gain = best_gain(claim.PHt, self.H @ claim.PHt + noise(self.R, late), seen)
         i = np.array(seen)
         PV = claim.P - gain.G @ (claim.PHt[:, i].T @ self.V)
         return gain, claimed(PV, claim.PHt)

@@ -20,11 +20,12 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
-from validate.estimate.covariance import Dense
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.covariance import Claim, Dense, Recursion
 from validate.estimate.explicit_filter import ExplicitFilterStepper
 from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
 from validate.estimate.gains import Event, events, schedule
-from validate.estimate.kalman import Innovation, innovation
+from validate.estimate.kalman import Gain, Innovation, innovation
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_basis import Basis, modes, pod
 from validate.estimate.reduced_kf import steady
@@ -57,6 +58,8 @@ class ReducedEKF:
     noise: Literal["white", "load"] = quantity("white", "1", "where the process noise acts")
     gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or the steady one")
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1):
@@ -76,11 +79,12 @@ class ReducedEKF:
         model = shapes_covariance(self, explicit, basis, measurements)
         when = {} if refusal else schedule(times)
         recursion = steady(model, when) if self.gains == "steady" and when else model
-        updates = {e.step: e for e in events(recursion, when, _SETTLED)}
+        care = care_of(measurements, self.gate, self.clock, explicit.h)
+        updates = {} if care else {e.step: e for e in events(recursion, when, _SETTLED)}
         sensed = np.unique(measurements.H.indices).astype(np.int64)
         rows = np.ascontiguousarray(measurements.H[:, sensed].toarray())
-        core = ShapesCore(explicit, basis.Phi, model, updates, sensed, rows)
-        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal)
+        core = ShapesCore(explicit, basis.Phi, model, recursion, updates, sensed, rows, care)
+        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal, care)
 
     def _basis(self, steps: ExplicitStep) -> Basis:
         if self.basis == "pod":
@@ -135,25 +139,29 @@ def _directions(settings: ReducedEKF, system: System, basis: Basis) -> Floats:
 
 @dataclass(frozen=True)
 class ShapesMemory:
-    """U_t and U_{t-h} (N,) m, bias (l,) N, and the explicit step of the last update (0: none)."""
+    """U_t and U_{t-h} (N,) m, bias (l,) N, and the explicit step of the last update (0: none), with
+    care also what was claimed then."""
 
     u: Floats
     before: Floats
     bias: Floats
     at: int
+    claim: Claim | None = None
 
 
 @dataclass(frozen=True)
 class ShapesCore:
     """`updates` are by explicit step; `rows` (m, c) read measured components from the `sensed` (c,)
-    unknowns."""
+    unknowns. With `care` no update is known before: each has its gain from `recursion`."""
 
     explicit: ExplicitStep
     Phi: Floats
     covariance: Dense
+    recursion: Recursion
     updates: Mapping[int, Event]
     sensed: Ints
     rows: Floats
+    care: Care | None
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -161,12 +169,13 @@ class ShapesCore:
 
     def start(self) -> ShapesMemory:
         zeros = np.zeros(len(self.Phi))
-        return ShapesMemory(zeros, zeros, np.zeros(len(self.units)), 0)
+        claim = self.recursion.start() if self.care else None
+        return ShapesMemory(zeros, zeros, np.zeros(len(self.units)), 0, claim)
 
     def predict(self, memory: ShapesMemory, loads: Floats, drives: Floats) -> ShapesMemory:
         u, R = memory.u, self.explicit.model.force(memory.u)
         new = self.explicit.following(u, memory.before, R, loads + memory.bias, drives)
-        return ShapesMemory(new, u, memory.bias, memory.at)
+        return ShapesMemory(new, u, memory.bias, memory.at, memory.claim)
 
     def failure(self, memory: ShapesMemory) -> tuple[Ending, str] | None:
         return None
@@ -174,17 +183,37 @@ class ShapesCore:
     def correct(
         self, memory: ShapesMemory, number: int, z: Floats
     ) -> tuple[ShapesMemory, Innovation]:
-        gain, r = self.updates[number].gain, self.Phi.shape[1]
-        found = innovation(z, self.rows @ memory.u[self.sensed], gain)
-        dx = gain.G @ found.y[np.array(gain.seen)]
+        shown = self.rows @ memory.u[self.sensed]
+        if self.care is not None:
+            return self._heeded(self.care, memory, number, z, shown)
+        gain = self.updates[number].gain
+        found = innovation(z, shown, gain)
+        return self._moved(memory, gain, found, number, None), found
+
+    def _heeded(
+        self, care: Care, memory: ShapesMemory, number: int, z: Floats, shown: Floats
+    ) -> tuple[ShapesMemory, Innovation]:
+        assert memory.claim is not None
+        moved = shown - self.rows @ memory.before[self.sensed]
+        claim = self.recursion.predict(memory.claim, number - memory.at)
+        gain, claim, found, _ = care.update(self.recursion, claim, z, shown, moved)
+        if gain is None:
+            return memory, found
+        return self._moved(memory, gain, found, number, claim), found
+
+    def _moved(
+        self, memory: ShapesMemory, gain: Gain, found: Innovation, number: int, claim: Claim | None
+    ) -> ShapesMemory:
+        r, dx = self.Phi.shape[1], gain.G @ found.y[np.array(gain.seen)]
         moved = self.Phi @ dx[: 2 * r].reshape(2, r).T
         u, before = memory.u + moved[:, 0], memory.before + moved[:, 1]
-        return ShapesMemory(u, before, memory.bias + dx[2 * r :], number), found
+        return ShapesMemory(u, before, memory.bias + dx[2 * r :], number, claim)
 
     def sd(self, memory: ShapesMemory, number: int) -> Floats:
         """What the shapes span, diag(Phi P Phi^T)."""
         covariance, r = self.covariance, self.Phi.shape[1]
-        claim = self.updates[memory.at].claim if memory.at else covariance.start()
+        claim = self.updates[memory.at].claim if memory.at in self.updates else memory.claim
+        claim = claim or covariance.start()
         if number > memory.at:
             claim = covariance.predict(claim, number - memory.at)
         variances = np.maximum(((self.Phi @ claim.P[:r, :r]) * self.Phi).sum(axis=1), 0)

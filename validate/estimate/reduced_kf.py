@@ -13,7 +13,8 @@ from scipy.linalg import LinAlgError, solve_discrete_are
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.estimate.covariance import Dense, Steady, claimed
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.covariance import Claim, Dense, Recursion, Steady, claimed
 from validate.estimate.gains import Claims, gain_sequence, schedule
 from validate.estimate.kalman import Gain, Innovation, Seen, innovation, nothing, propagated
 from validate.estimate.linear_model import LinearModel
@@ -47,6 +48,8 @@ class ReducedKf:
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
     gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or where it settles")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for scenes with drives, large strain, or coupled damping, and
@@ -56,9 +59,10 @@ class ReducedKf:
         R = measurements.variances(self.R)
         model = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
         table = timetable(measurements, self.dt)
+        care = care_of(measurements, self.gate, self.clock, self.dt)
         make = _steady if self.gains == "steady" else _exact
-        core = make(model, schedule(table), self.settled)
-        return CoreStepper(system, core, measurements.names, table)
+        core = make(model, schedule(table), self.settled, care)
+        return CoreStepper(system, core, measurements.names, table, care)
 
 
 def dense_covariance(model: LinearModel) -> Dense:
@@ -97,42 +101,63 @@ def _sizes(F: Floats, Q: Floats, P: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Amplitudes:
-    """x (n,) after step k."""
+    """x (n,) after step k, and with care what was claimed after the last look, at step `at`."""
 
     x: Floats
     k: int
+    claim: Claim | None = None
+    at: int = 0
 
 
 @dataclass(frozen=True)
 class GainCore:
-    """A linear model with gains by step; `claims` gives P (n, n) at the end of any step."""
+    """A linear model with gains by step; `claims` gives P (n, n) of any state.
+
+    With `care` there are no gains beforehand: each look has its own, from `recursion`.
+    """
 
     reduced: ReducedModel
+    recursion: Recursion
     gains: Mapping[int, Gain]
-    claims: Callable[[int], Floats]
+    claims: Callable[[Amplitudes], Floats]
+    care: Care | None
 
     @property
     def units(self) -> Mapping[str, str]:
         return {f"load_bias.{j}": "N" for j in range(self.reduced.loads)}
 
     def start(self) -> Amplitudes:
-        return Amplitudes(self.reduced.model.x0, 0)
+        return Amplitudes(self.reduced.model.x0, 0, self.recursion.start() if self.care else None)
 
     def step(
         self, inner: Amplitudes, k: int, loads: Floats, z: Floats | None
     ) -> tuple[Amplitudes, Innovation]:
         m = self.reduced.model
         prior, gain = m.F @ inner.x + m.B @ loads, self.gains.get(k)
+        if self.care is not None:
+            return self._heeded(self.care, inner, prior, k, z)
         if z is None or gain is None:
             return Amplitudes(prior, k), nothing(len(m.H))
         seen = innovation(z, m.H @ prior, gain)
         return Amplitudes(prior + gain.G @ seen.y[np.array(gain.seen)], k), seen
 
+    def _heeded(
+        self, care: Care, inner: Amplitudes, prior: Floats, k: int, z: Floats | None
+    ) -> tuple[Amplitudes, Innovation]:
+        H = self.reduced.model.H
+        if z is None:
+            return replace(inner, x=prior, k=k), nothing(len(H))
+        claim, shown = claim_of(self.recursion, inner, 1), H @ prior
+        gain, claim, seen, _ = care.update(self.recursion, claim, z, shown, shown - H @ inner.x)
+        if gain is None:
+            return replace(inner, x=prior, k=k), seen
+        return Amplitudes(prior + gain.G @ seen.y[np.array(gain.seen)], k, claim, k), seen
+
     def free(self, inner: Amplitudes) -> Floats:
         return self.reduced.lift @ inner.x
 
     def variances(self, inner: Amplitudes) -> Floats:
-        P = self.claims(inner.k)
+        P = self.claims(inner)
         lift = self.reduced.lift
         return np.asarray(np.einsum("ij,ij->i", lift @ P, lift))
 
@@ -141,15 +166,29 @@ class GainCore:
         return dict(zip(self.units, biases.tolist(), strict=True))
 
 
-def _exact(reduced: ReducedModel, when: Mapping[int, Seen], settled: float) -> GainCore:
+def claim_of(recursion: Recursion, inner: Amplitudes, ahead: int = 0) -> Claim:
+    """What is claimed so many steps after a state that a filter with care is in."""
+    assert inner.claim is not None
+    steps = inner.k + ahead - inner.at
+    return recursion.predict(inner.claim, steps) if steps else inner.claim
+
+
+def _exact(
+    reduced: ReducedModel, when: Mapping[int, Seen], settled: float, care: Care | None
+) -> GainCore:
     covariance = dense_covariance(reduced.model)
+    if care is not None:
+        return GainCore(reduced, covariance, {}, lambda s: claim_of(covariance, s).P, care)
     claims = Claims(covariance, when, settled)
     gains = gain_sequence(covariance, when, settled).gains
-    return GainCore(reduced, gains, lambda k: claims.at(k).P)
+    return GainCore(reduced, covariance, gains, lambda s: claims.at(s.k).P, None)
 
 
-def _steady(reduced: ReducedModel, when: Mapping[int, Seen], settled: float) -> GainCore:
+def _steady(
+    reduced: ReducedModel, when: Mapping[int, Seen], settled: float, care: Care | None
+) -> GainCore:
     """Its variances are the steady ones, from the first step on."""
     recursion = steady(dense_covariance(reduced.model), when)
     _, after = recursion.update(recursion.prior, (True,) * len(recursion.H))
-    return GainCore(reduced, gain_sequence(recursion, when, settled).gains, lambda _: after.P)
+    gains = {} if care else gain_sequence(recursion, when, settled).gains
+    return GainCore(reduced, recursion, gains, lambda _: after.P, care)

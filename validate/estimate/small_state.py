@@ -1,12 +1,13 @@
 """The stepper of filters with a small state: what they share, around a core that they bring."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from validate.arrays import Floats
+from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.kalman import Innovation, innovation_units
 from validate.estimate.measurements import Timetable
 from validate.fem.system import System
@@ -48,6 +49,7 @@ class CoreStepper:
     core: Core
     names: tuple[str, ...]
     table: Timetable
+    care: Care | None
 
     @property
     def scene(self) -> Scene:
@@ -56,7 +58,11 @@ class CoreStepper:
     @property
     def units(self) -> Mapping[str, str]:
         """NIS with its degrees, innovations with their sd, and the core's own."""
-        return {**innovation_units(self.names), **self.core.units}
+        return {**innovation_units(self.names), **gate_units(self.care), **self.core.units}
+
+    def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
+        """Why no measurement reached the estimate; empty where one did."""
+        return self.table.unheard(len(numbers), numbers)
 
     def rest(self) -> State:
         return State(0, self.core.start())
@@ -67,7 +73,8 @@ class CoreStepper:
         inner, seen = self.core.step(state.inner, k, inputs, self.table.at(k))
         if not np.isfinite(self.core.free(inner)).all():
             return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
-        numbers = {**seen.numbers(self.names), **self.core.numbers(inner)}
+        numbers = {**seen.numbers(self.names), **gate_numbers(self.care, seen)}
+        numbers |= self.core.numbers(inner)
         return State(k, inner, numbers=numbers)
 
     def field(self, state: State) -> Floats:

@@ -33,6 +33,7 @@ from validate.replay.checks import checks_of, effects_of, joint_inputs, variants
 from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
+from validate.replay.gated import gate_warnings
 from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, configure
 from validate.replay.origins import Opened, marked, opened
@@ -141,6 +142,7 @@ def _compared(
     warnings = (
         *(identified.doubts if identified else ()),
         *doubts(parameters_used, found.stated, found.recordings, first),
+        *gate_warnings({name: main[name] for name in methods if name in experiment.accepted}),
     )
     return Result(
         name=experiment.name,
@@ -291,6 +293,7 @@ def _notes(
         *remade,
         *(identified.notes if identified else ()),
         *found,
+        *gate_warnings(main),
         *locking_notes((f.label, f.scene) for f in main.values()),
     )
     return tuple(dict.fromkeys(said))

@@ -10,6 +10,7 @@ from validate.register.markers import MarkerObservation
 from validate.replay.consistency import consistency_exhibit, nis_of
 from validate.replay.experiment import Experiment
 from validate.replay.followed import Cases, Followed
+from validate.replay.gated import gate_exhibit
 
 _MM = 1e3
 _ROUNDING = 1e-9  # of the displacements: a map of less would show the computer's arithmetic
@@ -31,6 +32,7 @@ def standard_exhibits(
         _speeds(experiment, main) if over_time else None,
         _maps(shown),
         consistency_exhibit(main, others, experiment.accepted),
+        gate_exhibit(main),
     )
     return tuple(exhibit for exhibit in found if exhibit)
 

@@ -14,6 +14,7 @@ from validate.scene.meshless import AnyScene
 from validate.scene.scene import Scene, Weight
 from validate.solve.handles import require_handled
 from validate.solve.types import (
+    Listening,
     Outcome,
     Run,
     SceneSolver,
@@ -79,6 +80,7 @@ def march(
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
     walk, outcome = _walk(stepper, inputs, frozenset(at.tolist()), tell)
+    outcome = _listened(stepper, walk, outcome)
     done = len(walk.updates)
     traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
     traces |= given_traces(stepper.scene, inputs[:done])
@@ -128,6 +130,14 @@ def _walk(
             if isinstance(stepper, Uncertain):
                 walk.sd.append(stepper.sd(state))
     return walk, Outcome("finished", len(inputs))
+
+
+def _listened(stepper: Stepper, walk: _Kept, outcome: Outcome) -> Outcome:
+    """A filter that no measurement reached is its model under another name: its run is invalid."""
+    if outcome.state != "finished" or not isinstance(stepper, Listening):
+        return outcome
+    why = stepper.unheard(walk.numbers)
+    return Outcome("invalid", outcome.step, why) if why else outcome
 
 
 def _in_unit_of(scene: Scene, trace: Trace) -> Trace:

@@ -1,6 +1,6 @@
 """States, outcomes and runs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
@@ -83,6 +83,15 @@ class Uncertain(Protocol):
 
     def sd(self, state: State) -> Floats:
         """Standard deviations (n, d) m of the field."""
+        ...
+
+
+@runtime_checkable
+class Listening(Protocol):
+    """A stepper that is given measurements: a filter."""
+
+    def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
+        """Why none reached it in steps that told these numbers; empty where one did."""
         ...
 
 

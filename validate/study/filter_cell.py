@@ -128,6 +128,8 @@ def _all_seeds(
     if not (np.isfinite(found.values).all() and np.isfinite(found.nis).all()):
         raise ComparisonError("diverged: the estimate is not finite")
     names, dof = [p.name for p in scene.probes], int(found.dof.sum())
+    if not dof:
+        raise ComparisonError(f"invalid: {stepper.sensor.table.unheard(len(inputs), ())}")
     scores = [
         _scores(bench, first, dict(zip(names, values.T, strict=True)), float(nis.sum()), dof)
         for values, nis in zip(found.values, found.nis, strict=True)
