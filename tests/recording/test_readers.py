@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from exports import rows
 from mcap_samples import sample_recording
+from pydicom.dataset import Dataset, FileMetaDataset
+from pydicom.uid import ExplicitVRLittleEndian
 from scipy.io import savemat
 from sequences import tracked
 
@@ -111,6 +113,19 @@ def make_ndi(path: Path) -> None:
     path.write_text("Time (s),Tx,Ty,Tz,Qx,Qy,Qz,Q0\n" + "\n".join(body) + "\n")
 
 
+def make_dicom(path: Path) -> None:
+    ds = Dataset()
+    ds.SOPClassUID, ds.SOPInstanceUID = "1.2.840.10008.5.1.4.1.1.3.1", "1.2.3.4"
+    ds.Modality, ds.PhotometricInterpretation, ds.SamplesPerPixel = "US", "MONOCHROME2", 1
+    ds.Rows, ds.Columns, ds.NumberOfFrames, ds.FrameTime = 6, 8, 3, 40.0
+    ds.BitsAllocated = ds.BitsStored = 8
+    ds.HighBit, ds.PixelRepresentation, ds.PixelSpacing = 7, 0, [0.1, 0.2]
+    ds.PixelData = np.arange(144, dtype=np.uint8).tobytes()
+    ds.file_meta = FileMetaDataset()
+    ds.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+    ds.save_as(path, enforce_file_format=True)
+
+
 def make_fcsv(path: Path) -> None:
     head = "# Markups fiducial file version = 5.0\n# CoordinateSystem = LPS\n"
     rows = [f"{i},{i}.5,2,3,0,0,0,1,1,1,0,F-{i},,,2,0\n" for i in range(3)]
@@ -134,6 +149,7 @@ MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "optitrack": (make_optitrack, {}),
     "ndi": (make_ndi, {}),
     "fcsv": (make_fcsv, {}),
+    "dicom": (make_dicom, {}),
     "markups": (make_markups, {}),
     "metaimage": (make_metaimage, {}),
     "nrrd": (make_nrrd, {}),

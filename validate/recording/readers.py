@@ -6,6 +6,7 @@ from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.recording.exports.instron import INSTRON
 from validate.recording.formats.c3d import C3D
+from validate.recording.formats.dicom import DICOM
 from validate.recording.formats.matlab import MATLAB
 from validate.recording.formats.metaimage import METAIMAGE
 from validate.recording.formats.ndi import NDI
@@ -21,7 +22,7 @@ from validate.recording.reader import Reader
 
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
-    MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
+    MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
     INSTRON, PNG_STACK,
 )  # fmt: skip
 

@@ -1,0 +1,101 @@
+"""DICOM ultrasound that scanners wrote: the files of the package pydicom-data."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pydicom.data
+import pytest
+
+from validate.errors import RecordingError, UsageError
+from validate.recording.formats import apart
+from validate.recording.formats.dicom import read_dicom
+from validate.recording.readers import recognised
+
+data_store = pytest.importorskip("data_store", reason="pydicom-data is not installed")
+DATA = Path(data_store.__file__).parent / "data"
+BESIDE = Path(pydicom.data.__file__).parent / "test_files"
+
+
+def test_a_cine_loop_is_its_region_with_its_scale_and_its_times() -> None:
+    """120 JPEG images at 33.333 ms; the region states .05104970559 cm a pixel."""
+    path = DATA / "color3d_jpeg_baseline.dcm"
+    assert recognised(path).name == "dicom"
+    got = read_dicom(path, {})
+    frames = got.frame("images")
+    assert len(frames.images) == 120
+    assert frames.images[0].shape == (384, 512)
+    assert frames.m_per_px == pytest.approx((5.104970559e-4, 5.104970559e-4), rel=1e-9)
+    assert frames.t[-1] == pytest.approx(119 * 0.033333)
+    told = got.metadata["provenance"]
+    assert told["times"] == "FrameTime"
+    assert told["images px"] == "84..596 x 31..415 of 640 x 480"
+
+
+@pytest.mark.parametrize("other", ["OBXXXX1A_rle_2frame.dcm", "OBXXXX1A_expb_2frame.dcm"])
+def test_the_same_images_in_other_encodings_are_the_same_bit_for_bit(other: str) -> None:
+    plain = read_dicom(DATA / "OBXXXX1A_2frame.dcm", {"rate": "20"}).frame("images")
+    also = read_dicom(DATA / other, {"rate": "20"}).frame("images")
+    assert plain.m_per_px == also.m_per_px == pytest.approx((2.622878767e-4,) * 2, rel=1e-9)
+    for a, b in zip(plain.images, also.images, strict=True):
+        assert (a == b).all()
+    assert plain.t.tolist() == [0, 0.05]
+
+
+def test_two_views_beside_each_other_are_two_streams_from_the_left() -> None:
+    got = read_dicom(DATA / "gdcm-US-ALOKA-16.dcm", {})
+    assert sorted(got.frames) == ["images/1", "images/2"]
+    told = got.metadata["provenance"]
+    assert told["images/1 px"] == "32..336 x 24..416 of 640 x 480"
+    assert told["images/2 px"] == "336..640 x 24..416 of 640 x 480"
+    big = read_dicom(DATA / "gdcm-US-ALOKA-16_big.dcm", {})
+    for topic in got.frames:
+        assert (got.frame(topic).images[0] == big.frame(topic).images[0]).all()
+
+
+def test_a_scale_of_an_image_of_another_size_is_not_believed() -> None:
+    path = BESIDE / "examples_ybr_color.dcm"
+    with pytest.raises(
+        UsageError, match=r"ends at pixel 595, 414 of an image of 320 x 240: it was"
+    ):
+        read_dicom(path, {})
+    frames = read_dicom(path, {"m_per_px": "1.02mm"}).frame("images")
+    assert frames.images[0].shape == (240, 320)
+    assert frames.m_per_px == pytest.approx((1.02e-3, 1.02e-3))
+
+
+def test_what_is_not_stated_is_asked_for() -> None:
+    with pytest.raises(UsageError, match="2 images without times; say --map rate=HZ"):
+        read_dicom(DATA / "OBXXXX1A_2frame.dcm", {})
+    with pytest.raises(UsageError, match=r"states no scale, .* say --map m_per_px=0.1mm"):
+        read_dicom(DATA / "US1_UNCR.dcm", {})
+
+
+@pytest.mark.parametrize(
+    ("path", "why"),
+    [
+        (DATA / "JPGLosslessP14SV1_1s_1f_8b.dcm", "'JPEG Lossless, .* make it uncompressed first"),
+        (BESIDE / "rtplan.dcm", "no image in it"),
+        (BESIDE / "CT_small.dcm", "pixels of int16; only 8-bit images are read"),
+    ],
+)
+def test_what_is_no_readable_image_says_why(path: Path, why: str) -> None:
+    with pytest.raises(RecordingError, match=why):
+        read_dicom(path, {})
+
+
+def test_without_the_library_the_line_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    blocked = "import sys; sys.modules['pydicom'] = None; import runpy; runpy.run_module("
+    run = (sys.executable, "-c", f"{blocked}'validate.recording.formats.apart', None, '__main__')")
+    monkeypatch.setattr(apart, "_RUN", run)
+    with pytest.raises(UsageError, match=r"'pydicom'.*pip install 'validate-tissue\[dicom\]'"):
+        read_dicom(DATA / "US1_UNCR.dcm", {"m_per_px": "1mm"})
+
+
+def test_luma_is_what_an_operator_sees() -> None:
+    """Of pure red, green and blue: .299, .587 and .114 of white."""
+    frames = read_dicom(DATA / "SC_rgb.dcm", {"m_per_px": "1mm"}).frame("images")
+    values = set(np.unique(frames.images[0]).tolist())
+    assert {76, 150, 29, 0, 255} <= values

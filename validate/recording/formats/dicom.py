@@ -1,0 +1,117 @@
+"""DICOM images, above all of ultrasound: each calibrated region is a stream with its own scale."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.formats.apart import decoded
+from validate.recording.formats.options import above_zero, length
+from validate.recording.formats.recorded import recorded
+from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.types import Frames, Recording, Stream
+
+IMAGES = "images"
+_MAGIC, _AT = b"DICM", 128
+_PLANE = 1  # PS3.3 C.8.5.5.1.1: spatial format, a plane
+_TISSUE = (1.0, 2.0)  # C.8.5.5.1.2: data type, tissue or colour flow
+_OPTIONS = ("m_per_px", "rate", "frame")
+_Box = tuple[int, int, int, int]
+
+
+def read_dicom(path: Path, options: Options) -> Recording:
+    """Images (h, w) grey of every region of tissue, cut out, with the sides of its pixels in m:
+    `images`, or `images/1`, `images/2` from the left where there are several.
+
+    Without regions the whole image, with the stated spacing. Options: `m_per_px` (then the whole
+    image, with that scale), `rate` (Hz) in place of the file's times, `frame` (default image).
+    Raises `UsageError` where scale or times are stated nowhere, or the regions are those of an
+    image of another size, `RecordingError` for a file that is cut, damaged or holds no such image.
+    """
+    require_known(options, _OPTIONS)
+    if head(path, _AT + 4)[_AT:] != _MAGIC:
+        raise RecordingError(f"{path.name}: no DICOM file, or one cut in its first 132 bytes")
+    found = decoded("dicom_arrays", path, "dicom")
+    images = found["images"]
+    t = _times(path, found, options)
+    frame = options.get("frame", "image")
+    regions = _regions(path, found, options)
+    streams: dict[str, Stream] = {}
+    told = dict(text.split(": ", 1) for text in found["told"].tolist())
+    for i, (box, sides) in enumerate(regions, start=1):
+        topic = IMAGES if len(regions) == 1 else f"{IMAGES}/{i}"
+        left, top, right, bottom = box
+        cut = tuple(np.ascontiguousarray(image[top:bottom, left:right]) for image in images)
+        streams[topic] = Frames(t, cut, sides, np.eye(4), frame)
+        told[f"{topic} px"] = f"{left}..{right} x {top}..{bottom} of {images.shape[2]} x " \
+                              f"{images.shape[1]}"  # fmt: skip
+    told |= {"kind": "images (DICOM)", "times": _timed(found, options)}
+    source = source_of(path, "DICOM keeps no checksum: integrity not provable")
+    return recorded(path.stem, source, streams, told)
+
+
+def _times(path: Path, found: Mapping[str, Any], options: Options) -> Floats:
+    count = len(found["images"])
+    if "rate" in options:
+        return np.arange(count) / above_zero(options, "rate")
+    if len(found["t"]) != count:
+        raise UsageError(f"{path.name}: {count} images without times; say --map rate=HZ")
+    return np.asarray(np.rint(1e9 * found["t"]) / 1e9)
+
+
+def _timed(found: Mapping[str, Any], options: Options) -> str:
+    return f"{options['rate']} Hz (entered)" if "rate" in options else str(found["timed"])
+
+
+def _regions(
+    path: Path, found: Mapping[str, Any], options: Options
+) -> list[tuple[_Box, tuple[float, float]]]:
+    """Where each stream lies in the image, px, and the sides of its pixels, m."""
+    _, height, width = found["images"].shape
+    whole = (0, 0, width, height)
+    if "m_per_px" in options:
+        side = length(options, "m_per_px", "0.1mm")
+        return [(whole, (side, side))]
+    planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
+              and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
+    if not planes:
+        return [(whole, _spacing(path, found["spacing"]))]
+    return [
+        (_box(path, r, width, height), (float(r[4]), float(r[5])))
+        for r in sorted(planes, key=lambda r: (float(r[0]), float(r[1])))
+    ]
+
+
+def _spacing(path: Path, spacing: Floats) -> tuple[float, float]:
+    if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
+        raise UsageError(
+            f"{path.name}: states no scale, neither regions in cm nor a spacing; say "
+            "--map m_per_px=0.1mm"
+        )
+    return 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
+
+
+def _box(path: Path, region: Floats, width: int, height: int) -> _Box:
+    left, top, right, bottom = (int(v) for v in region[:4])
+    if right > width or bottom > height:
+        raise UsageError(
+            f"{path.name}: its region ends at pixel {right}, {bottom} of an image of {width} x "
+            f"{height}: it was resized after its scale was written; say --map m_per_px=0.1mm"
+        )
+    if left < 0 or top < 0 or right <= left or bottom <= top:
+        raise RecordingError(
+            f"{path.name}: a region from {left}, {top} to {right}, {bottom}; damaged"
+        )
+    return left, top, min(right + 1, width), min(bottom + 1, height)
+
+
+DICOM = Reader(
+    "dicom",
+    "ultrasound and other images (DICOM)",
+    lambda p: head(p, _AT + 4)[_AT:] == _MAGIC,
+    read_dicom,
+    "DICM stands at byte 128",
+)
