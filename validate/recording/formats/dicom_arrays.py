@@ -102,13 +102,13 @@ def _times(ds: pydicom.Dataset, count: int) -> tuple[NDArray[np.float64], str]:
     vector = ds.get("FrameTimeVector")
     if vector is not None and len(vector) == count:
         steps = 1e-3 * np.array([0.0, *(float(v) for v in list(vector)[1:])], dtype=np.float64)
-        return np.asarray(steps.cumsum(), dtype=np.float64), "FrameTimeVector"
+        return steps.cumsum(), "FrameTimeVector"
     for field, factor in (("FrameTime", 1e-3), ("ActualFrameDuration", 1e-3)):
         if float(ds.get(field) or 0) > 0:
-            return factor * float(ds.get(field)) * np.arange(count), field
+            return np.arange(count, dtype=np.float64) * (factor * float(ds.get(field))), field
     for field in ("CineRate", "RecommendedDisplayFrameRate"):
         if float(ds.get(field) or 0) > 0:
-            return np.arange(count) / float(ds.get(field)), f"{field}, the rate of display"
+            return np.arange(count, dtype=np.float64) / float(ds.get(field)), f"{field}, the rate of display"
     return np.zeros(0), "nothing"
 
 
