@@ -24,7 +24,7 @@ from validate.papers.async_regions.line import HapticProbe, LoadCell, TouchedLin
 from validate.papers.async_regions.line_exhibits import spring_words
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import growth, off, peak, pushed
-from validate.papers.async_regions.sizes import HEADS, reduced, size_rows, size_table
+from validate.papers.async_regions.sizes import HEADS, size_rows, size_table
 from validate.replay.find import load_file
 from validate.replay.ladder_default import body_of, trial_of
 from validate.solve.regions import AsyncRegions
@@ -116,18 +116,6 @@ def test_growth_is_that_of_the_tick() -> None:
     slow = replace(WHOLE, layers=(9,), rates=(100.0,))
     assert growth(bar(E, 10), slow) == pytest.approx(one, rel=2e-2)
     assert growth(bar(E, 10), replace(WHOLE, spring=200e3)) > 1.0
-
-
-def test_the_krylov_model_follows_the_whole_block() -> None:
-    """Statics from one vector a direction on, a smooth push to a few parts in a thousand."""
-    scene, near = block(E, 2, 2), AsyncRegions(H, (), ())
-    depth = 5e-3 * np.sin(np.linspace(0.0, np.pi / 2, 1500)) ** 2
-    whole = pushed(scene, near, depth).force
-    for r, close in ((1, 2e-2), (4, 2e-3)):
-        assert off(reduced(scene, near, r).walk(depth, near.spring)[0], whole) < close
-    held = np.minimum(np.arange(1, 3001) / 1000, 1.0) * 5e-3
-    statics = reduced(scene, near, 1).walk(held, near.spring)[0][-1]
-    assert statics == pytest.approx(pushed(scene, near, held).force[-1], rel=1e-5)
 
 
 def test_a_spring_that_is_too_stiff_is_warned_of() -> None:

@@ -20,6 +20,7 @@ from validate.papers.async_regions.bodies import (
     pad_of,
 )
 from validate.scene.scene import Scene
+from validate.solve.march import run_scheme
 from validate.solve.region_map import layers_from, ratios, split
 from validate.solve.region_march import carried, spectral_radius
 from validate.solve.region_size import PrimarySize
@@ -308,6 +309,17 @@ def test_rates_that_do_not_divide_the_primary_one_are_rounded_in_words() -> None
     )
     stepper = stepper_of(replace(NEAR, rates=(300.0,)))
     assert "300 Hz does not divide" in stepper.notices(stepper.rest())[0]
+
+
+def test_what_is_rounded_or_left_out_is_said_by_the_run_once() -> None:
+    settings = replace(NEAR, layers=(4, CELLS), rates=(300.0, 50.0))
+    t, still = H * np.arange(1, 6), np.zeros((5, 2))
+    run = run_scheme("r", settings, bar(E, CELLS), t, still, np.array([4]))
+    assert run.said == (
+        "300 Hz does not divide 1000 Hz: solved every 3 ticks, at 333.3 Hz",
+        "1 of 3 regions lie beyond the body's 12 layers and are left out",
+    )
+    assert run_scheme("r", NEAR, bar(E, CELLS), t, still, np.array([4])).said == ()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from validate.scene.box import box
 from validate.scene.contact import RigidContact, RigidPlane
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Drive, Load, Scene, Support
+from validate.scene.tool import Needle
 from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.modal import Modal
 from validate.solve.newton import StaticNewton
@@ -103,6 +104,37 @@ def test_a_scheme_of_drives_and_loads_steps_and_says_what_its_states_mean(
     assert u[plate, 2] == pytest.approx(np.full(len(plate), -0.001))
     assert stepper.units == {"press.force": "N"}
     assert state.numbers["press.force"] > 0.1
+    with pytest.raises(FrozenInstanceError):
+        state.updates = 7  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    "scheme",
+    [s for s in NEEDLES if s.handles.inertia and s.handles.law == ("linear",)],
+    ids=lambda s: s.__name__,
+)
+def test_a_scheme_of_a_touched_body_steps_and_says_what_its_states_mean(
+    scheme: type[Scheme], pressed: System
+) -> None:
+    """A probe that pushes a face inward feels it push back."""
+    scene = replace(
+        pressed.scene,
+        material=Material(1e5, 0.45, rho=1000.0, mass_damping=5.0),
+        drives=(),
+        loads=(),
+        tools=(Needle("tip", "x1", (0.02, 0.01, 0.01), (-1.0, 0.0, 0.0)),),
+    )
+    stepper = scheme().prepare(build(scene))
+    rest = stepper.rest()
+    assert (rest.k, np.abs(stepper.field(rest)).max()) == (0, 0.0)
+    state = stepper.step(rest, np.array([-0.001, 0.0, 0.0]))
+    assert state.failure is None
+    assert (state.k, set(state.numbers)) == (1, set(stepper.units))
+    u = stepper.field(state)
+    assert u.shape == scene.mesh.nodes.shape
+    assert u[scene.mesh.nearest_node(np.array([0.02, 0.01, 0.01])), 0] < 0
+    assert stepper.units["tip.force.x"] == "N"
+    assert state.numbers["tip.force.x"] > 0.1
     with pytest.raises(FrozenInstanceError):
         state.updates = 7  # type: ignore[misc]
 

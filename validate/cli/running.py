@@ -116,6 +116,8 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
             _checks(method)
         if ended := next((r.outcome for r in method.runs if not r.finished), None):
             say(f"{method.name}: {ended.state} at step {ended.step}: {ended.why}", indent="  ")
+        for words in dict.fromkeys(w for r in method.runs for w in r.said):
+            say(f"{method.name}: {words}", indent="  ")
     if result.published:
         figures_table([figure_members(p) for p in result.published])
     say(f"\n{result.sentence}")

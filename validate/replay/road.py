@@ -281,11 +281,12 @@ def _opening(identified: Identified | None) -> str:
 def _notes(
     remade: tuple[str, ...], identified: Identified | None, main: Mapping[str, Followed]
 ) -> tuple[str, ...]:
-    """What was made anew, identified, noticed by registration, compared with nothing, and locks."""
+    """What was made anew, identified, noticed by registration or schemes, not compared; locks."""
     first = next(iter(main.values()))
     found = [f for r in first.registered for f in r.findings]
     markers = [m for r in first.registered for m in r.of(MarkerObservation)]
     found += [f for m in markers for f in m.registration.findings]
+    found += [f"{f.label}: {w}" for f in main.values() for run in f.runs for w in run.said]
     found += [
         f for pair in zip(first.registered, first.runs, strict=True) for f in unanswered(*pair)
     ]

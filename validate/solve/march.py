@@ -15,6 +15,7 @@ from validate.scene.scene import Scene, Weight
 from validate.solve.handles import require_handled
 from validate.solve.types import (
     Listening,
+    Noticing,
     Outcome,
     Run,
     SceneSolver,
@@ -93,12 +94,15 @@ def march(
     times = _step_times(seconds[_UNTIMED if done > 2 * _UNTIMED else 0 :]) if done else None
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
-    return Run(method, t[:done], at[at < done], u, traces, outcome, setup_s, times, sd, seconds)
+    at = at[at < done]
+    return Run(
+        method, t[:done], at, u, traces, outcome, setup_s, times, sd, seconds, tuple(walk.said)
+    )
 
 
 @dataclass(frozen=True)
 class _Kept:
-    """What is kept of the steps: numbers, seconds, probes (p, d) m, and fields at the frames."""
+    """What is kept of the steps: numbers, seconds, probes (p, d) m, fields at the frames, words."""
 
     updates: list[int] = field(default_factory=list)
     numbers: list[Mapping[str, float]] = field(default_factory=list)
@@ -106,6 +110,7 @@ class _Kept:
     probes: list[Floats] = field(default_factory=list)
     fields: list[Floats] = field(default_factory=list)
     sd: list[Floats] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
 
 
 def _walk(
@@ -119,6 +124,8 @@ def _walk(
         start = perf_counter()
         state = stepper.step(state, value)
         walk.seconds.append(perf_counter() - start)
+        if isinstance(stepper, Noticing):
+            walk.said.extend(w for w in stepper.notices(state) if w not in walk.said)
         if state.failure:
             return walk, Outcome(state.failure[0], i, state.failure[1])
         walk.updates.append(state.updates)

@@ -9,11 +9,23 @@ from scipy import sparse
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.matrices import damping_of
+from validate.fem.rigid import require_held
 from validate.fem.system import System
 from validate.scene.select import facets_of
 from validate.solve.region_map import layers_from, node_graph, spacing, split, widened
 from validate.solve.region_march import BorderName, Coupled, zone_of
 from validate.solve.region_solvers import EXPLICIT, RegionMatrices, SolverName, critical_period
+
+
+def require_one_probe(system: System) -> None:
+    """Raises `SceneError` for a scene without one probe, with drives, or that can move rigidly."""
+    scene = system.scene
+    if len(scene.tools) != 1 or scene.drives:
+        raise SceneError(
+            f"{len(scene.tools)} probes and {len(scene.drives)} drives: a touched body takes one "
+            "probe and no drive"
+        )
+    require_held(scene, system.held)
 
 
 @dataclass(frozen=True)
@@ -35,8 +47,8 @@ class RegionBody:
         scene, free = system.scene, system.free
         if any(m.stiffness_damping for m in scene.materials):
             raise SceneError(
-                "asynchronous regions solve each node's own damping, C = alpha M (paper 004, eq "
-                "5); drop stiffness_damping, or take Newmark"
+                "touched bodies are solved with each node's own damping, C = alpha M (paper "
+                "004, eq 5); drop stiffness_damping, or take Newmark"
             )
         d = scene.mesh.dimension
         nodes = np.unique(free // d)

@@ -20,13 +20,12 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.rigid import require_held
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
-from validate.solve.region_body import RegionBody, RegionPlan, Regions
+from validate.solve.region_body import RegionBody, RegionPlan, Regions, require_one_probe
 from validate.solve.region_map import ratios
 from validate.solve.region_march import BorderName, Motion, carried
 from validate.solve.region_size import PrimarySize, SizeName
@@ -99,12 +98,7 @@ class AsyncRegions:
         """Raises `SceneError` for a scene without one probe, or whose surface is all held."""
         scene = system.scene
         require_handled(scene, self)
-        if len(scene.tools) != 1 or scene.drives:
-            raise SceneError(
-                f"{len(scene.tools)} probes and {len(scene.drives)} drives: asynchronous regions "
-                "take one probe and no drive"
-            )
-        require_held(scene, system.held)
+        require_one_probe(system)
         tool, body = scene.tools[0], RegionBody.of(system)
         every, words = ratios(self.rates, self.dt)
         plan = RegionPlan(body, self.dt, self.layers, every, self.solvers, self.border,

@@ -24,6 +24,7 @@ from validate.solve.regions import AsyncRegions
 from validate.solve.rigid_motion import RigidMotion
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
+from validate.solve.touched_krylov import TouchedKrylov
 from validate.solve.types import SceneSolver, Scheme
 from validate.solve.viscous_modes import ViscousModes
 
@@ -45,6 +46,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
     NeedleLoop,
     AsyncRegions,
     HapticLoop,
+    TouchedKrylov,
 )
 
 # What solves a whole scene at once.

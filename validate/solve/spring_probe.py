@@ -101,10 +101,15 @@ class SpringProbe:
         return np.asarray(self.spring * (tip - self.slack_at(held, u)))
 
     def nodal(self, held: Hold | None, tip: Floats, u: Floats) -> Floats:
-        """That force on the unknowns (m,), equal on the pad's nodes."""
+        """That force on the unknowns (m,)."""
+        if held is None:
+            return np.zeros(len(self.body.at))
+        return self.shared(held, self.force(held, tip, u))
+
+    def shared(self, held: Hold, force: Floats) -> Floats:
+        """A force (d,) N on the unknowns (m,), equal on the pad's nodes."""
         f = np.zeros(self.body.places.shape)
-        if held is not None:
-            f[list(held.pad)] = self.force(held, tip, u) / len(held.pad)
+        f[list(held.pad)] = force / len(held.pad)
         return np.asarray(f.ravel()[self.body.at])
 
     def _pulled(self, held: Hold, tip: Floats, u: Floats) -> float:

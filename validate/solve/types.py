@@ -95,6 +95,15 @@ class Listening(Protocol):
         ...
 
 
+@runtime_checkable
+class Noticing(Protocol):
+    """A stepper that does not do all that its settings ask, and says what it does instead."""
+
+    def notices(self, state: State) -> tuple[str, ...]:
+        """What was rounded or left out up to this state, in words."""
+        ...
+
+
 class Scheme(Protocol):
     """Settings of a scheme that steps. `prepare` does all that is done once."""
 
@@ -143,7 +152,7 @@ class Run:
     """t (nt,) s of the steps done; u (no, n, d) m at the output steps `at`; traces by name.
 
     `u` keeps the output frames only, and so does a filter's `sd`; `traces` every step, and
-    `seconds` (nt,) what each took, where it was timed.
+    `seconds` (nt,) what each took, where it was timed. `said`: what a `Noticing` stepper noticed.
     """
 
     method: str
@@ -156,6 +165,7 @@ class Run:
     step_s: StepTimes | None
     sd: Floats | None = None
     seconds: Floats | None = None
+    said: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", checked(self.t, "run t [s]", (None,)))

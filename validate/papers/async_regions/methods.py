@@ -1,10 +1,11 @@
 """The methods of `async_line`, rows of Table 1 and other borders for its worst one, and those of
-`async_block`."""
+`async_block`; beside both a reduced model of the same body."""
 
 from dataclasses import replace
 
 from validate.replay.method import Method
 from validate.solve.regions import AsyncRegions
+from validate.solve.touched_krylov import TouchedKrylov
 
 _WORST = AsyncRegions(layers=(5,), rates=(5.0,))
 LINE = {
@@ -22,6 +23,7 @@ LINE = {
             layers=(5, 10), rates=(500.0, 50.0), solvers=("explicit", "semi_implicit", "static")
         ),
     ),
+    "krylov": Method("4 Krylov vectors", TouchedKrylov()),
 }
 
 _NEAR = AsyncRegions(layers=(3,), rates=(50.0,))
@@ -38,4 +40,5 @@ BLOCK = {
         "1 to 4 layers by the displaced nodes, 50 Hz",
         replace(_NEAR, layers=(1,), adapt="threshold", most=4, moved=1e-3),
     ),
+    "krylov": Method("4 Krylov vectors a direction", TouchedKrylov()),
 }

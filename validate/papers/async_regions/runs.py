@@ -1,23 +1,25 @@
 """Runs of paper 004's bodies under a pushed probe, with the energy that their borders make."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import thread_time
 from typing import cast
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.system import build
+from validate.fem.system import System, build
 from validate.papers.async_regions.bodies import PROBE
 from validate.scene.scene import Scene
 from validate.solve.region_march import spectral_radius
 from validate.solve.regions import AsyncRegions, RegionStepper
+from validate.solve.touched_krylov import TouchedKrylov
+from validate.solve.types import Noticing
 
 
 @dataclass(frozen=True)
 class Pushed:
     """Force (nt,) N on the hand along x, CPU time of the ticks (nt,) s, layers (nt,) of the primary
-    region.
+    region (0: there is none).
 
     `made` J is the largest energy of body and spring beyond what the hand put in and damping took;
     `put` J the largest that the hand had put in. `words` on rounding and how it ended.
@@ -35,36 +37,69 @@ def stepper_of(scene: Scene, settings: AsyncRegions) -> RegionStepper:
     return cast(RegionStepper, settings.prepare(build(scene)))
 
 
-def pushed(scene: Scene, settings: AsyncRegions, depth: Floats, account: bool = False) -> Pushed:
-    """Walks a probe that is pushed by `depth` (nt,) m along -x; `account`: with energies."""
-    stepper = stepper_of(scene, settings)
-    state, d, h = stepper.rest(), scene.mesh.dimension, settings.dt
-    force, seconds, layers = [], [], []
-    m, c, K = stepper.body.body.m, stepper.body.body.c, stepper.body.body.K
-    ledger, before, last_x = [(0.0, 0.0)], stepper.body.still, 0.0
-    put = lost = 0.0
-    for x in depth:
+def pushed(
+    scene: Scene, settings: AsyncRegions | TouchedKrylov, path: Floats, account: bool = False
+) -> Pushed:
+    """Walks a probe along `path` (nt, d) m, or by (nt,) m along -x; `account`: with energies."""
+    stepper = settings.prepare(build(scene))
+    if path.ndim == 1:
+        path = np.pad(-path[:, None], [(0, 0), (0, scene.mesh.dimension - 1)])
+    state, ledger = stepper.rest(), Ledger.of(scene, settings) if account else None
+    forces, seconds, layers = [], [], []
+    names = [f"{PROBE}.force.{a}" for a in "xyz"[: path.shape[1]]]
+    for x in path:
         start = thread_time()
-        state = stepper.step(state, np.array([-x, *[0.0] * (d - 1)]))
+        state = stepper.step(state, x)
         seconds.append(thread_time() - start)
         if state.failure:
             break
-        force.append(state.numbers[f"{PROBE}.force.x"])
-        layers.append(state.numbers[f"{PROBE}.layers"])
-        if account:
-            u = state.inner.motion.visible
-            v = (u - before) / h
-            lost += h * float(c @ v**2)
-            put += (force[-1] + (force[-2] if len(force) > 1 else 0.0)) / 2 * (x - last_x)
-            spring = force[-1] ** 2 / (2 * settings.spring) if settings.spring else 0.0
-            ledger.append((float(m @ v**2 + u @ (K @ u)) / 2 + spring + lost - put, put))
-            before, last_x = u, float(x)
+        forces.append([state.numbers[name] for name in names])
+        layers.append(state.numbers.get(f"{PROBE}.layers", 0.0))
+        if ledger:
+            ledger = ledger.after(stepper.field(state), x, np.array(forces[-1]))
+    words = stepper.notices(state) if isinstance(stepper, Noticing) else ()
     ends = (state.failure[1],) if state.failure else ()
-    made, given = np.array(ledger).max(axis=0)
     return Pushed(
-        np.array(force), np.array(seconds), np.array(layers), float(made), float(given),
-        stepper.notices(state) + ends,
+        np.array(forces).reshape(-1, len(names))[:, 0], np.array(seconds), np.array(layers),
+        ledger.made if ledger else 0.0, ledger.most if ledger else 0.0, words + ends,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Energies J of a linear body and the probe's spring: `put` in by the hand, `lost` to damping;
+    `made` and `most` are the largest made and put in so far. `u` (N,), `x` (d,), `f` (d,) N of the
+    last tick."""
+
+    system: System
+    spring: float
+    h: float
+    u: Floats
+    x: Floats
+    f: Floats
+    put: float = 0.0
+    lost: float = 0.0
+    made: float = 0.0
+    most: float = 0.0
+
+    @classmethod
+    def of(cls, scene: Scene, settings: AsyncRegions | TouchedKrylov) -> "Ledger":
+        zero = np.zeros(scene.mesh.dimension)
+        system = build(scene)
+        return cls(system, settings.spring, settings.dt, np.zeros(len(system.moves)), zero, zero)
+
+    def after(self, u: Floats, x: Floats, f: Floats) -> "Ledger":
+        """After a tick that ends with u (n, d) m, the probe at x (d,) m and the force f (d,) N."""
+        u, m = u.ravel(), self.system.masses
+        v = (u - self.u) / self.h
+        lost = self.lost + self.h * self.system.scene.material.mass_damping * float(m @ v**2)
+        put = self.put - float((f + self.f) @ (x - self.x)) / 2
+        stretched = float(f @ f) / (2 * self.spring) if self.spring else 0.0
+        held = float(m @ v**2 + u @ (self.system.K @ u)) / 2 + stretched
+        return replace(
+            self, u=u, x=x, f=f, put=put, lost=lost,
+            made=max(self.made, held + lost - put), most=max(self.most, put),
+        )  # fmt: skip
 
 
 def growth(scene: Scene, settings: AsyncRegions) -> float:
