@@ -16,7 +16,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.kernel_tensors import Nine, combined, inlined, volume
-from validate.fem.law_kernels import Four, energy_invariants, first_invariants
+from validate.fem.law_kernels import Four, energy_invariants, first_split
 
 LANES, POINTS, CORNERS = 16, 8, 8
 ROWS = 25  # of a point: 24 slopes and the weight
@@ -129,7 +129,7 @@ def _stressed(w: Floats, geometry: Floats, block: int) -> None:
         for l in range(LANES):
             H, by = _stored(w, _H + q * 144 + l), w[384 + l]
             K, p = volume(H)[1], by * w[_MEAN + l]
-            P = combined(1.0, first_invariants(False, H, 0.0, _moduli(w, l, by)), p, K)
+            P = combined(1.0, first_split(H, 0.0, _moduli(w, l, by)), p, K)
             _push(w, l, (P[0] + p, P[1], P[2], P[3], P[4] + p, P[5], P[6], P[7], P[8] + p))
 
 

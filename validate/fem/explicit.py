@@ -18,10 +18,14 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem import central_kernel
 from validate.fem import explicit_kernels as kernels
+from validate.fem import point_kernels as laws
 from validate.fem.assemble import shape_gradients
 from validate.fem.brick_packing import packed_bricks, require_bricks
-from validate.fem.explicit_kernels import LANES, NEO_HOOKE, ROWS, SVK
+from validate.fem.cell_kernels import ROWS
+from validate.fem.lane_nodes import BLOCK
+from validate.fem.point_kernels import NEO_HOOKE, SVK
 from validate.fem.surface import foundation_stiffness
 from validate.fem.viscous import cell_branches, taut
 from validate.scene.laws import ogden_terms
@@ -39,13 +43,11 @@ _DIFFERENCE = 1e-6  # of the body's size: half the step of a difference of force
 _LAWS = {
     ("svk", "split"): SVK,
     ("neo_hooke", "split"): NEO_HOOKE,
-    ("neo_hooke", "coupled"): kernels.INVARIANTS_COUPLED,
-    ("ogden", "split"): kernels.OGDEN,
-    ("ogden", "coupled"): kernels.OGDEN_COUPLED,
-    **dict.fromkeys((("mooney_rivlin", "split"), ("yeoh", "split")), kernels.INVARIANTS),
-    **dict.fromkeys(
-        (("mooney_rivlin", "coupled"), ("yeoh", "coupled")), kernels.INVARIANTS_COUPLED
-    ),
+    ("neo_hooke", "coupled"): laws.INVARIANTS_COUPLED,
+    ("ogden", "split"): laws.OGDEN,
+    ("ogden", "coupled"): laws.OGDEN_COUPLED,
+    **dict.fromkeys((("mooney_rivlin", "split"), ("yeoh", "split")), laws.INVARIANTS),
+    **dict.fromkeys((("mooney_rivlin", "coupled"), ("yeoh", "coupled")), laws.INVARIANTS_COUPLED),
 }
 
 
@@ -74,7 +76,7 @@ class ExplicitMotion:
 
 @dataclass(frozen=True)
 class CentralRule:
-    """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `explicit_kernels.advance`.
+    """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `central_kernel.advance`.
 
     `held` unknowns move by `moves` (held, k) times the drives, `loaded` take `loads` (loaded, l).
     """
@@ -113,11 +115,11 @@ class ExplicitBody:
         if self.branches:
             _require_one_caller(mesh, threads)
             self._taut = _packed(taut(scene))[0]
-        self.work = np.zeros(kernels.WORK + kernels.WIDE * len(mesh.nodes))
+        self.work = np.zeros(kernels.work_size(len(mesh.nodes)))
         self._parts = self.work
         if threads > 1:
             os.environ.setdefault("GOMP_SPINCOUNT", _PATIENCE)
-            self._parts = np.zeros((threads, kernels.WORK + self.size))
+            self._parts = np.zeros((threads, self.size + len(self.work)))
         springs = sparse.csr_array((self.size, self.size))
         for foundation in scene.foundations:
             springs = sparse.csr_array(springs + foundation_stiffness(mesh, foundation))
@@ -184,7 +186,7 @@ class ExplicitBody:
         rows = np.empty((6, self.size))
         rows[:4] = motion.rows[:4]
         memory, series = self._remembered(motion, rule.dt)
-        work, taken, size = kernels.advance(
+        work, taken, size = central_kernel.advance(
             self.law, self.geometry, self.cells, self._rows, rows,
             rule.keep, rule.gain, rule.lag, rule.dt,
             rule.held, rule.moves, rule.loaded, rule.loads, _own(begin), _own(end), substeps,
@@ -198,11 +200,11 @@ class ExplicitBody:
         if self.branches is None:
             return None, None
         blocks, k = len(self.cells), 2 * len(self.branches.g)
-        series, factors = np.zeros((k, blocks * LANES)), np.stack(self.branches.factors(dt), 1)
+        series, factors = np.zeros((k, blocks * BLOCK)), np.stack(self.branches.factors(dt), 1)
         series[:, : len(self.scene.mesh.cells)] = factors.reshape(k, -1)
-        lanes = np.ascontiguousarray(series.reshape(k, blocks, LANES).swapaxes(0, 1))
+        lanes = np.ascontiguousarray(series.reshape(k, blocks, BLOCK).swapaxes(0, 1))
         if motion.memory is None:
-            return np.zeros((blocks, 6 + 3 * k, LANES)), lanes
+            return np.zeros((blocks, 6 + 3 * k, BLOCK)), lanes
         return motion.memory.copy(), lanes
 
     def _pull(self, u: Floats) -> Floats:
@@ -263,28 +265,28 @@ def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
     Rows: 9 gradients and two moduli times volume; with the card of a law (blocks, 11 + k, 16).
     """
     mesh, (bulk, cards) = scene.mesh, _cards(scene)
-    e, blocks = len(mesh.cells), -(-len(mesh.cells) // LANES)
+    e, blocks = len(mesh.cells), -(-len(mesh.cells) // BLOCK)
     n = ROWS + cards.shape[1]
-    rows, cells = np.zeros((blocks * LANES, n)), np.zeros((blocks * LANES, 4), np.int32)
+    rows, cells = np.zeros((blocks * BLOCK, n)), np.zeros((blocks * BLOCK, 4), np.int32)
     rows[:e, :9] = shape_gradients(mesh)[:, 1:].reshape(e, 9)
     volumes, mu = cell_volumes(mesh), scene.per_cell(lambda m: m.shear_modulus)
     rows[:e, 9], rows[:e, 10], rows[:e, ROWS:] = volumes * bulk, volumes * mu, cards
-    cells[:e] = 3 * mesh.cells
-    packed = np.ascontiguousarray(rows.reshape(blocks, LANES, n).swapaxes(1, 2))
-    lanes = np.ascontiguousarray(cells.reshape(blocks, LANES, 4).swapaxes(1, 2))
-    return packed if cards.shape[1] else packed.reshape(blocks, n * LANES), lanes
+    cells[:e] = 4 * mesh.cells
+    packed = np.ascontiguousarray(rows.reshape(blocks, BLOCK, n).swapaxes(1, 2))
+    lanes = np.ascontiguousarray(cells.reshape(blocks, BLOCK, 4).swapaxes(1, 2))
+    return packed if cards.shape[1] else packed.reshape(blocks, n * BLOCK), lanes
 
 
 def _cards(scene: Scene) -> tuple[Floats, Floats]:
     """What every cell's volume resists by, Pa (e,), and its card (e, k), moduli times volume."""
     law, volumes = _code(scene.material), cell_volumes(scene.mesh)[:, None]
-    lame = law in (SVK, kernels.OGDEN_COUPLED)
+    lame = law in (SVK, laws.OGDEN_COUPLED)
     bulk = scene.per_cell(lambda m: m.bulk_modulus - (2 * m.shear_modulus / 3 if lame else 0.0))
     if law in (SVK, NEO_HOOKE):
         return bulk, np.zeros((len(bulk), 0))
-    if law in (kernels.OGDEN, kernels.OGDEN_COUPLED):
+    if law in (laws.OGDEN, laws.OGDEN_COUPLED):
         return bulk, _terms(scene, volumes)
-    if law == kernels.INVARIANTS_COUPLED:
+    if law == laws.INVARIANTS_COUPLED:
         bulk = scene.per_cell(
             lambda m: coupled_lambda(m.coefficients, m.shear_modulus, m.bulk_modulus)
         )

@@ -1,10 +1,14 @@
-"""Small tensors of the compiled element loops, as tuples that are inlined into them."""
+"""Small tensors of the compiled element loops, as tuples that are inlined into them.
+
+Numbers are floats, or lanes of cells (`fem.lanes`).
+"""
 
 from collections.abc import Callable
 from typing import TypeVar, cast
 
-import numpy as np
 from numba import njit
+
+from validate.fem.lanes import rough_inverse_cube_root, where_positive
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 Six = tuple[float, float, float, float, float, float]
@@ -12,7 +16,6 @@ Three = tuple[float, float, float]
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 FAST = {"contract", "reassoc", "nsz", "arcp"}
-_CUBE_ROOT = np.int32(0x54A2FA8C)  # bits of a float32 first guess of x^(-1/3), 3 % off
 
 
 def inlined(function: _Function) -> _Function:
@@ -99,12 +102,11 @@ def volume(H: Nine) -> tuple[float, Nine]:
 def inverse_cube_root(x: float) -> float:
     """x^(-1/3) to rounding, without a division: a first guess from the bits, two steps of order
     four. NaN for x <= 0, where neo-Hooke has no state."""
-    bits = np.float32(x).view(np.int32)
-    y = np.float64(np.int32(_CUBE_ROOT - bits // np.int32(3)).view(np.float32))
+    y = rough_inverse_cube_root(x)
     for _ in range(2):
         r = 1 - x * y * y * y
         y += y * r * (1 / 3 + r * (2 / 9 + r * (14 / 81)))
-    return y if x > 0 else np.nan
+    return where_positive(x, y)
 
 
 @inlined

@@ -44,30 +44,28 @@ def _plus_trace(A: Nine, a: float) -> Nine:
 
 
 @inlined
-def first_invariants(coupled: bool, H: Nine, a: float, c: Four) -> Nine:
+def first_split(H: Nine, a: float, c: Four) -> Nine:
     """V P of C10 V, C01 V, C20 V, C30 V, and `a` the bulk modulus times V."""
     (G, dJ), B = inverse(H), _left(H)
-    t = B[0] + B[4] + B[8]
-    BB = product(B, B)
-    if coupled:
-        more = t * (2 * c[2] + 3 * c[3] * t)
-        tau = combined(2 * (c[0] + more + c[1] * (1 + t)), B, -2 * c[1], BB)
-        tau = _plus_trace(tau, 2 * (more + c[1] * t) + a * np.log1p(dJ))
-    else:
-        y = inverse_cube_root(1 + dJ)
-        j = y * y
-        x = j * (3 + t) - 3
-        s = c[0] + x * (2 * c[2] + 3 * c[3] * x)
-        tau = combined(2 * (s * j + c[1] * j * j * (1 + t)), B, -2 * c[1] * j * j, BB)
-        mean = (tau[0] + tau[4] + tau[8]) / 3
-        tau = _plus_trace(tau, 0.5 * a * dJ * (dJ + 2) - mean)
-    return product(tau, G)
+    t, BB = B[0] + B[4] + B[8], product(B, B)
+    y = inverse_cube_root(1 + dJ)
+    j = y * y
+    x = j * (3 + t) - 3
+    s = c[0] + x * (2 * c[2] + 3 * c[3] * x)
+    tau = combined(2 * (s * j + c[1] * j * j * (1 + t)), B, -2 * c[1] * j * j, BB)
+    mean = (tau[0] + tau[4] + tau[8]) / 3
+    return product(_plus_trace(tau, 0.5 * a * dJ * (dJ + 2) - mean), G)
 
 
 @called
-def first_of_four(coupled: bool, H: Nine, a: float, c: Four) -> Nine:
-    """The same in either form, for loops that take a cell at a time."""
-    return first_invariants(coupled, H, a, c)
+def first_coupled(H: Nine, a: float, c: Four) -> Nine:
+    """The same of the coupled form, `a` its lambda times V; for loops that take a cell at a time,
+    since no vector register takes the logarithm."""
+    (G, dJ), B = inverse(H), _left(H)
+    t, BB = B[0] + B[4] + B[8], product(B, B)
+    more = t * (2 * c[2] + 3 * c[3] * t)
+    tau = combined(2 * (c[0] + more + c[1] * (1 + t)), B, -2 * c[1], BB)
+    return product(_plus_trace(tau, 2 * (more + c[1] * t) + a * np.log1p(dJ)), G)
 
 
 @called

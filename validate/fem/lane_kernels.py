@@ -1,0 +1,178 @@
+"""Compiled element loops of tet4 that take 8 cells at once, 16 in single precision (`fem.lanes`).
+
+St. Venant-Kirchhoff, neo-Hooke, and Mooney-Rivlin and Yeoh in their split form. A block of 16 cells
+has its numbers side by side, row by row; the nodes' displacements are copied with a pad, so that a
+node is one load, and forces are added up in rows of their own.
+"""
+
+from typing import Any
+
+from validate.arrays import Floats
+from validate.fem.kernel_tensors import Nine, Six, Three, inlined, product, transposed
+from validate.fem.lane_nodes import BLOCK, FOUR, add_forces_of, add_numbers_of, edges
+from validate.fem.lanes import lanes_of, load
+from validate.fem.law_kernels import first_split
+from validate.fem.point_kernels import (
+    INVARIANTS,
+    NEO_HOOKE,
+    SVK,
+    along_neo_hooke,
+    along_svk,
+    first_neo_hooke,
+    first_svk,
+    nodes_neo_hooke,
+    nodes_svk,
+)
+
+
+@inlined
+def _gradients(geometry: Floats, o: int) -> Nine:
+    """dN/dX of nodes 1-3 of the cells from the flat index o on."""
+    return (
+        load(geometry, o), load(geometry, o + 16), load(geometry, o + 32),
+        load(geometry, o + 48), load(geometry, o + 64), load(geometry, o + 80),
+        load(geometry, o + 96), load(geometry, o + 112), load(geometry, o + 128),
+    )  # fmt: skip
+
+
+@inlined
+def _moduli(geometry: Floats, o: int) -> tuple[float, float]:
+    """a, b times volume."""
+    return load(geometry, o + 144), load(geometry, o + 160)
+
+
+@inlined
+def _padded(u: Floats, to: Floats) -> None:
+    for n in range(u.size // 3):
+        to[FOUR * n], to[FOUR * n + 1], to[FOUR * n + 2] = u[3 * n], u[3 * n + 1], u[3 * n + 2]
+
+
+@inlined
+def _place(k: int, count: int, size: int) -> tuple[int, int]:
+    """Flat indices in the geometry, `size` numbers a block, and in the cells of the k-th lanes."""
+    block, l = k * count // BLOCK, k * count % BLOCK
+    return block * size + l, block * FOUR * BLOCK + l
+
+
+@inlined
+def _add_first(law: int, geometry: Floats, cells: Any, x: Floats, r: Floats) -> None:
+    """Adds forces to r (4 n,) of padded displacements x.
+
+    The edges of the next cells are gathered before a cell's forces are reckoned: what waits for
+    each other in one cell is longer than a processor looks ahead.
+    """
+    count, size = lanes_of(x), geometry[0].size
+    groups = cells.shape[0] * BLOCK // count
+    U = edges(x, cells, 0)
+    for k in range(groups):
+        o, n = _place(k, count, size)
+        coming = edges(x, cells, _place(min(k + 1, groups - 1), count, size)[1])
+        G, (a, b) = _gradients(geometry, o), _moduli(geometry, o)
+        H = product(U, G)
+        if law == SVK:
+            P = first_svk(H, a, b)
+        elif law == NEO_HOOKE:
+            P = first_neo_hooke(H, a, b)
+        else:
+            P = _first_of_card(H, a, b, geometry, o)
+        add_forces_of(r, cells, n, product(P, transposed(G)))
+        U = coming
+
+
+@inlined
+def add_lane_forces(
+    law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, w: Floats
+) -> None:
+    """Adds internal forces to f (N,); w (8 n,) is a workspace of the numbers of `geometry`.
+
+    Each law has a loop of its own: a choice within it would cost a tenth.
+    """
+    nodes = u.size // 3
+    x, r = w[: FOUR * nodes], w[FOUR * nodes : 2 * FOUR * nodes]
+    _padded(u, x)
+    r[:] = 0
+    if geometry.ndim == 3:
+        _add_first(INVARIANTS, geometry, cells, x, r)
+    elif law == SVK:
+        _add_first(SVK, geometry, cells, x, r)
+    else:
+        _add_first(NEO_HOOKE, geometry, cells, x, r)
+    _add_unpadded(r, FOUR, 0, f, 3)
+
+
+@inlined
+def _add_unpadded(r: Floats, wide: int, first: int, f: Floats, rows: int) -> None:
+    """Adds to f `rows` numbers a node, from the `first` of the `wide` that r has."""
+    for n in range(f.size // rows):
+        for i in range(rows):
+            f[rows * n + i] += r[wide * n + first + i]
+
+
+@inlined
+def _first_of_card(H: Nine, a: float, b: float, geometry: Floats, o: int) -> Nine:
+    c01, c20, c30 = load(geometry, o + 176), load(geometry, o + 192), load(geometry, o + 208)
+    return first_split(H, a, (0.5 * b - c01, c01, c20, c30))
+
+
+@inlined
+def add_lane_products(
+    law: int, geometry: Floats, cells: Any, u: Floats, v: Floats, f: Floats, w: Floats
+) -> None:
+    """Adds K_t(u) v to f (N,); w (12 n,)."""
+    nodes, count, size = u.size // 3, lanes_of(w), geometry[0].size
+    x, y = w[: FOUR * nodes], w[FOUR * nodes : 2 * FOUR * nodes]
+    r = w[2 * FOUR * nodes : 3 * FOUR * nodes]
+    _padded(u, x)
+    _padded(v, y)
+    r[:] = 0
+    for k in range(cells.shape[0] * BLOCK // count):
+        o, n = _place(k, count, size)
+        G, (a, b) = _gradients(geometry, o), _moduli(geometry, o)
+        H, D = product(edges(x, cells, n), G), product(edges(y, cells, n), G)
+        P = along_svk(H, D, a, b) if law == SVK else along_neo_hooke(H, D, a, b)
+        add_forces_of(r, cells, n, product(P, transposed(G)))
+    _add_unpadded(r, FOUR, 0, f, 3)
+
+
+@inlined
+def _with_diagonal(f: Three, K: Six) -> Six:
+    return f[0], f[1], f[2], K[0], K[1], K[2]
+
+
+@inlined
+def _with_block(f: Three, K: Six) -> Nine:
+    return f[0], f[1], f[2], K[0], K[1], K[2], K[3], K[4], K[5]
+
+
+@inlined
+def _nodes(law: int, H: Nine, G: Nine, a: float, b: float) -> Any:
+    return nodes_svk(H, G, a, b) if law == SVK else nodes_neo_hooke(H, G, a, b)
+
+
+@inlined
+def add_lane_blocks(
+    law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats, w: Floats
+) -> None:
+    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (16 n,)."""
+    nodes, count, size = u.size // 3, lanes_of(w), geometry[0].size
+    whole = d.size == 2 * f.size
+    rows, wide = (6, 12) if whole else (3, 8)
+    x, r = w[: FOUR * nodes], w[FOUR * nodes : (FOUR + wide) * nodes]
+    _padded(u, x)
+    r[:] = 0
+    for k in range(cells.shape[0] * BLOCK // count):
+        o, n = _place(k, count, size)
+        G, (a, b) = _gradients(geometry, o), _moduli(geometry, o)
+        p, K = _nodes(law, product(edges(x, cells, n), G), G, a, b)
+        if whole:
+            add_numbers_of(r, cells, n, (
+                _with_block(p[0], K[0]), _with_block(p[1], K[1]),
+                _with_block(p[2], K[2]), _with_block(p[3], K[3]),
+            ))  # fmt: skip
+        else:
+            add_numbers_of(r, cells, n, (
+                _with_diagonal(p[0], K[0]), _with_diagonal(p[1], K[1]),
+                _with_diagonal(p[2], K[2]), _with_diagonal(p[3], K[3]),
+            ))  # fmt: skip
+    _add_unpadded(r, wide, 0, f, 3)
+    _add_unpadded(r, wide, 3, d, rows)

@@ -1,0 +1,145 @@
+"""Nodes of cells turned into lanes and back (`fem.lanes`): what element loops gather and add up.
+
+A node has four numbers in a row, x, y, z and a pad, or a multiple of four: read and written at
+once, as vectors. Cells are packed in blocks of 16, corner by corner, and hold 4 x node.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+from validate.fem.lanes import Lanes, place, shuffled
+
+BLOCK = 16  # cells side by side
+FOUR = 4  # numbers of a node that are moved at once
+
+
+def _each_four(count: int, picks: tuple[int, int, int, int]) -> list[int]:
+    """Picks (0-3 of the first, 4-7 of the second vector) in every four of `count` numbers."""
+    return [p % 4 + 4 * g + p // 4 * count for g in range(count // 4) for p in picks]
+
+
+def _even(builder: Any, x: Any, y: Any) -> Any:
+    return shuffled(builder, x, y, _each_four(x.type.count, (0, 4, 2, 6)))
+
+
+def _odd(builder: Any, x: Any, y: Any) -> Any:
+    return shuffled(builder, x, y, _each_four(x.type.count, (1, 5, 3, 7)))
+
+
+def _turned(builder: Any, rows: list[Any]) -> list[Any]:
+    """Four vectors, the 4 x 4 numbers of every four of their lanes transposed: its own inverse."""
+    pairs = [pick(builder, *rows[i : i + 2]) for pick in (_even, _odd) for i in (0, 2)]
+    first, last = (_each_four(rows[0].type.count, p) for p in ((0, 1, 4, 5), (2, 3, 6, 7)))
+    return [shuffled(builder, *pairs[i : i + 2], part) for part in (first, last) for i in (0, 2)]
+
+
+def _joined(builder: Any, parts: list[Any]) -> Any:
+    """Vectors of one length side by side."""
+    if len(parts) == 1:
+        return parts[0]
+    half = len(parts) // 2
+    low, high = _joined(builder, parts[:half]), _joined(builder, parts[half:])
+    return shuffled(builder, low, high, list(range(2 * low.type.count)))
+
+
+def _of_lanes(builder: Any, rows: list[Any]) -> list[Any]:
+    """What every lane has of one, two or four rows, as a vector each."""
+    if len(rows) == 4:
+        rows = _turned(builder, rows)
+    if len(rows) == 2:
+        rows = [_even(builder, *rows), _odd(builder, *rows)]
+    size = len(rows)
+    return [
+        shuffled(builder, row, row, list(range(begin, begin + size)))
+        for lane in range(rows[0].type.count)
+        for row, begin in [(rows[lane % size], lane // size * size)]
+    ]
+
+
+class _Corners:
+    """The nodes of the cells in the lanes, in code that is being made: from `nodes`, flat, and
+    `cells` from a flat index on."""
+
+    def __init__(self, context: Any, builder: Any, sig: Any, args: Any) -> None:
+        self.context, self.builder = context, builder
+        self.typ, self.nodes, self.index = sig.args[0], args[0], args[2]
+        proxy: Any = cgutils.create_struct_proxy(sig.args[1])
+        self.cells = proxy(context, builder, args[1]).data
+        self.align = int(self.typ.dtype.bitwidth // 8)
+
+    def at(self, corner: int, lane: int, size: int = FOUR, wide: int = FOUR, k: int = 0) -> Any:
+        """Pointer to `size` of the `wide` numbers of a lane's node, from the k-th on."""
+        builder, step = self.builder, ir.Constant(self.index.type, corner * BLOCK + lane)
+        node = builder.load(builder.gep(self.cells, [builder.add(self.index, step)]))
+        start = builder.zext(node, ir.IntType(64))
+        if wide != FOUR:
+            start = builder.mul(start, ir.Constant(start.type, wide // FOUR))
+        if k:
+            start = builder.add(start, ir.Constant(start.type, k))
+        return place(self.context, builder, self.typ, self.nodes, start, size)
+
+    def row(self, corner: int, lane: int) -> Any:
+        return self.builder.load(self.at(corner, lane), align=self.align)
+
+    def add(self, where: Any, numbers: Any, less: bool = False) -> None:
+        old = self.builder.load(where, align=self.align)
+        join = self.builder.fsub if less else self.builder.fadd
+        self.builder.store(join(old, numbers), where, align=self.align)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def edges(typing: Any, nodes: Any, cells: Any, index: Any) -> Any:
+    """u_a - u_0 as 3 x 3 (component, a - 1), a = 1-3, of the cells from the flat `index` on."""
+    to = Lanes(nodes.dtype)
+
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        of, found = _Corners(context, builder, sig, args), []
+        origins = [of.row(0, k) for k in range(to.count)]
+        for corner in (1, 2, 3):
+            ways = [builder.fsub(of.row(corner, k), origins[k]) for k in range(to.count)]
+            found.append(_turned(builder, [_joined(builder, ways[k::4]) for k in range(4)]))
+        flat = [found[a][i] for i in range(3) for a in range(3)]
+        return context.make_tuple(builder, sig.return_type, flat)
+
+    return types.UniTuple(to, 9)(nodes, cells, index), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> Any:
+    """Adds the forces f, 3 x 3 (component, a - 1) of nodes 1-3, and minus their sum at node 0.
+
+    What the pads are left with is of no use.
+    """
+
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        of, flat = _Corners(context, builder, sig, args), cgutils.unpack_tuple(builder, args[3], 9)
+        three = [_of_lanes(builder, [flat[a], *flat[3 + a :: 3], flat[6 + a]]) for a in range(3)]
+        for lane, (x, y, z) in enumerate(zip(*three, strict=True)):
+            of.add(of.at(0, lane), builder.fadd(builder.fadd(x, y), z), less=True)
+            for corner, four in enumerate((x, y, z)):
+                of.add(of.at(corner + 1, lane), four)
+        return context.get_dummy_value()
+
+    return types.none(nodes, cells, index, f), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def add_numbers_of(typing: Any, nodes: Any, cells: Any, index: Any, numbers: Any) -> Any:
+    """Adds m numbers at each corner, `numbers` four tuples of m lanes, to the first m of a node's,
+    which are a multiple of four."""
+    m = numbers.dtype.count
+    parts = [(k, min(FOUR, m - k)) for k in range(0, m, FOUR)]
+
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        of, wide = _Corners(context, builder, sig, args), FOUR * len(parts)
+        for corner, each in enumerate(cgutils.unpack_tuple(builder, args[3], 4)):
+            values = cgutils.unpack_tuple(builder, each, m)
+            for k, size in parts:
+                for lane, row in enumerate(_of_lanes(builder, values[k : k + size])):
+                    of.add(of.at(corner, lane, size, wide, k), row)
+        return context.get_dummy_value()
+
+    return types.none(nodes, cells, index, numbers), code
