@@ -106,7 +106,8 @@ def inverse_cube_root(x: float) -> float:
     for _ in range(2):
         r = 1 - x * y * y * y
         y += y * r * (1 / 3 + r * (2 / 9 + r * (14 / 81)))
-    return where_positive(x, y)
+    found: float = where_positive(x, y)
+    return found
 
 
 @inlined

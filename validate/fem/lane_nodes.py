@@ -1,16 +1,17 @@
+# mypy: disable-error-code="no-untyped-call, untyped-decorator"
 """Nodes of cells turned into lanes and back (`fem.lanes`): what element loops gather and add up.
 
 A node has four numbers in a row, x, y, z and a pad, or a multiple of four: read and written at
 once, as vectors. Cells are packed in blocks of 16, corner by corner, and hold 4 x node.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic
 
-from validate.fem.lanes import Lanes, place, shuffled
+from validate.fem.lanes import Lanes, emitted, place, shuffled
 
 BLOCK = 16  # cells side by side
 FOUR = 4  # numbers of a node that are moved at once
@@ -31,9 +32,11 @@ def _odd(builder: Any, x: Any, y: Any) -> Any:
 
 def _turned(builder: Any, rows: list[Any]) -> list[Any]:
     """Four vectors, the 4 x 4 numbers of every four of their lanes transposed: its own inverse."""
-    pairs = [pick(builder, *rows[i : i + 2]) for pick in (_even, _odd) for i in (0, 2)]
+    pairs = [pick(builder, rows[i], rows[i + 1]) for pick in (_even, _odd) for i in (0, 2)]
     first, last = (_each_four(rows[0].type.count, p) for p in ((0, 1, 4, 5), (2, 3, 6, 7)))
-    return [shuffled(builder, *pairs[i : i + 2], part) for part in (first, last) for i in (0, 2)]
+    return [
+        shuffled(builder, pairs[i], pairs[i + 1], part) for part in (first, last) for i in (0, 2)
+    ]
 
 
 def _joined(builder: Any, parts: list[Any]) -> Any:
@@ -50,13 +53,16 @@ def _of_lanes(builder: Any, rows: list[Any]) -> list[Any]:
     if len(rows) == 4:
         rows = _turned(builder, rows)
     if len(rows) == 2:
-        rows = [_even(builder, *rows), _odd(builder, *rows)]
+        rows = [pick(builder, rows[0], rows[1]) for pick in (_even, _odd)]
     size = len(rows)
     return [
         shuffled(builder, row, row, list(range(begin, begin + size)))
         for lane in range(rows[0].type.count)
         for row, begin in [(rows[lane % size], lane // size * size)]
     ]
+
+
+_unpacked = cast(Callable[..., list[Any]], cgutils.unpack_tuple)
 
 
 class _Corners:
@@ -90,7 +96,7 @@ class _Corners:
         self.builder.store(join(old, numbers), where, align=self.align)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@emitted
 def edges(typing: Any, nodes: Any, cells: Any, index: Any) -> Any:
     """u_a - u_0 as 3 x 3 (component, a - 1), a = 1-3, of the cells from the flat `index` on."""
     to = Lanes(nodes.dtype)
@@ -107,7 +113,7 @@ def edges(typing: Any, nodes: Any, cells: Any, index: Any) -> Any:
     return types.UniTuple(to, 9)(nodes, cells, index), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@emitted
 def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> Any:
     """Adds the forces f, 3 x 3 (component, a - 1) of nodes 1-3, and minus their sum at node 0.
 
@@ -115,7 +121,7 @@ def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> An
     """
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        of, flat = _Corners(context, builder, sig, args), cgutils.unpack_tuple(builder, args[3], 9)
+        of, flat = _Corners(context, builder, sig, args), _unpacked(builder, args[3], 9)
         three = [_of_lanes(builder, [flat[a], *flat[3 + a :: 3], flat[6 + a]]) for a in range(3)]
         for lane, (x, y, z) in enumerate(zip(*three, strict=True)):
             of.add(of.at(0, lane), builder.fadd(builder.fadd(x, y), z), less=True)
@@ -126,7 +132,7 @@ def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> An
     return types.none(nodes, cells, index, f), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@emitted
 def add_numbers_of(typing: Any, nodes: Any, cells: Any, index: Any, numbers: Any) -> Any:
     """Adds m numbers at each corner, `numbers` four tuples of m lanes, to the first m of a node's,
     which are a multiple of four."""
@@ -135,8 +141,8 @@ def add_numbers_of(typing: Any, nodes: Any, cells: Any, index: Any, numbers: Any
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         of, wide = _Corners(context, builder, sig, args), FOUR * len(parts)
-        for corner, each in enumerate(cgutils.unpack_tuple(builder, args[3], 4)):
-            values = cgutils.unpack_tuple(builder, each, m)
+        for corner, each in enumerate(_unpacked(builder, args[3], 4)):
+            values = _unpacked(builder, each, m)
             for k, size in parts:
                 for lane, row in enumerate(_of_lanes(builder, values[k : k + size])):
                     of.add(of.at(corner, lane, size, wide, k), row)
