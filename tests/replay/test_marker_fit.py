@@ -11,7 +11,7 @@ from validate.replay.options import Options, configure, folder_of
 
 
 @pytest.mark.parametrize(
-    "name", ["kf_cube", "ekf_cube", "ekf_cone", "needle_block", "fluid_phantom"]
+    "name", ["kf_cube", "ekf_cube", "ekf_liver", "ekf_cone", "needle_block", "fluid_phantom"]
 )
 def test_excluded_markers_leave_the_fit_and_stay_in_the_comparison(name: str) -> None:
     experiment = find(name, Path(__file__))

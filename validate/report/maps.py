@@ -17,6 +17,7 @@ from validate.scene.mesh import Mesh, boundary_facets
 Range = tuple[float, float]
 _MM = 1e3
 _FAINT = 0.2  # of the largest of a scale
+_SHORT = 0.1  # of an axis: what of it is seen when it points at the eye
 # Every map is seen from the corner of +x, -y and +z, z upward on paper: its triad says so.
 TOWARD_EYE = np.array([0.62, -1.0, 0.62]) / np.linalg.norm([0.62, -1.0, 0.62])
 
@@ -92,7 +93,7 @@ def drawn(shown: NodeMap, span: Range) -> Picture:
 
 def _axes(figure: Figure, shown: NodeMap, span: Range) -> None:
     ax, solid = figure.subplots(), shown.mesh.dimension == 3
-    polygons, facets = (_seen if solid else _planar)(shown.mesh)
+    polygons, facets = (facing if solid else _planar)(shown.mesh)
     face = PolyCollection(
         list(polygons), array=values(shown)[facets].mean(axis=1), cmap=colours(span),
         edgecolors="#30303055", linewidths=0.3,
@@ -104,7 +105,7 @@ def _axes(figure: Figure, shown: NodeMap, span: Range) -> None:
     ax.set_aspect("equal")
     if solid:
         ax.set_axis_off()
-        _triad(ax)
+        triad(ax)
     else:
         ax.set(xlabel="x / mm", ylabel="y / mm")
     figure.colorbar(face, ax=ax, label=bar_title(shown), shrink=0.8)
@@ -114,31 +115,36 @@ def _planar(mesh: Mesh) -> tuple[Floats, Ints]:
     return _MM * mesh.nodes[mesh.corners], mesh.corners
 
 
-def screen() -> tuple[Floats, Floats]:
-    """Directions (3,) to the right and upward on paper, seen from `TOWARD_EYE`."""
-    right = np.cross([0.0, 0.0, 1.0], TOWARD_EYE)
+def screen(eye: Floats = TOWARD_EYE) -> tuple[Floats, Floats]:
+    """Directions (3,) to the right and upward on paper, seen from `eye` (3,), a unit vector."""
+    right = np.cross([0.0, 0.0, 1.0], eye)
     right /= np.linalg.norm(right)
-    return right, np.cross(TOWARD_EYE, right)
+    return right, np.cross(eye, right)
 
 
-def _seen(mesh: Mesh) -> tuple[Floats, Ints]:
+def facing(mesh: Mesh, eye: Floats = TOWARD_EYE) -> tuple[Floats, Ints]:
     """Facets that face the eye as polygons (f, 3, 2) mm, from the far ones to the near ones."""
     facets = boundary_facets(mesh.corners, 3)
     points = _MM * mesh.nodes[facets]
     normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    facing = normals @ TOWARD_EYE > 0
-    points, facets = points[facing], facets[facing]
-    order = np.argsort((points @ TOWARD_EYE).mean(axis=1))
-    right, upward = screen()
+    towards = normals @ eye > 0
+    points, facets = points[towards], facets[towards]
+    order = np.argsort((points @ eye).mean(axis=1))
+    right, upward = screen(eye)
     return np.stack([points @ right, points @ upward], axis=2)[order], facets[order]
 
 
-def _triad(ax: Axes) -> None:
+def triad(ax: Axes, eye: Floats = TOWARD_EYE) -> None:
     """The directions of x, y and z, in the lower left corner."""
     low, high = np.array(ax.get_xlim()), np.array(ax.get_ylim())
-    size, start = 0.07 * max(np.ptp(low), np.ptp(high)), np.array([low[0], high[0]])
-    arrow = {"arrowstyle": "->", "color": "#404040"}
-    for name, axis in zip("xyz", np.stack(screen(), axis=1), strict=True):
+    axes = np.stack(screen(eye), axis=1)
+    size = 0.07 * max(np.ptp(low), np.ptp(high))
+    start = np.array([low[0], high[0] - 1.35 * size * axes[:, 1].min()])  # all within the axes
+    for name, axis in zip("xyz", axes, strict=True):
+        if np.hypot(*axis) < _SHORT:
+            continue
         tip, beyond = start + size * axis, start + 1.35 * size * axis
-        ax.annotate("", tuple(tip), tuple(start), arrowprops=arrow)
-        ax.annotate(name, tuple(beyond), ha="center", va="center", color="#404040")
+        arrow = {"arrowstyle": "->", "color": "#404040"}
+        ax.annotate("", tuple(tip), tuple(start), arrowprops=arrow, annotation_clip=False)
+        ax.annotate(name, tuple(beyond), ha="center", va="center", color="#404040",
+                    annotation_clip=False)  # fmt: skip

@@ -1,1 +1,1 @@
-"""Paper 003: an extended Kalman filter on nonlinear elements, a cube and a cone."""
+"""Paper 003: an extended Kalman filter on nonlinear elements, a cube, a liver and a cone."""

@@ -7,7 +7,12 @@ import numpy as np
 
 from validate.arrays import rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
-from validate.papers.ekf_nfem.tables import locking_table, readings_table, steps_table
+from validate.papers.ekf_nfem.tables import (
+    fields_apart,
+    locking_table,
+    readings_table,
+    steps_table,
+)
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told
@@ -36,6 +41,7 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "nodes": float(len(explicit.body.mesh.nodes)),
         "cells": float(len(explicit.body.mesh.cells)),
         "locking": float(plain(locked.rows[-1][1]) or 0.0),
+        "fields_apart": fields_apart(cases["small"]["ekf_held"], cases["small"]["nfem"]),
     }
     if share is not None:
         numbers["kinetic_share"] = share

@@ -11,7 +11,12 @@ from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.papers.ekf_nfem.figures import PRINTED_STEP
 from validate.papers.ekf_nfem.rates import Integrator, cells_at, measured_rates, rates_exhibit
-from validate.papers.ekf_nfem.tables import locking_table, readings_table, steps_table
+from validate.papers.ekf_nfem.tables import (
+    fields_apart,
+    locking_table,
+    readings_table,
+    steps_table,
+)
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases
 from validate.solve.central import CentralDifference
@@ -46,6 +51,7 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "critical_step": critical_step(build_system(scene)).lanczos,
         "nodes": float(len(scene.mesh.nodes)),
         "cells": float(len(scene.mesh.cells)),
+        "fields_apart": fields_apart(cases[""]["ekf_held"], cases[""]["nfem"]),
     }
     for name, label in (("explicit", EXPLICIT), ("filter", FILTER), ("implicit", IMPLICIT)):
         for hz in (VISUAL_HZ, HAPTIC_HZ):

@@ -1,4 +1,5 @@
-"""What the printed numbers of paper 003 leave open: readings of the force, steps, elements."""
+"""What the printed numbers of paper 003 leave open: readings of the force, steps, elements, fields
+that are "nearly same"."""
 
 from dataclasses import replace
 
@@ -7,6 +8,7 @@ import numpy as np
 from validate.compare.exhibit import Entry, NumberTable
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
+from validate.replay.followed import Followed
 from validate.scene.scene import Load, Scene
 from validate.solve.locking import locking_factor
 from validate.solve.march import march
@@ -78,3 +80,13 @@ def locking_table(scene: Scene, values: tuple[float, ...]) -> NumberTable:
         tuple(rows),
         "1: no locking. What misses to 1 is the element's stiffness, not the tissue's.",
     )
+
+
+def fields_apart(one: Followed, other: Followed) -> float:
+    """Largest distance of two fields at the last common frame over the largest displacement of the
+    other there; NaN where one of the runs ended early."""
+    if not (one.whole and other.whole):
+        return float("nan")
+    u, reference = one.run.u[-1], other.run.u[-1]
+    apart = np.linalg.norm(u - reference, axis=1).max()
+    return float(apart / np.linalg.norm(reference, axis=1).max())
