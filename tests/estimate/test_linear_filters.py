@@ -20,7 +20,7 @@ from validate.estimate.load_scale import LoadScale, ScaleCore
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.modal_kernel import advance, mirrored
 from validate.estimate.modal_kf import ModalKf
-from validate.estimate.observable import Observed, observed
+from validate.estimate.observable import observed
 from validate.estimate.reduced_kf import ReducedKf, dense_covariance, steady
 from validate.estimate.reduced_linear import LoadDoubt, reduced_model
 from validate.estimate.small_state import CoreStepper
@@ -136,9 +136,10 @@ def test_gains_of_what_is_observed_are_those_of_the_whole() -> None:
     modes = in_modes(big.system, rule_of("average", DT))
     whole = modal_covariance(KfFem(), big.system, seen, modes)
     assert isinstance(whole, Decoupled)
-    narrow, when = observed(whole, 40), schedule(timetable(seen, DT))
-    assert isinstance(narrow, Observed)
-    assert narrow.V.shape[1] <= 24
+    narrow, when = observed(whole, 40, {}), schedule(timetable(seen, DT))
+    assert narrow is not None
+    assert narrow.space.V.shape[1] <= 24
+    assert narrow.space.W.shape[1] <= 144
     gains, exact = gain_sequence(narrow, when, 0.0), gain_sequence(whole, when, 0.0)
     for step in when:
         found, known = gains.gains[step], exact.gains[step]
@@ -152,7 +153,7 @@ def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: Cas
     modes = in_modes(system, rule_of("average", DT))
     whole = modal_covariance(KfFem(), system, pulled.measured(1), modes)
     assert isinstance(whole, Decoupled)
-    assert observed(whole, 60) is whole
+    assert observed(whole, 60, {}) is None
 
 
 def test_gains_freeze_once_settled_and_thaw_where_something_is_missing(pulled: Case) -> None:

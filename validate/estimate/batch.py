@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
 from validate.estimate.displacement_filter import DisplacementStepper, InModes
 from validate.estimate.gains import GainSequence
+from validate.estimate.kalman import Gain
+from validate.estimate.modal_kernel import walked
 
 
 @dataclass(frozen=True)
@@ -31,15 +33,53 @@ def shared_gain_run(stepper: DisplacementStepper, inputs: Floats, z: Floats, row
     m, nt = len(stepper.sensor.names), len(inputs)
     z = checked(z, "z [m]", (None, nt, m), nan=True, error=ComparisonError)
     _require_schedule(stepper, z)
-    walk = _Seeds(stepper, modes, gains, len(z))
-    free = stepper.system.free
-    read, driven = rows[:, free] @ modes.shapes, rows @ stepper.system.moves
-    values, nis = np.empty((len(z), nt, len(rows))), np.zeros((len(z), nt))
-    for k in range(nt):
-        nis[:, k] = walk.step(inputs[k], z[:, k])
-        values[:, k] = (read @ walk.x + (driven @ inputs[k][: driven.shape[1]])[:, None]).T
+    forces, q, begin = stepper.excitation.walk(inputs)
+    which, stack, S_yy = _stacked(gains, nt, m, len(modes.shapes.T))
+    free, rule = stepper.system.free, modes.rule
+    read, moved = rows[:, free] @ modes.shapes, q @ (rows @ stepper.system.moves).T
+    offset = q @ stepper.sensor.driven.T
+    factors = np.array(modes.factors)
+    weights = np.array([rule.h, rule.b0, rule.b1, rule.g0, rule.g1])
+    towards_prior = stepper.recursion == "prior"
+    walks = [
+        walked(factors, weights, forces, begin, towards_prior, which, stack, stepper.sensor.H,
+               own - offset, read)
+        for own in z
+    ]  # fmt: skip
+    values = np.array([found + moved for found, _ in walks])
+    nis = _nis(np.array([y for _, y in walks]), which, S_yy)
     dof = np.array([float(sum(stepper.when.get(k + 1, ()))) for k in range(nt)])
     return Batch(values, nis, dof)
+
+
+def _stacked(gains: GainSequence, nt: int, m: int, n: int) -> tuple[Ints, Floats, Floats]:
+    """Which gain (nt,) every step takes, -1 for none; all gains (k, m, n), zero for what they do
+    not see, and their S_yy (k, m, m) m^2, there the unit."""
+    places: dict[int, int] = {}
+    which = np.full(nt, -1)
+    distinct: list[Gain] = []
+    for step, gain in gains.gains.items():
+        if step <= nt:
+            which[step - 1] = places.setdefault(id(gain), len(distinct))
+            if which[step - 1] == len(distinct):
+                distinct.append(gain)
+    stack, S_yy = np.zeros((len(distinct), n, m)), np.zeros((len(distinct), m, m))
+    for G, S, gain in zip(stack, S_yy, distinct, strict=True):
+        if all(gain.seen):
+            G[:], S[:] = gain.G, gain.S_yy
+        else:
+            seen = np.array(gain.seen)
+            G[:, seen], S[:] = gain.G, np.where(np.outer(seen, seen), gain.S_yy, np.eye(m))
+    return which, np.ascontiguousarray(stack.swapaxes(1, 2)), S_yy
+
+
+def _nis(y: Floats, which: Ints, S_yy: Floats) -> Floats:
+    """y^T S_yy^-1 y (seeds, nt) of innovations (seeds, nt, m), zero where nothing was measured."""
+    nis, seen = np.zeros(y.shape[:2]), which >= 0
+    if seen.any():
+        scaled = np.linalg.solve(S_yy[which[seen]], np.moveaxis(y[:, seen], 0, 2))
+        nis[:, seen] = np.einsum("stm,tms->st", y[:, seen], scaled)
+    return nis
 
 
 def _require_schedule(stepper: DisplacementStepper, z: Floats) -> None:
@@ -54,39 +94,3 @@ def _require_schedule(stepper: DisplacementStepper, z: Floats) -> None:
             f"{int(other.sum())} of {len(z)} seeds miss other samples than the gains were made "
             "for; run those one by one"
         )
-
-
-class _Seeds:
-    """Amplitudes (n, seeds) with their rates; they change in place."""
-
-    def __init__(
-        self, stepper: DisplacementStepper, modes: InModes, gains: GainSequence, seeds: int
-    ) -> None:
-        n = len(modes.factors[0])
-        self.stepper, self.modes, self.gains = stepper, modes, gains
-        self.x, self.v, self.a = (np.zeros((n, seeds)) for _ in range(3))
-        self.inputs, self.k = stepper.excitation.rest(), 0
-        self.fq, self.fv, self.fa, self.ff = (f[:, None] for f in modes.factors)
-
-    def step(self, inputs: Floats, z: Floats) -> Floats:
-        """NIS (seeds,) of the step, whose estimates are then in `x`."""
-        self.k += 1
-        f, self.inputs, a = self.stepper.excitation.step(self.k, inputs, self.inputs, self.a)
-        self.a = a if a.ndim == 2 else np.repeat(a[:, None], len(z), axis=1)
-        prior = self.fq * self.x
-        prior += self.fv * self.v
-        prior += self.fa * self.a
-        prior += self.ff * f[:, None]
-        x, nis = self._corrected(prior, z)
-        towards = prior if self.stepper.recursion == "prior" else x
-        self.v, self.a = self.modes.rates(towards, self.x, self.v, self.a)
-        self.x = x
-        return nis
-
-    def _corrected(self, prior: Floats, z: Floats) -> tuple[Floats, Floats]:
-        gain, s = self.gains.at(self.k), self.stepper.sensor
-        if gain is None:
-            return prior, np.zeros(len(z))
-        i = np.array(gain.seen)
-        y = z.T[i] - s.H[i] @ prior - (s.driven[i] @ self.inputs.q)[:, None]
-        return prior + gain.G @ y, gain.nis(y)

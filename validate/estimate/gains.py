@@ -20,13 +20,15 @@ SETTLED = 1e-6
 class GainSequence:
     """Gains by step; from step `frozen` on they repeat (None: they never settled).
 
-    `computed` counts the gains that were computed, `before` are those that were `mapped` to these.
+    `computed` counts the gains that were computed, `before` are those that were `mapped` to these;
+    all lie in the span of `basis` (n, w), orthonormal columns, where one is known that is narrow.
     """
 
     gains: Mapping[int, Gain]
     frozen: int | None
     computed: int
     before: "GainSequence | None" = None
+    basis: Floats | None = None
 
     def at(self, step: int) -> Gain | None:
         return self.gains.get(step)
@@ -37,11 +39,16 @@ class GainSequence:
         if not distinct:
             return self
         columns = np.cumsum([gain.G.shape[1] for gain in distinct.values()])[:-1]
-        whole = turn(np.hstack([gain.G for gain in distinct.values()]))  # one product, not hundreds
+        whole = np.hstack([gain.G for gain in distinct.values()])  # one product, not hundreds
+        W = self.basis
+        whole = turn(whole) if W is None else turn(W) @ (W.T @ whole)
         parts = zip(distinct.items(), np.split(whole, columns, axis=1), strict=True)
-        turned = {k: replace(gain, G=np.ascontiguousarray(G)) for (k, gain), G in parts}
+        turned = {
+            k: Gain(np.ascontiguousarray(G), gain.S_yy, gain.seen, gain.root)
+            for (k, gain), G in parts
+        }
         gains = {step: turned[id(gain)] for step, gain in self.gains.items()}
-        return replace(self, gains=MappingProxyType(gains), before=self)
+        return replace(self, gains=MappingProxyType(gains), before=self, basis=None)
 
 
 @dataclass(frozen=True)
@@ -108,15 +115,16 @@ class Claims:
         self, covariance: Covariance, when: Mapping[int, Seen], tolerance: float = SETTLED
     ) -> None:
         self._covariance, self._when, self._tolerance = covariance, when, tolerance
-        self._walk: Iterator[Event]
-        self._ahead: Event | None
+        self._walk: Iterator[Event] | None = None
+        self._ahead: Event | None = None
         self._claim: Claim
         self._step = 0
-        self._restart()
 
     def at(self, step: int) -> Claim:
-        if step < self._step:
-            self._restart()
+        if self._walk is None or step < self._step:
+            self._walk = events(self._covariance, self._when, self._tolerance)
+            self._claim, self._step = self._covariance.start(), 0
+            self._ahead = next(self._walk, None)
         while self._ahead is not None and self._ahead.step <= step:
             self._claim, self._step = self._ahead.claim, self._ahead.step
             self._ahead = next(self._walk, None)
@@ -124,8 +132,3 @@ class Claims:
             self._claim = self._covariance.predict(self._claim, step - self._step)
         self._step = step
         return self._claim
-
-    def _restart(self) -> None:
-        self._walk = events(self._covariance, self._when, self._tolerance)
-        self._claim, self._step = self._covariance.start(), 0
-        self._ahead = next(self._walk, None)

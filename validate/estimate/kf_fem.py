@@ -31,7 +31,7 @@ from validate.estimate.displacement_filter import (
 )
 from validate.estimate.gains import GainSequence, gain_sequence, schedule
 from validate.estimate.measurements import Measurements, Timetable, timetable
-from validate.estimate.observable import observed
+from validate.estimate.observable import Spaces, observed
 from validate.fem.modes import modes_of
 from validate.fem.once import once
 from validate.fem.system import System
@@ -100,14 +100,14 @@ class KfFem(DisplacementNoise):
         load; `ComparisonError` for measurements that land on no step."""
         require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt)
-        nodal = Nodal(propagation(system, rule))
+        nodal = once(system, ("nodal step", rule), lambda: Nodal(propagation(system, rule)))
         if self.gains == "every_step":
             covariance = self._dense(system, measurements, nodal)
             return stepper_of(self, system, measurements, nodal, covariance, nodal, None)
         claimed, covariance = self._shared(system, measurements, nodal)
         if self.care(measurements):
             return stepper_of(self, system, measurements, nodal, covariance, claimed, None)
-        gains = shared_gains(covariance, timetable(measurements, self.dt), self.settled)
+        gains = shared_gains(system, covariance, timetable(measurements, self.dt), self.settled)
         in_nodes = gains.mapped(claimed.free)
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
 
@@ -129,13 +129,17 @@ class KfFem(DisplacementNoise):
         return modes, modal_covariance(self, system, measurements, modes)
 
 
-def shared_gains(covariance: Covariance, table: Timetable, settled: float) -> GainSequence:
+def shared_gains(
+    system: System, covariance: Covariance, table: Timetable, settled: float
+) -> GainSequence:
     """All gains of the measurements, from the narrowest recursion that gives them."""
     when = schedule(table)
-    narrow = (
-        observed(covariance, max(when, default=1)) if isinstance(covariance, Decoupled) else None
-    )
-    return gain_sequence(narrow or covariance, when, settled)
+    if isinstance(covariance, Decoupled):
+        known: Spaces = once(system, "spaces of what is observed", dict)
+        narrow = observed(covariance, max(when, default=1), known)
+        if narrow is not None:
+            return replace(gain_sequence(narrow, when, settled), basis=narrow.space.W)
+    return gain_sequence(covariance, when, settled)
 
 
 def in_modes(system: System, rule: Rule) -> InModes:
@@ -182,7 +186,8 @@ def stepper_of(
     """The stepper in `coordinates`, its covariance recursed in those of `claimed`."""
     table, H = timetable(measurements, settings.dt), measurements.free(system.free)
     seen = H @ coordinates.shapes if isinstance(coordinates, InModes) else H
-    excited = excitation(system, rule_of(settings.rule, settings.dt), a0=settings.a0)
+    rule, a0 = rule_of(settings.rule, settings.dt), settings.a0
+    excited = once(system, ("excited", rule, a0), lambda: excitation(system, rule, a0=a0))
     return DisplacementStepper(
         system,
         reactions(system),

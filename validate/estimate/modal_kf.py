@@ -43,5 +43,7 @@ class ModalKf(DisplacementNoise):
         covariance = modal_covariance(self, system, measurements, modes)
         beforehand = self.gains == "shared" and self.care(measurements) is None
         table = timetable(measurements, self.dt)
-        gains = shared_gains(covariance, table, self.settled) if beforehand else None
+        gains = None
+        if beforehand:
+            gains = shared_gains(system, covariance, table, self.settled)
         return stepper_of(self, system, measurements, modes, covariance, modes, gains)

@@ -1,36 +1,52 @@
 """The covariance of what is observed alone: all gains of a linear filter from a narrow recursion.
 
 A gain needs P H^T only. With V (n, r) spanning H^T, A H^T, A^2 H^T, ... and A V = V T the columns
-P V close among themselves: (P- V) = A (P V) T + Q V, (P+ V) = P- V - G H P- V. Where damping makes
-all modes decay alike that space is narrow (r = 18 of 525 on paper 001's cube), and the gains equal
-those of the whole covariance to rounding.
+P V close among themselves: (P- V) = A (P V) T + Q V, (P+ V) = P- V - G H P- V. They stay in the
+span of W (n, w), of Q V, P0 V and their products with powers of A. In the eigenvectors of A within
+either span both products are by numbers. Where damping makes all modes decay alike the spans are
+narrow (r = 18, w = 108 of 525 on paper 001's cube), and the gains equal those of the whole
+covariance to rounding.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 
 from validate.arrays import Floats
-from validate.estimate.covariance import Claim, Decoupled, Recursion, claimed, noise
+from validate.estimate.covariance import Claim, Decoupled, claimed, noise
 from validate.estimate.kalman import Gain, Seen, best_gain
+from validate.estimate.modal_kernel import advance_observed
 
 _LEFT = 1e-12  # share of A^k H^T outside the space that is taken as none
+_NOTHING = 1e-14  # singular value, of the largest, that is rounding
 _WORTH = 5  # times narrower than the whole, or the whole is cheaper
+
+Spaces = dict[Hashable, "Space"]
+
+
+@dataclass(frozen=True)
+class Space:
+    """V (n, r) and W (n, w), orthonormal, in which A is diagonal: `theta` (r,) and `phi` (w,)."""
+
+    V: Floats
+    theta: Floats
+    W: Floats
+    phi: Floats
 
 
 @dataclass(frozen=True)
 class Observed:
-    """f (n,) the diagonal of A; T (r, r), QV and PV0 (n, r), `rows` (m, r) = H V.
+    """Claims hold W^T P V (w, r) where others hold P, and W^T G where others hold G.
 
-    Its claims hold P V where others hold P.
+    QV and PV0 (w, r) are Q V and P0 V in the span of W; `rows` (m, r) = H V, H (m, w) = H W.
     """
 
-    f: Floats
-    T: Floats
+    space: Space
     QV: Floats
     PV0: Floats
     rows: Floats
-    V: Floats
     H: Floats
     R: Floats
 
@@ -38,39 +54,79 @@ class Observed:
         return claimed(self.PV0, self.PV0 @ self.rows.T)
 
     def predict(self, claim: Claim, steps: int = 1) -> Claim:
-        PV = claim.P
+        s = self.space
         for _ in range(steps):
-            PV = self.f[:, None] * (PV @ self.T) + self.QV
-        return claimed(PV, PV @ self.rows.T)
+            moved = advance_observed(claim.P, claim.G, claim.B, s.phi, s.theta, self.QV, self.rows)
+            claim = claimed(*moved)
+        return claim
 
     def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
-        gain = best_gain(claim.PHt, self.H @ claim.PHt + noise(self.R, late), seen)
-        i = np.array(seen)
-        PV = claim.P - gain.G @ (claim.PHt[:, i].T @ self.V)
-        return gain, claimed(PV, claim.PHt)
+        within = best_gain(claim.PHt, self.H @ claim.PHt + noise(self.R, late), seen)
+        B = (self.H if all(seen) else self.H[np.array(seen)]) @ claim.P
+        gain = Gain(self.space.W @ within.G, within.S_yy, seen, within.root)
+        return gain, Claim(claim.P, claim.PHt, within.G, B.T.copy())
 
 
-def observed(covariance: Decoupled, steps: int) -> Recursion:
-    """The narrow recursion if `steps` steps stay in a space that is narrow, else `covariance`."""
-    f, H, n = covariance.f, covariance.H, len(covariance.f)
-    V = np.linalg.qr(H.T)[0]
-    block = V
-    while not _holds(V, f, H, steps):
-        if V.shape[1] + len(H) > n // _WORTH:
-            return covariance
+def observed(covariance: Decoupled, steps: int, known: Spaces) -> Observed | None:
+    """The narrow recursion if `steps` steps stay in a space that is narrow, else None.
+
+    `known` keeps spaces for filters that differ in their variances only.
+    """
+    f, H = covariance.f, covariance.H
+    key = (f.tobytes(), H.tobytes(), steps)
+    space = known.get(key)
+    V = space.V if space else _span(H.T, f, steps, len(f) // _WORTH)
+    if V is None:
+        return None
+    QV, PV0 = covariance.Q @ V, covariance.P0 @ V
+    if not (QV.any() or PV0.any()):  # nothing is doubted: there is no gain
+        return None
+    if space is None or not all(_holds(space.W, f, X, steps) for X in (QV, PV0)):
+        space = known[key] = _space(f, V, QV, PV0, steps)
+        QV, PV0 = covariance.Q @ space.V, covariance.P0 @ space.V
+    W, V = space.W, space.V
+    return Observed(space, W.T @ QV, W.T @ PV0, H @ V, H @ W, covariance.R)
+
+
+def _space(f: Floats, V: Floats, QV: Floats, PV0: Floats, steps: int) -> Space:
+    sizes = (float(np.linalg.norm(X)) or 1.0 for X in (QV, PV0))
+    X = np.hstack([X / size for X, size in zip((QV, PV0), sizes, strict=True)])
+    W = _span(X, f, steps, len(f) // 2)
+    if W is None:
+        return Space(*_diagonal(V, f), np.eye(len(f)), f)
+    return Space(*_diagonal(V, f), *_diagonal(W, f))
+
+
+def _diagonal(V: Floats, f: Floats) -> tuple[Floats, Floats]:
+    """V turned so that V^T A V is diagonal, and that diagonal."""
+    values, turn = eigh(V.T @ (f[:, None] * V))
+    return V @ turn, values
+
+
+def _span(X: Floats, f: Floats, steps: int, most: int) -> Floats | None:
+    """Orthonormal columns that span X (n, k) and its products with A up to `steps` times; None
+    for more than `most`."""
+    V = block = _basis(X)
+    while not _holds(V, f, X, steps):
         block = (f - f.mean())[:, None] * block
         for _ in range(2):  # once leaves what rounding leaves
             block = block - V @ (V.T @ block)
-        block = np.linalg.qr(block)[0]
+        block = _basis(block)
         V = np.hstack([V, block])
-    T = V.T @ (f[:, None] * V)
-    return Observed(f, T, covariance.Q @ V, covariance.P0 @ V, H @ V, V, H, covariance.R)
+        if V.shape[1] > most:
+            return None
+    return V
 
 
-def _holds(V: Floats, f: Floats, H: Floats, steps: int) -> bool:
-    """Whether powers of A up to `steps` keep H^T within V."""
-    for k in (1, steps // 4, steps // 2, steps):
-        moved = (f / np.abs(f).max())[:, None] ** k * H.T
+def _basis(X: Floats) -> Floats:
+    U, s, _ = np.linalg.svd(X, full_matrices=False)
+    return np.asarray(U[:, s > _NOTHING * s[0]])
+
+
+def _holds(V: Floats, f: Floats, X: Floats, steps: int) -> bool:
+    """Whether powers of A up to `steps` keep X within V."""
+    for k in (0, 1, steps // 4, steps // 2, steps):
+        moved = (f / np.abs(f).max())[:, None] ** k * X
         if np.linalg.norm(moved - V @ (V.T @ moved)) > _LEFT * np.linalg.norm(moved):
             return False
     return True

@@ -1,5 +1,6 @@
 """What inputs do to the free unknowns: motions of drives, forces of loads, the start from rest."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -67,9 +68,23 @@ class Excitation:
             last, a = replace(last, loads=moved.loads), self.starts @ moved.loads
         return self.force(moved, last), moved, a
 
+    def walk(self, inputs: Floats) -> tuple[Floats, Floats, Floats]:
+        """Of a whole run from rest to inputs (nt, k + l): forces (nt, m) N of its steps, drives
+        (nt, k) m, and the accelerations (m,) it begins with."""
+        last, passed = self.rest(), []
+        for k, new in enumerate(inputs, 1):
+            passed.append(last := self.moved(k, new, last))
+        first, begin = self.rest(), np.zeros(len(self.loads))
+        if self.starts is not None and passed:
+            first, begin = replace(first, loads=passed[0].loads), self.starts @ passed[0].loads
+        new, old = _columns(passed), _columns([first, *passed[:-1]])
+        return np.ascontiguousarray(self.force(new, old).T), new.q.T, begin
+
     def moved(self, k: int, new: Floats, last: Inputs) -> Inputs:
         """What the inputs are at the end of step k, which takes them to `new` (k + l,)."""
         h, q, loads = self.rule.h, new[: self.drives], new[self.drives :]
+        if not self.drives:
+            return Inputs(q, q, q, loads)
         if self.rates == "given":
             speeds = np.array([_speed(d, k * h, h) for d in self.given])
             return Inputs(q, speeds, np.zeros_like(speeds), loads)
@@ -88,6 +103,12 @@ class Excitation:
         f -= self.damping @ r.weighted(new.rate, old.rate)
         f -= self.mass @ r.weighted_a(new.acceleration, old.acceleration)
         return np.asarray(f)
+
+
+def _columns(of: Sequence[Inputs]) -> Inputs:
+    """Many steps' inputs, a column each."""
+    parts = ((i.q, i.rate, i.acceleration, i.loads) for i in of)
+    return Inputs(*(np.array(part).T for part in zip(*parts, strict=True)))
 
 
 def _speed(drive: Drive, t: float, h: float) -> float:

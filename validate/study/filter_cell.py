@@ -4,7 +4,7 @@ Scenes, systems, registrations and truths are kept from cell to cell. Seeds chan
 a linear filter whose gains need no data runs them all at once, everything else one by one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -16,6 +16,7 @@ from validate.errors import ComparisonError
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.gains import schedule
+from validate.estimate.kalman import Seen
 from validate.estimate.measurements import Timetable, measurements, timetable
 from validate.fem.locate import probe_rows
 from validate.fem.system import System
@@ -27,6 +28,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.followed import Truth
 from validate.replay.method import Method
 from validate.replay.own_body import meshed
+from validate.scene.scene import Scene
 from validate.solve.march import march
 from validate.solve.types import Run, Stepper
 from validate.study.filter_plan import FilterCell, set_up
@@ -42,12 +44,22 @@ _MANY = 40  # recordings and registrations kept, of seeds mostly
 
 @dataclass(frozen=True)
 class Ready:
-    """A cell prepared for one seed."""
+    """A cell prepared for one seed; `mark` names all that `seen` and the scene come from."""
 
     parameters: Any
     method: Method
     system: System
     seen: Registered
+    mark: Hashable
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Measurements by step: their timetable, which are there, and z (nt, m) m, NaN = none."""
+
+    table: Timetable
+    when: Mapping[int, Seen]
+    z: Floats
 
 
 class Bench:
@@ -58,21 +70,37 @@ class Bench:
         assert experiment.twin is not None
         self.twin = experiment.twin
         self._systems: Kept[System] = Kept(4)
-        self._seen: Kept[Registered] = Kept(_MANY)
+        self._seen: Kept[tuple[str, Registered]] = Kept(_MANY)
+        self._looks: Kept[Looks | None] = Kept(_MANY)
         self._recordings: Kept[Any] = Kept(_MANY)
         self._truths: Kept[Truth] = Kept(4)
 
     def ready(self, cell: FilterCell, seed: int) -> Ready:
         parameters, method = set_up(self.experiment, self.job, cell, seed)
         key = _text(parameters)
-        recording = self._recordings.get(key, lambda: self.twin.made(parameters, lambda _: None))
-        scene = meshed(self.experiment.build(recording, parameters, method.scene))
-        mark = fingerprint(scene)
-        system = self._systems.get(mark, lambda: build_system(scene))
-        seen = self._seen.get(
-            (key, mark), lambda: self.experiment.place(recording, parameters, system.scene)
-        )
-        return Ready(parameters, method, system, seen)
+        mark = (key, fingerprint(method.scene))
+        body, seen = self._seen.get(mark, lambda: self._registered(key, parameters, method))
+        system = self._systems.get(body, lambda: build_system(self._scene(key, parameters, method)))
+        return Ready(parameters, method, system, seen, mark)
+
+    def looks(self, ready: Ready, names: tuple[str, ...]) -> Looks | None:
+        """Those components' measurements on the recorded steps; None where they are not there."""
+        return self._looks.get((ready.mark, names), lambda: _looks(ready, names))
+
+    def _recording(self, key: str, parameters: Any) -> Any:
+        return self._recordings.get(key, lambda: self.twin.made(parameters, lambda _: None))
+
+    def _scene(self, key: str, parameters: Any, method: Method) -> Scene:
+        recording = self._recording(key, parameters)
+        return meshed(self.experiment.build(recording, parameters, method.scene))
+
+    def _registered(self, key: str, parameters: Any, method: Method) -> tuple[str, Registered]:
+        """The registration, behind the fingerprint of its scene: seeds share their system."""
+        scene = self._scene(key, parameters, method)
+        body = fingerprint(scene)
+        system = self._systems.get(body, lambda: build_system(scene))
+        recording = self._recording(key, parameters)
+        return body, self.experiment.place(recording, parameters, system.scene)
 
     def truth(self, ready: Ready) -> Mapping[str, Floats]:
         """The twin's motion: noise does not touch it, so the first seed's serves all."""
@@ -151,24 +179,18 @@ def _measured(
 
     The filter's own table shows which those are: from the first seed's recording it must come out.
     """
-    sensor, nt = stepper.sensor, len(first.seen.t)
-    own = _given(first, sensor.names)
-    if own is None or not _equal(own, sensor.table):
+    sensor = stepper.sensor
+    own = bench.looks(first, sensor.names)
+    if own is None or not _equal(own.table, sensor.table):
         return None
-    others = [_given(bench.ready(cell, seed), sensor.names) for seed in cell.seeds[1:]]
-    tables = [own, *(t for t in others if t is not None)]
-    if any(schedule(t) != stepper.when for t in tables):
+    others = [bench.looks(bench.ready(cell, seed), sensor.names) for seed in cell.seeds[1:]]
+    all_ = [own, *(o for o in others if o is not None)]
+    if any(o.when != stepper.when for o in all_):
         return None
-    z = np.full((len(tables), nt, len(sensor.names)), np.nan)
-    for s, table in enumerate(tables):
-        for step, row in table.z.items():
-            if step <= nt:
-                z[s, step - 1] = row
-    return z
+    return np.array([o.z for o in all_])
 
 
-def _given(ready: Ready, names: tuple[str, ...]) -> Timetable | None:
-    """Those components' timetable, on the steps of the recorded inputs."""
+def _looks(ready: Ready, names: tuple[str, ...]) -> Looks | None:
     if not ready.seen.of(MarkerObservation):
         return None
     seen = measurements(ready.seen, ready.system.scene.mesh)
@@ -176,13 +198,17 @@ def _given(ready: Ready, names: tuple[str, ...]) -> Timetable | None:
         return None
     pick = [seen.names.index(name) for name in names]
     given = replace(seen, H=seen.H[pick], z=seen.z[:, pick], sd=seen.sd[pick], names=names)
-    return timetable(given, float(ready.seen.t[0]))
+    table = timetable(given, float(ready.seen.t[0]))
+    z = np.full((len(ready.seen.t), len(names)), np.nan)
+    for step, row in table.z.items():
+        if step <= len(z):
+            z[step - 1] = row
+    return Looks(table, schedule(table), z)
 
 
 def _equal(one: Timetable, other: Timetable) -> bool:
-    return one.z.keys() == other.z.keys() and all(
-        np.array_equal(z, other.z[k], equal_nan=True) for k, z in one.z.items()
-    )
+    mine, others = (np.array(list(table.z.values())) for table in (one, other))
+    return one.z.keys() == other.z.keys() and np.array_equal(mine, others, equal_nan=True)
 
 
 def _step_time(stepper: Stepper, inputs: Floats) -> float:

@@ -30,7 +30,7 @@ def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
         covariance = _turned(covariance, modes)
     gains, nodal = stepper.gains, isinstance(stepper.coordinates, Nodal)
     if gains is None:
-        gains = shared_gains(covariance, stepper.sensor.table, stepper.settled)
+        gains = shared_gains(stepper.system, covariance, stepper.sensor.table, stepper.settled)
     elif nodal:
         known = gains.before if stepper.claimed is modes else None
         gains = known or gains.mapped(modes.amplitudes)
