@@ -6,6 +6,7 @@ from pathlib import Path
 
 from validate.cli.arguments import pairs
 from validate.cli.display import say, table
+from validate.recording.mcap.peek import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
 
 
@@ -16,6 +17,16 @@ def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...
         print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
     else:
         _print(found)
+
+
+def messages(file: Path, topic: str, most: int, as_json: bool) -> None:
+    """Prints messages of a topic of an MCAP file, decoded, a line each or as one document."""
+    found = list(messages_in(file, topic, most))
+    if as_json:
+        print(json.dumps(found, indent=2, allow_nan=False))
+        return
+    for one in found:
+        print(json.dumps(one, allow_nan=False))
 
 
 def _print(found: Inspection) -> None:

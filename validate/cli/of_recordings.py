@@ -13,11 +13,18 @@ from validate.cli.arguments import EXPERIMENTS, FILE
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 @click.option("--as", "kind", metavar="KIND", help="The format, as of `validate import`.")
 @click.option("--map", "mapping", multiple=True, metavar="KEY=VALUE", help="As of `import`.")
-def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> None:
+@click.option("--messages", "topic", metavar="TOPIC", help="MCAP: its messages, a line each.")
+@click.option("--most", type=int, default=10, show_default=True, help="So many of them.")
+def inspect(
+    file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...], topic: str, most: int
+) -> None:
     """What a recording of any format holds: topics, clocks, rates, gaps, units, defects."""
     from validate.cli import inspecting
 
-    inspecting.inspect(file, as_json, kind, mapping)
+    if topic:
+        inspecting.messages(file, topic, most, as_json)
+    else:
+        inspecting.inspect(file, as_json, kind, mapping)
 
 
 @click.command("import")

@@ -29,6 +29,8 @@ from validate.recording.readers import READERS, named, recognised
 from validate.recording.scales import odd_stream
 from validate.recording.types import Clock, Frames, Recording, Signal, Source
 
+# What rosbag2 always writes is no defect: this record for every split, channels without messages.
+_ROS2, _OFTEN = "ros2", "rosbag2"
 DISAGREEMENT = 0.010  # s; larger differences between stamp, publish and log time are defects
 _KINDS = {MARKERS: "markers", SIGNAL: "signal", CONTOUR: "contours", IMAGE: "frames"}
 
@@ -198,7 +200,8 @@ def _topic(
         frame=samples[0].frame if samples else "",
         clock=clock,
     )
-    return topic, [*defects, *_clock_defects(channel.topic, clock, log)]
+    silent = clock is None and verified.header.profile == _ROS2  # it declares what it could record
+    return topic, [*defects, *([] if silent else _clock_defects(channel.topic, clock, log))]
 
 
 def _unit(raw: Collected) -> str:
@@ -246,7 +249,7 @@ def _file_defects(verified: Verified) -> list[str]:
         schema = verified.schemas.get(channel.schema_id)
         if schema is not None and schema.name == IMAGE and number not in ours(verified):
             found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
-    names = Counter(m.name for m in verified.metadata)
+    names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
     found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
     return found
 

@@ -108,7 +108,9 @@ def _times(ds: pydicom.Dataset, count: int) -> tuple[NDArray[np.float64], str]:
             return np.arange(count, dtype=np.float64) * (factor * float(ds.get(field))), field
     for field in ("CineRate", "RecommendedDisplayFrameRate"):
         if float(ds.get(field) or 0) > 0:
-            return np.arange(count, dtype=np.float64) / float(ds.get(field)), f"{field}, the rate of display"
+            return np.arange(count, dtype=np.float64) / float(
+                ds.get(field)
+            ), f"{field}, the rate of display"
     return np.zeros(0), "nothing"
 
 

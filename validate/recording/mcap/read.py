@@ -1,24 +1,29 @@
 """An MCAP file as a recording: verified front to back, then read by the index of that check.
 
-Topics with schemas of others, mirrors among them, are not read; `validate inspect` lists them.
-So are images without a record of their calibration (`calibration/<topic>`: m_per_px_x, m_per_px_y).
+Topics with schemas of others, mirrors among them, are not read by `read_recording`, which
+experiments use, nor are images without a record of their calibration (`calibration/<topic>`:
+m_per_px_x, m_per_px_y). `validate import` reads what of them means something (`read_all`).
 Nothing in the file is used as a path, and sizes are bounded before memory is taken
 (`records.MAX_RECORD`, `integrity.MAX_MESSAGES`, `schemas.MAX_MESSAGE`,
 `streams.MAX_NUMBERS`).
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from validate.errors import RecordingError
+from validate.recording.alignment import moved
 from validate.recording.clocks import clock_of
+from validate.recording.mcap.foreign import Found, found_streams, gatherers
+from validate.recording.mcap.foreign import fill as fill_foreign
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import by_name, name_of, own_records
 from validate.recording.mcap.records import MAGIC
 from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
-from validate.recording.reader import Options, Reader, head, require_known
+from validate.recording.reader import Options, Reader, head
 from validate.recording.types import Clock, Recording, by_kind
 
 
@@ -76,15 +81,53 @@ def _clock(raw: Collected) -> Clock:
     return clock_of(raw.channel.topic, raw.stamps_ns, raw.publish_ns, raw.log_ns)
 
 
-def _read(path: Path, options: Options) -> Recording:
-    require_known(options, ())
-    return read_recording(path)
+def read_all(path: Path, options: Options) -> Recording:
+    """The recording in an MCAP file of anybody: streams of ours, and messages of others that mean
+    something (`known_messages`), as one.
+
+    Options: `m_per_px` of images without a scale, `/topic.field=UNIT` for a number in messages of
+    other types. Raises as `read_recording`, `UsageError` for a wrong option, and `RecordingError`
+    where nothing is a stream.
+    """
+    with opened(path) as stream:
+        verified = verify(stream, path)
+        gathered, never = gatherers(verified, options)
+        try:
+            fill_foreign(gathered, messages_of(stream, verified, gathered.keys()))
+            found = found_streams(gathered, options)
+        except RecordingError as error:
+            raise RecordingError(f"{path.name}: {error}") from None
+    never = {**never, **found.never}
+    own = read_recording(path) if ours(verified) else None
+    if own is None and not found.make:
+        why = "; ".join(f"{topic}: {reason}" for topic, reason in never.items())
+        raise RecordingError(f"{path.name}: no message in it becomes a stream; {why or 'empty'}")
+    return _together(path, verified, own, found, never)
+
+
+def _together(
+    path: Path, verified: Verified, own: Recording | None, found: Found, never: Mapping[str, str]
+) -> Recording:
+    """Own and foreign streams on one clock."""
+    begins = [int(ns[0]) for ns in found.ns.values()] + ([own.t0_ns] if own else [])
+    t0 = min(begins)
+    streams = {topic: make(t0) for topic, make in found.make.items()}
+    told = {**found.told, "library": verified.header.library, "profile": verified.header.profile}
+    if own is None:
+        records = {**by_name(verified.metadata), "provenance": told}
+        return Recording(path.stem, verified.source, t0, **by_kind(streams), clock=found.clocks,
+                         metadata=records, unread=never)  # fmt: skip
+    own = moved(own, (own.t0_ns - t0) / 1e9)
+    return replace(
+        own, t0_ns=t0, **by_kind({**own.streams, **streams}), clock={**own.clock, **found.clocks},
+        unread=never,
+    )  # fmt: skip
 
 
 MCAP = Reader(
     "mcap",
     "an MCAP file",
     lambda path: head(path, len(MAGIC)) == MAGIC,
-    _read,
+    read_all,
     "its first 8 bytes are MCAP's",
 )

@@ -1,0 +1,43 @@
+"""Pictures as cameras and recorders pack them (PNG, JPEG, TIFF, BMP), made grey. Owns Pillow here.
+
+For images of others: ours are PNG, grey, and checked chunk by chunk in `image`.
+"""
+
+import io
+import warnings
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from validate.errors import RecordingError
+from validate.recording.images.image import MAX_SIDE, Pixels
+
+FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
+
+
+def decode_picture(data: bytes) -> Pixels:
+    """The image (h, w) uint8, colour by ITU-R BT.601's luma.
+
+    Raises `RecordingError` for a picture of another format, over `MAX_SIDE`, of more than 8 bits a
+    sample, cut or damaged.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of bombs and of broken tags
+            with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
+                _require_small(opened)
+                return np.asarray(opened.convert("L"), dtype=np.uint8).copy()
+    except UnidentifiedImageError:
+        raise RecordingError(f"no picture of {', '.join(FORMATS)} in {len(data)} bytes") from None
+    except RecordingError:
+        raise
+    except (OSError, ValueError, SyntaxError, Warning, EOFError, MemoryError) as error:
+        raise RecordingError(f"damaged picture ({' '.join(str(error).split())[:120]})") from None
+
+
+def _require_small(picture: Image.Image) -> None:
+    width, height = picture.size
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} a side")
+    if picture.mode.startswith(("I", "F")):
+        raise RecordingError(f"a picture of mode {picture.mode}: more than 8 bits; save 8-bit grey")

@@ -1,0 +1,136 @@
+"""Messages of others as plain dicts: ROS 2 (CDR), Protobuf, JSON, CBOR. Owns their libraries.
+
+Numbers stay numbers, texts texts, bytes bytes, lists lists; times of Protobuf become {sec, nsec}.
+"""
+
+import base64
+import io
+import json
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from typing import Any
+
+from mcap.records import Schema as TheirSchema
+
+from validate.errors import RecordingError
+from validate.recording.mcap.records import Channel, Schema
+
+Plain = dict[str, Any]
+Decoder = Callable[[bytes], Plain]
+MAX_MESSAGE = 64 * 2**20  # bytes of one message
+_TIMES = ("google.protobuf.Timestamp", "google.protobuf.Duration")
+
+
+def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
+    """What reads the messages of a channel, or why nothing does."""
+    encodings = (schema.encoding if schema else "", channel.encoding)
+    try:
+        if encodings == ("ros2msg", "cdr") and schema is not None:
+            with redirect_stdout(io.StringIO()):  # its library prints what it cannot parse
+                return _ros2(schema)
+        if encodings == ("protobuf", "protobuf") and schema is not None:
+            return _protobuf(schema)
+        if channel.encoding == "json":
+            return _guarded(_json)
+        if channel.encoding == "cbor":
+            return _cbor()
+    except ImportError as missing:
+        extra = {"cdr": "ros2", "protobuf": "foxglove"}.get(channel.encoding, channel.encoding)
+        return (
+            f"the library '{missing.name}' that reads it is not installed; "
+            f"pip install 'validate-tissue[{extra}]'"
+        )
+    except Exception as error:  # a schema that its own library cannot parse
+        return f"its schema cannot be parsed ({_line(error)})"
+    return f"no decoder for '{'/'.join(encodings)}'"
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120] or type(error).__name__
+
+
+def _guarded(decode: Callable[[bytes], Any]) -> Decoder:
+    """One typed error for whatever a library raises on damage, and for what is no object."""
+
+    def guarded(data: bytes) -> Plain:
+        if len(data) > MAX_MESSAGE:
+            raise RecordingError(f"a message of {len(data)} bytes, the limit is {MAX_MESSAGE}")
+        try:
+            found = decode(data)
+        except RecordingError:
+            raise
+        except Exception as error:
+            raise RecordingError(f"damaged ({_line(error)})") from None
+        if not isinstance(found, dict):
+            raise RecordingError(f"{type(found).__name__}, expected an object with fields")
+        return found
+
+    return guarded
+
+
+def _theirs(schema: Schema) -> TheirSchema:
+    return TheirSchema(schema.id, schema.data, schema.encoding, schema.name)
+
+
+def _ros2(schema: Schema) -> Decoder:
+    from mcap_ros2.decoder import DecoderFactory
+
+    decode = DecoderFactory().decoder_for("cdr", _theirs(schema))
+    if decode is None:
+        raise RecordingError("no ROS 2 message definition")
+    return _guarded(lambda data: _plain_ros2(decode(data)))
+
+
+def _plain_ros2(value: Any) -> Any:
+    slots = getattr(value, "__slots__", None)
+    if slots is not None:
+        return {name: _plain_ros2(getattr(value, name)) for name in slots}
+    if isinstance(value, (list, tuple)) and value and hasattr(value[0], "__slots__"):
+        return [_plain_ros2(item) for item in value]
+    return value
+
+
+def _protobuf(schema: Schema) -> Decoder:
+    from mcap_protobuf.decoder import DecoderFactory
+
+    decode = DecoderFactory().decoder_for("protobuf", _theirs(schema))
+    if decode is None:
+        raise RecordingError("no Protobuf schema")
+    return _guarded(lambda data: _plain_protobuf(decode(data)))
+
+
+def _plain_protobuf(message: Any) -> Any:
+    if message.DESCRIPTOR.full_name in _TIMES:
+        return {"sec": message.seconds, "nsec": message.nanos}
+    found = {}
+    for field in message.DESCRIPTOR.fields:
+        value = getattr(message, field.name)
+        nested = field.message_type is not None
+        if not isinstance(value, (str, bytes)) and hasattr(value, "__len__"):
+            found[field.name] = [_plain_protobuf(v) if nested else v for v in value]
+        else:
+            found[field.name] = _plain_protobuf(value) if nested else value
+    return found
+
+
+def _json(data: bytes) -> Any:
+    return json.loads(data.decode("utf-8"))
+
+
+def _cbor() -> Decoder:
+    import cbor2
+
+    return _guarded(cbor2.loads)
+
+
+def binary(value: Any) -> bytes:
+    """The bytes of a field: as they are, as a list of numbers, or base64 in JSON."""
+    if isinstance(value, str):
+        try:
+            return base64.b64decode(value, validate=True)
+        except ValueError as error:
+            raise RecordingError(f"no base64 ({error})") from None
+    try:
+        return bytes(value)
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"no bytes ({error})") from None

@@ -1,0 +1,233 @@
+"""What messages of ROS 2 and Foxglove mean: points, poses, numbers with units, images.
+
+Each known type is one function from its plain fields to parts; a part is a sample of the stream
+`<topic><part>`. Coordinates of both are metres, forces newtons, angles radians.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.formats.poses import ROTATION, TRANSLATION, rotations
+from validate.recording.images.image import Pixels
+from validate.recording.images.picture import decode_picture
+from validate.recording.mcap.decoders import Plain, binary
+
+NOT_STATED = "not stated"
+MAX_POINTS = 100_000  # of one cloud
+_LUMA = np.array([0.299, 0.587, 0.114])
+_FLOATS = {7: "f4", 8: "f8"}  # sensor_msgs/PointField, foxglove.PackedElementField alike
+_CHANNELS = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A sample of the stream `<topic><name>`, measured at `ns` (none: when it was published).
+
+    Points (k, 3) m of `names`, or numbers (c,) in `unit`, or an `image`.
+    """
+
+    name: str
+    ns: int | None
+    frame: str
+    values: Floats = field(default_factory=lambda: np.empty(0))
+    names: tuple[str, ...] = ()
+    unit: str = ""
+    image: Pixels | None = None
+
+
+Parts = Callable[[Plain], Sequence[Part]]
+
+
+def parts_of(schema: str) -> Parts | None:
+    """What reads messages of a type; none for one that means nothing here."""
+    return _KNOWN.get(schema)
+
+
+def _ns(stamp: Any) -> int:
+    sec, nsec = stamp["sec"], stamp.get("nanosec", stamp.get("nsec"))
+    return int(sec) * 10**9 + int(nsec)
+
+
+def _header(message: Plain) -> tuple[int, str]:
+    return _ns(message["header"]["stamp"]), str(message["header"]["frame_id"])
+
+
+def _own(message: Plain) -> tuple[int, str]:
+    """Stamp and frame of Foxglove's messages."""
+    return _ns(message["timestamp"]), str(message["frame_id"])
+
+
+def _xyz(value: Mapping[str, Any]) -> list[float]:
+    return [float(value[axis]) for axis in "xyz"]
+
+
+def _pose(name: str, ns: int, frame: str, place: Any, turn: Any) -> list[Part]:
+    q = np.array([[*_xyz(turn), float(turn["w"])]])
+    R = rotations(q, name or "pose").reshape(9)
+    x = np.array(_xyz(place))
+    return [
+        Part(f"{name}/{ROTATION}", ns, frame, R, unit="1"),
+        Part(f"{name}/{TRANSLATION}", ns, frame, x, unit="m"),
+    ]
+
+
+def _points(ns: int, frame: str, x: Floats) -> list[Part]:
+    if len(x) > MAX_POINTS:
+        raise RecordingError(f"{len(x)} points, the limit is {MAX_POINTS}")
+    return [Part("", ns, frame, x, tuple(str(i + 1) for i in range(len(x))))]
+
+
+def _pose_stamped(m: Plain) -> Sequence[Part]:
+    return _pose("", *_header(m), m["pose"]["position"], m["pose"]["orientation"])
+
+
+def _transform_stamped(m: Plain) -> Sequence[Part]:
+    inner = m["transform"]
+    name = f"/{m['child_frame_id']}"
+    return _pose(name, *_header(m), inner["translation"], inner["rotation"])
+
+
+def _tf(m: Plain) -> Sequence[Part]:
+    return [part for one in m["transforms"] for part in _transform_stamped(one)]
+
+
+def _pose_array(m: Plain) -> Sequence[Part]:
+    x = np.array([_xyz(p["position"]) for p in m["poses"]]).reshape(-1, 3)
+    return _points(*_header(m), x)
+
+
+def _point_stamped(m: Plain) -> Sequence[Part]:
+    return _points(*_header(m), np.array([_xyz(m["point"])]))
+
+
+def _wrench(m: Plain) -> Sequence[Part]:
+    ns, frame = _header(m)
+    inner = m["wrench"]
+    return [
+        Part("/force", ns, frame, np.array(_xyz(inner["force"])), unit="N"),
+        Part("/torque", ns, frame, np.array(_xyz(inner["torque"])), unit="N m"),
+    ]
+
+
+def _joints(m: Plain) -> Sequence[Part]:
+    """Revolute and prismatic joints look alike: their units are not stated."""
+    ns, frame = _header(m)
+    return [
+        Part(f"/{name}.{what}", ns, frame or "joints", np.array([float(values[i])]),
+             unit=NOT_STATED)
+        for what in ("position", "velocity", "effort")
+        for values in (m[what],)
+        for i, name in enumerate(m["name"])
+        if i < len(values)
+    ]  # fmt: skip
+
+
+def _ros_cloud(m: Plain) -> Sequence[Part]:
+    order = ">" if m["is_bigendian"] else "<"
+    offsets = {f["name"]: (f["offset"], f["datatype"]) for f in m["fields"]}
+    count = int(m["width"]) * int(m["height"])
+    return _points(*_header(m), _packed(binary(m["data"]), offsets, m["point_step"], order, count))
+
+
+def _foxglove_cloud(m: Plain) -> Sequence[Part]:
+    offsets = {f["name"]: (f["offset"], f["type"]) for f in m["fields"]}
+    data, stride = binary(m["data"]), int(m["point_stride"])
+    return _points(*_own(m), _packed(data, offsets, stride, "<", len(data) // max(stride, 1)))
+
+
+def _packed(data: bytes, offsets: Mapping[str, Any], stride: int, order: str, count: int) -> Floats:
+    """Coordinates (k, 3) of points that lie `stride` bytes apart."""
+    if count > MAX_POINTS:
+        raise RecordingError(f"{count} points, the limit is {MAX_POINTS}")
+    columns = []
+    for axis in "xyz":
+        at, kind = offsets.get(axis, (0, None))
+        if kind not in _FLOATS or not 0 <= int(at) < max(stride, 1):
+            raise RecordingError(f"a cloud without '{axis}' as a float")
+        dtype = np.dtype(order + _FLOATS[kind])
+        if len(data) < count * stride or at + dtype.itemsize > stride:
+            raise RecordingError(f"{len(data)} bytes for {count} points of {stride}; cut")
+        column = np.ndarray((count,), dtype, data, int(at), (stride,))
+        columns.append(column.astype(np.float64))
+    return np.stack(columns, axis=1)
+
+
+def _ros_image(m: Plain) -> Sequence[Part]:
+    ns, frame = _header(m)
+    return [Part("", ns, frame, image=_raw(m))]
+
+
+def _foxglove_image(m: Plain) -> Sequence[Part]:
+    ns, frame = _own(m)
+    return [Part("", ns, frame, image=_raw(m))]
+
+
+def _raw(m: Plain) -> Pixels:
+    height, width, step = int(m["height"]), int(m["width"]), int(m["step"])
+    encoding = str(m["encoding"])
+    channels = _CHANNELS.get(encoding)
+    data = binary(m["data"])
+    if channels is None:
+        raise RecordingError(f"encoding '{encoding}'; read are {', '.join(_CHANNELS)}")
+    if step < width * channels or len(data) < height * step or min(height, width) < 1:
+        raise RecordingError(f"{len(data)} bytes for {width} x {height} px of {channels}; cut")
+    rows = np.frombuffer(data, np.uint8, height * step).reshape(height, step)
+    pixels = rows[:, : width * channels].reshape(height, width, channels)
+    if channels == 1:
+        return pixels[..., 0].copy()
+    colour = pixels[..., 2::-1] if encoding.startswith("b") else pixels[..., :3]
+    return np.asarray(np.rint(colour @ _LUMA), dtype=np.uint8)
+
+
+def _ros_picture(m: Plain) -> Sequence[Part]:
+    ns, frame = _header(m)
+    return [Part("", ns, frame, image=decode_picture(binary(m["data"])))]
+
+
+def _foxglove_picture(m: Plain) -> Sequence[Part]:
+    ns, frame = _own(m)
+    return [Part("", ns, frame, image=decode_picture(binary(m["data"])))]
+
+
+def _pose_in_frame(m: Plain) -> Sequence[Part]:
+    return _pose("", *_own(m), m["pose"]["position"], m["pose"]["orientation"])
+
+
+def _poses_in_frame(m: Plain) -> Sequence[Part]:
+    x = np.array([_xyz(p["position"]) for p in m["poses"]]).reshape(-1, 3)
+    return _points(*_own(m), x)
+
+
+def _frame_transform(m: Plain) -> Sequence[Part]:
+    ns, frame = _ns(m["timestamp"]), str(m["parent_frame_id"])
+    return _pose(f"/{m['child_frame_id']}", ns, frame, m["translation"], m["rotation"])
+
+
+def _frame_transforms(m: Plain) -> Sequence[Part]:
+    return [part for one in m["transforms"] for part in _frame_transform(one)]
+
+
+_KNOWN: Mapping[str, Parts] = {
+    "sensor_msgs/msg/Image": _ros_image,
+    "sensor_msgs/msg/CompressedImage": _ros_picture,
+    "sensor_msgs/msg/JointState": _joints,
+    "sensor_msgs/msg/PointCloud2": _ros_cloud,
+    "geometry_msgs/msg/PoseStamped": _pose_stamped,
+    "geometry_msgs/msg/PoseArray": _pose_array,
+    "geometry_msgs/msg/PointStamped": _point_stamped,
+    "geometry_msgs/msg/TransformStamped": _transform_stamped,
+    "geometry_msgs/msg/WrenchStamped": _wrench,
+    "tf2_msgs/msg/TFMessage": _tf,
+    "foxglove.RawImage": _foxglove_image,
+    "foxglove.CompressedImage": _foxglove_picture,
+    "foxglove.PoseInFrame": _pose_in_frame,
+    "foxglove.PosesInFrame": _poses_in_frame,
+    "foxglove.PointCloud": _foxglove_cloud,
+    "foxglove.FrameTransform": _frame_transform,
+    "foxglove.FrameTransforms": _frame_transforms,
+}
