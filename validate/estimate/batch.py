@@ -28,7 +28,7 @@ def shared_gain_run(stepper: DisplacementStepper, inputs: Floats, z: Floats, row
     rows (p, N) read what is wanted. Raises `ComparisonError` for other steppers and schedules.
     """
     modes, gains = stepper.coordinates, stepper.gains
-    if not isinstance(modes, InModes) or gains is None:
+    if not isinstance(modes, InModes) or gains is None or stepper.smooth:
         raise ComparisonError('seeds share a walk of ModalKf(gains="shared"); prepare that')
     m, nt = len(stepper.sensor.names), len(inputs)
     z = checked(z, "z [m]", (None, nt, m), nan=True, error=ComparisonError)

@@ -56,7 +56,18 @@ class Covariance(Recursion, Protocol):
     """A recursion of the whole covariance."""
 
     @property
+    def Q(self) -> Floats: ...
+
+    @property
     def P0(self) -> Floats: ...
+
+    def ahead(self, x: Floats) -> Floats:
+        """A x."""
+        ...
+
+    def back(self, x: Floats) -> Floats:
+        """A^T x of x (n,) or (n, k)."""
+        ...
 
     def matrix(self, claim: Claim) -> Floats:
         """P (n, n) with the last update in it."""
@@ -87,6 +98,12 @@ class Dense:
 
     def start(self) -> Claim:
         return claimed(self.P0, self.P0 @ self.H.T)
+
+    def ahead(self, x: Floats) -> Floats:
+        return np.asarray(self.A @ x)
+
+    def back(self, x: Floats) -> Floats:
+        return np.asarray(self.A.T @ x)
 
     def over(self, steps: int) -> tuple[Floats, Floats]:
         """A and Q (n, n) of so many steps >= 1 together, by repeated squaring; kept."""
@@ -153,6 +170,12 @@ class Decoupled:
 
     def start(self) -> Claim:
         return claimed(self.P0, self.P0 @ self.H.T)
+
+    def ahead(self, x: Floats) -> Floats:
+        return self.f * x
+
+    def back(self, x: Floats) -> Floats:
+        return self.f * x if x.ndim == 1 else self.f[:, None] * x
 
     def predict(self, claim: Claim, steps: int = 1) -> Claim:
         for _ in range(steps):

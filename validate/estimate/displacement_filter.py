@@ -5,8 +5,8 @@ velocity and acceleration are inputs, recursed beside the filter and not part of
 knows nothing of them. Its transition J^-1 A alone decides P, hence the gains need no data.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Protocol
 
@@ -26,6 +26,7 @@ from validate.estimate.kalman import (
     nothing,
 )
 from validate.estimate.measurements import Timetable
+from validate.estimate.smoother import Look, Note, look_of, smoothed
 from validate.fem.system import System
 from validate.solve.dynamic import InertialStepper
 from validate.solve.excitation import Excitation, Inputs
@@ -136,13 +137,19 @@ class Sensed:
 
 @dataclass(frozen=True)
 class Estimate:
-    """State (n,) with its rates, the inputs, and what is claimed (None: precomputed)."""
+    """State (n,) with its rates, the inputs, and what is claimed (None: precomputed).
+
+    To be smoothed: `look`, its gain in the coordinates of the claim; smoothed: `sd` (m,) m of the
+    free unknowns at output frames.
+    """
 
     x: Floats
     v: Floats
     a: Floats
     inputs: Inputs
     claim: Claim | None
+    look: Look | None = None
+    sd: Floats | None = None
 
 
 class Spread:
@@ -179,6 +186,7 @@ class DisplacementStepper(InertialStepper):
     claimed: Coordinates
     settled: float
     care: Care | None
+    smooth: bool
     _claims: Claims = field(init=False)
     _spread: "Spread" = field(init=False)
 
@@ -208,16 +216,20 @@ class DisplacementStepper(InertialStepper):
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
         prior = of.predict(last.x, last.v, a, f)
         corrected = self._heeded if self.care else self._corrected
-        x, claim, seen = corrected(prior, k, last, moved)
+        x, claim, gain, seen = corrected(prior, k, last, moved)
         towards = prior if self.recursion == "prior" else x
         v, a = of.rates(towards, last.x, last.v, a)
-        inner = Estimate(x, v, a, moved, claim)
+        inner = Estimate(x, v, a, moved, claim, self._look(k, gain, seen))
         if not np.isfinite(a.sum() + x.sum()):
             return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
         numbers = {**seen.numbers(self.sensor.names), **gate_numbers(self.care, seen)}
-        if self.reactions.names:
-            numbers |= self.forces(of.free(x), of.free(v), of.free(a), moved)
-        return State(k, inner, numbers=numbers)
+        return State(k, inner, numbers={**numbers, **self._forces(inner)})
+
+    def _forces(self, e: Estimate) -> Mapping[str, float]:
+        if not self.reactions.names:
+            return {}
+        of = self.coordinates
+        return self.forces(of.free(e.x), of.free(e.v), of.free(e.a), e.inputs)
 
     def _gain(self, step: int, claim: Claim | None) -> tuple[Gain | None, Claim | None]:
         if self.gains is not None:
@@ -228,31 +240,33 @@ class DisplacementStepper(InertialStepper):
 
     def _corrected(
         self, prior: Floats, step: int, last: Estimate, inputs: Inputs
-    ) -> tuple[Floats, Claim | None, Innovation]:
+    ) -> tuple[Floats, Claim | None, Gain | None, Innovation]:
         gain, claim = self._gain(step, last.claim)
         z = self.sensor.table.at(step)
         if z is None or gain is None:
-            return prior, claim, nothing(len(self.sensor.names))
+            return prior, claim, None, nothing(len(self.sensor.names))
         found = innovation(z, self._shown(prior, inputs), gain)
-        return prior + gain.G @ found.y[np.array(gain.seen)], claim, found
+        return prior + gain.G @ found.y[np.array(gain.seen)], claim, gain, found
 
     def _heeded(
         self, prior: Floats, step: int, last: Estimate, inputs: Inputs
-    ) -> tuple[Floats, Claim | None, Innovation]:
+    ) -> tuple[Floats, Claim | None, Gain | None, Innovation]:
         """With a gain of this very look."""
         assert self.care is not None
         assert last.claim is not None
         z, claim = self.sensor.table.at(step), self.covariance.predict(last.claim)
         if z is None:
-            return prior, claim, nothing(len(self.sensor.names))
+            return prior, claim, None, nothing(len(self.sensor.names))
         shown = self._shown(prior, inputs)
         moved = shown - self._shown(last.x, last.inputs)
         gain, claim, found, _ = self.care.update(self.covariance, claim, z, shown, moved)
         if gain is None:
-            return prior, claim, found
-        dx = gain.G @ found.y[np.array(gain.seen)]
-        nodal = isinstance(self.coordinates, Nodal)
-        return prior + (self.claimed.free(dx) if nodal else dx), claim, found
+            return prior, claim, None, found
+        return prior + self._turned(gain.G @ found.y[np.array(gain.seen)]), claim, gain, found
+
+    def _turned(self, dx: Floats) -> Floats:
+        """From the coordinates of what is claimed to those of the state."""
+        return self.claimed.free(dx) if isinstance(self.coordinates, Nodal) else dx
 
     def _shown(self, x: Floats, inputs: Inputs) -> Floats:
         """Measured components (m,) m of a state and its drives."""
@@ -265,9 +279,44 @@ class DisplacementStepper(InertialStepper):
 
     def sd(self, state: State) -> Floats:
         """Claimed standard deviations (n, d) m; prescribed unknowns have none."""
+        sd = state.inner.sd
+        sd = self._spread.at(self._claim(state)) if sd is None else sd
+        return self.nodal(sd, np.zeros(0))
+
+    def _claim(self, state: State) -> Claim:
         claim = state.inner.claim
-        claim = self._claims.at(state.k) if claim is None else claim
-        return self.nodal(self._spread.at(claim), np.zeros(0))
+        return self._claims.at(state.k) if claim is None else claim
+
+    # --- smoothing --------------------------------------------------------------------------------
+
+    def _look(self, step: int, gain: Gain | None, found: Innovation) -> Look | None:
+        if not self.smooth or gain is None:
+            return None
+        turned = self.gains.before if self.gains else None
+        return look_of(turned.gains[step] if turned else gain, found)
+
+    def note(self, state: State, framed: bool) -> Note:
+        return Note(state.inner.look, framed)
+
+    def smoother(self, notes: Sequence[Note]) -> Callable[[State], State]:
+        """Displacements with their claims, and forces of the drives at the filter's own rates."""
+        found = smoothed(self.covariance, notes)
+
+        def shown(state: State) -> State:
+            e: Estimate = state.inner
+            x = e.x + self._turned(found.after(state.k))
+            W = found.roots.get(state.k)
+            inner = replace(e, x=x, sd=None if W is None else self._narrowed(state, W))
+            return replace(state, inner=inner, numbers={**state.numbers, **self._forces(inner)})
+
+        return shown
+
+    def _narrowed(self, state: State, W: Floats) -> Floats:
+        """Standard deviations (m,) m of the free unknowns from P - (P W)(P W)^T."""
+        claim = self._claim(state)
+        known = self.claimed.free(self.covariance.matrix(claim) @ W)
+        variances = self._spread.at(claim) ** 2 - (known**2).sum(axis=1)
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 def load_shapes(system: System, H: Floats) -> Floats:

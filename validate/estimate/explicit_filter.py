@@ -1,8 +1,8 @@
 """The stepper of filters that predict with the explicit step, around a core that they bring."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.explicit_step import ExplicitStep
 from validate.estimate.kalman import Innovation, innovation_units, nothing
 from validate.estimate.measurements import Timetable
+from validate.estimate.smoother import Look, Note, Transition, smoothed
 from validate.scene.scene import Scene
 from validate.solve.types import Ending, State
 
@@ -50,12 +51,29 @@ class ExplicitCore(Protocol):
     def numbers(self, memory: Any) -> Mapping[str, float]: ...
 
 
+@runtime_checkable
+class SmoothExplicitCore(ExplicitCore, Protocol):
+    """A core whose memory can be smoothed."""
+
+    def look(self, memory: Any) -> Look | None:
+        """What it took at its last correction."""
+        ...
+
+    def transition(self) -> Transition: ...
+
+    def corrected(self, memory: Any, number: int, e: Floats, W: Floats | None) -> Memory:
+        """After step `number`, with e (n,) added, and at output frames P_s = P - (P W)(P W)^T."""
+        ...
+
+
 @dataclass(frozen=True)
 class AtInputs:
-    """The core's memory, and the inputs (k + l,) at the end of the step."""
+    """The core's memory, the inputs (k + l,) at the end of the step, and what was taken in its
+    explicit steps, to be smoothed."""
 
     memory: Any
     inputs: Floats
+    looks: tuple[Look | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,6 +86,7 @@ class ExplicitFilterStepper:
     times: Timetable
     refusal: str
     care: Care | None
+    smooth: bool = False
 
     @property
     def scene(self) -> Scene:
@@ -91,7 +110,7 @@ class ExplicitFilterStepper:
         if self.refusal:
             return replace(state, failure=("refused", self.refusal))
         core, parts, last = self.core, self.explicit.parts, state.inner
-        memory, found = last.memory, nothing(len(self.names))
+        memory, found, looks = last.memory, nothing(len(self.names)), list[Look | None]()
         for part in range(parts):
             memory = core.predict(memory, *self.explicit.inputs(last.inputs, inputs, part))
             if failure := self._failure(memory):
@@ -101,9 +120,35 @@ class ExplicitFilterStepper:
             if z is not None:
                 memory, new = core.correct(memory, number, z)
                 found = new.after(found)
+            if self.smooth:
+                looks.append(None if z is None else self._smoothing.look(memory))
         numbers = {**found.numbers(self.names), **gate_numbers(self.care, found)}
         numbers |= core.numbers(memory)
-        return State(state.k + 1, AtInputs(memory, inputs), numbers=numbers)
+        return State(state.k + 1, AtInputs(memory, inputs, tuple(looks)), numbers=numbers)
+
+    @property
+    def _smoothing(self) -> SmoothExplicitCore:
+        assert isinstance(self.core, SmoothExplicitCore)
+        return self.core
+
+    def note(self, state: State, framed: bool) -> tuple[Note, ...]:
+        """Of every explicit step; the last one is the frame."""
+        *parts, end = state.inner.looks
+        return (*(Note(look) for look in parts), Note(end, framed))
+
+    def smoother(self, notes: Sequence[tuple[Note, ...]]) -> Callable[[State], State]:
+        """With what else the core estimates, by its linearisation."""
+        core = self._smoothing
+        found = smoothed(core.transition(), [note for step in notes for note in step])
+
+        def shown(state: State) -> State:
+            number = state.k * self.explicit.parts
+            e, W = found.after(number), found.roots.get(number)
+            memory = core.corrected(state.inner.memory, number, e, W)
+            numbers = {**state.numbers, **core.numbers(memory)}
+            return replace(state, inner=replace(state.inner, memory=memory), numbers=numbers)
+
+        return shown
 
     def _failure(self, memory: Memory) -> tuple[Ending, str] | None:
         largest = kernel.farthest(memory.u)

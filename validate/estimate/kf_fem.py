@@ -32,6 +32,7 @@ from validate.estimate.displacement_filter import (
 from validate.estimate.gains import GainSequence, gain_sequence, schedule
 from validate.estimate.measurements import Measurements, Timetable, timetable
 from validate.estimate.observable import Spaces, observed
+from validate.estimate.smoother import smooth_setting
 from validate.fem.modes import modes_of
 from validate.fem.once import once
 from validate.fem.system import System
@@ -71,6 +72,7 @@ class DisplacementNoise:
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
+    smooth: bool = smooth_setting()
 
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt)
@@ -201,6 +203,7 @@ def stepper_of(
         claimed,
         settings.settled,
         settings.care(measurements),
+        settings.smooth,
     )
 
 

@@ -29,6 +29,13 @@ from validate.estimate.kalman import Gain, Innovation, innovation
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_basis import Basis, modes, pod
 from validate.estimate.reduced_kf import steady
+from validate.estimate.smoother import (
+    Look,
+    Transition,
+    look_of,
+    require_exact,
+    smooth_setting,
+)
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
@@ -60,6 +67,7 @@ class ReducedEKF:
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
+    smooth: bool = smooth_setting()
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1):
@@ -72,6 +80,7 @@ class ReducedEKF:
         does not exist, `ComparisonError` for a steady gain that does not, or times off the steps.
         """
         require_handled(system.scene, self)
+        require_exact(self.smooth, self.gains)
         explicit = explicit_step(system, self.dt, self.substeps)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
         times = timetable(measurements, explicit.h)
@@ -84,7 +93,9 @@ class ReducedEKF:
         sensed = np.unique(measurements.H.indices).astype(np.int64)
         rows = np.ascontiguousarray(measurements.H[:, sensed].toarray())
         core = ShapesCore(explicit, basis.Phi, model, recursion, updates, sensed, rows, care)
-        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal, care)
+        return ExplicitFilterStepper(
+            explicit, core, measurements.names, times, refusal, care, self.smooth
+        )
 
     def _basis(self, steps: ExplicitStep) -> Basis:
         if self.basis == "pod":
@@ -140,13 +151,15 @@ def _directions(settings: ReducedEKF, system: System, basis: Basis) -> Floats:
 @dataclass(frozen=True)
 class ShapesMemory:
     """U_t and U_{t-h} (N,) m, bias (l,) N, and the explicit step of the last update (0: none), with
-    care also what was claimed then."""
+    care also what was claimed then; the look of that update; smoothed, at output frames, P."""
 
     u: Floats
     before: Floats
     bias: Floats
     at: int
     claim: Claim | None = None
+    taken: Look | None = None
+    P: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -198,26 +211,51 @@ class ShapesCore:
         claim = self.recursion.predict(memory.claim, number - memory.at)
         gain, claim, found, _ = care.update(self.recursion, claim, z, shown, moved)
         if gain is None:
-            return memory, found
+            return replace(memory, taken=None), found
         return self._moved(memory, gain, found, number, claim), found
 
     def _moved(
         self, memory: ShapesMemory, gain: Gain, found: Innovation, number: int, claim: Claim | None
     ) -> ShapesMemory:
-        r, dx = self.Phi.shape[1], gain.G @ found.y[np.array(gain.seen)]
+        look = look_of(gain, found)
+        memory = self._shifted(memory, gain.G @ look.y)
+        return replace(memory, at=number, claim=claim, taken=look)
+
+    def _shifted(self, memory: ShapesMemory, dx: Floats) -> ShapesMemory:
+        r = self.Phi.shape[1]
         moved = self.Phi @ dx[: 2 * r].reshape(2, r).T
         u, before = memory.u + moved[:, 0], memory.before + moved[:, 1]
-        return ShapesMemory(u, before, memory.bias + dx[2 * r :], number, claim)
+        return replace(memory, u=u, before=before, bias=memory.bias + dx[2 * r :])
+
+    def look(self, memory: ShapesMemory) -> Look | None:
+        return memory.taken
+
+    def transition(self) -> Transition:
+        return self.covariance
+
+    def corrected(
+        self, memory: ShapesMemory, number: int, e: Floats, W: Floats | None
+    ) -> ShapesMemory:
+        if W is None:
+            return self._shifted(memory, e)
+        P = self._claim(memory, number).P
+        PW = P @ W
+        return replace(self._shifted(memory, e), P=P - PW @ PW.T)
 
     def sd(self, memory: ShapesMemory, number: int) -> Floats:
         """What the shapes span, diag(Phi P Phi^T)."""
-        covariance, r = self.covariance, self.Phi.shape[1]
+        P = self._claim(memory, number).P if memory.P is None else memory.P
+        r = self.Phi.shape[1]
+        variances = np.maximum(((self.Phi @ P[:r, :r]) * self.Phi).sum(axis=1), 0)
+        return np.asarray(np.sqrt(variances).reshape(-1, 3))
+
+    def _claim(self, memory: ShapesMemory, number: int) -> Claim:
+        covariance = self.covariance
         claim = self.updates[memory.at].claim if memory.at in self.updates else memory.claim
         claim = claim or covariance.start()
         if number > memory.at:
             claim = covariance.predict(claim, number - memory.at)
-        variances = np.maximum(((self.Phi @ claim.P[:r, :r]) * self.Phi).sum(axis=1), 0)
-        return np.asarray(np.sqrt(variances).reshape(-1, 3))
+        return claim
 
     def numbers(self, memory: ShapesMemory) -> Mapping[str, float]:
         """`<load>.bias` N."""

@@ -21,6 +21,13 @@ from validate.estimate.linear_model import LinearModel
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
 from validate.estimate.small_state import CoreStepper
+from validate.estimate.smoother import (
+    Look,
+    Transition,
+    look_of,
+    require_exact,
+    smooth_setting,
+)
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
@@ -50,11 +57,13 @@ class ReducedKf:
     gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or where it settles")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
+    smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` for scenes with drives, large strain, or coupled damping, and
         `ComparisonError` for measurements off the steps, or a steady gain of irregular ones."""
         require_handled(system.scene, self)
+        require_exact(self.smooth, self.gains)
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
         model = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
@@ -62,7 +71,7 @@ class ReducedKf:
         care = care_of(measurements, self.gate, self.clock, self.dt)
         make = _steady if self.gains == "steady" else _exact
         core = make(model, schedule(table), self.settled, care)
-        return CoreStepper(system, core, measurements.names, table, care)
+        return CoreStepper(system, core, measurements.names, table, care, self.smooth)
 
 
 def dense_covariance(model: LinearModel) -> Dense:
@@ -101,12 +110,15 @@ def _sizes(F: Floats, Q: Floats, P: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Amplitudes:
-    """x (n,) after step k, and with care what was claimed after the last look, at step `at`."""
+    """x (n,) after step k, its look if it had one, and with care what was claimed after the last
+    one, at step `at`; smoothed, at output frames, P (n, n)."""
 
     x: Floats
     k: int
     claim: Claim | None = None
     at: int = 0
+    look: Look | None = None
+    P: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -139,31 +151,47 @@ class GainCore:
         if z is None or gain is None:
             return Amplitudes(prior, k), nothing(len(m.H))
         seen = innovation(z, m.H @ prior, gain)
-        return Amplitudes(prior + gain.G @ seen.y[np.array(gain.seen)], k), seen
+        look = look_of(gain, seen)
+        return Amplitudes(prior + gain.G @ look.y, k, look=look), seen
 
     def _heeded(
         self, care: Care, inner: Amplitudes, prior: Floats, k: int, z: Floats | None
     ) -> tuple[Amplitudes, Innovation]:
         H = self.reduced.model.H
         if z is None:
-            return replace(inner, x=prior, k=k), nothing(len(H))
+            return replace(inner, x=prior, k=k, look=None), nothing(len(H))
         claim, shown = claim_of(self.recursion, inner, 1), H @ prior
         gain, claim, seen, _ = care.update(self.recursion, claim, z, shown, shown - H @ inner.x)
         if gain is None:
-            return replace(inner, x=prior, k=k), seen
-        return Amplitudes(prior + gain.G @ seen.y[np.array(gain.seen)], k, claim, k), seen
+            return replace(inner, x=prior, k=k, look=None), seen
+        look = look_of(gain, seen)
+        return Amplitudes(prior + gain.G @ look.y, k, claim, k, look), seen
 
     def free(self, inner: Amplitudes) -> Floats:
         return self.reduced.lift @ inner.x
 
     def variances(self, inner: Amplitudes) -> Floats:
-        P = self.claims(inner)
+        P = self.claims(inner) if inner.P is None else inner.P
         lift = self.reduced.lift
         return np.asarray(np.einsum("ij,ij->i", lift @ P, lift))
 
     def numbers(self, inner: Amplitudes) -> Mapping[str, float]:
         biases = inner.x[len(inner.x) - self.reduced.loads :]
         return dict(zip(self.units, biases.tolist(), strict=True))
+
+    def look(self, inner: Amplitudes) -> Look | None:
+        return inner.look
+
+    def transition(self) -> Transition:
+        assert isinstance(self.recursion, Dense)
+        return self.recursion
+
+    def corrected(self, inner: Amplitudes, e: Floats, W: Floats | None) -> Amplitudes:
+        if W is None:
+            return replace(inner, x=inner.x + e)
+        P = self.claims(inner)
+        PW = P @ W
+        return replace(inner, x=inner.x + e, P=P - PW @ PW.T)
 
 
 def claim_of(recursion: Recursion, inner: Amplitudes, ahead: int = 0) -> Claim:

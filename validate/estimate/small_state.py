@@ -1,8 +1,8 @@
 """The stepper of filters with a small state: what they share, around a core that they bring."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from validate.arrays import Floats
 from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.kalman import Innovation, innovation_units
 from validate.estimate.measurements import Timetable
+from validate.estimate.smoother import Look, Note, Transition, smoothed
 from validate.fem.system import System
 from validate.scene.scene import Scene
 from validate.solve.dynamic import spread
@@ -41,6 +42,21 @@ class Core(Protocol):
     def numbers(self, inner: Any) -> Mapping[str, float]: ...
 
 
+@runtime_checkable
+class SmoothCore(Core, Protocol):
+    """A core whose states can be smoothed."""
+
+    def look(self, inner: Any) -> Look | None:
+        """What it took at the last step, if anything."""
+        ...
+
+    def transition(self) -> Transition: ...
+
+    def corrected(self, inner: Any, e: Floats, W: Floats | None) -> Any:
+        """The state with e (n,) added, and at output frames P_s = P - (P W)(P W)^T."""
+        ...
+
+
 @dataclass(frozen=True)
 class CoreStepper:
     """States carry what the core does."""
@@ -50,6 +66,7 @@ class CoreStepper:
     names: tuple[str, ...]
     table: Timetable
     care: Care | None
+    smooth: bool = False
 
     @property
     def scene(self) -> Scene:
@@ -76,6 +93,22 @@ class CoreStepper:
         numbers = {**seen.numbers(self.names), **gate_numbers(self.care, seen)}
         numbers |= self.core.numbers(inner)
         return State(k, inner, numbers=numbers)
+
+    def note(self, state: State, framed: bool) -> Note:
+        assert isinstance(self.core, SmoothCore)
+        return Note(self.core.look(state.inner), framed)
+
+    def smoother(self, notes: Sequence[Note]) -> Callable[[State], State]:
+        """With what else the core estimates."""
+        core = self.core
+        assert isinstance(core, SmoothCore)
+        found = smoothed(core.transition(), notes)
+
+        def shown(state: State) -> State:
+            inner = core.corrected(state.inner, found.after(state.k), found.roots.get(state.k))
+            return replace(state, inner=inner, numbers={**state.numbers, **core.numbers(inner)})
+
+        return shown
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""

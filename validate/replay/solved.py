@@ -147,4 +147,6 @@ def _label(method: Method, scene: AnyScene) -> str:
     """The method's label, and what it was run as where parameters changed that."""
     own = scene.mesh.order
     order = getattr(method.scene, "order", own)
-    return method.label if order == own else f"{method.label} [order {own}]"
+    label = method.label if order == own else f"{method.label} [order {own}]"
+    smooth = getattr(method.settings, "smooth", False)
+    return f"{label} [smoothed: sees the future]" if smooth else label

@@ -176,11 +176,11 @@ def _speeds(experiment: Experiment, main: Mapping[str, Followed]) -> Exhibit:
 
 
 def _endings(main: Mapping[str, Followed]) -> Exhibit:
-    """Of methods that solve a scene at once: there is no step to time."""
+    """Of methods that solve a scene at once or are smoothed: there is no step to time."""
     rows = tuple((f.label, f.run.setup_s, f.run.outcome.state, f.run.outcome.why)
                  for f in main.values())  # fmt: skip
     table = NumberTable(
-        "speeds", "Every method solves its scene at once.",
+        "speeds", "No step is timed: every method solves its scene at once, or is smoothed.",
         ("method", "time / s", "ended", "why"), rows, below="why",
     )  # fmt: skip
     return Exhibit("speeds", "How every method ended", tables=(table,))

@@ -20,6 +20,8 @@ from validate.solve.types import (
     Run,
     SceneSolver,
     Scheme,
+    Smoothing,
+    State,
     Stepper,
     StepTimes,
     Trace,
@@ -76,11 +78,13 @@ def march(
     `tell` is given the step, now and then.
 
     Inputs are drives in m, then loads in N. Inputs, the numbers of the states and the scene's
-    probes are traced at every step.
+    probes are traced at every step. A filter that smooths is stepped twice and has no times: it is
+    none for real time.
     """
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
-    walk, outcome = _walk(stepper, inputs, frozenset(at.tolist()), tell)
+    smooths = isinstance(stepper, Smoothing) and stepper.smooth
+    walk, outcome = (_smoothed if smooths else _walk)(stepper, inputs, frozenset(at.tolist()), tell)
     outcome = _listened(stepper, walk, outcome)
     done = len(walk.updates)
     traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
@@ -90,8 +94,8 @@ def march(
     traces |= _totals(stepper.scene, traces)
     traces |= probe_traces(stepper.scene, np.array(walk.probes))
     traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
-    seconds = np.array(walk.seconds)[:done]
-    times = _step_times(seconds[_UNTIMED if done > 2 * _UNTIMED else 0 :]) if done else None
+    seconds = None if smooths else np.array(walk.seconds)[:done]
+    times = _times(seconds)
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     at = at[at < done]
@@ -113,8 +117,30 @@ class _Kept:
     said: list[str] = field(default_factory=list)
 
 
-def _walk(
+def _smoothed(
     stepper: Stepper, inputs: Floats, at: frozenset[int], tell: Tell
+) -> tuple[_Kept, Outcome]:
+    """The second walk shows what the first one's measurements say of every step."""
+    assert isinstance(stepper, Smoothing)
+    notes, state = [], stepper.rest()
+    for i, value in enumerate(inputs):
+        state = stepper.step(state, value)
+        if state.failure:
+            break
+        notes.append(stepper.note(state, i in at))
+    return _walk(stepper, inputs, at, tell, stepper.smoother(notes))
+
+
+def _filtered(state: State) -> State:
+    return state
+
+
+def _walk(
+    stepper: Stepper,
+    inputs: Floats,
+    at: frozenset[int],
+    tell: Tell,
+    shown: Callable[[State], State] = _filtered,
 ) -> tuple[_Kept, Outcome]:
     walk, state, rows = _Kept(), stepper.rest(), _probe_rows(stepper)
     often = -(-len(inputs) // _TOLD)
@@ -128,14 +154,15 @@ def _walk(
             walk.said.extend(w for w in stepper.notices(state) if w not in walk.said)
         if state.failure:
             return walk, Outcome(state.failure[0], i, state.failure[1])
-        walk.updates.append(state.updates)
-        walk.numbers.append(state.numbers)
+        seen = shown(state)
+        walk.updates.append(seen.updates)
+        walk.numbers.append(seen.numbers)
         if rows is not None:
-            walk.probes.append(rows.apply(stepper.field(state)))
+            walk.probes.append(rows.apply(stepper.field(seen)))
         if i in at:
-            walk.fields.append(stepper.field(state))
+            walk.fields.append(stepper.field(seen))
             if isinstance(stepper, Uncertain):
-                walk.sd.append(stepper.sd(state))
+                walk.sd.append(stepper.sd(seen))
     return walk, Outcome("finished", len(inputs))
 
 
@@ -204,6 +231,12 @@ def probe_traces(scene: Scene, values: Floats) -> dict[str, Trace]:
 def output_frames(steps: int, frames: int) -> Ints:
     """Evenly spaced steps whose fields are kept, the last one among them."""
     return np.unique(np.linspace(0, steps - 1, min(frames, steps)).round().astype(np.int64))
+
+
+def _times(seconds: Floats | None) -> StepTimes | None:
+    if seconds is None or not len(seconds):
+        return None
+    return _step_times(seconds[_UNTIMED if len(seconds) > 2 * _UNTIMED else 0 :])
 
 
 def _step_times(seconds: Floats) -> StepTimes:

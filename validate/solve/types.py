@@ -1,6 +1,6 @@
 """States, outcomes and runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
@@ -101,6 +101,22 @@ class Noticing(Protocol):
 
     def notices(self, state: State) -> tuple[str, ...]:
         """What was rounded or left out up to this state, in words."""
+        ...
+
+
+@runtime_checkable
+class Smoothing(Protocol):
+    """A filter that can estimate every step from later measurements too; `smooth`: it is to."""
+
+    @property
+    def smooth(self) -> bool: ...
+
+    def note(self, state: State, framed: bool) -> Any:
+        """What must be kept of a step until the run is over; `framed`: an output frame."""
+        ...
+
+    def smoother(self, notes: Sequence[Any]) -> Callable[[State], State]:
+        """Turns the states of the same steps, in order, into smoothed ones."""
         ...
 
 

@@ -241,12 +241,12 @@ def _one_by_one(
         traces = {n: run.traces[f"{n}.{bench.experiment.axis}"].y for n in names}
         rows.append(_scores(bench, first, traces, own, degrees))
         nis, dof, steps = nis + own, dof + degrees, len(run.t)
-        times.append(run.step_s.p50 if run.step_s else 0.0)
+        times += [run.step_s.p50] if run.step_s else []
     return FilterScores(
         *_columns(rows),
         nis=nis if dof else None,
         nis_dof=dof,
-        step_s=float(np.median(times)),
+        step_s=float(np.median(times)) if times else None,
         setup_s=setup,
         steps=steps,
     )

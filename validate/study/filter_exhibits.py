@@ -53,8 +53,14 @@ def ranking_row(r: Ranked) -> tuple[Entry, ...]:
         seen.verdict if seen else None,
         None if r.result.step_s is None else _MM * r.result.step_s,
         r.result.frozen,
-        "front" if r.dominated_by is None else f"#{r.dominated_by} beats",
+        _front(r),
     )
+
+
+def _front(r: Ranked) -> str:
+    if r.result.step_s is None:
+        return "sees the future"
+    return "front" if r.dominated_by is None else f"#{r.dominated_by} beats"
 
 
 RANKING = (
@@ -172,8 +178,10 @@ def _dominated(ranking: Ranking) -> Iterator[str]:
 
 def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
     rows = [r for r in ranking.rows if r.result.step_s and r.score.mean > 0]
-    exact = len(ranking.rows) - len(rows)
+    exact = sum(r.score.mean <= 0 for r in ranking.rows)
     none = f" Not drawn: {exact} without any error." if exact else ""
+    future = sum(r.result.step_s is None for r in ranking.rows)
+    none += f" Not drawn: {future} smoothed, which see the future." if future else ""
     series = []
     for method in dict.fromkeys(r.cell.method for r in rows):
         mine = [r for r in rows if r.cell.method == method]

@@ -1,5 +1,6 @@
 """Which cells are best: ranked within a condition of the twin, ties stated, Pareto beside."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -45,9 +46,15 @@ class Ranking:
 
     @property
     def front(self) -> tuple[Ranked, ...]:
-        """The Pareto front, fastest first."""
-        free = [r for r in self.rows if r.dominated_by is None]
-        return tuple(sorted(free, key=lambda r: (r.result.step_s or 0.0, r.place)))
+        """The Pareto front, fastest first; what has no time is not on it."""
+        timed = [r for r in self.rows if r.result.step_s is not None]
+        free = [r for r in timed if r.dominated_by is None]
+        return tuple(sorted(free, key=lambda r: (_time(r.result), r.place)))
+
+
+def _time(scores: FilterScores) -> float:
+    """Seconds of a step; one that cannot keep up with a clock takes for ever."""
+    return math.inf if scores.step_s is None else scores.step_s
 
 
 def rankings(
@@ -72,7 +79,7 @@ def _ranking(
     order = sorted(found, key=lambda one: interval(one[1].scores[by]).mean)
     scores = [value.scores[by] for _, value in order]
     means = [interval(s) for s in scores]
-    times = [value.step_s or 0.0 for _, value in order]
+    times = [_time(value) for _, value in order]
     rows = []
     for i, (cell, value) in enumerate(order):
         better = dominator(i, [m.mean for m in means], times)

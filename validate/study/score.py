@@ -15,7 +15,8 @@ NIS = "nis.per_dof"
 
 @dataclass(frozen=True)
 class FilterScores:
-    """Scores by name, one number per seed (SI, `units` by name); step_s s is the median step.
+    """Scores by name, one number per seed (SI, `units` by name); step_s s is the median step,
+    None for runs that are smoothed: they are none for real time.
 
     `nis` is that of all seeds with `nis_dof` degrees of freedom, None without innovations.
     `frozen` is the step from which a linear filter's gains repeat. `shared`: all seeds were run at

@@ -17,8 +17,8 @@ from validate.estimate.kf_fem import excitation_in, in_modes, shared_gains
 
 def sharing(stepper: DisplacementStepper) -> DisplacementStepper | None:
     """The same filter in modes with `gains`; None where damping couples the modes, and where gains
-    depend on what each seed measures."""
-    if stepper.care is not None:
+    depend on what each seed measures; smoothing walks twice."""
+    if stepper.care is not None or stepper.smooth:
         return None
     modes, covariance = stepper.claimed, stepper.covariance
     if not isinstance(modes, InModes):
