@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Protocol
 
+from validate.estimate.ensemble_kf import EnsembleKf
 from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
@@ -10,6 +11,7 @@ from validate.estimate.modal_kf import ModalKf
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.estimate.reduced_kf import ReducedKf
+from validate.estimate.roukf import Roukf
 from validate.fem.system import System
 from validate.solve.handles import Handles
 from validate.solve.types import Stepper
@@ -31,6 +33,8 @@ FILTERS: tuple[type[Filter], ...] = (
     Guest,
     NodeEKF,
     ReducedEKF,
+    Roukf,
+    EnsembleKf,
 )
 LINEAR_FILTERS = tuple(f for f in FILTERS if "linear" in f.handles.law)
-EXPLICIT_FILTERS = tuple(f for f in FILTERS if "linear" not in f.handles.law)
+EXPLICIT_FILTERS = tuple(f for f in FILTERS if set(f.handles.law) != {"linear"})

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import cholesky
 
 from validate.arrays import Floats
-from validate.estimate.kalman import Gaussian, Update, best_gain, innovation
+from validate.estimate.kalman import Gaussian, Innovation, Update, best_gain, innovation
 
 Function = Callable[[Floats], Floats]
 
@@ -65,10 +65,50 @@ def enkf_predict(members: Floats, f: Function, noise: Floats) -> Floats:
 def enkf_update(members: Floats, z: Floats, h: Function, R: Floats, noise: Floats) -> Floats:
     """Members (N, n) corrected by perturbed measurements z + noise (N, m) (Burgers et al. 1998)."""
     seen = np.array([h(member) for member in members])
+    return ensemble_update(members, seen, z, R, noise).members
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """Members (N, n) after an update, and the innovation that led to it."""
+
+    members: Floats
+    innovation: Innovation
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Factors between 0 and 1 on the sample covariances of state and measured (n, m), and of what
+    is measured among itself (m, m)."""
+
+    state: Floats
+    seen: Floats
+
+
+def ensemble_update(
+    members: Floats,
+    seen: Floats,
+    z: Floats,
+    R: Floats,
+    noise: Floats | None,
+    reach: Reach | None = None,
+) -> Corrected:
+    """Members (N, n), of which `seen` (N, m) would be measured, corrected by z (m,), NaN = missing.
+
+    With draws `noise` (N, m) of R every member takes a measurement of its own (Burgers et al.
+    1998); without, all move by the mean's correction, and half the gain draws them together, which
+    is right to first order in H P H^T R^-1 (Sakov & Oke 2008). What the reach leaves no covariance
+    is not moved at all.
+    """
     off, apart = members - members.mean(axis=0), seen - seen.mean(axis=0)
-    degrees = len(members) - 1
-    gain = best_gain(off.T @ apart / degrees, apart.T @ apart / degrees + R)
-    return np.asarray(members + (z + noise - seen) @ gain.G.T)
+    degrees, i = len(members) - 1, np.isfinite(z)
+    PHt, HPHt = off.T @ apart / degrees, apart.T @ apart / degrees
+    if reach is not None:
+        PHt, HPHt = reach.state * PHt, reach.seen * HPHt
+    gain = best_gain(PHt, HPHt + R, tuple(i.tolist()))
+    found = innovation(z, seen.mean(axis=0), gain)
+    y = found.y[i] - apart[:, i] / 2 if noise is None else (z + noise - seen)[:, i]
+    return Corrected(np.asarray(members + y @ gain.G.T), found)
 
 
 def ensemble_gaussian(members: Floats) -> Gaussian:

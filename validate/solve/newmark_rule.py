@@ -92,7 +92,7 @@ class Propagation:
 
     def history(self, u: Floats, v: Floats, a: Floats) -> Floats:
         """A u + L v + M_a a (m,) N, by one product with M and one with C."""
-        (mu, mv, ma), (cu, cv, ca), ku = _weights(self.rule)
+        (mu, mv, ma), (cu, cv, ca), ku = of_history(self.rule)
         damped = cu * u + cv * v if ca == 0 else cu * u + cv * v + ca * a
         total = self.M @ (mu * u + mv * v + ma * a) + self.C @ damped
         return np.asarray(total if ku == 0 else total + self.K @ (ku * u))
@@ -108,7 +108,7 @@ class Propagation:
     @cached_property
     def A(self) -> sparse.csr_array:
         """Paper 001, eq 12."""
-        (mu, _, _), (cu, _, _), ku = _weights(self.rule)
+        (mu, _, _), (cu, _, _), ku = of_history(self.rule)
         return sparse.csr_array(mu * self.M + cu * self.C + ku * self.K)
 
     @cached_property
@@ -140,9 +140,14 @@ def propagation(
 def _system_matrix(
     rule: Rule, M: sparse.csr_array, C: sparse.csr_array, K: sparse.csr_array
 ) -> sparse.csr_array:
+    m, c, k = of_system(rule)
+    return sparse.csr_array(m * M + c * C + k * K)
+
+
+def of_system(rule: Rule) -> tuple[float, float, float]:
+    """Weights of M, C and K in J (paper 001, eq 13)."""
     m = (1 - rule.am) / (rule.h**2 * rule.b1)
-    c = (1 - rule.af) * rule.g1 / (rule.h * rule.b1)
-    return sparse.csr_array(m * M + c * C + (1 - rule.af) * K)
+    return m, (1 - rule.af) * rule.g1 / (rule.h * rule.b1), 1 - rule.af
 
 
 def require_start(system: System, rule: Rule, mass: MassName, terms: DampingTerms = "full") -> None:
@@ -164,15 +169,15 @@ def require_start(system: System, rule: Rule, mass: MassName, terms: DampingTerm
 
 def per_mode(rule: Rule, c: Floats, k: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Factors (m,) of q, q', q'' and force in the next q, for q'' + c q' + k q = f per mode."""
-    masses, dampings, ku = _weights(rule)
+    masses, dampings, ku = of_history(rule)
     h, w = rule.h, 1 - rule.af
     J = (1 - rule.am) / (h * h * rule.b1) + w * rule.g1 / (h * rule.b1) * c + w * k
     q, v, a = ((m + d * c) / J for m, d in zip(masses, dampings, strict=True))
     return q + ku * k / J, v, a, 1 / J
 
 
-def _weights(r: Rule) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
-    """Weights of M and of C in A, L, M_a, and of K in A (paper 001, eqs 12 and 14)."""
+def of_history(r: Rule) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
+    """Weights of M and of C in A, L, M_a, and of K in A (paper 001, eqs 12 and 14): of u, v, a."""
     c, d = 1 / (r.h**2 * r.b1), r.g1 / (r.h * r.b1)
     m, w = 1 - r.am, 1 - r.af
     masses = (m * c, m * c * r.h, m * r.b0 / r.b1 - r.am)

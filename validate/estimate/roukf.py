@@ -1,0 +1,61 @@
+"""Reduced-order unscented Kalman filter: sigma points in the space of parameters alone.
+
+Every sigma point is a run of the same model with stiffness, loads or supports of its own; states
+are uncertain only through them (Moireau & Chapelle 2011). p parameters cost p + 1 runs. Parameters
+are constant in time: the filter listens less and less, and where the truth is of another kind than
+the model it is confidently wrong: NIS far above 1 is then the alarm.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from validate.arrays import Floats
+from validate.estimate.measurements import Measurements
+from validate.estimate.member_filter import HANDLES, MemberModel, MemberStepper, sight
+from validate.estimate.reduced_unscented import SigmaName, reduced_update, unit_points
+from validate.estimate.sampled_kalman import Corrected
+from validate.fem.system import System
+from validate.parameters import quantity
+from validate.solve.handles import Handles, require_handled
+from validate.solve.types import Stepper
+
+
+@dataclass(frozen=True)
+class Roukf(MemberModel):
+    """`points`: p + 1 runs of a simplex, or 2 p runs on the axes."""
+
+    handles: ClassVar[Handles] = HANDLES
+
+    points: SigmaName = quantity("simplex", "1", "sigma points of p parameters: p + 1, or 2 p")
+
+    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+        """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
+        scene does not have, `ComparisonError` for measurements off the steps."""
+        require_handled(system.scene, self)
+        members = self.members(system)
+        sd, R = members.doubts.sd, measurements.variances(self.R)
+        analysis = SigmaRuns(unit_points(self.points, len(sd)), sd, R)
+        looks = sight(members, measurements, self.h)
+        return MemberStepper(self, members, analysis, looks, self.limit(system))
+
+
+@dataclass(frozen=True)
+class SigmaRuns:
+    """unit (s, p), sd (p,) at the start, R (m,) m^2."""
+
+    unit: Floats
+    sd: Floats
+    R: Floats
+
+    @property
+    def degrees(self) -> int:
+        return len(self.unit)
+
+    def start(self) -> Floats:
+        return self.unit * self.sd
+
+    def walked(self, x: Floats, number: int) -> Floats:
+        return x
+
+    def corrected(self, Z: Floats, seen: Floats, z: Floats, number: int) -> Corrected:
+        return reduced_update(Z, seen, z, self.R, self.unit)
