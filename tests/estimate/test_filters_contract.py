@@ -148,6 +148,9 @@ def test_a_gated_outlier_changes_as_much_as_a_missing_look(settings: Filter, pul
     assert rejected[0][20] == 1 + rejected[1][20]
     assert jumped.traces["gate.tested"].y.sum() == 120
     free = pulled.march(settings.prepare(pulled.system, replace(seen, z=z)), at=(20,))
+    if isinstance(settings, MemberModel) and not free.finished:  # a constant does not come back
+        assert "a gate keeps outliers away" in free.outcome.why
+        return
     assert np.abs(free.u[0] - missing.u[1]).max() > 1e-3
 
 

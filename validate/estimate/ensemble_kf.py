@@ -60,9 +60,8 @@ class EnsembleKf(MemberModel):
             )
         walks = [self.load_walk if p.kind == "bias" else self.walk for p in doubtful]
         reach = None if self.radius is None else reached(members, measurements, self.radius)
-        R = measurements.variances(self.R)
-        analysis = DrawnRuns(self, members.doubts.sd, np.array(walks) * np.sqrt(self.h), R, reach)
-        looks = sight(members, measurements, self.h)
+        analysis = DrawnRuns(self, members.doubts.sd, np.array(walks) * np.sqrt(self.h), reach)
+        looks = sight(self, members, measurements)
         return MemberStepper(self, members, analysis, looks, self.limit(system))
 
 
@@ -87,12 +86,11 @@ def reached(members: Members, measurements: Measurements, radius: float) -> Reac
 
 @dataclass(frozen=True)
 class DrawnRuns:
-    """sd and walk of a step (p,), R (m,) m^2; every step draws from a generator of its own."""
+    """sd and walk of a step (p,); every step draws from a generator of its own."""
 
     settings: EnsembleKf
     sd: Floats
     walk: Floats
-    R: Floats
     reach: Reach | None
 
     @property
@@ -109,12 +107,17 @@ class DrawnRuns:
     def walked(self, x: Floats, number: int) -> Floats:
         return x + self.walk * self._normal(1, number, len(self.sd)) if self.walk.any() else x
 
-    def corrected(self, Z: Floats, seen: Floats, z: Floats, number: int) -> Corrected:
+    def claimed(self, seen: Floats) -> Floats:
+        apart = seen - seen.mean(axis=0)
+        HPHt = np.asarray(apart.T @ apart / self.degrees)
+        return HPHt if self.reach is None else self.reach.seen * HPHt
+
+    def corrected(self, Z: Floats, seen: Floats, z: Floats, R: Floats, number: int) -> Corrected:
         noise = None
         if self.settings.update == "perturbed":
-            drawn = self._normal(2, number, len(self.R))
-            noise = np.sqrt(self.R) * (drawn - drawn.mean(axis=0))
-        return ensemble_update(Z, seen, z, np.diag(self.R), noise, self.reach)
+            drawn = self._normal(2, number, len(R))
+            noise = (drawn - drawn.mean(axis=0)) @ np.linalg.cholesky(R).T
+        return ensemble_update(Z, seen, z, R, noise, self.reach)
 
     def _normal(self, what: int, number: int, columns: int) -> Floats:
         """(runs, columns); the same for the same step, so that a step can be made again."""

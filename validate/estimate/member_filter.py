@@ -4,7 +4,7 @@ Between measurements every member is a run of the model; at one, an `Analysis` c
 parameters together. What is estimated is the members' mean, with their spread.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, Literal, Protocol, cast
@@ -13,6 +13,14 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
+from validate.estimate.care import (
+    Care,
+    care_of,
+    clock_setting,
+    gate_numbers,
+    gate_setting,
+    gate_units,
+)
 from validate.estimate.doubtful import Doubts, doubts
 from validate.estimate.explicit_step import FAR, MARGIN, explicit_step
 from validate.estimate.kalman import Innovation, innovation_units, nothing
@@ -34,6 +42,7 @@ from validate.solve.handles import LARGE, Handles
 from validate.solve.newmark_rule import rule_of
 from validate.solve.types import Ending, State
 
+_AWAY = 6 * np.log(10)  # of a scale's logarithm: six orders of magnitude
 NORMAL_95 = 1.959963984540054  # sd either side that hold 95 % of a normal law
 HANDLES = Handles(("linear", *LARGE), inertia=True, cavities=False, drives=False)
 
@@ -60,6 +69,8 @@ class MemberModel:
     a0: StartName = quantity("equilibrium", "1", "of a linear scene: M^-1 f, or zero")
     coordinates: Coordinates = quantity("shapes", "1", "of a linear scene: few shapes, or nodes")
     shapes: int = quantity(6, "1", "of every load, with each stiffness that is tried")
+    gate: float | None = gate_setting()
+    clock: float | None = clock_setting()
     inflation: float = quantity(1.0, "1", "of the members' distance from their mean, an update")
     beyond_limit: Literal["refuse", "run"] = quantity(
         "refuse", "1", "an explicit step above the stiffest member's critical one"
@@ -109,8 +120,12 @@ class Analysis(Protocol):
         """After a step; the same object where nothing walks."""
         ...
 
-    def corrected(self, Z: Floats, seen: Floats, z: Floats, number: int) -> Corrected:
-        """Of states and coordinates Z (s, n + p) by z (m,) m, NaN = missing."""
+    def claimed(self, seen: Floats) -> Floats:
+        """Covariance (m, m) m^2 of what members would show (s, m)."""
+        ...
+
+    def corrected(self, Z: Floats, seen: Floats, z: Floats, R: Floats, number: int) -> Corrected:
+        """Of states and coordinates Z (s, n + p) by z (m,) m, NaN = missing, of noise R (m, m)."""
         ...
 
     @property
@@ -121,25 +136,29 @@ class Analysis(Protocol):
 
 @dataclass(frozen=True)
 class Sight:
-    """What is measured of a member: `rows` (m, c) of the columns `at` (c,) of its state."""
+    """What is measured of a member: `rows` (m, c) of the columns `at` (c,) of its state; its noise
+    R (m, m) m^2, and the care it is taken with."""
 
     names: tuple[str, ...]
     times: Timetable
     rows: Floats
     at: Ints
+    R: Floats
+    care: Care | None
 
     def of(self, X: Floats) -> Floats:
         """(s, m) m."""
         return np.asarray(X[:, self.at] @ self.rows.T)
 
 
-def sight(members: Members, measurements: Measurements, h: float) -> Sight:
-    """Raises `ComparisonError` for times off the steps of h s."""
+def sight(model: MemberModel, members: Members, measurements: Measurements) -> Sight:
+    """Raises `ComparisonError` for times off the members' steps, `UsageError` as `care_of`."""
     H, shapes = measurements.H, members.displaced
     at = np.unique(H.indices) if shapes is None else np.arange(len(shapes))
     rows = H[:, at].toarray() if shapes is None else H @ shapes.T
-    times = timetable(measurements, h)
-    return Sight(measurements.names, times, np.asarray(rows), at.astype(np.int64))
+    times, R = timetable(measurements, model.h), np.diag(measurements.variances(model.R))
+    care = care_of(measurements, model.gate, model.clock, model.h)
+    return Sight(measurements.names, times, np.asarray(rows), at.astype(np.int64), R, care)
 
 
 @dataclass(frozen=True)
@@ -170,7 +189,7 @@ class MemberStepper:
     def units(self) -> Mapping[str, str]:
         """NIS with its degrees, innovations with their sd, and the estimates: value, 95 % interval,
         share of the start's sd that is left, correlations."""
-        units = innovation_units(self.sight.names)
+        units = {**innovation_units(self.sight.names), **gate_units(self.sight.care)}
         for p in self.members.doubts.parameters:
             name = f"estimate.{p.name}"
             units |= {name: p.unit, f"{name}.low": p.unit, f"{name}.high": p.unit}
@@ -199,21 +218,26 @@ class MemberStepper:
                 last.inputs + s / parts * (inputs - last.inputs) for s in (part, part + 1)
             )
             number = state.k * parts + part + 1
-            now = self._moved(replace(now, inputs=end), begin, number)
+            before, now = now, self._moved(replace(now, inputs=end), begin, number)
             if failure := self._lost(now.X):
                 return replace(state, failure=failure)
             z = self.sight.times.at(number)
             if z is None:
                 continue
             try:
-                now, new = self._corrected(now, z, number)
+                now, new = self._corrected(now, before, z, number)
             except np.linalg.LinAlgError as singular:
                 return replace(state, failure=("diverged", f"step {state.k + 1}: {singular}"))
-            found = replace(new, nis=found.nis + new.nis, dof=found.dof + new.dof)
-            if failure := self._refused(now.x):
+            found = new.after(found)
+            if failure := self._away(now.x) or self._refused(now.x):
                 return replace(state, failure=failure)
-        numbers = {**found.numbers(self.sight.names), **self._estimates(now.x)}
-        return State(state.k + 1, now, numbers=numbers)
+            now = replace(now, ready=self._ready(before, now.x))
+        numbers = {**found.numbers(self.sight.names), **gate_numbers(self.sight.care, found)}
+        return State(state.k + 1, now, numbers=numbers | dict(self._estimates(now.x)))
+
+    def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
+        """Why no measurement reached the estimate; empty where one did."""
+        return self.sight.times.unheard(len(numbers) * self.model.substeps, numbers)
 
     def _moved(self, now: MemberStates, begin: Floats, number: int) -> MemberStates:
         x = self.analysis.walked(now.x, number)
@@ -228,14 +252,21 @@ class MemberStepper:
         return self.members.ready(x)
 
     def _corrected(
-        self, now: MemberStates, z: Floats, number: int
+        self, now: MemberStates, before: MemberStates, z: Floats, number: int
     ) -> tuple[MemberStates, Innovation]:
         n, Z = now.X.shape[1], np.hstack([now.X, now.x])
         if self.model.inflation != 1:
             Z = Z.mean(axis=0) + self.model.inflation * (Z - Z.mean(axis=0))
-        after = self.analysis.corrected(Z, self.sight.of(Z), z, number)
+        seen, R, gated, care = self.sight.of(Z), self.sight.R, None, self.sight.care
+        shown = seen.mean(axis=0)
+        if care is not None:
+            R = R + care.together(shown - self.sight.of(before.X).mean(axis=0))
+            z, gated = care.passed(z, shown, self.analysis.claimed(seen) + R)
+        if not np.isfinite(z).any():
+            return now, replace(nothing(len(z)), gated=gated)
+        after = self.analysis.corrected(Z, seen, z, R, number)
         X, x = np.ascontiguousarray(after.members[:, :n]), after.members[:, n:]
-        return MemberStates(X, x, self._ready(now, x), now.inputs), after.innovation
+        return MemberStates(X, x, now.ready, now.inputs), replace(after.innovation, gated=gated)
 
     def _refused(self, x: Floats) -> tuple[Ending, str] | None:
         """Of a step that the stiffest member does not bear."""
@@ -247,6 +278,19 @@ class MemberStepper:
             f"the stiffest of {len(x)} members is {stiffest:.3g} times as stiff as the model: "
             f"steps of {h:g} s are beyond its {self.limit / np.sqrt(stiffest):.3g} s (critical, "
             f"less {100 * MARGIN:g} %); take substeps = {substeps} or a smaller sd"
+        )
+
+    def _away(self, x: Floats) -> tuple[Ending, str] | None:
+        """Of a scale that no body has: what was measured is none of the model's displacements."""
+        doubts = self.members.doubts
+        scales = list(doubts.columns("stiffness", "support", "load"))
+        largest = np.abs(x[:, scales]).max(axis=0, initial=0.0)
+        if not (largest > _AWAY).any():
+            return None
+        name = doubts.names[scales[int(largest.argmax())]]
+        return "diverged", (
+            f"a member of {len(x)} has {name} more than 1e{_AWAY / np.log(10):.0f} times off the "
+            "model's: a gate keeps outliers away, a larger R what the model cannot follow"
         )
 
     def _lost(self, X: Floats) -> tuple[Ending, str] | None:

@@ -12,7 +12,7 @@ instead of the paper's U; both are equal (Woodbury).
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import helmert, solve_triangular
+from scipy.linalg import helmert, solve, solve_triangular
 
 from validate.arrays import Floats
 from validate.estimate.kalman import best_gain, innovation
@@ -36,11 +36,11 @@ def spread(Z: Floats, unit: Floats) -> Floats:
 
 def reduced_update(Z: Floats, seen: Floats, z: Floats, R: Floats, unit: Floats) -> Corrected:
     """Members Z (s, n), of which `seen` (s, m) would be measured, corrected by z (m,), NaN =
-    missing, of variances R (m,): new points about the new mean."""
+    missing, of noise R (m, m): new points about the new mean."""
     L, Ly, i = spread(Z, unit), spread(seen, unit), np.isfinite(z)
-    gain = best_gain(L @ Ly.T, Ly @ Ly.T + np.diag(R), tuple(i.tolist()))
+    gain = best_gain(L @ Ly.T, Ly @ Ly.T + R, tuple(i.tolist()))
     found = innovation(z, seen.mean(axis=0), gain)
-    U = np.eye(unit.shape[1]) + (Ly[i].T / R[i]) @ Ly[i]
+    U = np.eye(unit.shape[1]) + Ly[i].T @ solve(R[np.ix_(i, i)], Ly[i], assume_a="pos")
     narrowed = solve_triangular(np.linalg.cholesky(U).T, np.eye(len(U)))  # T T^T = U^-1
     mean = Z.mean(axis=0) + gain.G @ found.y[i]
     return Corrected(mean + unit @ (L @ narrowed).T, found)

@@ -12,7 +12,7 @@ from typing import ClassVar
 from validate.arrays import Floats
 from validate.estimate.measurements import Measurements
 from validate.estimate.member_filter import HANDLES, MemberModel, MemberStepper, sight
-from validate.estimate.reduced_unscented import SigmaName, reduced_update, unit_points
+from validate.estimate.reduced_unscented import SigmaName, reduced_update, spread, unit_points
 from validate.estimate.sampled_kalman import Corrected
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -33,19 +33,18 @@ class Roukf(MemberModel):
         scene does not have, `ComparisonError` for measurements off the steps."""
         require_handled(system.scene, self)
         members = self.members(system)
-        sd, R = members.doubts.sd, measurements.variances(self.R)
-        analysis = SigmaRuns(unit_points(self.points, len(sd)), sd, R)
-        looks = sight(members, measurements, self.h)
+        sd = members.doubts.sd
+        analysis = SigmaRuns(unit_points(self.points, len(sd)), sd)
+        looks = sight(self, members, measurements)
         return MemberStepper(self, members, analysis, looks, self.limit(system))
 
 
 @dataclass(frozen=True)
 class SigmaRuns:
-    """unit (s, p), sd (p,) at the start, R (m,) m^2."""
+    """unit (s, p), sd (p,) at the start."""
 
     unit: Floats
     sd: Floats
-    R: Floats
 
     @property
     def degrees(self) -> int:
@@ -57,5 +56,9 @@ class SigmaRuns:
     def walked(self, x: Floats, number: int) -> Floats:
         return x
 
-    def corrected(self, Z: Floats, seen: Floats, z: Floats, number: int) -> Corrected:
-        return reduced_update(Z, seen, z, self.R, self.unit)
+    def claimed(self, seen: Floats) -> Floats:
+        Ly = spread(seen, self.unit)
+        return Ly @ Ly.T
+
+    def corrected(self, Z: Floats, seen: Floats, z: Floats, R: Floats, number: int) -> Corrected:
+        return reduced_update(Z, seen, z, R, self.unit)
