@@ -1,12 +1,11 @@
 """Paper 004's bodies, oracle and tables: known numbers first, then the road of its experiments."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from validate.errors import SceneError, UsageError
+from validate.errors import SceneError
 from validate.fem.system import build
 from validate.papers.async_regions import touched_block
 from validate.papers.async_regions.bodies import (
@@ -25,8 +24,6 @@ from validate.papers.async_regions.line_exhibits import spring_words
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import growth, off, peak, pushed
 from validate.papers.async_regions.sizes import HEADS, size_rows, size_table
-from validate.replay.find import load_file
-from validate.replay.ladder_default import body_of, trial_of
 from validate.solve.regions import AsyncRegions
 
 E, KS, H = 5e3, 1000.0, 1e-3
@@ -126,11 +123,7 @@ def test_a_spring_that_is_too_stiff_is_warned_of() -> None:
     assert "spring of 28000 N/m is too stiff for ticks of 0.001 s" in words[0]
 
 
-def test_studies_that_have_no_rung_for_a_probe_say_so(project_root: Path) -> None:
-    experiment = load_file(project_root / "experiments" / "async_block.py")
-    for study in (lambda: trial_of(experiment, True), lambda: body_of(experiment)):
-        with pytest.raises(UsageError, match="is touched by the probe 'probe', which no solver"):
-            study()
+def test_a_block_in_no_dimension_is_refused() -> None:
     with pytest.raises(SceneError, match="block of 6 cells in 6 dimensions"):
         block(E, 6, 6)
 

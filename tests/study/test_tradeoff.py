@@ -169,7 +169,7 @@ def test_the_climb_ends_at_the_first_rung_that_meets_both(measured: Trade) -> No
     assert asked == ["static superposition", "modal"]
     assert choice.pick is not None
     assert choice.pick.solver.rung == "modal"
-    assert [c.verdict for c in choice.ladder] == ["too wrong", "meets both", *4 * ["not climbed"]]
+    assert [c.verdict for c in choice.ladder] == ["too wrong", "meets both", *5 * ["not climbed"]]
     assert choice.ladder[2].evidence == "skipped: 'modal' meets both"
     assert {r.solver.rung for r in choice.trade.rows} == {"static superposition", "modal"}
     assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}

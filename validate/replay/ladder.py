@@ -23,10 +23,12 @@ LARGEST = 1000  # unknowns of a body whose stability is mapped: all its modes ar
 QUALITY = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 
 Rung = Literal[
-    "static superposition", "modal", "condensed", "prefactored", "explicit", "large strain"
-]
+    "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
+    "large strain",
+]  # fmt: skip
 RUNGS: tuple[Rung, ...] = (
-    "static superposition", "modal", "condensed", "prefactored", "explicit", "large strain",
+    "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
+    "large strain",
 )  # fmt: skip
 
 # --- error against time ---------------------------------------------------------------------------
@@ -39,7 +41,8 @@ class Rival:
     It runs on `elements` (none: all) at meshes up to `finest` (0: all) and down to `shortest`
     steps (0: all): slow baselines need no fine ones. `law` is what its scenes are made of; `order`
     that of its error in dt. `lacks`: what the scene has and it leaves out; it is run as evidence
-    and never chosen.
+    and never chosen. `uneven`: some of its steps are much longer than the median by design, so that
+    a rate is held by the slow ones alone.
     """
 
     name: str
@@ -52,6 +55,7 @@ class Rival:
     shortest: float = 0.0
     order: float = 2.0
     lacks: str = ""
+    uneven: bool = False
 
     def steps(self, element: str, level: int, steps: tuple[float, ...]) -> tuple[float, ...]:
         """Those of the ladder's steps s that it takes on that mesh."""

@@ -34,6 +34,7 @@ from validate.replay.ladder_solvers import (
     swinging,
     swinging_pair,
 )
+from validate.replay.ladder_touched import touched_ladder
 from validate.replay.options import folder_of
 from validate.replay.own_body import OwnBody, own_body, with_law
 from validate.scene.box import centroids
@@ -48,6 +49,11 @@ _UNKNOWNS, _QUICK_UNKNOWNS = 30_000, 6_000  # of the reference
 _STEPS, _QUICK_STEPS = 500, 100  # of the recording's time
 _FRAMES = 40
 _POINTS = 16
+_TOUCHED, _QUICK_TOUCHED = 7_000, 1_500  # of a touched reference, stepped in parts
+_DERIVED = (
+    "The experiment declares no ladder: this one is derived from its scene. A mesh's number is its "
+    "cells along an edge in percent of those of the experiment's own mesh."
+)
 _INSIDE = 1e-9  # of the body's size: a point within rounding of a face is on it
 
 
@@ -87,17 +93,17 @@ class _Loading:
         return np.stack(columns, axis=1)
 
 
-def _require_no_tools(own: OwnBody) -> None:
-    """Raises `UsageError` for a scene that a probe touches: no rung of the ladders holds it."""
-    if own.scene.tools:
-        raise UsageError(
-            f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which "
-            "no solver of a derived ladder takes; run the experiment, or declare its ladder"
-        )
+def _untaken(own: OwnBody) -> UsageError:
+    """Of a scene that is touched by a probe, where nothing on the ladder takes it."""
+    return UsageError(
+        f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which "
+        "no solver of a derived ladder takes; run the experiment, or declare its ladder"
+    )
 
 
 def _trial(own: OwnBody, quick: bool) -> Trial:
-    _require_no_tools(own)
+    if own.scene.tools:
+        return _touched(own, quick)
     meshes, reference = _meshes(own, _QUICK_UNKNOWNS if quick else _UNKNOWNS, quick)
     loading = _loading(own)
     dt, frames = _steps_and_frames(loading, quick)
@@ -122,11 +128,48 @@ def _trial(own: OwnBody, quick: bool) -> Trial:
         dynamic=loading.dynamic,
         rise_s=loading.rise_s,
         noise=marker_noise(own.recording),
-        notes=(
-            "The experiment declares no ladder: this one is derived from its scene. A mesh's "
-            "number is its cells along an edge in percent of those of the experiment's own mesh.",
-        ),
+        notes=(_DERIVED,),
     )
+
+
+def _touched(own: OwnBody, quick: bool) -> Trial:
+    """Under a probe: the experiment's own methods, linear cells, smaller bodies."""
+    known = touched_ladder(own, 100)
+    if known is None:
+        raise _untaken(own)
+    element = _elements(linear(own.scene.mesh), own.scene)[0]
+    levels = _touched_levels(own, _QUICK_TOUCHED if quick else _TOUCHED)
+    ladder = touched_ladder(own, levels[0]) or known
+    loading, meshes, reference = _loading(own), {element: levels[:-1]}, (element, levels[-1])
+    dt, frames = _steps_and_frames(loading, quick)
+    return Trial(
+        build=lambda element, level, law: with_law(of_element(own.at(level), element), law),
+        size=own.size,
+        meshes=meshes,
+        orders={element: 1.0},
+        steps=dt,
+        inputs=loading.inputs,
+        frames=frames,
+        points=_points(own, meshes, reference),
+        reference=reference,
+        best=ladder.best,
+        solvers=ladder.solvers,
+        pair=None,
+        dynamic=True,
+        rise_s=loading.rise_s,
+        notes=(_DERIVED, ladder.note),
+    )
+
+
+def _touched_levels(own: OwnBody, most: int) -> tuple[int, ...]:
+    """Three rising meshes, or two, of at most so many unknowns. Raises `UsageError` for one."""
+    fitting = [n for n in own.levels(_LEVELS) if own.at(n).mesh.nodes.size <= most]
+    if len(fitting) < 2:
+        raise UsageError(
+            f"'{own.experiment.name}' has {own.scene.mesh.nodes.size} unknowns and cannot be "
+            f"meshed twice with at most {most}; give it a number of cells as a parameter"
+        )
+    return tuple(sorted({fitting[0], fitting[len(fitting) // 2], fitting[-1]}))
 
 
 def _elements(mesh: Mesh, scene: Scene) -> tuple[str, ...]:
@@ -246,7 +289,8 @@ def _spread(points: Floats) -> Floats:
 
 def _body(own: OwnBody) -> StabilityBody:
     """The body without its fluid, in linear cells, on meshes whose modes can all be taken."""
-    _require_no_tools(own)
+    if own.scene.tools:
+        raise _untaken(own)
     fitting = [n for n in own.levels(_LEVELS) if linear(own.at(n).mesh).nodes.size <= LARGEST]
     if not fitting:
         raise UsageError(

@@ -61,7 +61,8 @@ class OwnBody:
         return self._scenes[level]
 
     def levels(self, wanted: Sequence[int]) -> tuple[int, ...]:
-        """Those `wanted` that can be meshed and differ, rising: of equal meshes the first."""
+        """Those `wanted` that can be meshed, are touched at the same place and differ, rising: of
+        equal meshes the first."""
         known = wanted if self.refining else [n for n in (100, 200, 400) if n <= max(wanted)]
         found: dict[int, int] = {}
         for level in sorted(known):
@@ -85,9 +86,11 @@ class OwnBody:
 
     def _cells(self, level: int) -> int:
         try:
-            return len(self.at(level).mesh.cells)
+            scene = self.at(level)
         except ValidateError:
             return 0
+        mine, first = ([tool.tip for tool in s.tools] for s in (scene, self.scene))
+        return len(scene.mesh.cells) if np.allclose(mine, first) else 0
 
     def _built(self, parameters: Any) -> Scene:
         method = self.experiment.methods[self.experiment.accepted[0]]

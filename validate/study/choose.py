@@ -106,7 +106,7 @@ def misses(row: TradeRow, want: Wanted, by: str, dynamic: bool) -> tuple[float, 
 
     A scene with inertia must also keep up with the clock: a step within its own dt.
     """
-    error, time = error_of(row, by), row.time_s
+    error, time = error_of(row, by), row.deadline_s
     if error is None or time is None:
         return np.inf, np.inf
     late = time * want.rate
@@ -250,7 +250,7 @@ def _why_not(mine: Sequence[TradeRow], dynamic: bool) -> str:
     if mine:
         return f"all {len(mine)} cells failed, the first: {mine[0].failed}"
     if dynamic:
-        return "not for this scene: no plate drives it and no cavity is in it"
+        return "not for this scene: no plate drives it, no cavity is in it, or no probe touches it"
     return (
         "not for this scene: it declares no density, and linear schemes with inertia know no "
         "fluid in cavities"

@@ -9,6 +9,7 @@ from validate.study.choose import Choice, error_of, meeting, misses
 from validate.study.ranking import SAME_TIME
 from validate.study.trade import TradeRow
 from validate.study.trade_exhibits import trade_exhibits
+from validate.study.trade_regions import pays
 
 _MM, _US = 1e3, 1e6
 
@@ -36,6 +37,7 @@ def words(choice: Choice) -> Iterator[str]:
         yield f"Nothing meets both {asked}."
         yield f"Nearest: {described(choice.nearest, choice)}; {_missed(choice)}."
         yield from _one_sided(choice)
+    yield from pays(choice.trade)
     floor = choice.trade.floor
     if want.error < floor:
         yield f"The reference is itself off by {_MM * floor:.2g} mm: no cell can show that."

@@ -61,8 +61,7 @@ def _loading(scene: Trial, body: Scene) -> Fact:
 
 
 def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
-    stepper = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
-    u = stepper.field(stepper.step(stepper.rest(), scene.largest_inputs))
+    u = _pilot(scene, body)
     strain = principal_strains(body.mesh, u)
     peak, most = float(strain.max()), float(np.quantile(strain, 0.95))
     cost = f"large strain was not solved ({trade.law_words})"
@@ -70,9 +69,24 @@ def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
         moved = f"{1e3 * trade.law_error:.3g} mm"
         cost = f"large strain changes the answer by {moved} ({trade.law_words})"
     means = "within small strain" if peak < _SMALL_STRAIN else "large strain is on the ladder"
-    return Fact("strain level (static pilot, coarse mesh)",
+    return Fact(f"strain level ({'' if body.tools else 'static '}pilot, coarse mesh)",
                 f"peak {100 * peak:.2g} %, 95 % of cells below {100 * most:.2g} %",
                 f"{means}; measured, {cost}")  # fmt: skip
+
+
+def _pilot(scene: Trial, body: Scene) -> Floats:
+    """Displacements (n, d) m under the largest inputs: statics, or where a probe touches the motion
+    up to there."""
+    if not body.tools:
+        stepper = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
+        return stepper.field(stepper.step(stepper.rest(), scene.largest_inputs))
+    dt = scene.steps[-1]
+    path = scene.inputs(scene.times(dt))
+    stepper = scene.best(dt).prepare(build(body))
+    state = stepper.rest()
+    for x in path[: int(np.abs(path).sum(axis=1).argmax()) + 1]:
+        state = stepper.step(state, x)
+    return stepper.field(state)
 
 
 def principal_strains(mesh: Mesh, u: Floats) -> Floats:

@@ -73,6 +73,13 @@ class TradeRow:
         return None if self.step is None else self.step.p50 + self.field_s
 
     @property
+    def deadline_s(self) -> float | None:
+        """Seconds that a tick must have: the median, of an uneven solver the slow hundredth."""
+        if self.step is None or not self.solver.uneven:
+            return self.time_s
+        return self.step.p99 + self.field_s
+
+    @property
     def label(self) -> str:
         return f"{self.solver.name}, {self.element} mesh {self.level}"
 

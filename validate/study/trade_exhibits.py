@@ -9,6 +9,7 @@ from validate.replay.ladder import RUNGS
 from validate.study.held import DEFINITION
 from validate.study.ranking import SAME_TIME
 from validate.study.trade import ERROR, ParetoFront, Refinement, Trade, TradeRow
+from validate.study.trade_regions import regions_exhibit
 
 _MM, _US, _MB = 1e3, 1e6, 1e-6
 _NAMES = {"error": "error", "total": "error with the law's share"}
@@ -25,6 +26,8 @@ _TIMES = (
 def trade_exhibits(trade: Trade) -> tuple[Exhibit, ...]:
     """In the order of a reader's questions."""
     found = [_front_exhibit(trade), _shares(trade), _costs(trade), _convergence(trade)]
+    if (sizes := regions_exhibit(trade)) is not None:
+        found.insert(1, sizes)
     rest = [r for r in trade.rows if r.failed]
     return (*found, *((_failures(rest),) if rest else ()))
 

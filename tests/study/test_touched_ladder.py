@@ -1,0 +1,94 @@
+"""The ladder of a body that a probe touches: its rungs, its reference, what is said of sizes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.errors import UsageError
+from validate.fem.system import build
+from validate.papers.async_regions.bodies import block
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.ladder import Trial
+from validate.replay.ladder_default import body_of, trial_of
+from validate.replay.ladder_touched import Divided
+from validate.solve.regions import AsyncRegions
+from validate.solve.types import StepTimes
+from validate.study.choose import Wanted, meeting, misses
+from validate.study.choose_facts import facts
+from validate.study.climb import rungs
+from validate.study.job import Where
+from validate.study.trade import Trade, TradeRow
+from validate.study.trade_exhibits import trade_exhibits
+from validate.study.trade_regions import pays, regions_exhibit
+
+
+@pytest.fixture(scope="module")
+def touched(project_root: Path) -> Experiment:
+    return load_file(project_root / "experiments" / "async_block.py")
+
+
+@pytest.fixture(scope="module")
+def trial(touched: Experiment) -> Trial:
+    return trial_of(touched, quick=True)
+
+
+def test_a_touched_body_is_climbed_by_its_own_methods(trial: Trial) -> None:
+    """Meshes that are not touched in the middle of a node's face are no meshes of this ladder."""
+    assert {s.rung for s in trial.solvers} == {"modal", "prefactored", "regions"}
+    assert {s.rung for s in trial.solvers if s.uneven} == {"regions"}
+    element, finest = trial.reference
+    for level in (*trial.meshes[element], finest):
+        scene = trial.build(element, level, "linear")
+        assert scene.tools[0].tip == pytest.approx((0.1, 0.05, 0.05))
+        away = np.linalg.norm(scene.mesh.nodes - np.array(scene.tools[0].tip), axis=1)
+        assert away.min() < 1e-9
+    assert trial.steps == pytest.approx((2e-3, 1e-3))
+    assert "shared by the nodes within" in trial.notes[1]
+
+
+def test_the_reference_is_the_whole_solve_in_shorter_steps() -> None:
+    """A step of eight parts is eight steps, the probe halfway after half of them."""
+    scene, whole = block(5e3, 2, 2), AsyncRegions(1e-3, (), ())
+    divided = Divided(whole, 8).prepare(build(scene))
+    plain = whole.prepare(build(scene))
+    a, b = divided.rest(), plain.rest()
+    for k in range(1, 4):
+        a = divided.step(a, np.array([-1e-3 * k, 0.0]))
+        for i in range(1, 9):
+            b = plain.step(b, np.array([-1e-3 * (k - 1 + i / 8), 0.0]))
+    assert a.k == 3
+    assert divided.field(a) == pytest.approx(plain.field(b), abs=1e-15)
+
+
+def test_a_stability_map_has_no_probe(touched: Experiment) -> None:
+    with pytest.raises(UsageError, match="is touched by the probe 'probe', which no solver"):
+        body_of(touched)
+
+
+def test_a_rate_is_held_by_the_slow_steps_of_regions(trial: Trial) -> None:
+    times = StepTimes(1e-4, 2e-3, 3e-3, 100)
+    solver = next(s for s in trial.solvers if s.rung == "regions")
+    row = TradeRow(solver, "P1", 100, 1e-3, step=times, error=1e-5, total=None)
+    want = Wanted(1e-4, 1000.0)
+    assert misses(row, want, "error", dynamic=True) == pytest.approx((0.1, 2.0))
+    assert meeting([row], want, "error", dynamic=True) == []
+    even = replace(row, solver=replace(solver, uneven=False))
+    assert meeting([even], want, "error", dynamic=True) == [even]
+
+
+@pytest.mark.slow
+def test_sizes_are_told_by_what_was_measured(touched: Experiment, tmp_path: Path) -> None:
+    trades = dict(rungs(touched, quick=True, out=tmp_path, where=Where(workers=0)))
+    assert list(trades) == ["modal", "prefactored", "regions"]
+    assert regions_exhibit(trades["prefactored"]) is None
+    told: Trade = trades["regions"]
+    words = list(pays(told))
+    assert len(words) == len(told.trial.meshes["P1"]) + 1
+    assert all("unknowns: regions (" in w for w in words[:-1])
+    assert "regions" in [e.anchor for e in trade_exhibits(told)]
+    assert facts(told, 1e-3)[1].name == "strain level (pilot, coarse mesh)"
+    reduced = min(r.error for r in trades["modal"].rows if r.error is not None)
+    assert reduced < 0.1 * told.moved
