@@ -253,13 +253,16 @@ def _nodal_mean_stiffness(scene: Scene) -> sparse.csr_array:
 
 def divergence(mesh: Mesh) -> tuple[sparse.csr_array, Floats]:
     """B (e, N) so that B u is the volume strain of every linear cell, and volumes (e,) m^d."""
-    gradients = shape_gradients(mesh)
+    return rows_of_cells(mesh, shape_gradients(mesh)), cell_volumes(mesh)
+
+
+def rows_of_cells(mesh: Mesh, values: Floats) -> sparse.csr_array:
+    """A row (e, N) for every cell with its corners' values (e, d + 1, d)."""
     cells, d = mesh.corners, mesh.dimension
     columns = (cells[..., None] * d + np.arange(d)).reshape(len(cells), -1)
     rows = np.repeat(np.arange(len(cells)), columns.shape[1])
     shape = (len(cells), len(mesh.nodes) * d)
-    values = gradients.reshape(len(cells), -1).ravel()
-    return sparse.csr_array((values, (rows, columns.ravel())), shape=shape), cell_volumes(mesh)
+    return sparse.csr_array((values.ravel(), (rows, columns.ravel())), shape=shape)
 
 
 def shape_gradients(mesh: Mesh) -> Floats:

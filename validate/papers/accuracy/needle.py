@@ -5,6 +5,7 @@ free along the side. A displacement prescribed at a point has no limit under ref
 falls with 1/ln of the mesh size.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,10 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.scene.box import grid
 from validate.scene.material import Material
-from validate.scene.scene import Drive, PlaneState, Probe, Scene, Support
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Drive, Load, PlaneState, Probe, Scene, Support
+
+Mesher = Callable[[tuple[float, ...], tuple[int, ...]], Mesh]
 
 MP1 = Material(200.0, 0.47, rho=2000.0, mass_damping=1.0, stiffness_damping=0.1)
 MP2 = Material(60e3, 0.495, rho=1140.0, mass_damping=1.0, stiffness_damping=0.1)
@@ -55,3 +59,14 @@ def needle_from_above(n: int, material: Material = MP1, plane: PlaneState = "str
     needle = replace(block.drives[0], facets="y1", direction=(0.0, -1.0), point=(0.5, 1.0))
     sides = tuple(Support(side, (0, 1)) for side in ("y0", "x0", "x1"))
     return replace(block, supports=sides, drives=(needle,), probes=())
+
+
+def pressed_block(n: int, material: Material = MP1, cells: Mesher = grid) -> Scene:
+    """The block pressed by a traction "press" on the middle fifth of its free side, without needle
+    and probes; of quadrilaterals, or by `box` of triangles. n of 10, 20, ... hit the fifth."""
+    block, mesh = needle_block(n, material), cells((1.0, 1.0), (n, n))
+    side = mesh.facets["x1"]
+    middle = side[np.abs(mesh.nodes[side].mean(axis=1)[:, 1] - 0.5) < 0.1]
+    pressed = Mesh(mesh.nodes, mesh.cells, mesh.kind, {**mesh.facets, "middle": middle})
+    load = Load("press", "middle", (-1.0, 0.0))
+    return replace(block, mesh=pressed, drives=(), loads=(load,), probes=())

@@ -13,6 +13,7 @@ from validate.fem.mixed import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.papers.accuracy.benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES, SolverTest
+from validate.papers.accuracy.beyond import BLOCK, beyond
 from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
     RIVALS,
@@ -33,13 +34,19 @@ from validate.papers.accuracy.errors import (
     switches_exhibit,
     units_in,
 )
-from validate.papers.accuracy.needle import MP1, MP2, needle_block, needle_depth, needle_from_above
+from validate.papers.accuracy.needle import (
+    MP1,
+    MP2,
+    needle_block,
+    needle_depth,
+    needle_from_above,
+    pressed_block,
+)
 from validate.papers.accuracy.rules import rules_exhibit
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, PlaneState, Scene
+from validate.scene.scene import PlaneState, Scene
 from validate.solve.dynamic import elastic_forces
 from validate.solve.march import march, output_frames
 from validate.solve.types import Run
@@ -78,6 +85,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     progress("meshes")
     mesh, mesh_numbers = _meshes(cases, errors)
     rules, rule_numbers = rules_exhibit()
+    more, found = beyond(BLOCK, progress)
     numbers = {
         "ordered": ordered_share(errors, until=_MOVING),
         "ordered.all": ordered_share(errors),
@@ -88,10 +96,11 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "peaks": float(_peaks(errors["quasi_static"].line("E_s"))),
         "limit.printed": stable_of(_block(30, "MP2", "strain"), "consistent", "printed"),
         "limit.lagged": stable_of(_block(30, "MP2", "strain"), "consistent", "lagged"),
-        **counts, **ends, **mesh_numbers, **rule_numbers,
+        **counts, **ends, **mesh_numbers, **rule_numbers, **found,
     }  # fmt: skip
     return Told(
-        (shown, _shapes(main), switches, prostate, still, limits, swept, mesh, rules), numbers
+        (shown, _shapes(main), switches, prostate, still, limits, swept, mesh, rules, *more),
+        numbers,
     )
 
 
@@ -330,17 +339,7 @@ def _meshes(cases: Cases, errors: Mapping[str, Errors]) -> tuple[Exhibit, dict[s
 def _locking(n: int, material: Material) -> float:
     """Compliance of the block pressed on a fifth of its free side, over that of mixed elements on a
     mesh twice as fine: the traction ends within the side, where stresses are singular."""
-    system = build_system(_pressed(n, material))
+    system = build_system(pressed_block(n, material))
     f = system.loads[system.free, 0]
-    reference = mixed_static(_pressed(2 * n, material)).compliances[0]
+    reference = mixed_static(pressed_block(2 * n, material)).compliances[0]
     return float(f @ system.factor().solve(f)) / float(reference)
-
-
-def _pressed(n: int, material: Material) -> Scene:
-    block = needle_block(n, material)
-    mesh = block.mesh
-    side = mesh.facets["x1"]
-    middle = side[np.abs(mesh.nodes[side].mean(axis=1)[:, 1] - 0.5) < 0.1]
-    pressed = Mesh(mesh.nodes, mesh.cells, mesh.kind, {**mesh.facets, "middle": middle})
-    load = Load("press", "middle", (-1.0, 0.0))
-    return replace(block, mesh=pressed, drives=(), loads=(load,))

@@ -4,6 +4,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.papers.accuracy.needle import Mesher
 from validate.scene.box import grid
 from validate.scene.material import Material
 from validate.scene.scene import Probe, Scene, Support, Weight
@@ -13,15 +14,16 @@ SIZE = (0.5, 0.25, 0.25)  # m
 GRAVITY = 0.05  # m/s^2
 
 
-def bending_rod(n: int, material: Material = MP3) -> Scene:
+def bending_rod(n: int, material: Material = MP3, cells: Mesher = grid) -> Scene:
     """2n x n x n hexahedra, x = 0 held, the weight "gravity" along -z with its input in m/s^2.
 
-    Probe "tip": the middle of the free end. Raises `SceneError` for n < 1.
+    With `box` the cells are tetrahedra, six in such a brick. Probe "tip": the middle of the free
+    end. Raises `SceneError` for n < 1.
     """
     if n < 1:
         raise SceneError(f"rod of {n} cells across: at least 1")
     return Scene(
-        grid(SIZE, (2 * n, n, n)),
+        cells(SIZE, (2 * n, n, n)),
         material,
         (Support("x0", (0, 1, 2)),),
         loads=(Weight("gravity", (0.0, 0.0, -1.0)),),

@@ -10,6 +10,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.papers.accuracy.benchmark import FIVE, IMPLICIT, SolverTest
+from validate.papers.accuracy.beyond import ROD, beyond
 from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
     RIVALS,
@@ -61,6 +62,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     progress("meshes")
     frames = at_instants(cases["finer_mesh"]["implicit"].run)
     finer = errors_on(cases["finer_mesh"], ("E_n", "E_i"), ("implicit", *RIVALS), frames)
+    more, found = beyond(ROD, progress)
     quasi = errors["quasi_static"]
     numbers = {
         "ordered": ordered_share(errors, until=_MOVING),
@@ -71,12 +73,13 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "static.end": end,
         "quasi.dip": _dip_of(quasi),
         **crossings,
+        **found,
     }
     shapes = Exhibit(
         "shapes", "Deformed shapes", maps=tuple(shape_maps(main, ("implicit", "quasi_static"), 1.0))
     )
     mesh = _mesh_error(finer, mesh_words(finer, errors))
-    return Told((shown, shapes, switches, still, dip, _limits(p), mesh), numbers)
+    return Told((shown, shapes, switches, still, dip, _limits(p), mesh, *more), numbers)
 
 
 def _words(errors: Mapping[str, Errors]) -> tuple[str, ...]:

@@ -1,0 +1,103 @@
+"""What both benchmarks show of paper 002's future work: penalty forces, sensitivities, diagonal
+damping."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Exhibit
+from validate.papers.accuracy.diagonal_damping import damping_exhibit
+from validate.papers.accuracy.needle import (
+    MP1,
+    MP2,
+    STEP,
+    needle_block,
+    needle_depth,
+    pressed_block,
+)
+from validate.papers.accuracy.penalty import NEARLY, Squeezed, penalty_exhibit
+from validate.papers.accuracy.rod import MP3, bending_rod, gravity_inputs
+from validate.papers.accuracy.sensitivity import (
+    Turned,
+    material_turns,
+    mesh_turn,
+    moved_nodes,
+    sensitivity_exhibit,
+)
+from validate.replay.experiment import Progress
+from validate.scene.box import box
+from validate.scene.material import Material
+from validate.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class PaperBody:
+    """A benchmark's scene as printed, its inputs (nt, k) at times (nt,) s, and what is done to
+    it."""
+
+    scene: Callable[[], Scene]
+    inputs: Callable[[Floats], Floats]
+    squeezed: Callable[[], Squeezed]
+    turned: Callable[[], Turned]
+
+
+def beyond(body: PaperBody, progress: Progress) -> tuple[tuple[Exhibit, ...], dict[str, float]]:
+    """The three exhibits and their numbers."""
+    progress("penalty")
+    penalty, kept = penalty_exhibit(body.squeezed())
+    progress("material and mesh")
+    turned = sensitivity_exhibit(body.turned())
+    progress("diagonal damping")
+    damped, numbers = damping_exhibit(body.scene(), body.inputs, STEP)
+    return (damped, turned, penalty), {**kept, **numbers}
+
+
+def _squeezed_block() -> Squeezed:
+    """Pressed on a fifth of its free side."""
+    unlocked = replace(pressed_block(10, replace(MP1, nu=NEARLY)), dilatation="mixed")
+
+    def make(n: int, material: Material) -> Scene:
+        return pressed_block(n, material, box)
+
+    return Squeezed(make, MP1, 10, 40, ("mixed quadrilaterals", unlocked))
+
+
+def _turned_block() -> Turned:
+    """12 cells a side, so that every method is stable at both ends of every input; nu by a
+    hundredth, because a tenth more is beyond .5."""
+    base = needle_block(12)
+    turns = (
+        *material_turns(base, 0.01),
+        mesh_turn("cells, along both sides", base, (14, 14), (10, 10)),
+        mesh_turn("cells, along x alone", base, (14, 12), (10, 12)),
+    )
+    beside = {
+        "inner nodes moved by up to a fifth of a cell": moved_nodes(base),
+        "the material MP2": replace(base, material=MP2),
+    }
+    return Turned(base, needle_depth, turns, beside)
+
+
+def _squeezed_rod() -> Squeezed:
+    """Under its weight."""
+    unlocked = replace(bending_rod(3, replace(MP3, nu=NEARLY)), dilatation="mixed")
+
+    def make(n: int, material: Material) -> Scene:
+        return bending_rod(n, material, box)
+
+    return Squeezed(make, MP3, 3, 4, ("mixed hexahedra", unlocked))
+
+
+def _turned_rod() -> Turned:
+    base = bending_rod(3)
+    turns = (
+        *material_turns(base, 0.1),
+        mesh_turn("cells, along all edges", base, (6, 3, 3), (4, 2, 2)),
+        mesh_turn("cells, along the rod alone", base, (6, 3, 3), (5, 3, 3)),
+    )
+    beside = {"inner nodes moved by up to a fifth of a cell": moved_nodes(base)}
+    return Turned(base, gravity_inputs, turns, beside)
+
+
+BLOCK = PaperBody(lambda: needle_block(20), needle_depth, _squeezed_block, _turned_block)
+ROD = PaperBody(lambda: bending_rod(3), gravity_inputs, _squeezed_rod, _turned_rod)
