@@ -31,7 +31,7 @@ from validate.papers.accuracy.penalty import (
 )
 from validate.papers.accuracy.rod import MP3, bending_rod
 from validate.papers.accuracy.sensitivity import (
-    Turned,
+    TurnedBench,
     material_turns,
     mesh_turn,
     moved_nodes,
@@ -171,7 +171,9 @@ def test_a_method_that_is_refused_has_no_number_and_says_so() -> None:
     """Cells a third as long are beyond the critical step; slopes of the others stay."""
     scene = needle_block(4)
     turn = mesh_turn("cells", scene, (60, 4), (4, 4))
-    shown = sensitivity_exhibit(Turned(scene, needle_depth, (turn,), {"moved": moved_nodes(scene)}))
+    shown = sensitivity_exhibit(
+        TurnedBench(scene, needle_depth, (turn,), {"moved": moved_nodes(scene)})
+    )
     costs, slopes = shown.tables
     rows = {(row[0], row[1]): row for row in slopes.rows}
     assert rows["explicit", "E_n"][3] is None

@@ -18,7 +18,7 @@ from validate.papers.accuracy.needle import (
 from validate.papers.accuracy.penalty import NEARLY, Squeezed, penalty_exhibit
 from validate.papers.accuracy.rod import MP3, bending_rod, gravity_inputs
 from validate.papers.accuracy.sensitivity import (
-    Turned,
+    TurnedBench,
     material_turns,
     mesh_turn,
     moved_nodes,
@@ -38,7 +38,7 @@ class PaperBody:
     scene: Callable[[], Scene]
     inputs: Callable[[Floats], Floats]
     squeezed: Callable[[], Squeezed]
-    turned: Callable[[], Turned]
+    turned: Callable[[], TurnedBench]
 
 
 def beyond(body: PaperBody, progress: Progress) -> tuple[tuple[Exhibit, ...], dict[str, float]]:
@@ -62,7 +62,7 @@ def _squeezed_block() -> Squeezed:
     return Squeezed(make, MP1, 10, 40, ("mixed quadrilaterals", unlocked))
 
 
-def _turned_block() -> Turned:
+def _turned_block() -> TurnedBench:
     """12 cells a side, so that every method is stable at both ends of every input; nu by a
     hundredth, because a tenth more is beyond .5."""
     base = needle_block(12)
@@ -75,7 +75,7 @@ def _turned_block() -> Turned:
         "inner nodes moved by up to a fifth of a cell": moved_nodes(base),
         "the material MP2": replace(base, material=MP2),
     }
-    return Turned(base, needle_depth, turns, beside)
+    return TurnedBench(base, needle_depth, turns, beside)
 
 
 def _squeezed_rod() -> Squeezed:
@@ -88,7 +88,7 @@ def _squeezed_rod() -> Squeezed:
     return Squeezed(make, MP3, 3, 4, ("mixed hexahedra", unlocked))
 
 
-def _turned_rod() -> Turned:
+def _turned_rod() -> TurnedBench:
     base = bending_rod(3)
     turns = (
         *material_turns(base, 0.1),
@@ -96,7 +96,7 @@ def _turned_rod() -> Turned:
         mesh_turn("cells, along the rod alone", base, (6, 3, 3), (5, 3, 3)),
     )
     beside = {"inner nodes moved by up to a fifth of a cell": moved_nodes(base)}
-    return Turned(base, gravity_inputs, turns, beside)
+    return TurnedBench(base, gravity_inputs, turns, beside)
 
 
 BLOCK = PaperBody(lambda: needle_block(20), needle_depth, _squeezed_block, _turned_block)

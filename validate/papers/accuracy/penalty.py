@@ -181,8 +181,12 @@ def _row(label: str, ratio: float, k: KeptVolume) -> tuple[Entry, ...]:
             100 * k.net, k.growth)  # fmt: skip
 
 
-def _shown(found: Mapping[str, list[KeptVolume]], rows: tuple[tuple[Entry, ...], ...], instead: KeptVolume,
-           words: str) -> Exhibit:  # fmt: skip
+def _shown(
+    found: Mapping[str, list[KeptVolume]],
+    rows: tuple[tuple[Entry, ...], ...],
+    instead: KeptVolume,
+    words: str,
+) -> Exhibit:
     table = NumberTable(
         "penalty",
         "Statics under the load against the exact constraint (mixed elements, finer mesh), and "

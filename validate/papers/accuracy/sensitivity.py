@@ -50,7 +50,7 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Turned:
+class TurnedBench:
     """A benchmark whose inputs are turned: `inputs` (nt, k) of times (nt,) s, the turns, and scenes
     that only stand beside it (another material, moved nodes), by name."""
 
@@ -109,7 +109,7 @@ def moved_nodes(scene: Scene, share: float = SHIFT) -> Scene:
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedScene:
     """The runs of the five methods in a scene, with fields at the instants; why not, by method."""
 
     scene: Scene
@@ -119,7 +119,7 @@ class Solved:
     def refused(self) -> Mapping[str, str]:
         return {n: r.outcome.state for n, r in self.runs.items() if not r.finished}
 
-    def against(self, truth: "Solved", method: str = "implicit") -> Means:
+    def against(self, truth: "SolvedScene", method: str = "implicit") -> Means:
         """Metrics of a method against the other's implicit run, on the other's mesh."""
         run, on = self.runs[method], truth.scene
         if not run.finished:
@@ -129,12 +129,14 @@ class Solved:
         return {n: None if np.isnan(y).any() else float(y.mean()) for n, y in found.values.items()}
 
 
-def solve(scene: Scene, inputs: Callable[[Floats], Floats], methods: tuple[str, ...]) -> Solved:
+def solve(
+    scene: Scene, inputs: Callable[[Floats], Floats], methods: tuple[str, ...]
+) -> SolvedScene:
     t: Floats = STEP * np.arange(1, _STEPS + 1, dtype=np.float64)
     at = np.asarray(_FRAMES, dtype=np.int64)
     system = build(scene)  # one for all: its matrices are assembled once
     steppers = {n: FIVE[n].settings.prepare(system) for n in methods}
-    return Solved(scene, {n: march(n, s, t, inputs(t), at, 0.0) for n, s in steppers.items()})
+    return SolvedScene(scene, {n: march(n, s, t, inputs(t), at, 0.0) for n, s in steppers.items()})
 
 
 def slope(low: float | None, high: float | None, ratio: float) -> float | None:
@@ -144,7 +146,7 @@ def slope(low: float | None, high: float | None, ratio: float) -> float | None:
     return float(np.log(high / low) / np.log(ratio))
 
 
-def sensitivity_exhibit(bench: Turned) -> Exhibit:
+def sensitivity_exhibit(bench: TurnedBench) -> Exhibit:
     """What inputs that are off cost, and how the solvers' errors follow them."""
     every = ("implicit", *RIVALS)
     own = solve(bench.scene, bench.inputs, every)
@@ -166,7 +168,7 @@ def sensitivity_exhibit(bench: Turned) -> Exhibit:
 # --- tables ---------------------------------------------------------------------------------------
 
 
-def _costs(bench: Turned, off: Mapping[str, Means], beside: Mapping[str, Means],
+def _costs(bench: TurnedBench, off: Mapping[str, Means], beside: Mapping[str, Means],
            solvers: Mapping[str, Means]) -> NumberTable:  # fmt: skip
     rows: list[tuple[Entry, ...]] = []
     for t in bench.turns:
@@ -192,7 +194,7 @@ def _costs(bench: Turned, off: Mapping[str, Means], beside: Mapping[str, Means],
     )  # fmt: skip
 
 
-def _slopes(bench: Turned, ends: Mapping[str, tuple[Solved, ...]],
+def _slopes(bench: TurnedBench, ends: Mapping[str, tuple[SolvedScene, ...]],
             solvers: Mapping[str, Means]) -> NumberTable:  # fmt: skip
     rows: list[tuple[Entry, ...]] = []
     found = {(t, n): [s.against(s, n) for s in ends[t]] for t in ends for n in RIVALS}
@@ -214,13 +216,13 @@ def _slopes(bench: Turned, ends: Mapping[str, tuple[Solved, ...]],
     )  # fmt: skip
 
 
-def _mesh(bench: Turned) -> str:
+def _mesh(bench: TurnedBench) -> str:
     mesh = bench.scene.mesh
     return f"{len(mesh.cells)} {mesh.kind} cells"
 
 
 def _words(
-    bench: Turned, off: Mapping[str, Means], solvers: Mapping[str, Means]
+    bench: TurnedBench, off: Mapping[str, Means], solvers: Mapping[str, Means]
 ) -> tuple[str, ...]:
     by = {t.name: f"{t.name} {100 * (t.off[0] / t.nominal - 1):+.3g} %" for t in bench.turns}
     costs = sorted(((means["E_n"] or 0.0, by[n]) for n, means in off.items()), reverse=True)
