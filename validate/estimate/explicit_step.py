@@ -8,7 +8,6 @@ Departures: the paper drops the damping matrix (eq 19); here that is a scene wit
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -24,21 +23,6 @@ FAR = 10  # body lengths
 MARGIN = 0.05  # of the critical step, which falls as a body deforms: as in `CentralDifference`
 
 
-class ExplicitModel(Protocol):
-    """A body's internal forces (N,) N at displacements u (N,) m, and what the tangent has of every
-    node: `ExplicitBody`."""
-
-    def force(self, u: Floats) -> Floats: ...
-
-    def force_and_diagonal(self, u: Floats) -> tuple[Floats, Floats]:
-        """Forces (N,) N and K_ii (N,) N/m of the tangent at u."""
-        ...
-
-    def force_and_blocks(self, u: Floats) -> tuple[Floats, Floats]:
-        """Forces (N,) N and K_nn (n, 6) N/m of every node: xx, yy, zz, xy, xz, yz."""
-        ...
-
-
 @dataclass(frozen=True)
 class ExplicitStep:
     """U' = c2 U - c1 U_{t-h} + w (F - R(U)), all (N,); held unknowns have zeros in c2, c1 and w.
@@ -48,7 +32,7 @@ class ExplicitStep:
     """
 
     system: System
-    model: ExplicitModel
+    model: ExplicitBody
     h: float
     parts: int
     c2: Floats

@@ -119,18 +119,13 @@ class NodeCore:
 
     def predict(self, memory: NodeMemory, loads: Floats, drives: Floats) -> NodeMemory:
         """Eqs 35 and 36."""
-        w, u, P, c = self.explicit, memory.u, memory.P.copy(), self.settings
-        if c.block == "node":
-            R, K = w.model.force_and_blocks(u)
-            count = kernel.spread_nodes(P, w.c2, w.w, K, self.Q)
-        elif c.block == "companion":
-            R, K = w.model.force_and_diagonal(u)
-            count = kernel.spread_companions(P, w.c2, w.c1, w.w, K, self.Q)
-        else:
-            R, K = w.model.force_and_diagonal(u)
-            count = kernel.spread_components(P, w.c2, w.w, K, self.Q)
-        held = kernel.clip(P) if count and c.overflow == "hold" else count
-        return NodeMemory(w.following(u, memory.before, R, loads, drives), u, P, held)
+        w = self.explicit
+        u, P, count = kernel.predict(
+            w.model.packed, memory.u, memory.before, memory.P, w.c2, w.c1, w.w, self.Q,
+            w.loaded, w.columns, loads, w.driven, w.moves, drives,
+        )  # fmt: skip
+        held = kernel.clip(P) if count and self.settings.overflow == "hold" else count
+        return NodeMemory(u, memory.u, P, held)
 
     def failure(self, memory: NodeMemory) -> tuple[Ending, str] | None:
         if not memory.held or self.settings.overflow == "hold":
@@ -161,16 +156,14 @@ class NodeCore:
         return np.where(same, P[kernel.ROW[axis[:, None], axis], node[:, None]], 0.0)
 
     def _corrected(self, memory: NodeMemory, z: Floats, R: Floats) -> tuple[NodeMemory, Innovation]:
-        c, u, P, m = self.settings, memory.u, memory.P, len(z)
-        y, sd, joseph = np.empty(m), np.empty(m), c.covariance == "joseph"
-        before = memory.before.copy()
-        dof = kernel.innovations(u, P, self.rows, z, R, y, sd)
-        if c.block == "companion":
-            nis = kernel.correct_companions(u, before, P, self.rows, z, R, joseph)
-        else:
-            update = kernel.correct_nodes if c.block == "node" else kernel.correct_components
-            nis = update(u, before, P, self.rows, z, R, joseph, c.correct_previous)
-        return NodeMemory(u, before, P, memory.held), Innovation(y, sd, nis, dof)
+        c, before, y, sd = self.settings, memory.before, np.empty(len(z)), np.empty(len(z))
+        if c.correct_previous or c.block == "companion":
+            before = before.copy()  # which is the last state's own
+        nis, dof = kernel.correct(
+            memory.u, before, memory.P, self.rows, z, R,
+            c.covariance == "joseph", c.correct_previous, y, sd,
+        )  # fmt: skip
+        return NodeMemory(memory.u, before, memory.P, memory.held), Innovation(y, sd, nis, dof)
 
     def sd(self, memory: NodeMemory, number: int) -> Floats:
         P = memory.P

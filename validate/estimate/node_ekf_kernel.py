@@ -8,12 +8,19 @@ Paper 003, eqs 35-39. P is changed in place and packed by row, one column a comp
 import numpy as np
 
 from validate.arrays import Floats, Ints
+from validate.fem import central_kernel, explicit_kernels
+from validate.fem.central_kernel import pull
 from validate.fem.compiled import compiled
+from validate.fem.explicit import PackedBody
+from validate.fem.explicit_kernels import add_forces_and_blocks
 
+_UNSIGNED = np.int64(0x7FFFFFFFFFFFFFFF)  # all bits of a double but its sign
 HUGE = 1e300  # m^2: beyond it the next products would leave the number range
 
 ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
-_compiled = compiled(error_model="numpy")
+_compiled = compiled(
+    *explicit_kernels.MODULES, explicit_kernels, central_kernel, error_model="numpy"
+)
 
 
 @_compiled
@@ -40,12 +47,15 @@ def follow(
 
 @_compiled
 def farthest(u: Floats) -> float:
-    """The largest |u|; infinite where one is not a number."""
-    top, lost = 0.0, 0
-    for i in range(u.size):
-        top = max(top, abs(u[i]))
-        lost += not abs(u[i]) < np.inf
-    return np.inf if lost else top
+    """The largest |u|; infinite where one is not a number.
+
+    By their bits, which are ordered as the numbers are, and in vectors.
+    """
+    bits, top = u.view(np.int64), np.zeros(1, np.int64)
+    for i in range(bits.size):
+        top[0] = max(top[0], bits[i] & _UNSIGNED)
+    found = float(top.view(np.float64)[0])
+    return found if found < np.inf else np.inf
 
 
 @_compiled
@@ -102,6 +112,30 @@ def spread_nodes(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
         P[5, n] = y0 * zx + y1 * zy + y2 * zz
         count += not (P[0, n] < HUGE and P[1, n] < HUGE and P[2, n] < HUGE)
     return count
+
+
+@_compiled
+def predict(
+    body: PackedBody, u: Floats, before: Floats, P: Floats,
+    c2: Floats, c1: Floats, w: Floats, Q: Floats,
+    loaded: Ints, columns: Floats, loads: Floats, held: Ints, moves: Floats, drives: Floats,
+) -> tuple[Floats, Floats, int]:  # fmt: skip
+    """Eqs 35 and 36 at once: U_{t+h} as `follow` has it, the next P, and how many are beyond
+    `HUGE`; a P of 1 row spreads by components, of 3 by companions, of 6 by nodes."""
+    law, geometry, cells, springs, own, work = body
+    R, six = np.empty_like(u), P.shape[0] == 6
+    K, new = np.zeros(2 * u.size if six else u.size), P.copy()
+    pull(springs, u, R)
+    for i in range(own.size):
+        K[2 * i - i % 3 if six else i] = own[i]
+    add_forces_and_blocks(law, geometry, cells, u, R, K, work)
+    if six:
+        count = spread_nodes(new, c2, w, K.reshape(-1, 6), Q)
+    elif P.shape[0] == 3:
+        count = spread_companions(new, c2, c1, w, K, Q)
+    else:
+        count = spread_components(new, c2, w, K, Q)
+    return follow(u, before, R, c2, c1, w, loaded, columns, loads, held, moves, drives), new, count
 
 
 @_compiled
@@ -220,3 +254,17 @@ def clip(P: Floats) -> int:
                 whole = 0.0 if cross else HUGE
                 P[k, i] = whole if lost else P[k, i] * (HUGE / top)
     return count
+
+
+@_compiled
+def correct(
+    u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
+    joseph: bool, shift: bool, y: Floats, sd: Floats,
+) -> tuple[float, int]:  # fmt: skip
+    """`innovations`, then the update of the kind that P has: NIS, and how many were measured."""
+    dof = innovations(u, P, rows, z, R, y, sd)
+    if P.shape[0] == 3:
+        return correct_companions(u, before, P, rows, z, R, joseph), dof
+    if P.shape[0] == 6:
+        return correct_nodes(u, before, P, rows, z, R, joseph, shift), dof
+    return correct_components(u, before, P, rows, z, R, joseph, shift), dof

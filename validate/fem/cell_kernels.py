@@ -2,7 +2,7 @@
 logarithms, which no vector register takes, memories of viscoelastic cells, and looks at energies.
 
 Geometry is (blocks, 11 x 16), or with the card of a law (blocks, 11 + k, 16): the compiler knows
-which, so that neither kind is in the code of the other. Cells (blocks, 4, 16) hold 4 x node. The
+which, so that neither kind is in the code of the other. Cells (blocks, 4, 16) hold 8 x node. The
 coupled forms take about 120 ns a cell, Ogden of three terms 1 us.
 """
 
@@ -71,12 +71,12 @@ def gradients(geometry: Floats, block: int, l: int) -> Nine:
 @inlined
 def _unknowns(cells: Any, block: int, l: int) -> tuple[Any, Any, Any, Any]:
     """First unknowns of a cell's nodes. Unsigned: a sign would be tested for at every access."""
-    four, three = np.uint64(4), np.uint64(3)
+    eight, three = np.uint64(8), np.uint64(3)
     return (
-        np.uint64(cells[block, 0, l]) // four * three,
-        np.uint64(cells[block, 1, l]) // four * three,
-        np.uint64(cells[block, 2, l]) // four * three,
-        np.uint64(cells[block, 3, l]) // four * three,
+        np.uint64(cells[block, 0, l]) // eight * three,
+        np.uint64(cells[block, 1, l]) // eight * three,
+        np.uint64(cells[block, 2, l]) // eight * three,
+        np.uint64(cells[block, 3, l]) // eight * three,
     )
 
 

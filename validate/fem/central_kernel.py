@@ -15,7 +15,7 @@ Springs = tuple[Cells, Cells, Floats]
 
 
 @inlined
-def _pull(springs: Springs, u: Floats, r: Floats) -> None:
+def pull(springs: Springs, u: Floats, r: Floats) -> None:
     """r = K u of springs, rows of a csr matrix; zero without any."""
     starts, columns, values = springs
     for i in range(r.size):
@@ -134,7 +134,7 @@ def advance(
             d[i] = _input(moves, j, begin, end, (s + 1) / substeps, 0) - u[i]
             u[i] += d[i]
             work += r[i] * d[i] / 2
-        _pull(springs, u, r)
+        pull(springs, u, r)
         # What follows is known to the compiler: each kind of body has its own code alone.
         if memory is not None and series is not None:
             add_late_forces(law, geometry, cells, u, r, memory, series)

@@ -9,7 +9,7 @@ import math
 import os
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import Literal, get_args
 
@@ -49,6 +49,10 @@ _LAWS = {
     **dict.fromkeys((("mooney_rivlin", "split"), ("yeoh", "split")), laws.INVARIANTS),
     **dict.fromkeys((("mooney_rivlin", "coupled"), ("yeoh", "coupled")), laws.INVARIANTS_COUPLED),
 }
+
+
+#: Law, geometry, cells, springs and their diagonal (empty without any), workspace.
+PackedBody = tuple[int, Floats, kernels.Cells, central_kernel.Springs, Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,13 @@ class ExplicitBody:
         other._spring(sparse.csr_array(self.springs + springs))
         return other
 
+    @cached_property
+    def packed(self) -> PackedBody:
+        """What compiled loops take of a body of tetrahedra."""
+        self._require_tets()
+        own = self._own_springs if self.springs.nnz else np.zeros(0)
+        return self.law, self.geometry, self.cells, self._rows, own, self.work
+
     def force(self, u: Floats) -> Floats:
         """Internal nodal forces (N,) N."""
         f = self._pull(u)
@@ -211,9 +222,12 @@ class ExplicitBody:
         """Forces (N,) N of the springs alone."""
         return np.asarray(self.springs @ u) if self.springs.nnz else np.zeros(self.size)
 
-    def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
+    def _require_tets(self) -> None:
         if self.scene.mesh.bricks:
             raise SceneError("filters of single nodes are for tetrahedra; use box()")
+
+    def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
+        self._require_tets()
         kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, _own(u), f, d, self.work)
 
 
@@ -271,7 +285,7 @@ def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
     rows[:e, :9] = shape_gradients(mesh)[:, 1:].reshape(e, 9)
     volumes, mu = cell_volumes(mesh), scene.per_cell(lambda m: m.shear_modulus)
     rows[:e, 9], rows[:e, 10], rows[:e, ROWS:] = volumes * bulk, volumes * mu, cards
-    cells[:e] = 4 * mesh.cells
+    cells[:e] = 8 * mesh.cells
     packed = np.ascontiguousarray(rows.reshape(blocks, BLOCK, n).swapaxes(1, 2))
     lanes = np.ascontiguousarray(cells.reshape(blocks, BLOCK, 4).swapaxes(1, 2))
     return packed if cards.shape[1] else packed.reshape(blocks, n * BLOCK), lanes

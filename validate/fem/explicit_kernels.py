@@ -57,7 +57,7 @@ def work_size(nodes: int) -> int:
 def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w: Floats) -> None:
     """Adds the internal forces N of all blocks to f (N,); w is a workspace (`work_size`).
 
-    Cells (blocks, 4, 16) hold 4 x node, those of hexahedra (blocks, 8, 16) 3 x node.
+    Cells (blocks, 4, 16) hold 8 x node, those of hexahedra (blocks, 8, 16) 3 x node.
     """
     if geometry.ndim == 4:
         add_brick_forces(geometry, cells, u, f, w)

@@ -145,26 +145,18 @@ def _with_block(f: Three, K: Six) -> Nine:
 
 
 @inlined
-def _nodes(law: int, H: Nine, G: Nine, a: float, b: float) -> Any:
-    return nodes_svk(H, G, a, b) if law == SVK else nodes_neo_hooke(H, G, a, b)
-
-
-@inlined
-def add_lane_blocks(
-    law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats, w: Floats
-) -> None:
-    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (16 n,)."""
-    nodes, count, size = u.size // 3, lanes_of(w), geometry[0].size
-    whole = d.size == 2 * f.size
-    rows, wide = (6, 12) if whole else (3, 8)
-    x, r = w[: FOUR * nodes], w[FOUR * nodes : (FOUR + wide) * nodes]
-    _padded(u, x)
-    r[:] = 0
-    for k in range(cells.shape[0] * BLOCK // count):
+def _add_nodes(law: int, rows: int, geometry: Floats, cells: Any, x: Floats, r: Floats) -> None:
+    """Adds forces and `rows` entries of the nodes' blocks to r of padded displacements x."""
+    count, size = lanes_of(x), geometry[0].size
+    groups = cells.shape[0] * BLOCK // count
+    U = edges(x, cells, 0)
+    for k in range(groups):
         o, n = _place(k, count, size)
+        coming = edges(x, cells, _place(min(k + 1, groups - 1), count, size)[1])
         G, (a, b) = _gradients(geometry, o), _moduli(geometry, o)
-        p, K = _nodes(law, product(edges(x, cells, n), G), G, a, b)
-        if whole:
+        H = product(U, G)
+        p, K = nodes_svk(H, G, a, b) if law == SVK else nodes_neo_hooke(H, G, a, b)
+        if rows == 6:
             add_numbers_of(r, cells, n, (
                 _with_block(p[0], K[0]), _with_block(p[1], K[1]),
                 _with_block(p[2], K[2]), _with_block(p[3], K[3]),
@@ -174,5 +166,26 @@ def add_lane_blocks(
                 _with_diagonal(p[0], K[0]), _with_diagonal(p[1], K[1]),
                 _with_diagonal(p[2], K[2]), _with_diagonal(p[3], K[3]),
             ))  # fmt: skip
+        U = coming
+
+
+@inlined
+def add_lane_blocks(
+    law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats, w: Floats
+) -> None:
+    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (16 n,)."""
+    nodes, rows = u.size // 3, 3 * d.size // f.size
+    wide = 12 if rows == 6 else 8
+    x, r = w[: FOUR * nodes], w[FOUR * nodes : (FOUR + wide) * nodes]
+    _padded(u, x)
+    r[:] = 0
+    if law == SVK and rows == 6:
+        _add_nodes(SVK, 6, geometry, cells, x, r)
+    elif law == SVK:
+        _add_nodes(SVK, 3, geometry, cells, x, r)
+    elif rows == 6:
+        _add_nodes(NEO_HOOKE, 6, geometry, cells, x, r)
+    else:
+        _add_nodes(NEO_HOOKE, 3, geometry, cells, x, r)
     _add_unpadded(r, wide, 0, f, 3)
     _add_unpadded(r, wide, 3, d, rows)

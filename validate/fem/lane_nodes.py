@@ -2,7 +2,7 @@
 """Nodes of cells turned into lanes and back (`fem.lanes`): what element loops gather and add up.
 
 A node has four numbers in a row, x, y, z and a pad, or a multiple of four: read and written at
-once, as vectors. Cells are packed in blocks of 16, corner by corner, and hold 4 x node.
+once, as vectors. Cells are packed in blocks of 16, corner by corner, and hold 8 x node.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from typing import Any, cast
 from llvmlite import ir
 from numba.core import cgutils, types
 
-from validate.fem.lanes import Lanes, emitted, place, shuffled
+from validate.fem.lanes import Lanes, emitted, shuffled, vector
 
 BLOCK = 16  # cells side by side
 FOUR = 4  # numbers of a node that are moved at once
@@ -49,11 +49,11 @@ def _joined(builder: Any, parts: list[Any]) -> Any:
 
 
 def _of_lanes(builder: Any, rows: list[Any]) -> list[Any]:
-    """What every lane has of one, two or four rows, as a vector each."""
+    """What every lane has of one, four or six rows, as a vector each; six with two pads."""
+    if len(rows) == 6:
+        return _sixes(builder, rows)
     if len(rows) == 4:
         rows = _turned(builder, rows)
-    if len(rows) == 2:
-        rows = [pick(builder, rows[0], rows[1]) for pick in (_even, _odd)]
     size = len(rows)
     return [
         shuffled(builder, row, row, list(range(begin, begin + size)))
@@ -62,6 +62,18 @@ def _of_lanes(builder: Any, rows: list[Any]) -> list[Any]:
     ]
 
 
+def _sixes(builder: Any, rows: list[Any]) -> list[Any]:
+    fours = _turned(builder, rows[:4])
+    twos = [pick(builder, rows[4], rows[5]) for pick in (_even, _odd)]
+    count, found = rows[0].type.count, []
+    for lane in range(count):
+        begin, last = lane // 4 * 4, lane // 2 * 2 + count
+        picks = [*range(begin, begin + 4), last, last + 1, last, last + 1]
+        found.append(shuffled(builder, fours[lane % 4], twos[lane % 2], picks))
+    return found
+
+
+_proxy = cast(Callable[..., Any], cgutils.create_struct_proxy)
 _unpacked = cast(Callable[..., list[Any]], cgutils.unpack_tuple)
 
 
@@ -70,22 +82,28 @@ class _Corners:
     `cells` from a flat index on."""
 
     def __init__(self, context: Any, builder: Any, sig: Any, args: Any) -> None:
-        self.context, self.builder = context, builder
-        self.typ, self.nodes, self.index = sig.args[0], args[0], args[2]
-        proxy: Any = cgutils.create_struct_proxy(sig.args[1])
-        self.cells = proxy(context, builder, args[1]).data
+        self.builder = builder
+        self.typ, self.index = sig.args[0], args[2]
+        self.data, self.cells = (
+            _proxy(sig.args[i])(context, builder, args[i]).data for i in (0, 1)
+        )
         self.align = int(self.typ.dtype.bitwidth // 8)
 
     def at(self, corner: int, lane: int, size: int = FOUR, wide: int = FOUR, k: int = 0) -> Any:
-        """Pointer to `size` of the `wide` numbers of a lane's node, from the k-th on."""
+        """Pointer to `size` of the `wide` numbers of a lane's node, from the k-th on.
+
+        8 x node is counted in eighths of a node's bytes, which spares a multiplication.
+        """
         builder, step = self.builder, ir.Constant(self.index.type, corner * BLOCK + lane)
         node = builder.load(builder.gep(self.cells, [builder.add(self.index, step)]))
-        start = builder.zext(node, ir.IntType(64))
-        if wide != FOUR:
-            start = builder.mul(start, ir.Constant(start.type, wide // FOUR))
-        if k:
-            start = builder.add(start, ir.Constant(start.type, k))
-        return place(self.context, builder, self.typ, self.nodes, start, size)
+        start, eighth = builder.zext(node, ir.IntType(64)), wide * self.align // 8
+        if eighth not in (2, 4, 8):
+            start, eighth = builder.mul(start, ir.Constant(start.type, eighth // 4)), 4
+        numbers = builder.bitcast(self.data, ir.IntType(8 * eighth).as_pointer())
+        kind = vector(self.typ.dtype, 1).element.as_pointer()
+        first = builder.bitcast(builder.gep(numbers, [start]), kind)
+        first = builder.gep(first, [ir.Constant(start.type, k)]) if k else first
+        return builder.bitcast(first, vector(self.typ.dtype, size).as_pointer())
 
     def row(self, corner: int, lane: int) -> Any:
         return self.builder.load(self.at(corner, lane), align=self.align)
@@ -134,18 +152,18 @@ def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> An
 
 @emitted
 def add_numbers_of(typing: Any, nodes: Any, cells: Any, index: Any, numbers: Any) -> Any:
-    """Adds m numbers at each corner, `numbers` four tuples of m lanes, to the first m of a node's,
-    which are a multiple of four."""
+    """Adds m = 6 or 9 numbers at each corner, `numbers` four tuples of m lanes, to the first m of
+    a node's 8 or 12."""
     m = numbers.dtype.count
-    parts = [(k, min(FOUR, m - k)) for k in range(0, m, FOUR)]
+    parts = {6: [(0, 6)], 9: [(0, 4), (4, 4), (8, 1)]}[m]
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        of, wide = _Corners(context, builder, sig, args), FOUR * len(parts)
+        of, wide = _Corners(context, builder, sig, args), -(-m // FOUR) * FOUR
         for corner, each in enumerate(_unpacked(builder, args[3], 4)):
             values = _unpacked(builder, each, m)
             for k, size in parts:
                 for lane, row in enumerate(_of_lanes(builder, values[k : k + size])):
-                    of.add(of.at(corner, lane, size, wide, k), row)
+                    of.add(of.at(corner, lane, row.type.count, wide, k), row)
         return context.get_dummy_value()
 
     return types.none(nodes, cells, index, numbers), code
