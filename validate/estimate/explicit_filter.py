@@ -110,7 +110,7 @@ class ExplicitFilterStepper:
         if self.refusal:
             return replace(state, failure=("refused", self.refusal))
         core, parts, last = self.core, self.explicit.parts, state.inner
-        memory, found, looks = last.memory, nothing(len(self.names)), list[Look | None]()
+        memory, found, looks = last.memory, None, list[Look | None]()
         for part in range(parts):
             memory = core.predict(memory, *self.explicit.inputs(last.inputs, inputs, part))
             if failure := self._failure(memory):
@@ -119,9 +119,10 @@ class ExplicitFilterStepper:
             z = self.times.at(number)
             if z is not None:
                 memory, new = core.correct(memory, number, z)
-                found = new.after(found)
+                found = new.after(found) if found else new
             if self.smooth:
                 looks.append(None if z is None else self._smoothing.look(memory))
+        found = found or nothing(len(self.names))
         numbers = {**found.numbers(self.names), **gate_numbers(self.care, found)}
         numbers |= core.numbers(memory)
         return State(state.k + 1, AtInputs(memory, inputs, tuple(looks)), numbers=numbers)

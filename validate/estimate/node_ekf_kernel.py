@@ -1,6 +1,6 @@
 """Compiled arithmetic of the nonlinear filters: the explicit step and the node-level update.
 
-Paper 003, eqs 35-39. P is changed in place and packed by row, one column a component or node:
+Paper 003, eqs 35-39. P is packed by row, one column a component or node:
 "component" 1 row of variances m^2, "companion" 3 rows (U_t, cross, U_{t-dt}) of 2 x 2 covariances,
 "node" 6 rows (xx, yy, zz, xy, xz, yz) of 3 x 3 ones.
 """
@@ -59,37 +59,37 @@ def farthest(u: Floats) -> float:
 
 
 @_compiled
-def spread_components(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
-    """P = A^2 P + Q of every component (eq 36), A = c2 - w K_ii; counts those beyond `HUGE`."""
-    count = 0
-    p = P[0]
+def spread_components(
+    P: Floats, new: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats
+) -> int:  # fmt: skip
+    """A^2 P + Q of every component (eq 36), A = c2 - w K_ii; counts those beyond `HUGE`."""
+    count, p, following = 0, P[0], new[0]
     for i in range(p.shape[0]):
         a = c2[i] - w[i] * K[i]
-        p[i] = a * a * p[i] + Q[i]
-        count += not p[i] < HUGE
+        following[i] = a * a * p[i] + Q[i]
+        count += not following[i] < HUGE
     return count
 
 
 @_compiled
 def spread_companions(
-    P: Floats, c2: Floats, c1: Floats, w: Floats, K: Floats, Q: Floats
+    P: Floats, new: Floats, c2: Floats, c1: Floats, w: Floats, K: Floats, Q: Floats
 ) -> int:  # fmt: skip
-    """P = A P A^T + Q of (U_t, U_{t-dt}), A = [[a, -c1], [1, 0]]; counts those beyond `HUGE`."""
+    """A P A^T + Q of (U_t, U_{t-dt}), A = [[a, -c1], [1, 0]]; counts those beyond `HUGE`."""
     count = 0
-    now, cross, before = P[0], P[1], P[2]
-    for i in range(now.shape[0]):
+    for i in range(P.shape[1]):
         a = c2[i] - w[i] * K[i]
-        p, x = now[i], cross[i]
-        now[i] = a * a * p - 2 * a * c1[i] * x + c1[i] * c1[i] * before[i] + Q[i]
-        cross[i] = a * p - c1[i] * x
-        before[i] = p
-        count += not now[i] < HUGE
+        p, x = P[0, i], P[1, i]
+        new[0, i] = a * a * p - 2 * a * c1[i] * x + c1[i] * c1[i] * P[2, i] + Q[i]
+        new[1, i] = a * p - c1[i] * x
+        new[2, i] = p
+        count += not new[0, i] < HUGE
     return count
 
 
 @_compiled
-def spread_nodes(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
-    """P = A P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
+def spread_nodes(P: Floats, new: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
+    """A P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
 
     K (n, 6) holds the packed rows; c2, w and Q (N,) are those of the nodes' components.
     """
@@ -104,13 +104,13 @@ def spread_nodes(P: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
         x0, x1, x2 = xx * a + xy * d + xz * e, xx * d + xy * b + xz * f, xx * e + xy * f + xz * c
         y0, y1, y2 = yx * a + yy * d + yz * e, yx * d + yy * b + yz * f, yx * e + yy * f + yz * c
         z0, z1, z2 = zx * a + zy * d + zz * e, zx * d + zy * b + zz * f, zx * e + zy * f + zz * c
-        P[0, n] = x0 * xx + x1 * xy + x2 * xz + Q[x]
-        P[1, n] = y0 * yx + y1 * yy + y2 * yz + Q[y]
-        P[2, n] = z0 * zx + z1 * zy + z2 * zz + Q[z]
-        P[3, n] = x0 * yx + x1 * yy + x2 * yz
-        P[4, n] = x0 * zx + x1 * zy + x2 * zz
-        P[5, n] = y0 * zx + y1 * zy + y2 * zz
-        count += not (P[0, n] < HUGE and P[1, n] < HUGE and P[2, n] < HUGE)
+        new[0, n] = x0 * xx + x1 * xy + x2 * xz + Q[x]
+        new[1, n] = y0 * yx + y1 * yy + y2 * yz + Q[y]
+        new[2, n] = z0 * zx + z1 * zy + z2 * zz + Q[z]
+        new[3, n] = x0 * yx + x1 * yy + x2 * yz
+        new[4, n] = x0 * zx + x1 * zy + x2 * zz
+        new[5, n] = y0 * zx + y1 * zy + y2 * zz
+        count += not (new[0, n] < HUGE and new[1, n] < HUGE and new[2, n] < HUGE)
     return count
 
 
@@ -124,17 +124,17 @@ def predict(
     `HUGE`; a P of 1 row spreads by components, of 3 by companions, of 6 by nodes."""
     law, geometry, cells, springs, own, work = body
     R, six = np.empty_like(u), P.shape[0] == 6
-    K, new = np.zeros(2 * u.size if six else u.size), P.copy()
+    K, new = np.zeros(2 * u.size if six else u.size), np.empty_like(P)
     pull(springs, u, R)
     for i in range(own.size):
         K[2 * i - i % 3 if six else i] = own[i]
     add_forces_and_blocks(law, geometry, cells, u, R, K, work)
     if six:
-        count = spread_nodes(new, c2, w, K.reshape(-1, 6), Q)
+        count = spread_nodes(P, new, c2, w, K.reshape(-1, 6), Q)
     elif P.shape[0] == 3:
-        count = spread_companions(new, c2, c1, w, K, Q)
+        count = spread_companions(P, new, c2, c1, w, K, Q)
     else:
-        count = spread_components(new, c2, w, K, Q)
+        count = spread_components(P, new, c2, w, K, Q)
     return follow(u, before, R, c2, c1, w, loaded, columns, loads, held, moves, drives), new, count
 
 
