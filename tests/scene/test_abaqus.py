@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.scene.abaqus import read_abaqus
 from validate.scene.box import grid
+from validate.scene.foreign_mesh import read_foreign
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.mesh_file import read_mesh
 
@@ -55,7 +55,7 @@ def test_a_body_comes_back_whole(tmp_path: Path, kind: str) -> None:
 
 
 def test_the_liver(shared_data: Path) -> None:
-    got = read_abaqus(shared_data / LIVER)
+    got = read_foreign(shared_data / LIVER, "m").mesh
     assert (got.kind, len(got.nodes), len(got.cells)) == ("tet4", 935, 4408)
     assert 0.5e-3 < cell_volumes(got).sum() < 3e-3  # m3: a liver of half a litre to three
     assert {"Disp", "FixT&P"} <= set(got.facets)
@@ -80,7 +80,7 @@ def test_what_is_no_body_is_one_line(tmp_path: Path, text: str, said: str) -> No
     path = tmp_path / "body.inp"
     path.write_text(text)
     with pytest.raises(SceneError, match=said) as raised:
-        read_abaqus(path)
+        read_foreign(path, "m")
     assert "\n" not in str(raised.value)
 
 
@@ -89,17 +89,17 @@ def test_elements_inside_out_and_curved_ones_are_refused(tmp_path: Path) -> None
     turned = Mesh(whole.nodes, whole.cells[:, [1, 0, 2, 3]], "tet4")
     path.write_text(inp(turned))
     with pytest.raises(SceneError, match=r"body\.inp: "):
-        read_abaqus(path)
+        read_foreign(path, "m")
     round_ = body("tet10")
     nodes = round_.nodes.copy()
     nodes[round_.cells[0, 4]] += 1e-3
     path.write_text(inp(Mesh(nodes, round_.cells, "tet10")))
     with pytest.raises(SceneError, match="are curved"):
-        read_abaqus(path)
+        read_foreign(path, "m")
 
 
 def test_a_file_that_is_not_there_and_a_unit_that_is_none(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="no such file"):
-        read_abaqus(tmp_path / "none.inp")
+        read_foreign(tmp_path / "none.inp", "m")
     with pytest.raises(SceneError, match="no unit of length"):
-        read_abaqus(tmp_path / "none.inp", "kPa")
+        read_foreign(tmp_path / "none.inp", "kPa")

@@ -84,6 +84,19 @@ def new(name: str, source: Path, out: Path | None) -> None:
 
 
 @click.command()
+@click.argument("file", type=FILE)
+@click.option("--unit", metavar="UNIT", help="Of its lengths, as mm: such files state none.")
+@click.option("--edge", metavar="LENGTH", help="Of the elements that fill a surface, as 2mm.")
+@click.option("--quadratic", "curved", is_flag=True, help="A node in the middle of every edge.")
+@click.option("-o", "out", type=FILE, help="The npz to write, as experiments take it.")
+def body(file: Path, unit: str | None, edge: str | None, curved: bool, out: Path | None) -> None:
+    """A body of another program: .inp, .msh, .vtu, .vtk, or a closed surface .stl, .obj, .ply."""
+    from validate.cli import bodies
+
+    bodies.body(file, unit, edge, out, curved=curved)
+
+
+@click.command()
 @click.argument("name")
 @click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")

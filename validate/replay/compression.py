@@ -96,8 +96,8 @@ class Specimen:
 
     diameter: float | None = quantity(None, "m", "diameter; none: the recording's", asked=True)
     height: float | None = quantity(None, "m", "height; none: the recording's", asked=True)
-    mesh: str | None = quantity(None, "1", "mesh file (npz, or Abaqus inp); none: a cylinder")
-    mesh_unit: str = quantity("m", "1", "unit of lengths in a mesh file that states none (inp)")
+    mesh: str | None = quantity(None, "1", "mesh file (npz, inp, msh, vtu); none: a cylinder")
+    mesh_unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
 
     @property
     def size(self) -> Cylinder:

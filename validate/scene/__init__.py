@@ -4,7 +4,8 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "mesh": ("Mesh", "quadratic"),
-    "abaqus": ("read_abaqus",),
+    "filled": ("filled",),
+    "foreign_mesh": ("Body", "read_foreign"),
     "mesh_file": ("read_mesh", "write_mesh"),
     "scene": (
         "Cavity",

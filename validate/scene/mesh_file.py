@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import SceneError
-from validate.scene.abaqus import read_abaqus
+from validate.scene.filled import SUFFIXES as SURFACES
+from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.foreign_mesh import read_foreign
 from validate.scene.mesh import Kind, Mesh, require_positive_cells
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
@@ -37,14 +39,23 @@ def write_mesh(mesh: Mesh, path: Path, provenance: str = "") -> None:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def read_mesh(path: Path, unit: str = "m") -> Mesh:
-    """The mesh of a file that `write_mesh` wrote, or of an Abaqus .inp with lengths in `unit`.
+def read_mesh(path: Path, unit: str | None = None) -> Mesh:
+    """The mesh of a file that `write_mesh` wrote, or of one of `foreign_mesh` with lengths in
+    `unit`.
 
     Raises `SceneError`, one line that names the file, for one that is missing, damaged, too large
-    or no such mesh, and for inverted elements.
+    or no such mesh, for inverted elements, without a unit that it needs, and for a surface.
     """
-    if path.suffix.lower() == ".inp":
-        return read_abaqus(path, unit)
+    suffix = path.suffix.lower()
+    if suffix in FOREIGN and unit is None:
+        raise SceneError(f"{path.name}: states no unit of length; say it: specimen.mesh_unit=mm")
+    if suffix in FOREIGN:
+        return read_foreign(path, unit or "").mesh
+    if suffix in SURFACES:
+        raise SceneError(
+            f"{path.name}: a surface; fill it first: validate body {path.name} --unit mm "
+            "-o body.npz"
+        )
     try:
         mesh = _mesh(_arrays(path))
         require_positive_cells(mesh)

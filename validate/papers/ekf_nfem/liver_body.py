@@ -53,7 +53,7 @@ class LiverBody:
         if which == "generated":
             return with_sets(generated_liver())
         path = found(FOLDER, FILE, Path(self.beside), self.file or None, "body.file")
-        return with_sets(read_mesh(path))
+        return with_sets(read_mesh(path, "m"))
 
 
 def generated_liver(cells: tuple[int, int, int] = CELLS) -> Mesh:

@@ -4,6 +4,7 @@ A library in C that crashes on a damaged file, hangs, ends the interpreter or ta
 costs one line. What it found comes back as plain arrays, read without pickle.
 """
 
+import json
 import os
 import resource
 import subprocess
@@ -29,15 +30,22 @@ _RUN = (sys.executable, "-m", f"{_HOME}.apart")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def decoded(decoder: str, path: Path, extra: str) -> dict[str, NDArray[Any]]:
-    """What `arrays(path)` of the module `decoder` gives, one beside this file or named in full.
+def decoded(
+    decoder: str,
+    path: Path,
+    extra: str,
+    given: Mapping[str, float] | None = None,
+    seconds: int = _SECONDS,
+) -> dict[str, NDArray[Any]]:
+    """What `arrays(path, **given)` of the module `decoder` gives, one beside this file or named in
+    full, within `seconds` s and one more for each MB.
 
     Raises `UsageError` with what to install where the library of the `extra` is absent, else
     `RecordingError` naming the file: what the decoder said, or how its process ended.
     """
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         out = Path(folder) / "arrays.npz"
-        done = _ended(decoder, path, out)
+        done = _ended(decoder, path, out, given or {}, seconds)
         line = " ".join(done.stdout.decode("utf-8", "replace").split())[:300]
         if done.returncode == _MISSING:
             raise UsageError(f"{path.name}: {line}; pip install 'validate-tissue[{extra}]'")
@@ -52,13 +60,16 @@ def decoded(decoder: str, path: Path, extra: str) -> dict[str, NDArray[Any]]:
             return {name: found[name] for name in found.files}
 
 
-def _ended(decoder: str, path: Path, out: Path) -> subprocess.CompletedProcess[bytes]:
+def _ended(
+    decoder: str, path: Path, out: Path, given: Mapping[str, float], least: int
+) -> subprocess.CompletedProcess[bytes]:
     size = path.stat().st_size
-    seconds = _SECONDS + size // _RATE
+    seconds = least + size // _RATE
+    more = [json.dumps(dict(given))] if given else []
     limit = _MEMORY + 40 * size
     try:
         return subprocess.run(
-            [*_RUN, decoder, str(path), str(out), str(limit)],
+            [*_RUN, decoder, str(path), str(out), str(limit), *more],
             env={**os.environ, **dict.fromkeys(_THREADS, "1")},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -72,13 +83,12 @@ def _ended(decoder: str, path: Path, out: Path) -> subprocess.CompletedProcess[b
         ) from None
 
 
-def _decode(decoder: str, path: Path, out: Path, limit: int) -> int:
+def _decode(decoder: str, path: Path, out: Path, limit: int, given: str = "{}") -> int:
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        arrays: Arrays = import_module(decoder if "." in decoder else f"{_HOME}.{decoder}").arrays(
-            path
-        )
+        module = import_module(decoder if "." in decoder else f"{_HOME}.{decoder}")
+        arrays: Arrays = module.arrays(path, **json.loads(given))
     except ImportError as missing:
         print(f"the library '{missing.name}' that reads this format is not installed")
         return _MISSING
@@ -96,5 +106,5 @@ def _decode(decoder: str, path: Path, out: Path, limit: int) -> int:
 
 
 if __name__ == "__main__":
-    decoder, path, out, limit = sys.argv[1:]
-    raise SystemExit(_decode(decoder, Path(path), Path(out), int(limit)))
+    decoder, path, out, limit, *given = sys.argv[1:]
+    raise SystemExit(_decode(decoder, Path(path), Path(out), int(limit), *given))

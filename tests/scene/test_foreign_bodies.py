@@ -1,0 +1,180 @@
+"""Bodies of Gmsh, VTK and of closed surfaces, as libraries of others write them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista as pv
+from click.testing import CliRunner
+
+from validate.cli.main import cli
+from validate.errors import SceneError
+from validate.scene.body_facts import facts, quality
+from validate.scene.box import grid
+from validate.scene.filled import filled
+from validate.scene.foreign_mesh import read_foreign
+from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
+from validate.scene.mesh_file import read_mesh
+
+SIZE = (0.01, 0.02, 0.03)
+
+
+def linear() -> Mesh:
+    mesh = grid(SIZE, (1, 2, 2))
+    return Mesh(mesh.nodes, mesh.simplices, "tet4")
+
+
+def facets_at(mesh: Mesh, height: float) -> np.ndarray:
+    facets = boundary_facets(mesh.cells, 3)
+    return facets[(np.abs(mesh.nodes[facets][..., 2] - height) < 1e-9).all(axis=1)]
+
+
+def gmsh2(path: Path, mesh: Mesh) -> Path:
+    """With its lower facets as the physical group `plate`, the upper ones without a name; mm."""
+    low, high = facets_at(mesh, 0.0), facets_at(mesh, SIZE[2])
+    labels = [np.full(len(low), 7), np.full(len(high), 8), np.full(len(mesh.cells), 1)]
+    meshio.Mesh(
+        1e3 * mesh.nodes,
+        [("triangle", low), ("triangle", high), ("tetra", mesh.cells)],
+        cell_data={"gmsh:physical": labels, "gmsh:geometrical": labels},
+        field_data={"plate": np.array([7, 2]), "gel": np.array([1, 3])},
+    ).write(path, file_format="gmsh22", binary=False)
+    return path
+
+
+def gmsh4(path: Path, mesh: Mesh) -> Path:
+    """The same in version 4.1, after its documentation: two surfaces and a volume."""
+    low, high = facets_at(mesh, 0.0), facets_at(mesh, SIZE[2])
+    box = "0 0 0 10 20 30"
+    names = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", "2", '2 7 "plate"',
+             '3 1 "gel"', "$EndPhysicalNames"]  # fmt: skip
+    entities = ["$Entities", "0 0 2 1", f"1 {box} 1 7 0", f"2 {box} 1 8 0", f"1 {box} 1 1 2 1 2",
+                "$EndEntities"]  # fmt: skip
+    n = len(mesh.nodes)
+    nodes = ["$Nodes", f"1 {n} 1 {n}", f"3 1 0 {n}", *(str(i + 1) for i in range(n))]
+    nodes += [" ".join(map(repr, (1e3 * x).tolist())) for x in mesh.nodes] + ["$EndNodes"]
+    total = len(low) + len(high) + len(mesh.cells)
+    elements, number = ["$Elements", f"3 {total} 1 {total}"], 0
+    for head, cells in ((f"2 1 2 {len(low)}", low), (f"2 2 2 {len(high)}", high),
+                        (f"3 1 4 {len(mesh.cells)}", mesh.cells)):  # fmt: skip
+        elements.append(head)
+        for cell in cells:
+            number += 1
+            elements.append(f"{number} " + " ".join(str(i + 1) for i in cell))
+    path.write_text("\n".join([*names, *entities, *nodes, *elements, "$EndElements", ""]))
+    return path
+
+
+@pytest.mark.parametrize("write", [gmsh2, gmsh4])
+def test_groups_of_gmsh_are_facet_sets(write: Callable[[Path, Mesh], Path], tmp_path: Path) -> None:
+    body = read_foreign(write(tmp_path / "x.msh", linear()), "mm")
+    assert cell_volumes(body.mesh).sum() == pytest.approx(np.prod(SIZE))
+    low = body.mesh.facet_nodes("plate")
+    assert np.abs(body.mesh.nodes[low, 2]).max() < 1e-12
+    assert len(body.mesh.facets["plate"]) == 4
+    assert len(body.mesh.facets["label 8"]) == 4
+    assert body.told["turned"].startswith("0 of")
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
+def test_elements_told_the_other_way_round_are_turned_and_told(suffix: str, tmp_path: Path) -> None:
+    mesh = linear()
+    wrong = mesh.cells.copy()
+    wrong[::2] = wrong[::2][:, [1, 0, 2, 3]]
+    types = np.full(len(wrong), pv.CellType.TETRA)
+    cells = np.hstack([np.full((len(wrong), 1), 4), wrong]).ravel()
+    pv.UnstructuredGrid(cells, types, 1e3 * mesh.nodes).save(tmp_path / f"x{suffix}")
+    body = read_foreign(tmp_path / f"x{suffix}", "mm")
+    assert (cell_volumes(body.mesh) > 0).all()
+    assert cell_volumes(body.mesh).sum() == pytest.approx(np.prod(SIZE))
+    assert body.told["turned"] == f"{len(wrong[::2])} of {len(wrong)} elements"
+
+
+def test_hexahedra_and_quadratic_tetrahedra_come_in(tmp_path: Path) -> None:
+    hexahedra = grid(SIZE, (2, 2, 2))
+    meshio.Mesh(hexahedra.nodes, [("hexahedron", hexahedra.cells)]).write(tmp_path / "h.vtu")
+    assert read_foreign(tmp_path / "h.vtu", "m").mesh.kind == "hex8"
+    curved = quadratic(linear())
+    body = read_mesh(_inp(tmp_path / "q.vtu", curved), "m")
+    assert (body.kind, len(body.nodes)) == ("tet10", len(curved.nodes))
+
+
+def _inp(path: Path, mesh: Mesh) -> Path:
+    meshio.Mesh(mesh.nodes, [("tetra10", mesh.cells)]).write(path)
+    return path
+
+
+def test_a_sphere_is_filled_to_its_volume(tmp_path: Path) -> None:
+    """The volume of the triangulated sphere, within the envelope of a thousandth."""
+    surface = pv.Icosphere(radius=10.0, nsub=3)
+    surface.save(tmp_path / "ball.stl")
+    body = filled(tmp_path / "ball.stl", "mm", 4e-3)
+    assert cell_volumes(body.mesh).sum() == pytest.approx(1e-9 * surface.volume, rel=5e-3)
+    assert (quality(body.mesh) > 0.1).all()
+    edges = np.linalg.norm(body.mesh.nodes[body.mesh.cells[:, 0]]
+                           - body.mesh.nodes[body.mesh.cells[:, 1]], axis=1)  # fmt: skip
+    assert 1.5e-3 < np.median(edges) < 6e-3
+    assert "triangles around" in body.told["surface"]
+
+
+def test_an_open_surface_is_refused_with_its_open_edges(tmp_path: Path) -> None:
+    pv.Plane(i_resolution=2, j_resolution=2).triangulate().save(tmp_path / "open.stl")
+    with pytest.raises(SceneError, match=r"open\.stl: 8 open or doubled edges in 8 triangles"):
+        filled(tmp_path / "open.stl", "mm")
+
+
+def test_the_beam_of_others_is_filled(shared_data: Path) -> None:
+    """30 x 30 x 100 mm, as its makers say."""
+    body = filled(shared_data / "markers/silicone-beam/beam.stl", "mm", 8e-3)
+    assert cell_volumes(body.mesh).sum() == pytest.approx(90e-6, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        ("x.msh", "$MeshFormat\n1 0 8\n$EndMeshFormat\n", "x.msh: "),
+        ("x.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "x.vtk: "),
+        ("x.vtu", "<VTKFile>", "x.vtu: "),
+        ("x.obj", "v 0 0 0\n", "x.obj: "),
+        ("x.ply", "ply\nformat ascii 1.0\n", "x.ply: "),
+        ("x.stl", "solid x\nendsolid x\n", "x.stl: "),
+    ],
+)
+def test_a_reader_that_ends_the_interpreter_costs_a_line(
+    name: str, text: str, why: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    read = filled if name[-3:] in ("obj", "ply", "stl") else read_foreign
+    with pytest.raises(SceneError, match=why) as raised:
+        read(tmp_path / name, "mm")
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_quality_of_a_regular_tetrahedron_and_of_a_cube_is_one() -> None:
+    corners = np.array([[1, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1.0]])
+    regular = Mesh(corners, np.array([[0, 2, 1, 3]]), "tet4")
+    assert quality(regular) == pytest.approx(1)
+    assert quality(grid((0.1, 0.1, 0.1), (1, 1, 1))) == pytest.approx(1)
+    flat = Mesh(corners * [1, 1, 1e-3], np.array([[0, 2, 1, 3]]), "tet4")
+    assert quality(flat)[0] < 0.05
+    assert "1 tet4, 4 nodes" in facts(regular)["elements"]
+
+
+def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path: Path) -> None:
+    path = gmsh2(tmp_path / "x.msh", linear())
+    run = CliRunner()
+    refused = run.invoke(cli, ["body", str(path)])
+    assert "states no unit; say it: --unit mm" in str(refused.exception)
+    shown = run.invoke(cli, ["body", str(path), "--unit", "mm", "-o", str(tmp_path / "b.npz")])
+    assert shown.exit_code == 0, shown.output
+    assert "10 x 20 x 30 mm" in shown.output
+    assert set(read_mesh(tmp_path / "b.npz").facets) == {"plate", "label 8"}
+    with pytest.raises(SceneError, match=r"states no unit of length; .* specimen.mesh_unit=mm"):
+        read_mesh(path)
+    pv.Icosphere().save(tmp_path / "s.stl")
+    with pytest.raises(
+        SceneError, match=r"a surface; fill it first: validate body s.stl --unit mm"
+    ):
+        read_mesh(tmp_path / "s.stl", "mm")

@@ -1,0 +1,50 @@
+"""What a body's mesh is like: size, shape of its elements, facet sets. For people, with units."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.shape_functions import CORNERS, brick_rule
+
+POOR = 0.1  # elements below such a quality shorten steps and spoil answers
+
+
+def quality(mesh: Mesh) -> Floats:
+    """Of every cell (e,), 1 for the best, 0 for a flat one: of simplices the mean ratio (volume
+    over that of a regular one with the same sum of squared edges), of bricks the least scaled
+    Jacobian of their corners."""
+    x = mesh.nodes[mesh.corners]
+    if mesh.bricks:
+        corners = CORNERS[mesh.dimension]
+        J = brick_rule(corners, np.zeros(len(corners))).jacobians(x)
+        lengths = np.linalg.norm(J, axis=-2).prod(axis=-1)
+        return np.asarray((np.linalg.det(J) / lengths).min(axis=1))
+    d = mesh.dimension
+    pairs = [(a, b) for b in range(d + 1) for a in range(b)]
+    squares = sum(((x[:, a] - x[:, b]) ** 2).sum(axis=1) for a, b in pairs)
+    size = np.abs(cell_volumes(mesh))
+    if d == 2:
+        return np.asarray(4 * np.sqrt(3) * size / squares)
+    return np.asarray(12 * (3 * size) ** (2 / 3) / squares)
+
+
+def facts(mesh: Mesh) -> Mapping[str, str]:
+    """Counts, box, volume, quality and facet sets, in words with units."""
+    volumes, q = cell_volumes(mesh), quality(mesh)
+    low, high = 1e3 * mesh.nodes.min(axis=0), 1e3 * mesh.nodes.max(axis=0)
+    box = " x ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))
+    at = ", ".join(f"{a:.4g}" for a in low)
+    poor = int((q < POOR).sum())
+    size = f"{1e6 * volumes.sum():.4g} cm3" if mesh.dimension == 3 else \
+        f"{1e4 * volumes.sum():.4g} cm2"  # fmt: skip
+    sets = ", ".join(f"{name} ({len(f)} facets)" for name, f in sorted(mesh.facets.items()))
+    return {
+        "elements": f"{len(mesh.cells)} {mesh.kind}, {len(mesh.nodes)} nodes",
+        "box": f"{box} mm, from ({at}) mm",
+        "volume" if mesh.dimension == 3 else "area": size,
+        "quality": f"worst {q.min():.3g} (element {int(q.argmin())}), median {np.median(q):.3g}; "
+        f"{poor} below {POOR:g}; 1 is best",
+        "facet sets": sets or "none: name them by plane, box or nearest point (scene.select)",
+    }

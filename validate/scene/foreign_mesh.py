@@ -1,0 +1,140 @@
+"""Bodies that other programs wrote: Abaqus .inp, Gmsh .msh, VTK's .vtu and .vtk.
+
+One shape of solid elements, in the file's own unit, which it does not state. Node sets and labelled
+facets become facet sets. Materials, steps and loads in a file are not taken: a scene declares its
+own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats, Ints
+from validate.errors import RecordingError, SceneError
+from validate.recording.formats.apart import decoded
+from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic, require_positive_cells
+from validate.scene.shape_functions import EDGES
+from validate.units import in_si
+
+SUFFIXES = (".inp", ".msh", ".vtu", ".vtk")
+EXTRA = "meshes"
+_KINDS: Mapping[str, Kind] = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8"}
+_CELLS, _NSET, _FACET = "cells.", "nset.", "facet."
+_MOST = 64 * 2**20  # bytes: some 500 000 tetrahedra
+_STRAIGHT = 1e-3  # of an edge: how far its middle node may lie off
+_TURNED: Mapping[Kind, tuple[int, ...]] = {
+    "tet4": (0, 2, 1, 3), "hex8": (4, 5, 6, 7, 0, 1, 2, 3),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh, and what was done to the file's to make it, in words."""
+
+    mesh: Mesh
+    told: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "told", MappingProxyType(dict(self.told)))
+
+
+def metres(name: str, unit: str) -> float:
+    """Metres in one `unit`; raises `SceneError` for what is no length."""
+    factor = in_si(1.0, unit, "m")
+    if factor is None:
+        raise SceneError(f"{name}: '{unit}' is no unit of length; as mm")
+    return factor
+
+
+def require_readable(path: Path) -> None:
+    """Raises `SceneError` for a file that is missing, empty or too large."""
+    size = path.stat().st_size if path.is_file() else -1
+    if not 0 < size <= _MOST:
+        why = "no such file" if size < 0 else f"{size} bytes; 1 to {_MOST} are read"
+        raise SceneError(f"{path.name}: {why}")
+
+
+def read_foreign(path: Path, unit: str) -> Body:
+    """The body, lengths in `unit`; nodes that no element has are left out.
+
+    Elements whose nodes are told the other way round are turned, but in .inp, whose order has a
+    meaning. Raises `SceneError` for a file that is missing, too large or damaged, more than one
+    part, shapes other than linear and straight quadratic tetrahedra and linear hexahedra or several
+    of them; `UsageError` without the library.
+    """
+    factor = metres(path.name, unit)
+    require_readable(path)
+    try:
+        found = decoded("validate.scene.meshio_arrays", path, EXTRA)
+    except RecordingError as error:
+        raise SceneError(str(error)) from None
+    return _body(path.name, found, factor, turn=path.suffix.lower() != ".inp")
+
+
+def _body(name: str, found: Mapping[str, NDArray[Any]], factor: float, *, turn: bool) -> Body:
+    shapes = {k.removeprefix(_CELLS): v for k, v in found.items() if k.startswith(_CELLS)}
+    if len(shapes) != 1 or next(iter(shapes)) not in _KINDS:
+        listed = ", ".join(f"{len(v)} {k}" for k, v in shapes.items()) or "none"
+        raise SceneError(f"{name}: its elements are {listed}; one of {', '.join(_KINDS)} is taken")
+    ((shape, cells),) = shapes.items()
+    kind, points = _KINDS[shape], factor * found["points"]
+    if kind == "tet10":
+        _require_straight(name, points[cells])
+        kind, cells = "tet4", cells[:, :4]
+    used, at = np.unique(cells, return_inverse=True)
+    mesh = Mesh(points[used], at.reshape(cells.shape), kind)
+    mesh, turned = _turned(mesh) if turn else (mesh, 0)
+    try:
+        require_positive_cells(mesh)
+    except SceneError as error:
+        raise SceneError(f"{name}: {error}") from error
+    told = {
+        "turned": f"{turned} of {len(cells)} elements",
+        "not used": f"{len(points) - len(used)} of {len(points)} nodes",
+    }
+    mesh = replace(mesh, facets=_facets(mesh, used, found))
+    return Body(quadratic(mesh) if shape == "tetra10" else mesh, told)
+
+
+def _turned(mesh: Mesh) -> tuple[Mesh, int]:
+    """The mesh with its elements the right way round, and how many were not."""
+    wrong = cell_volumes(mesh) < 0
+    cells = mesh.cells.copy()
+    cells[wrong] = cells[wrong][:, list(_TURNED[mesh.kind])]
+    return replace(mesh, cells=cells), int(wrong.sum())
+
+
+def _facets(mesh: Mesh, used: Ints, found: Mapping[str, NDArray[Any]]) -> dict[str, Ints]:
+    """The outer facets (f, m) of every node set and label that has any; nodes in the file's numbers
+    in what was found."""
+    outer = used[mesh.surface]
+    sets = {k.removeprefix(_NSET): v for k, v in found.items() if k.startswith(_NSET)}
+    inside = {k: np.isin(outer, nodes).all(axis=1) for k, nodes in sets.items()}
+    known = {k.removeprefix(_FACET): v for k, v in found.items() if k.startswith(_FACET)}
+    inside |= {k: _labelled(outer, facets) for k, facets in known.items()}
+    return {k: mesh.surface[rows] for k, rows in inside.items() if rows.any()}
+
+
+def _labelled(outer: Ints, facets: Ints) -> NDArray[np.bool_]:
+    """Which outer facets (f, m) are among the labelled ones (k, m), in whatever order of nodes."""
+    if facets.shape[1] != outer.shape[1]:
+        return np.zeros(len(outer), bool)
+    wanted = {tuple(row) for row in np.sort(facets, axis=1).tolist()}
+    return np.array([tuple(row) in wanted for row in np.sort(outer, axis=1).tolist()], dtype=bool)
+
+
+def _require_straight(name: str, x: Floats) -> None:
+    """x (e, 10, 3) m of quadratic tetrahedra."""
+    for k, (a, b) in enumerate(EDGES[3]):
+        off = np.linalg.norm(x[:, 4 + k] - (x[:, a] + x[:, b]) / 2, axis=1)
+        bent = off > _STRAIGHT * np.linalg.norm(x[:, b] - x[:, a], axis=1)
+        if bent.any():
+            raise SceneError(
+                f"{name}: {int(bent.sum())} edges {a}-{b} are curved, middles up to "
+                f"{1e3 * off.max():.3g} mm off; straight ones are taken: export linear elements"
+            )
