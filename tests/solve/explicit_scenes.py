@@ -10,7 +10,7 @@ from validate.fem.system import System, build
 from validate.scene.box import box
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.march import march
-from validate.solve.types import Run, Scheme
+from validate.solve.types import Run, Scheme, Stepper
 
 
 def pulled(law: str = "svk", cells: int = 3, nu: float = 0.4, **damping: float) -> System:
@@ -31,9 +31,13 @@ def pressed(law: str = "svk", **damping: float) -> System:
 
 def ran(scheme: Scheme, system: System, inputs: Floats, dt: float) -> Run:
     """The last step's field and the traces of one input (nt,)."""
+    return marched(scheme.prepare(system), inputs, dt)
+
+
+def marched(stepper: Stepper, inputs: Floats, dt: float) -> Run:
     t = dt * np.arange(1, len(inputs) + 1)
     last = np.array([len(inputs) - 1])
-    return march("run", scheme.prepare(system), t, inputs[:, None], last, 0.0)
+    return march("run", stepper, t, inputs[:, None], last, 0.0)
 
 
 def rise(n: int, to: float) -> Floats:

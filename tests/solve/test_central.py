@@ -1,17 +1,19 @@
 """Explicit dynamics: order, energy, the critical step, and how runs end that should end."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from explicit_scenes import pressed, pulled, ran, rise
+from explicit_scenes import marched, pressed, pulled, ran, rise
 from law_samples import NAMES
 from scipy.linalg import eigh
 
 from validate.errors import SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System
+from validate.fem.threads import Choice, Team
 from validate.solve.central import CentralDifference, CentralStepper, Damping
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.newton import StaticNewton
@@ -53,13 +55,37 @@ def test_substeps_are_steps_with_inputs_linear_between() -> None:
 
 
 def test_threads_change_no_more_than_rounding() -> None:
+    """Also where a run begins with two and goes on with one."""
     system, dt = pressed(), 3e-4
-    one, two = (
-        ran(CentralDifference(dt, threads=n, watch=1), system, rise(200, 0.02), dt) for n in (1, 2)
-    )
-    assert np.abs(two.u - one.u).max() < 1e-12 * np.abs(one.u).max()
-    force, other = (run.traces["plate.force"].y for run in (one, two))
-    assert np.abs(other - force).max() < 1e-10 * np.abs(force).max()
+    inputs = rise(200, 0.02)
+    one = ran(CentralDifference(dt, watch=1), system, inputs, dt)
+    for seconds in (1.0, 0.0):  # of one thread's step: two stay, or take longer from the start
+        stepper = CentralDifference(dt, watch=1).prepare(system)
+        assert isinstance(stepper, CentralStepper)
+        team = Team(Choice(2, 2, {1: seconds, 2: seconds / 2}))
+        stepper.body.share(2)
+        two = marched(replace(stepper, team=team), inputs, dt)
+        assert team.threads == (2 if seconds else 1)
+        assert two.said[-1] == team.said
+        assert np.abs(two.u - one.u).max() < 1e-12 * np.abs(one.u).max()
+        force, other = (run.traces["plate.force"].y for run in (one, two))
+        assert np.abs(other - force).max() < 1e-10 * np.abs(force).max()
+
+
+def test_no_threads_run_where_no_core_is_idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("validate.solve.central.idle_cores", lambda: 1)
+    system, dt = pressed(), 3e-4
+    run = ran(CentralDifference(dt, threads=2), system, rise(20, 0.02), dt)
+    assert run.said == ("threads: 1 of 2, no other core is idle",)
+    alone = ran(CentralDifference(dt), system, rise(20, 0.02), dt)
+    assert np.array_equal(run.u, alone.u)
+    assert alone.said == ()
+
+
+def test_a_measured_number_of_threads_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("validate.solve.central.idle_cores", lambda: 2)
+    run = ran(CentralDifference(3e-4, threads=2), pressed(), rise(20, 0.02), 3e-4)
+    assert re.match(r"threads: [12] of 2, pilot 1: \S+ us, 2: \S+ us", run.said[0])
 
 
 @pytest.mark.parametrize("law", LAWS)

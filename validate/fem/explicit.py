@@ -109,8 +109,7 @@ class ExplicitBody:
 
     def __init__(self, scene: Scene, threads: int = 1) -> None:
         _require(scene)
-        if threads < 1:
-            raise SceneError(f"{threads} threads: take 1, or as many as there are idle cores")
+        require_threads(threads)
         mesh = scene.mesh
         self.scene, self.law, self.size = scene, _code(scene.material), mesh.nodes.size
         self.geometry, self.cells = packed_bricks(scene) if mesh.bricks else _packed(scene)
@@ -120,14 +119,19 @@ class ExplicitBody:
             _require_one_caller(mesh, threads)
             self._taut = _packed(taut(scene))[0]
         self.work = np.zeros(kernels.work_size(len(mesh.nodes)))
-        self._parts = self.work
-        if threads > 1:
-            os.environ.setdefault("GOMP_SPINCOUNT", _PATIENCE)
-            self._parts = np.zeros((threads, self.size + len(self.work)))
+        self._places = {1: self.work}
+        self.share(threads)
         springs = sparse.csr_array((self.size, self.size))
         for foundation in scene.foundations:
             springs = sparse.csr_array(springs + foundation_stiffness(mesh, foundation))
         self._spring(springs)
+
+    def share(self, threads: int) -> None:
+        """So many threads from now on."""
+        if threads not in self._places:
+            os.environ.setdefault("GOMP_SPINCOUNT", _PATIENCE)
+            self._places[threads] = np.zeros((threads, self.size + len(self.work)))
+        self._parts = self._places[threads]
 
     def _spring(self, springs: sparse.csr_array) -> None:
         self.springs, self._own_springs = springs, np.asarray(springs.diagonal())
@@ -229,6 +233,12 @@ class ExplicitBody:
     def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
         self._require_tets()
         kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, _own(u), f, d, self.work)
+
+
+def require_threads(threads: int) -> None:
+    """Raises `SceneError` for fewer than one."""
+    if threads < 1:
+        raise SceneError(f"{threads} threads: take 1, or as many as there are idle cores")
 
 
 def _require_one_caller(mesh: Mesh, threads: int) -> None:

@@ -11,6 +11,7 @@ body's strain energy is that of its relaxed law, and what its branches take is i
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ from validate.fem.assemble import lumped, mass
 from validate.fem.critical import lanczos_step
 from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitMotion
 from validate.fem.system import System
+from validate.fem.threads import Team, idle_cores, pilot
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.central_contact import ExplicitContact, Struck, explicit_contact
@@ -45,7 +47,8 @@ class CentralDifference:
     takes that too, "none" is eq 19. A substep above (1 - margin) of the critical step is refused
     before the first step, or with `beyond_limit` "run" goes on. Every `watch` steps energies, det F
     and, when the body has deformed further, the critical step are looked at; traces hold between.
-    `threads` share the cells of a step, which pays where as many cores are idle (`ExplicitBody`).
+    Up to `threads` share the cells of a step, as many as a measured pilot shows to pay and no more
+    than cores are idle; what was chosen is in the run's notes. Several change results by rounding.
     """
 
     handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, contact=("foundations", "rigid"))
@@ -56,7 +59,7 @@ class CentralDifference:
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
     margin: float = quantity(0.05, "1", "share of the critical step kept free")
     watch: int = quantity(20, "1", "steps between looks at energy, det F, critical step")
-    threads: int = quantity(1, "1", "cores that share the cells of a step")
+    threads: int = quantity(1, "1", "most cores to share the cells of a step, where it pays")
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1 and self.watch >= 1):
@@ -82,6 +85,7 @@ class CentralDifference:
         plates = system.moves[system.held]
         feels_loads = bool(system.loads[system.held].any())
         body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
+        body.share(1)  # until a pilot has shown that more pay
         if body.branches and system.scene.contacts:
             raise SceneError(
                 "explicit contact knows no Prony series: drop one of them, or take NewtonDynamics "
@@ -95,7 +99,8 @@ class CentralDifference:
         if stepper.contact:
             stepper = replace(stepper, start=replace(past, struck=stepper.contact.rest()))
         stepper.warm()
-        return replace(stepper, start=stepper.limited(stepper.start))
+        stepper = replace(stepper, start=stepper.limited(stepper.start))
+        return stepper if self.threads == 1 else stepper.teamed(idle_cores())
 
     def _beta(self, scene: Scene) -> float:
         betas = set(scene.per_cell(lambda m: m.stiffness_damping))
@@ -158,6 +163,7 @@ class CentralStepper:
     masses: Floats
     start: Past
     contact: ExplicitContact | None = None
+    team: Team | None = None
 
     @property
     def scene(self) -> Scene:
@@ -175,6 +181,21 @@ class CentralStepper:
         self.body.advance(self.start.motion, self.rule, inputs, inputs, 1)
         self.body.look(self.start.motion["u"])
 
+    def teamed(self, idle: int) -> "CentralStepper":
+        """With as many threads as pay where `idle` cores are."""
+        begin = self.start.inputs
+
+        def steps(threads: int) -> None:
+            self.body.share(threads)
+            self._advanced(self.start, begin)
+
+        team = Team(pilot(steps, self.settings.threads, idle))
+        self.body.share(team.threads)
+        return replace(self, team=team)
+
+    def notices(self, state: State) -> tuple[str, ...]:
+        return (self.team.said,) if self.team else ()
+
     def rest(self) -> State:
         u = self.start.motion["u"]
         seen = self._seen(self.start, self.body.look(u))
@@ -187,7 +208,11 @@ class CentralStepper:
         if state.k == 0 and self._refused(past.limit, self.settings.margin):
             return replace(state, failure=("refused", self._too_large(past.limit)))
         k, substeps = state.k + 1, self.settings.substeps
+        start = perf_counter()
         motion, struck, work, taken, finite = self._advanced(past, inputs)
+        if self.team:
+            self.team.saw(perf_counter() - start)
+            self.body.share(self.team.threads)
         if not finite:
             ratio = self.rule.dt / past.limit
             words = f"step {k}: displacements not finite; dt is {ratio:.3g} of the critical step"

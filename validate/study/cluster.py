@@ -1,7 +1,6 @@
 """Cells on Dask: a local cluster on loopback, or a scheduler that already runs."""
 
 import logging
-import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
@@ -13,6 +12,7 @@ import distributed
 from distributed.scheduler import KilledWorker
 
 from validate.errors import UsageError
+from validate.fem.threads import cores
 from validate.study.job import C, Done, Plan, R, Where, run_batch
 from validate.study.store import Record
 
@@ -41,10 +41,6 @@ def run_in_turn(plan: Plan[C, R], cells: Sequence[C], where: Where, done: Done) 
     with _client(where, len(cells)) as client:
         _Drain(plan, client, cells, done, ahead=0).run()
         return _named(where, client)
-
-
-def cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _named(where: Where, client: Any) -> str:
