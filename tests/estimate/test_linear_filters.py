@@ -12,7 +12,7 @@ from validate.errors import ComparisonError, SceneError
 from validate.estimate.batch import shared_gain_run
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
 from validate.estimate.covariance import Decoupled
-from validate.estimate.displacement_filter import DisplacementStepper, Estimate
+from validate.estimate.displacement_filter import DisplacementStepper, Estimate, Structure
 from validate.estimate.gains import Claims, gain_sequence, schedule
 from validate.estimate.kalman import Gaussian, kf_predict, kf_update
 from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
@@ -20,7 +20,7 @@ from validate.estimate.load_scale import LoadScale, ScaleCore
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.modal_kernel import advance, mirrored
 from validate.estimate.modal_kf import ModalKf
-from validate.estimate.observable import observed
+from validate.estimate.observable import Spaces, observed
 from validate.estimate.reduced_kf import ReducedKf, dense_covariance, steady
 from validate.estimate.reduced_linear import LoadDoubt, reduced_model
 from validate.estimate.small_state import CoreStepper
@@ -31,6 +31,7 @@ from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import propagation, rule_of
 from validate.solve.types import Run, Stepper
+from validate.study.shared import sharing
 
 
 @pytest.fixture(scope="module")
@@ -129,22 +130,35 @@ def test_the_kernel_is_the_dense_formula() -> None:
     assert PHt == pytest.approx(reference @ H.T, rel=1e-12)
 
 
-def test_gains_of_what_is_observed_are_those_of_the_whole() -> None:
-    """Also with measurements missing; the space is narrow because all modes decay alike."""
+@pytest.mark.parametrize("structure", ["white", "load"])
+def test_gains_of_what_is_observed_are_those_of_the_whole(structure: Structure) -> None:
+    """Also with measurements missing; the space is narrow because all modes decay alike. It serves
+    other variances, too; what a P0 of its own leaves is in it where it must be."""
     big = case(40, PAPER)
     seen = with_gaps(big, 1)
     modes = in_modes(big.system, rule_of("average", DT))
-    whole = modal_covariance(KfFem(), big.system, seen, modes)
+    whole = modal_covariance(KfFem(structure=structure), big.system, seen, modes)
     assert isinstance(whole, Decoupled)
-    narrow, when = observed(whole, 40, {}), schedule(timetable(seen, DT))
+    known: Spaces = {}
+    narrow, when = observed(whole, 40, known), schedule(timetable(seen, DT))
     assert narrow is not None
+    (space,) = known.values()
+    again = observed(replace(whole, Q=7 * whole.Q, P0=0 * whole.P0), 40, known)
+    assert again is not None
+    assert again.space is space
+    assert observed(replace(whole, P0=np.eye(len(whole.f))), 40, known) is not None
+    assert next(iter(known.values())) is not space  # it does not hold that P0
+    assert observed(replace(whole, Q=0 * whole.Q, P0=0 * whole.P0), 40, known) is None
     assert narrow.space.V.shape[1] <= 24
     assert narrow.space.W.shape[1] <= 144
     gains, exact = gain_sequence(narrow, when, 0.0), gain_sequence(whole, when, 0.0)
     for step in when:
-        found, known = gains.gains[step], exact.gains[step]
-        assert np.abs(found.G - known.G).max() < 1e-9 * np.abs(known.G).max()
-        assert np.abs(found.S_yy - known.S_yy).max() < 1e-9 * np.abs(known.S_yy).max()
+        found, exactly = gains.gains[step], exact.gains[step]
+        assert np.abs(found.G - exactly.G).max() < 1e-9 * np.abs(exactly.G).max()
+        assert np.abs(found.S_yy - exactly.S_yy).max() < 1e-9 * np.abs(exactly.S_yy).max()
+    nodal = (replace(gains, basis=W).mapped(modes.free).gains for W in (narrow.space.W, None))
+    for short, long in zip(*(g.values() for g in nodal), strict=True):
+        assert np.abs(short.G - long.G).max() < 1e-12 * np.abs(long.G).max()
 
 
 def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: Case) -> None:
@@ -192,6 +206,39 @@ def test_claims_walk_back_and_forth(pulled: Case) -> None:
         known.append(claim.P)
     for k in (0, 7, 29, 3, 3, 20):
         assert pytest.approx(known[k], rel=1e-9, abs=1e-30) == claims.at(k).P
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        KfFem(),
+        KfFem(gains="every_step", recursion="posterior"),
+        KfFem(structure="load", a0="zero"),
+        KfFem(rule="generalised_alpha", a0="zero"),
+        ModalKf(rule="backward_euler"),
+        ModalKf(gains="shared", recursion="posterior", structure="load"),
+    ],
+    ids=repr,
+)
+def test_a_batch_is_the_filter_one_by_one(settings: KfFem | ModalKf, pulled: Case) -> None:
+    """Every kind that can share a walk, with looks missing: estimates, NIS and its degrees."""
+    settings = replace(settings, settled=0.0)
+    seeds = [replace(with_gaps(pulled, 2), z=with_gaps(pulled, 2).z * k) for k in (1.0, -2.0)]
+    stepper = settings.prepare(pulled.system, seeds[0])
+    assert isinstance(stepper, DisplacementStepper)
+    shared = sharing(stepper)
+    assert shared is not None
+    z = np.full((2, len(pulled.t), 3), np.nan)
+    z[:, 1::2] = [seen.z for seen in seeds]
+    rows = np.vstack([pulled.rows(p).toarray() for p in (TOP, CORNER)])
+    batch = shared_gain_run(shared, pulled.inputs, z, rows)
+    for i, seen in enumerate(seeds):
+        run = pulled.march(settings.prepare(pulled.system, seen))
+        for j, name in enumerate(("top.x", "top.y", "top.z", "corner.x", "corner.y", "corner.z")):
+            y = run.traces[name].y
+            assert np.abs(batch.values[i, :, j] - y).max() < 1e-10 * np.abs(y).max(), name
+        assert batch.nis[i] == pytest.approx(run.traces["nis"].y, rel=1e-7, abs=1e-9)
+        assert batch.dof.tolist() == run.traces["nis.dof"].y.tolist()
 
 
 def test_seeds_share_one_walk(pulled: Case) -> None:

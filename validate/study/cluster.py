@@ -64,6 +64,7 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
         # In the workers only: numba rereads its own settings, and a process keeps to its first.
         "distributed.nanny.environ": {"NUMBA_NUM_THREADS": "1"},
         "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.worker.profile.enabled": False,  # a thread that looks a hundred times a second
     }
     with dask.config.set(settings):
         with _deaf_to_interrupts():
