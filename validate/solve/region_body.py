@@ -1,6 +1,6 @@
 """A system's free unknowns as regions take them, and the regions around a place of its surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,8 @@ from validate.fem.rigid import require_held
 from validate.fem.system import System
 from validate.scene.select import facets_of
 from validate.solve.region_map import layers_from, node_graph, spacing, split, widened
-from validate.solve.region_march import BorderName, Coupled, zone_of
+from validate.solve.region_march import BorderName, Coupled, Zone, zone_of
+from validate.solve.region_primary import PrimaryLaw, PrimarySolver, primary_solver
 from validate.solve.region_solvers import EXPLICIT, RegionMatrices, SolverName, critical_period
 
 
@@ -110,7 +111,9 @@ class Regions:
         """Critical period s, ratio and solver of every explicit region."""
         body = self.coupled.body
         zones = [z for z in self.coupled.zones if z.name in EXPLICIT]
-        return tuple((critical_period(z.name, body, z.wide), z.ratio, z.name) for z in zones)
+        return tuple(
+            (critical_period(z.name, body, z.wide, _taut(z)), z.ratio, z.name) for z in zones
+        )
 
     def beyond(self, dt: float, rounding: float) -> str:
         """The first explicit region whose period is above its critical one, in words."""
@@ -124,9 +127,13 @@ class Regions:
         return ""
 
 
+def _taut(zone: Zone) -> sparse.csr_array | None:
+    return zone.solver.law.taut if isinstance(zone.solver, PrimarySolver) else None
+
+
 @dataclass(frozen=True)
 class RegionPlan:
-    """Regions around any contact; each is made once and `kept`."""
+    """Regions around any contact; each is made once and `kept`. `law`: that of the primary one."""
 
     of: RegionBody
     dt: float
@@ -136,6 +143,7 @@ class RegionPlan:
     border: BorderName
     overlap: int
     kept: dict[tuple[int, ...], Around | Regions]
+    law: PrimaryLaw | None = None
 
     def around(self, pad: tuple[int, ...]) -> Around:
         """The layers around the nodes `pad`."""
@@ -156,6 +164,17 @@ class RegionPlan:
         assert isinstance(found, Regions)
         return found
 
+    def _primary(self, zone: Zone, nodes: Ints) -> Zone:
+        """The primary region, on `nodes` of the mesh, with its law."""
+        if self.law is None:
+            return zone
+        beyond = self.law.beyond(zone.wide, nodes)
+        if beyond is None:
+            return zone
+        return replace(
+            zone, solver=primary_solver(zone.solver, beyond, self.of.body, zone.wide, self.dt)
+        )
+
     def _made(self, layer: Ints, primary: int) -> Regions:
         """The regions after the primary one keep their outer borders where it grows over them."""
         ends = np.maximum(np.cumsum(self.layers), primary + np.arange(len(self.layers))).astype(int)
@@ -168,5 +187,10 @@ class RegionPlan:
             wide = self.of.unknowns(widened(found.of, i, self.of.graph, self.overlap))
             own = self.of.unknowns(np.flatnonzero(found.of == i))
             zones.append(zone_of(self.of.body, wide, own, every[i], names[i], self.dt))
+        zones[0] = self._primary(zones[0], self.of.nodes[found.of == 0])
         coupled = Coupled(self.of.body, tuple(zones), self.dt, self.border, {})
-        return Regions(coupled, int(layer[found.of == 0].max()) + 1, found.words)
+        count = int(layer[found.of == 0].max()) + 1
+        words = found.words
+        if self.law is not None and not isinstance(zones[0].solver, PrimarySolver):
+            words += (f"a primary region of {count} layers has no whole cell and stays linear",)
+        return Regions(coupled, count, words)

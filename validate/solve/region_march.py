@@ -12,14 +12,16 @@ its spectral radius over a common period is found.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import lcm
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.solve.region_primary import PrimarySolver
 from validate.solve.region_solvers import (
     EXPLICIT,
     RegionMatrices,
@@ -45,6 +47,11 @@ class Zone:
     solver: RegionSolver
     outside: sparse.csr_array
 
+    @property
+    def memory(self) -> Any:
+        """What the region's law remembers at rest."""
+        return self.solver.law.rest() if isinstance(self.solver, PrimarySolver) else None
+
     def share(self, k: int) -> float:
         """How much of its period has passed at tick k, in (0, 1]."""
         return ((k - 1) % self.ratio + 1) / self.ratio
@@ -53,12 +60,14 @@ class Zone:
 @dataclass(frozen=True)
 class Piece:
     """A region's displacements m at its last solve, `before` (w,) one period earlier; `start` (o,)
-    is what it showed at that solve; `seen` (m,) what an explicit one saw of all at that time."""
+    is what it showed at that solve; `seen` (m,) what an explicit one saw of all at that time;
+    `memory` what its law remembers."""
 
     u: Floats
     before: Floats
     start: Floats
     seen: Floats
+    memory: Any = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +97,9 @@ class Coupled:
     def rest(self, columns: tuple[int, ...] = ()) -> Motion:
         """All at rest; `columns` (q,) independent states."""
         zero = np.zeros((len(self.body.m), *columns))
-        pieces = tuple(Piece(zero[z.wide], zero[z.wide], zero[z.own], zero) for z in self.zones)
+        pieces = tuple(
+            Piece(zero[z.wide], zero[z.wide], zero[z.own], zero, z.memory) for z in self.zones
+        )
         return Motion(0, pieces, zero)
 
     def tick(self, last: Motion, f: Floats) -> Motion:
@@ -104,8 +115,7 @@ class Coupled:
                 self._solve(i, last, pieces, visible, f)
         for i in due:
             if self.zones[i].name in EXPLICIT:
-                p = pieces[i]
-                pieces[i] = Piece(p.u, p.before, p.start, visible)
+                pieces[i] = replace(pieces[i], seen=visible)
         return Motion(k, tuple(pieces), visible)
 
     def _shown(self, zone: Zone, piece: Piece, share: float) -> Floats:
@@ -116,12 +126,17 @@ class Coupled:
         zone, piece = self.zones[i], pieces[i]
         seen = piece.seen if zone.name in EXPLICIT else visible
         forces = f[zone.wide] - zone.outside @ seen
-        self._take(i, zone.solver.next(piece.u, piece.before, forces), pieces, visible)
+        if isinstance(zone.solver, PrimarySolver):
+            new, memory = zone.solver.walk(piece.u, piece.before, forces, piece.memory)
+            pieces[i] = replace(piece, memory=memory)
+        else:
+            new = zone.solver.next(piece.u, piece.before, forces)
+        self._take(i, new, pieces, visible)
 
     def _take(self, i: int, new: Floats, pieces: list[Piece], visible: Floats) -> None:
         """The region's solution becomes its piece, and is shown where the border says so."""
         zone, piece = self.zones[i], pieces[i]
-        pieces[i] = Piece(new, piece.u, visible[zone.own], piece.seen)
+        pieces[i] = replace(piece, u=new, before=piece.u, start=visible[zone.own])
         if i == 0 or self.border != "delayed":
             visible[zone.own] = new[zone.shown]
 
@@ -192,7 +207,7 @@ def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) 
         u[kept], before[kept] = motion.pieces[i].u[from_], motion.pieces[i].before[from_]
         same = np.isin(zone.own, old.zones[i].own)
         start[same] = motion.pieces[i].start[np.searchsorted(old.zones[i].own, zone.own[same])]
-    return Piece(u, before, start, motion.visible)
+    return Piece(u, before, start, motion.visible, zone.memory)
 
 
 # --- stability ------------------------------------------------------------------------------------
@@ -200,6 +215,8 @@ def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) 
 
 def period_map(coupled: Coupled, forces: Callable[[Floats], Floats] | None = None) -> Floats:
     """The map (s, s) of the state over a common period; `forces` gives f (m, q) from `visible`."""
+    if any(isinstance(z.solver, PrimarySolver) for z in coupled.zones):
+        raise SceneError("the map of a primary region with a law of its own has no spectral radius")
     size = len(_packed(coupled, coupled.rest()))
     motion = _unpacked(coupled, np.eye(size))
     for _ in range(coupled.common):

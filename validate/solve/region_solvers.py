@@ -104,15 +104,19 @@ def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> Reg
     return kind(K, body.c[at] * T / (2 * body.m[at]), T**2 / body.m[at])
 
 
-def critical_period(name: SolverName, body: RegionMatrices, at: Ints) -> float:
+def critical_period(
+    name: SolverName, body: RegionMatrices, at: Ints, taut: sparse.csr_array | None = None
+) -> float:
     """The longest stable T s of an explicit region whose neighbours stand still; else infinite.
 
-    Eq 5: 2/w, whatever the damping. Eq 6: w^2 T^2 + 2 (c/m) T = 4, with the largest c/m.
+    `taut` (w, w) N/m is what a law adds to K at once. Eq 5: 2/w, whatever the damping. Eq 6:
+    w^2 T^2 + 2 (c/m) T = 4, with the largest c/m.
     """
     if name not in EXPLICIT:
         return np.inf
     root = sparse.diags_array(1 / np.sqrt(body.m[at]))
-    A = root @ body.K[at][:, at] @ root
+    K = body.K[at][:, at] if taut is None else body.K[at][:, at] + taut
+    A = root @ K @ root
     if len(at) < _DENSE:
         square = float(np.linalg.eigvalsh(A.toarray())[-1])
     else:

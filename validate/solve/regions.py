@@ -12,7 +12,7 @@ at the first contact), and does not change its force where the contact moves to 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -21,13 +21,16 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
-from validate.parameters import quantity
+from validate.parameters import part, quantity
+from validate.scene.material import LawName
+from validate.scene.prony import Prony
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
 from validate.solve.region_body import RegionBody, RegionPlan, Regions, require_one_probe
 from validate.solve.region_map import ratios
 from validate.solve.region_march import BorderName, Motion, carried
+from validate.solve.region_primary import PrimaryLaw, UnsettledError
 from validate.solve.region_size import PrimarySize, SizeName
 from validate.solve.region_solvers import EXPLICIT, SolverName
 from validate.solve.spring_probe import Hold, SpringProbe
@@ -47,6 +50,9 @@ class AsyncRegions:
     rounded, a region beyond the body left out: the stepper's `notices` say so. `grip` as in
     `NeedleLoop`. An explicit region whose period is above its critical one is refused at the first
     step, or with `beyond_limit` "run" goes on until displacements are 100 times the body's size.
+
+    `law` and `prony` are the primary region's alone (`region_primary`); they end where its cells
+    do, so that a region that grows or moves gives its energy to the law it finds.
     """
 
     handles: ClassVar[Handles] = Handles(
@@ -70,6 +76,8 @@ class AsyncRegions:
     grip: float | None = quantity(None, "N", "pull at which the body lets go; none: never")
     slides: bool = quantity(False, "1", "the contact moves to the node nearest to the probe")
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a period above the critical")
+    law: LawName = quantity("linear", "1", "of the primary region; the rest is linear")
+    prony: Prony = part(Prony(), "how the primary region's isochoric stress relaxes")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.dt) and self.dt > 0):
@@ -91,8 +99,23 @@ class AsyncRegions:
             )
         if self.border == "joint" and (self.overlap or set(self.solvers) & set(EXPLICIT)):
             raise SceneError("joint borders solve one system: no overlap, no explicit solvers")
+        if self.of_its_own and (self.border == "joint" or self.overlap):
+            raise SceneError(
+                "a primary region with a law of its own is solved by itself: no joint borders, no "
+                "overlap"
+            )
+        if self.prony.g and (self.adapt != "fixed" or self.slides or self.grip is not None):
+            raise SceneError(
+                "a primary region that remembers its stress stays where it is: adapt fixed, slides "
+                "false, grip none"
+            )
         if not (self.grip is None or self.grip >= 0):
             raise SceneError(f"grip {self.grip:g} N: 0 or above, or none")
+
+    @property
+    def of_its_own(self) -> bool:
+        """Whether the primary region has another law than the rest."""
+        return self.law != "linear" or bool(self.prony.g)
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a scene without one probe, or whose surface is all held."""
@@ -102,10 +125,15 @@ class AsyncRegions:
         tool, body = scene.tools[0], RegionBody.of(system)
         every, words = ratios(self.rates, self.dt)
         plan = RegionPlan(body, self.dt, self.layers, every, self.solvers, self.border,
-                          self.overlap, {})  # fmt: skip
+                          self.overlap, {}, self._primary(system))  # fmt: skip
         probe = SpringProbe(body, np.array(tool.axis), self.spring, self.reach, self.pad, self.grip,
                       self.slides)  # fmt: skip
         return RegionStepper(self, system, tool, body, plan, probe, words)
+
+    def _primary(self, system: System) -> PrimaryLaw | None:
+        if not self.of_its_own:
+            return None
+        return PrimaryLaw(system.scene, system.free, self.law, self.prony)
 
 
 @dataclass(frozen=True)
@@ -166,7 +194,10 @@ class RegionStepper:
         if regions is None or motion is None:
             return self._told(state.k + 1, last, np.zeros(len(tip)), changed=False)
         f = self.probe.nodal(held, tip, u)
-        motion = regions.coupled.tick(motion, f)
+        try:
+            motion = regions.coupled.tick(motion, f)
+        except UnsettledError as lost:
+            return replace(state, failure=("not_converged", f"step {state.k + 1}: {lost}"))
         hand = -self.probe.force(held, tip, motion.visible)
         changed = last.regions is not None and regions is not last.regions
         new = RegionTick(held, regions, motion)
