@@ -1,8 +1,8 @@
-"""The table of docs/paper-000.md: every number and picture of paper 000, from stored runs.
+"""The tables of docs/paper-000.md and -003.md: every number and picture of a paper, of stored runs.
 
 validate run fluid_block fluid_phantom needle_pocket --out DIR
-python benchmarks/paper_table.py DIR            prints it
-python benchmarks/paper_table.py DIR --write    puts it into the page
+python benchmarks/paper_table.py DIR paper-000            prints it
+python benchmarks/paper_table.py DIR paper-000 --write    puts it into the page
 
 Rates are of the machine that ran; tests/docs/test_paper_page.py holds names, printed numbers and
 claims to what the experiments declare today.
@@ -15,10 +15,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-EXPERIMENTS = ("fluid_block", "fluid_phantom", "needle_pocket")
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "paper-000.md"
+PAGES = {
+    "paper-000": ("fluid_block", "fluid_phantom", "needle_pocket"),
+    "paper-003": ("ekf_cube", "ekf_liver", "ekf_cone"),
+}
+DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 HEAD = ("paper", "what", "theirs", "ours", "verdict", "why", "experiment")
+
+
+def path(page: str) -> Path:
+    """The file of a page."""
+    return DOCS / f"{page}.md"
 
 
 def place(source: str) -> tuple[float, str]:
@@ -39,10 +47,10 @@ def row(figure: Mapping[str, Any], experiment: str) -> list[str]:
     return [figure["source"], figure["name"], theirs, ours, verdict, why, f"`{experiment}`"]
 
 
-def table(folder: Path) -> str:
+def table(folder: Path, page: str) -> str:
     """Markdown of all figures of the runs below `folder`, in the order of the paper."""
     rows = []
-    for name in EXPERIMENTS:
+    for name in PAGES[page]:
         found = json.loads((folder / name / "results.json").read_text("utf-8"))
         rows += [row(p, name) for p in found["published"]]
     rows.sort(key=lambda r: place(r[0]))
@@ -50,12 +58,13 @@ def table(folder: Path) -> str:
 
 
 def main() -> None:
-    made = table(Path(sys.argv[1]))
+    folder, page = Path(sys.argv[1]), sys.argv[2]
+    made = table(folder, page)
     print(made)
-    if "--write" in sys.argv[2:]:
-        text = PAGE.read_text("utf-8")
+    if "--write" in sys.argv[3:]:
+        text = path(page).read_text("utf-8")
         before, after = text.split(BEGIN)[0], text.split(END)[1]
-        PAGE.write_text(f"{before}{BEGIN}\n{made}\n{END}{after}", "utf-8")
+        path(page).write_text(f"{before}{BEGIN}\n{made}\n{END}{after}", "utf-8")
 
 
 if __name__ == "__main__":

@@ -119,7 +119,7 @@ def test_the_printed_gain_leaves_the_noise_where_it_is(printed: Result) -> None:
 
 def test_table_1_stands_beside_ours_and_is_not_called_reproduced(printed: Result) -> None:
     values = {m.name: scores(printed, m.name) for m in printed.methods}
-    figures = [f.beside(values) for f in CUBE_FIGURES if f.source == "Table 1"]
+    figures = [f.beside(values) for f in CUBE_FIGURES if f.source == "section 3.1, Table 1"]
     assert len(figures) == 6
     assert {f.verdict for f in figures} == {"not reproducible as printed"}
     assert all(f.ours is not None and f.theirs is not None for f in figures)

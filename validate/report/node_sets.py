@@ -63,7 +63,7 @@ def _view(
             ax.annotate(label, tuple(at[node]), xytext=(7, 6), textcoords="offset points",
                         weight="bold", bbox={"fc": "white", "ec": "none", "pad": 1})  # fmt: skip
     ax.autoscale_view()
-    ax.margins(0.04)
+    ax.margins(0.06, 0.22)  # room below for the triad
     ax.set_aspect("equal")
     ax.set_axis_off()
     triad(ax, eye)

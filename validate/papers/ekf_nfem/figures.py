@@ -134,7 +134,7 @@ CUBE_FIGURES = (
         "noise unit, mesh and force reading are not printed, and no reading gives these three: the "
         "printed gain at A is near .99, so the filter follows the noise there, and B is disturbed "
         "by what the corrections at A set in motion",
-        "Table 1",
+        "section 3.1, Table 1",
     ),
     count("nodes of the cube's mesh", "told:nodes", 839.0, 833.0, "section 3.1"),
     count("tetrahedra of the cube's mesh", "told:cells", 3760.0, 3738.0, "section 3.1"),
@@ -192,7 +192,7 @@ CONE_FIGURES = (
         _TABLE_3, "@small",
         "a total of 0.15 N moves this cone by less than the printed error: only a force on every "
         "node, or some 15 N, gives motions of that size",
-        "Table 3",
+        "section 3.4, Table 3",
     ),
     count("nodes of the cone's mesh", "told:nodes", 559.0, 555.0, "section 3.4"),
     count("tetrahedra of the cone's mesh", "told:cells", 2349.0, 2357.0, "section 3.4"),

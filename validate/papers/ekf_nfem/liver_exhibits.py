@@ -26,7 +26,7 @@ _MM = 1e3
 _SLIVER = 0.25  # of the median altitude: what counts as a flat cell
 _NAMED = {
     "data": "the data folder's liver",
-    "generated": "a body made by formulas, about a liver's size",
+    "generated": "made by formulas, about a liver's size",
 }
 
 
@@ -65,7 +65,7 @@ def sets_exhibit(scene: Scene, body: str) -> Exhibit:
     sets = {name: mesh.facet_nodes(name) for name in ("held", "loaded")}
     named = {name[-1]: node for name, node in watched(mesh).items()}
     words = (
-        f"The body is {body}: {len(mesh.nodes)} nodes and {len(mesh.cells)} tetrahedra, "
+        f"The body: {body}, {len(mesh.nodes)} nodes and {len(mesh.cells)} tetrahedra, "
         f"{1e3 * cell_volumes(mesh).sum():.3g} litres. Paper 003 draws its liver and prints no "
         "mesh: its counts of nodes are no target.",
         "Held: faces that look upward in the left three tenths of the length. Loaded: faces that "
@@ -94,11 +94,12 @@ def _sets_table(scene: Scene) -> NumberTable:
 def _ramp_words(plain: Followed, readings: NumberTable) -> str:
     """How much of the static answer the ramp reaches at A."""
     static, end = readings.rows[0][2], float(plain.reference("node_A")[-1, 2])
-    share = f", {_MM * end / float(static):.2f} of it" if isinstance(static, float) else ""
+    share = ""
+    if isinstance(static, float):
+        share = f", {_MM * end / static:.2f} of where that force at rest leaves it"
     return (
-        f"The ramp lasts {plain.seen.t[-1]:.3g} s and leaves node A at {_MM * end:.3g} mm; the "
-        f"same force at rest is in the table{share}. So inertia decides here, and a wrong "
-        "stiffness hardly shows."
+        f"The ramp lasts {plain.seen.t[-1]:.3g} s and takes node A to {_MM * end:.3g} mm{share}: "
+        "the nearer that is to 1, the more stiffness decides, and not inertia."
     )
 
 
