@@ -164,6 +164,17 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
     comparing.compare(runs, comparing.Shown(**wanted), out, as_json=as_json)
 
 
+@cli.command("export")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--junit", type=FILE, help="JUnit XML of its checks and printed figures.")
+@click.option("--latex", type=FILE, help="A tabular of its checks.")
+def export_(run: Path, junit: Path | None, latex: Path | None) -> None:
+    """A stored run (a report folder) for other programs; nothing is run again."""
+    from validate.cli import exporting
+
+    exporting.export(run, junit, latex)
+
+
 @cli.group()
 def study() -> None:
     """Many runs of any experiment, on Dask; goes on where it was stopped."""

@@ -1,14 +1,15 @@
 """Stored runs side by side: results.json files read again, nothing is run."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from validate.errors import ComparisonError, UsageError
 
+T = TypeVar("T")
 _LARGEST = 500_000_000  # bytes of a results.json: more is none of ours
 
 
@@ -76,12 +77,16 @@ class SideBySide:
 
 def read_run(path: Path) -> StoredRun:
     """A report folder, or its results.json; raises `UsageError` for anything else."""
+    return read_as(path, lambda content: _run(path, content))
+
+
+def read_as(path: Path, make: Callable[[Any], T]) -> T:
+    """What `make` makes of a stored results.json; raises as `read_run`."""
     file = path / "results.json" if path.is_dir() else path
     try:
         if file.stat().st_size > _LARGEST:
             raise UsageError(f"{file}: {file.stat().st_size} bytes, at most {_LARGEST}")
-        content = json.loads(file.read_text(encoding="utf-8"))
-        return _run(path, content)
+        return make(json.loads(file.read_text(encoding="utf-8")))
     except OSError as error:
         raise UsageError(
             f"no stored run at {path}: {error.strerror}; name a report folder or its results.json"
