@@ -118,6 +118,13 @@ def test_drives_are_inputs_of_the_filter_too() -> None:
     assert np.abs(dense.u - plain.u).max() > 1e-6
     z_innovation = dense.traces["innovation.z"].y  # the drive is known: noise alone is left
     assert z_innovation == pytest.approx(z[:, 2] + inputs[:, 0], abs=1e-15)
+    stepper = ModalKf(settled=0.0).prepare(system, seen)
+    assert isinstance(stepper, DisplacementStepper)
+    shared = sharing(stepper)
+    assert shared is not None
+    batch = shared_gain_run(shared, inputs, z[None], H.toarray())
+    assert batch.nis[0] == pytest.approx(modal.traces["nis"].y, rel=1e-8)
+    assert batch.values[0, -1] == pytest.approx(H @ modal.u[0].ravel(), rel=1e-8)
 
 
 def test_the_kernel_is_the_dense_formula() -> None:
