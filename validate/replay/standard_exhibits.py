@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.compare.track import TRACK_METRICS, TrackError, nrmse, track_error
 from validate.register.markers import MarkerObservation
@@ -188,7 +189,12 @@ def _endings(main: Mapping[str, Followed]) -> Exhibit:
 
 def _real_time(f: Followed) -> float | None:
     times = f.run.step_s
-    return float(f.own_time[0]) * times.rate_hz if times else None  # the first step starts at 0
+    return _step(f.own_time) * times.rate_hz if times else None
+
+
+def _step(t: Floats) -> float:
+    """Length s of a run's steps to times t (nt,) s: the first one starts at 0, or stays there."""
+    return float(t[0]) if t[0] > 0 or len(t) < 2 else float(t[1] - t[0])
 
 
 def _speed_row(f: Followed, base: float | None) -> tuple[Entry, ...]:
@@ -197,7 +203,7 @@ def _speed_row(f: Followed, base: float | None) -> tuple[Entry, ...]:
     if times is None or factor is None:
         return (f.label, f.run.setup_s, *(7 * (None,)), 0, ended)
     parts = max(float(f.run.traces["updates"].y[0]), 1.0) if _limit(f) else 1.0
-    dt = float(f.run.t[0]) / parts
+    dt = _step(f.run.t) / parts
     limit = _limit(f)
     return (
         f.label, f.run.setup_s, 1e3 * times.p50, 1e3 * times.p99, times.rate_hz, 1e3 * dt,

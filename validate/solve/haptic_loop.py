@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from threading import get_native_id
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -36,7 +37,6 @@ from validate.solve.touched_body import Read, TouchableBody, TouchedBody
 from validate.solve.types import State, Stepper
 
 _AXES = "xyz"
-_JOBS = "simulation"
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class HapticLoop:
         assert isinstance(body, CentralStepper)
         probe = SpringProbe(touchable, np.array(tool.axis), self.spring, self.reach, self.pad,
                             self.grip, self.slides)  # fmt: skip
-        jobs = ThreadPoolExecutor(1, _JOBS) if self.background else None
+        jobs = Background() if self.background else None
         return HapticStepper(self, system, tool, TouchedBody(body, probe, {}), substeps, jobs)
 
     def _substeps(self, system: System, body: TouchableBody) -> int:
@@ -150,6 +150,21 @@ class HapticTick:
     since: int = 0
 
 
+class Background:
+    """One thread, begun with its first job; `numbers` are the system's of it."""
+
+    def __init__(self) -> None:
+        self.numbers: list[int] = []
+        self._pool = ThreadPoolExecutor(1, "simulation", self._begun)
+
+    def _begun(self) -> None:
+        self.numbers.append(get_native_id())
+
+    def result_of(self, job: Callable[[], Read]) -> Callable[[], Read]:
+        """Begins a job; what waits for its result."""
+        return self._pool.submit(job).result
+
+
 @dataclass(frozen=True)
 class HapticStepper:
     """Steps through displacements (d,) m of the probe, a tick each; see `HapticLoop`.
@@ -162,7 +177,7 @@ class HapticStepper:
     tool: Needle
     body: TouchedBody
     substeps: int
-    jobs: ThreadPoolExecutor | None
+    jobs: Background | None
 
     @property
     def scene(self) -> Scene:
@@ -186,6 +201,11 @@ class HapticStepper:
             f"{name}.answered": "1", f"{name}.jump": "N", f"{name}.stretch": "J",
         }  # fmt: skip
         return {**forces, **own, **self.body.untouched.units}
+
+    @property
+    def threads(self) -> tuple[int, ...]:
+        """The simulation's own, once it has begun."""
+        return tuple(self.jobs.numbers) if self.jobs else ()
 
     def warm(self) -> None:
         """A touch that is forgotten: kernels compiled, and the spring at the nearest node."""
@@ -216,7 +236,7 @@ class HapticStepper:
         if k % self.settings.every:
             return tick
         to = partial(self.body.to, tick.body, tip)
-        return replace(tick, running=self.jobs.submit(to).result if self.jobs else to, since=k)
+        return replace(tick, running=self.jobs.result_of(to) if self.jobs else to, since=k)
 
     def _taken(self, tick: HapticTick, k: int) -> HapticTick:
         """The answer, at the tick at which it is due."""

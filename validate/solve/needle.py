@@ -200,6 +200,10 @@ class NeedleStepper:
     def limit(self) -> float:
         return self.settings.limit
 
+    @property
+    def threads(self) -> tuple[int, ...]:
+        return ()
+
     def warm(self) -> None:
         """A way into the body and out again that is forgotten: kernels compiled, columns kept."""
         size = float(np.ptp(self.scene.mesh.nodes, axis=0).max())

@@ -72,6 +72,11 @@ class HandStepper(Stepper, Protocol):
     @property
     def limit(self) -> float: ...
 
+    @property
+    def threads(self) -> tuple[int, ...]:
+        """The system's numbers of threads that it computes in, besides its caller's."""
+        ...
+
     def warm(self) -> None:
         """What a first touch costs, paid before the clock starts."""
         ...

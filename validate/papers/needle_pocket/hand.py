@@ -60,15 +60,17 @@ class Hand:
         if d == 3:
             stops[:, 2] = [-0.5 * s[2] for s in STOPS]
         x = np.array(self.above) + self.depth * moved(t, arrive, stops)
-        return t, x + self._shaken(t, d)
+        return t, x + tremor(t, d, self.tremor, self.seed)
 
-    def _shaken(self, t: Floats, d: int) -> Floats:
-        rng = np.random.default_rng(self.seed)
-        tones = rng.uniform(*_TREMOR, (_TONES, d))
-        phases = rng.uniform(0, 2 * np.pi, (_TONES, d))
-        waves = np.sin(2 * np.pi * tones * t[:, None, None] + phases).sum(axis=1)
-        fade = np.clip(np.sin(np.pi * t / t[-1]), 0, 1)[:, None] ** 0.25
-        return np.asarray(self.tremor * np.sqrt(2 / _TONES) * fade * waves)
+
+def tremor(t: Floats, d: int, rms: float, seed: int) -> Floats:
+    """A hand's (nt, d) m at times t (nt,) s, `rms` m along every axis, none at the ends."""
+    rng = np.random.default_rng(seed)
+    tones = rng.uniform(*_TREMOR, (_TONES, d))
+    phases = rng.uniform(0, 2 * np.pi, (_TONES, d))
+    waves = np.sin(2 * np.pi * tones * t[:, None, None] + phases).sum(axis=1)
+    fade = np.clip(np.sin(np.pi * t / t[-1]), 0, 1)[:, None] ** 0.25
+    return np.asarray(rms * np.sqrt(2 / _TONES) * fade * waves)
 
 
 def moved(t: Floats, arrive: Floats, stops: Floats) -> Floats:

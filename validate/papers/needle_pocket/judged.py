@@ -6,11 +6,10 @@ from dataclasses import replace
 from validate.compare.verdict import Accept
 from validate.papers.needle_pocket.pocket import NeedlePocket
 from validate.recording.types import Recording
-from validate.replay.experiment import Experiment, Twin
-from validate.replay.live import LIVE
+from validate.replay.experiment import Experiment
+from validate.replay.live import LIVE, as_given
 from validate.replay.remade import made_here
 
-_SAME = 1e-9  # N: a replay of a live loop is the same to rounding
 _PLANE = 25.0  # N/m over N: what a force limit in the plane is worth in the solid's
 
 
@@ -23,7 +22,7 @@ def follows(experiment: Experiment, recordings: Sequence[Recording], p: NeedlePo
     twin = experiment.twin
     assert twin is not None
     if LIVE in recording.metadata:
-        return _replayed(experiment, recording, twin)
+        return as_given(experiment, recording)
     there = tuple(a for a in accept if a.quantity in recording.signals)
     return replace(experiment, accept=there, twin=replace(twin, remake=()))
 
@@ -31,14 +30,3 @@ def follows(experiment: Experiment, recordings: Sequence[Recording], p: NeedlePo
 def _of_space(accept: Accept, p: NeedlePocket) -> Accept:
     force = accept.quantity.startswith("force") and p.body.space == "solid"
     return replace(accept, limit=accept.limit / _PLANE) if force else accept
-
-
-def _replayed(experiment: Experiment, recording: Recording, twin: Twin) -> Experiment:
-    """A live loop's own force is held against the same method's, and nothing else."""
-    method = recording.record(LIVE)["method"]
-    names = sorted(name for name in recording.signals if name.startswith("given."))
-    accept = tuple(Accept(name, _SAME, "rounding: the same method, replayed") for name in names)
-    return replace(
-        experiment, accept=accept, accepted=(method,), uncertainty=None, cases=(),
-        twin=replace(twin, remake=(), same_model=True),
-    )  # fmt: skip

@@ -1,8 +1,4 @@
-"""A path of a needle as somebody recorded it: what of it can be walked, and what was wrong with it.
-
-The tip is recorded as signals `tip.x`, `tip.y`(, `tip.z`) in m, or as the only point of a stream of
-markers `tip` (positions that a tracker did not see are null there).
-"""
+"""A path of a needle as somebody recorded it: what of it can be walked, what was wrong with it."""
 
 from dataclasses import dataclass
 
@@ -12,9 +8,9 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.types import Recording
+from validate.replay.live.tip import recorded_tip
 from validate.scene.mesh import Mesh
 
-_AXES = "xyz"
 _GAP = 3.0  # steps as long as this many median ones are gaps
 _LINEAR = 0.15  # of the body's height: the strain to which paper 000 takes its law as linear
 _FAR = 1.0  # body sizes away: such a place is no needle's at this body
@@ -36,7 +32,8 @@ def walkable(recording: Recording, mesh: Mesh) -> Walkable:
     Raises `RecordingError` where no path is there, it has other dimensions, or none of it can be
     walked.
     """
-    t, x, sd = _recorded(recording, mesh.dimension)
+    space = "plane" if mesh.dimension == 3 else "solid"
+    t, x, sd = recorded_tip(recording, mesh.dimension, f"--set body.space={space}")
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
     size = float((high - low).max())
     seen = np.asarray(np.isfinite(x).all(axis=1))
@@ -64,38 +61,6 @@ def walkable(recording: Recording, mesh: Mesh) -> Walkable:
         _left(x[kept], low, high),
     ]
     return Walkable(t[kept], x[kept], sd, tuple(f for f in findings if f))
-
-
-def _recorded(recording: Recording, d: int) -> tuple[Floats, Floats, float]:
-    if "tip" in recording.markers:
-        marker = recording.marker("tip")
-        x = marker.x[:, 0]
-        _require_dimension(recording, x.shape[1], d)
-        return marker.t, np.array(x), marker.sd
-    names = [f"tip.{a}" for a in _AXES]
-    there = sum(name in recording.signals for name in names)
-    parts = [recording.signal(name, "m") for name in names[: max(there, d)]] if there else []
-    if not parts:
-        raise RecordingError(
-            f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
-            f"{sorted(recording.streams)}"
-        )
-    _require_dimension(recording, len(parts), d)
-    if any(not np.array_equal(s.t, parts[0].t) for s in parts):
-        raise RecordingError(
-            f"{recording.name}: tip.x .. tip.{_AXES[d - 1]} have {[len(s.t) for s in parts]} "
-            "samples at different times; record them together"
-        )
-    return parts[0].t, np.hstack([s.y[:, :1] for s in parts]), max(s.sd for s in parts)
-
-
-def _require_dimension(recording: Recording, found: int, d: int) -> None:
-    if found != d:
-        space = "solid" if found == 3 else "plane"
-        raise RecordingError(
-            f"{recording.name}: a tip of {found} coordinates, a body of {d}; "
-            f"--set body.space={space}"
-        )
 
 
 def _beyond(x: Floats, low: Floats, high: Floats) -> Floats:

@@ -4,6 +4,8 @@ from validate.replay.live.clock import Lived, live, realtime
 from validate.replay.live.listener import Listener
 from validate.replay.live.path import RecordedPath
 from validate.replay.live.prepared import Prepared, prepared
+from validate.replay.live.replayed import as_given
+from validate.replay.live.tip import recorded_tip
 from validate.replay.live.written import LIVE, written
 
 __all__ = [
@@ -12,8 +14,10 @@ __all__ = [
     "Lived",
     "Prepared",
     "RecordedPath",
+    "as_given",
     "live",
     "prepared",
     "realtime",
+    "recorded_tip",
     "written",
 ]

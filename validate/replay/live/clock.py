@@ -100,7 +100,8 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def realtime(*, wanted: bool) -> Iterator[None]:
-    """This process before all that are scheduled as usual, where `wanted`; what it starts is not.
+    """This process before all that are scheduled as usual, where `wanted`; what it starts is not,
+    but for the threads of a stepper (`live`), which come right behind it.
 
     Raises `UsageError` where the system has no such scheduling or refuses it.
     """
@@ -110,7 +111,7 @@ def realtime(*, wanted: bool) -> Iterator[None]:
     try:
         policy, before = os.sched_getscheduler(0), os.sched_getparam(0)
         first = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, first, os.sched_param(os.sched_get_priority_min(os.SCHED_FIFO)))
+        os.sched_setscheduler(0, first, os.sched_param(_behind() + 1))
     except (AttributeError, OSError) as error:
         raise UsageError(
             f"--realtime: {error}; it takes Linux and the right to it (CAP_SYS_NICE, or ulimit -r)"
@@ -119,6 +120,20 @@ def realtime(*, wanted: bool) -> Iterator[None]:
         yield
     finally:
         os.sched_setscheduler(0, policy, before)
+
+
+def _behind() -> int:
+    """The priority of a stepper's own threads, below the loop's."""
+    return os.sched_get_priority_min(os.SCHED_FIFO)
+
+
+def _first_too(threads: tuple[int, ...]) -> None:
+    """The stepper's own threads behind the loop and before all others, where the loop is first."""
+    if not (threads and hasattr(os, "sched_getscheduler")):
+        return
+    if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO:
+        for thread in threads:
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_behind()))
 
 
 def live(
@@ -130,6 +145,7 @@ def live(
 ) -> Lived:
     """Runs until the source ends, or for so many seconds; an interruption ends it, too."""
     stepper.warm()
+    _first_too(stepper.threads)
     kept, skipped = _Ticked(), 0
     with quiet():
         try:

@@ -1,0 +1,69 @@
+"""A tool at 1 kHz on the liver of paper 003, simulated at a rate of its own (section 3.5).
+
+St. Venant-Kirchhoff tissue by central difference reads the tool every n-th tick and answers a
+period later; in between the force is held, or extrapolated in time by a line or a parabola. Told
+are errors, energy created, passivity and ticks against the clock; `validate live haptic_liver` runs
+it live. A path of your own: `--set recording=FILE`.
+"""
+
+from pathlib import Path
+
+from validate.compare.verdict import Accept
+from validate.papers.ekf_nfem.haptic import (
+    EACH_TICK,
+    TouchedLiver,
+    build,
+    follows,
+    load,
+    place,
+    record,
+    sets,
+)
+from validate.papers.ekf_nfem.haptic_exhibits import FIGURES, tell
+from validate.papers.ekf_nfem.liver_body import LiverBody
+from validate.replay.cards import changed
+from validate.replay.experiment import Experiment, Twin
+from validate.replay.method import Method
+from validate.solve.haptic_loop import HapticLoop
+
+PARAMETERS = TouchedLiver(body=LiverBody(beside=str(Path(__file__).parent)))
+METHODS = {
+    "every_tick": Method("simulated at every tick", EACH_TICK),
+    "hold": Method("100 Hz, held", HapticLoop(extrapolation="hold", background=True)),
+    "linear": Method("100 Hz, linear", HapticLoop(background=True)),
+    "quadratic": Method(
+        "100 Hz, second order", HapticLoop(extrapolation="quadratic", background=True)
+    ),
+    "place": Method(
+        "100 Hz, linear in the spring's place", HapticLoop(extrapolates="place", background=True)
+    ),
+    "slow": Method("33 Hz, linear", HapticLoop(every=30, late=30, background=True)),
+}
+
+EXPERIMENT = Experiment(
+    name="haptic_liver",
+    title="A tool at haptic rate on a slower liver",
+    source="paper 003 (EKF-NFEM), section 3.5",
+    parameters=PARAMETERS,
+    methods=METHODS,
+    accepted=("every_tick",),
+    accept=(Accept("force.z", 0.15, "a twentieth of the largest force (ours)"),),
+    load=load,
+    build=build,
+    place=place,
+    sets=sets,
+    axis="z",
+    reference="every_tick",
+    exhibits=tell,
+    published=FIGURES,
+    frames=40,
+    follows=follows,
+    quick=changed("path", seconds=0.8),
+    twin=Twin(
+        record,
+        remake=("twin.", "path.", "body.", "material.", "hand."),
+        same_model=True,
+        seed=PARAMETERS.twin.seed,
+        notice="The recording is a twin: the same body simulated at every tick, plus noise.",
+    ),
+)

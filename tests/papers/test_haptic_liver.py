@@ -1,0 +1,215 @@
+"""A tool on the liver of paper 003, section 3.5: body, path, what is told, live and replayed."""
+
+import os
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, SceneError
+from validate.papers.ekf_nfem import haptic_exhibits
+from validate.papers.ekf_nfem.haptic import (
+    STOPS,
+    ToolPath,
+    TouchedLiver,
+    follows,
+    place,
+    touchable_liver,
+    touched_place,
+    way,
+)
+from validate.papers.ekf_nfem.haptic_exhibits import FIGURES, felt_by
+from validate.papers.ekf_nfem.liver_body import LiverBody, generated_liver
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Markers, Recording, Source
+from validate.replay import load as experiment_named
+from validate.replay.experiment import Experiment
+from validate.replay.live import RecordedPath, live, prepared, written
+from validate.replay.live.clock import _first_too
+from validate.replay.options import Options
+from validate.replay.road import compare
+from validate.scene.mesh import Mesh
+from validate.scene.mesh_file import write_mesh
+from validate.solve.haptic_loop import HapticStepper
+
+
+def silent(_: str) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What sets a coarse body and 0.6 s of its path."""
+    file = tmp_path_factory.mktemp("liver") / "small.npz"
+    write_mesh(generated_liver((5, 4, 3)), file)
+    return {"body.body": "data", "body.file": str(file), "path.seconds": "0.6"}
+
+
+@cache
+def mesh() -> Mesh:
+    return touchable_liver(TouchedLiver(body=LiverBody("generated")))
+
+
+def experiment() -> Experiment:
+    return experiment_named("haptic_liver")
+
+
+class Turned:
+    """A clock that stands until it is waited for."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def wait(self, seconds: float) -> None:
+        self.now += seconds
+
+
+# --- body and path --------------------------------------------------------------------------------
+
+
+def test_all_of_the_surface_may_be_touched_but_what_is_held() -> None:
+    sets = mesh().facets
+    assert len(sets["surface"]) + len(sets["held"]) == len(mesh().surface)
+    both = {tuple(sorted(f)) for f in sets["surface"].tolist()}
+    assert not both & {tuple(sorted(f)) for f in sets["held"].tolist()}
+    at = touched_place(mesh())
+    assert at[2] > 0.6 * mesh().nodes[:, 2].max()
+
+
+def test_the_hand_ends_where_it_began_and_goes_as_deep_as_it_says() -> None:
+    above = np.array([0.01, 0.02, 0.05])
+    t, x = way(ToolPath(tremor=0.0), above)
+    assert x[0] == pytest.approx(x[-1], abs=2e-9)
+    assert x[0, 2] - above[2] == pytest.approx(0.003, abs=2e-9)
+    assert above[2] - x[:, 2].min() == pytest.approx(0.006, abs=2e-9)
+    assert np.diff(t) == pytest.approx(1e-3)
+    assert t[-1] == STOPS[-1][0]
+    shaken = way(ToolPath(tremor=2e-5), above)[1] - x
+    assert 1e-5 < shaken.std() < 3e-5
+    assert len(way(ToolPath(seconds=0.5), above)[0]) == 501
+
+
+@pytest.mark.parametrize("wrong", [{"depth": 0.0}, {"rate": -1.0}, {"seconds": 3.0}])
+def test_a_path_that_cannot_be_walked_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(SceneError, match="tool path"):
+        way(replace(ToolPath(), **wrong), np.zeros(3))
+
+
+def test_the_shipped_recording_is_the_twin_of_the_generated_body(project_root: Path) -> None:
+    shipped = read_recording(project_root / "recordings" / "haptic_liver.mcap")
+    p = TouchedLiver(body=LiverBody("generated"))
+    t, x = way(p.path, touched_place(mesh()))
+    tip = np.hstack([shipped.signals[f"tip.{a}"].y for a in "xyz"])
+    assert tip == pytest.approx(x, abs=1e-12)
+    force = shipped.signals["force.z"]
+    assert force.t == pytest.approx(t[::5])
+    assert 2.5 < force.y.max() < 3.5
+    file = project_root / "recordings" / "haptic_liver.mcap"
+    other = replace(p, body=LiverBody("data"), recording=str(file))
+    with pytest.raises(RecordingError, match=r"body\.body=generated"):
+        experiment().load(other, project_root / "experiments")
+
+
+def _path(x: Floats, t: Floats) -> Recording:
+    tip = Markers(t, ("tip",), x[:, None], 1e-5, "liver")
+    return Recording("own", Source("own", "", 0, ""), 1, markers={"tip": tip})
+
+
+def test_a_path_of_ones_own_sets_the_tick_and_says_what_was_left_out(small: dict[str, str]) -> None:
+    p = TouchedLiver(body=LiverBody("data", small["body.file"]))
+    t = np.arange(40) / 500
+    t[20:] += 0.1
+    x = np.tile(touched_place(touchable_liver(p)) + [0, 0, 0.01], (40, 1))
+    x[5] = np.nan
+    recording = _path(x, t)
+    scene = experiment().build(recording, p, None)
+    seen = place(recording, p, scene)
+    assert len(seen.t) == 39
+    assert experiment().sets(p, seen)["dt"] == 0.002
+    first, second = seen.findings
+    assert "1 of 40 samples is not seen" in first
+    assert "every sample is taken as one tick" in second
+    assert follows(experiment(), (recording,), p).accept == ()
+    with pytest.raises(RecordingError, match="0 of 40 samples"):
+        place(_path(np.full((40, 3), np.nan), t), p, scene)
+
+
+# --- what is told ---------------------------------------------------------------------------------
+
+
+def test_what_is_told_of_a_coarse_liver(
+    small: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(haptic_exhibits, "_LIVE_SECONDS", 0.01)
+    result = compare(experiment(), Options(small))
+    (check,) = result.checks
+    assert check.verdict == "repeats itself"
+    found = {e.anchor: e for e in result.exhibits}
+    forces = {row[0]: row for row in found["forces"].tables[0].rows}
+    held, line, curve = (forces[f"100 Hz, {n}"] for n in ("held", "linear", "second order"))
+    rates = [held[1], forces["simulated at every tick"][1]]
+    assert rates == pytest.approx([100.0, 1000.0])
+    assert curve[5] < line[5] < held[5]  # type: ignore[operator]
+    energy = {row[0]: row for row in found["energy"].tables[0].rows}
+    assert energy["100 Hz, held"][1] > energy["100 Hz, linear"][1] > 0  # type: ignore[operator]
+    first = found["energy"].charts[0].series[0]
+    assert len(first.x) == 601
+    assert {c.name for c in found["periods"].charts} >= {"periods"}
+    assert [row[1] for row in found["live"].tables[0].rows] == [10, 10, 10]
+    speeds = next(e for e in result.exhibits if e.anchor == "speeds").tables[0]
+    step = speeds.rows[0][speeds.headings.index("dt / ms")]
+    assert 0 < step < 1  # type: ignore[operator]
+    (force, *_) = FIGURES
+    assert force.beside({}).ours == 1000.0
+
+
+def test_nothing_is_felt_without_the_reference() -> None:
+    assert felt_by({}) == {}
+
+
+# --- live -----------------------------------------------------------------------------------------
+
+
+def test_live_in_a_thread_of_its_own_replays_to_the_same_numbers(
+    small: dict[str, str], tmp_path: Path
+) -> None:
+    made = prepared(experiment(), Options(small), "linear")
+    assert isinstance(made.stepper, HapticStepper)
+    assert made.stepper.threads == ()
+    clock = Turned()
+    path = RecordedPath(made.path.t[:600], made.path.x[:600])
+    done = live(made.stepper, path, None, clock, clock.wait)
+    assert (done.ticks, done.missed) == (600, 0)
+    assert np.abs(done.F).max() > 0.5
+    assert made.stepper.rate == pytest.approx(1000.0)
+    (thread,) = made.stepper.threads
+    assert thread != os.getpid()
+    file = tmp_path / "live.mcap"
+    write_recording(written(done, made, 10**18), file)
+    again = compare(experiment(), Options({**small, "recording": str(file)}, ("linear",)))
+    traces = again.methods[0].runs[0].traces
+    force = np.column_stack([traces[f"tool.force.{a}"].y for a in "xyz"])
+    assert np.array_equal(force[-len(done.F) :], done.F)
+    assert {c.name for c in again.checks} == {f"given.{a}.rms@all" for a in "xyz"}
+    assert again.passed
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="no such scheduling here")
+def test_a_loop_that_is_first_takes_its_simulation_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int, int]] = []
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda n, policy, p: asked.append((n, policy, p.sched_priority))
+    )
+    monkeypatch.setattr(os, "sched_getscheduler", lambda _: os.SCHED_OTHER)
+    _first_too((7,))
+    monkeypatch.setattr(os, "sched_getscheduler", lambda _: os.SCHED_FIFO | os.SCHED_RESET_ON_FORK)
+    _first_too(())
+    assert asked == []
+    _first_too((7,))
+    assert asked == [(7, os.SCHED_FIFO, os.sched_get_priority_min(os.SCHED_FIFO))]

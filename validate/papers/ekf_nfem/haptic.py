@@ -1,0 +1,248 @@
+"""The liver of paper 003 under a tool at 1 kHz (section 3.5): parameters, path, twin, registration.
+
+The paper's device, tool path and coupling are not printed. Here a synthetic hand pushes, slides,
+lets go and pokes at the middle of the liver's top, through the spring of a probe. The recording is
+the same body's, simulated at every tick: it says what a slower simulation loses, and can only
+repeat itself about the body.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.verdict import Accept
+from validate.errors import RecordingError, SceneError
+from validate.fem.system import build as build_system
+from validate.papers.async_regions.line import LoadCell
+from validate.papers.ekf_nfem.cube import LargeStrain
+from validate.papers.ekf_nfem.liver import watched
+from validate.papers.ekf_nfem.liver_body import LiverBody
+from validate.papers.needle_pocket.hand import moved, tremor
+from validate.parameters import quantity
+from validate.recording.mcap.read import read_recording
+from validate.recording.types import Recording, Signal, Source
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, validating
+from validate.replay.experiment import Experiment, Progress
+from validate.replay.live import LIVE, as_given, recorded_tip
+from validate.replay.remade import made_here, stamped
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Probe, Scene, Support
+from validate.scene.tool import Needle
+from validate.solve.haptic import HAPTIC_HZ
+from validate.solve.haptic_loop import HapticLoop
+from validate.solve.march import march
+from validate.twin.sensors import signal, streams
+from validate.twin.tracked import START_NS
+
+TOOL, AXES = "tool", "xyz"
+SHIPPED = "haptic_liver.mcap"  # of the generated body
+EACH_TICK = HapticLoop(every=1, late=0, extrapolation="hold")
+_DOWN = (0.0, 0.0, -1.0)
+_FRAME = "liver"
+#: Stops of the hand: time s, depth and way sideways in units of the path's depth. Approach, push,
+#: slide, leave, a quick poke, leave.
+STOPS: tuple[tuple[float, float, float], ...] = (
+    (0.0, -0.5, 0.0),
+    (0.25, -0.15, 0.0),
+    (0.75, 1.0, 0.0),
+    (1.0, 1.0, 0.4),
+    (1.3, 0.7, 0.1),
+    (1.5, -0.5, 0.0),
+    (1.6, -0.3, 0.0),
+    (1.7, 0.6, 0.0),
+    (1.85, -0.6, 0.0),
+    (2.0, -0.5, 0.0),
+)
+
+
+@dataclass(frozen=True)
+class ToolSpring:
+    """The coupling of the hand to the body, of every method."""
+
+    spring: float = quantity(1000.0, "N/m", "between tool and contact (virtual coupling)")
+    reach: float = quantity(1e-3, "m", "distance at which the tool takes hold")
+    pad: float = quantity(0.02, "m", "surface nodes that near to the contact share the spring")
+    grip: float | None = quantity(0.0, "N", "pull at which the body lets go; none: never")
+    limit: float = quantity(5.0, "N", "largest force given to the hand")
+
+
+@dataclass(frozen=True)
+class ToolPath:
+    depth: float = quantity(0.006, "m", "how deep the hand goes below the resting surface")
+    rate: float = quantity(HAPTIC_HZ, "1/s", "samples a second")
+    tremor: float = quantity(2e-5, "m", "of the hand, rms along every axis")
+    seed: int = quantity(3, "1", "seed of the tremor")
+    seconds: float = quantity(STOPS[-1][0], "s", "how much of the path is walked")
+
+
+_CELL = LoadCell(seed=35, noise=5e-3, every=5)
+
+
+@dataclass(frozen=True)
+class TouchedLiver:
+    """Parameters; the damping is ours, the paper prints none. Section 3.5 prints no Poisson ratio:
+    the 0.49 of section 3.2 takes steps half as long, and its linear cells lock. `recording` is a
+    path."""
+
+    material: LargeStrain = LargeStrain(nu=0.45, mass_damping=20.0)
+    body: LiverBody = LiverBody()
+    hand: ToolSpring = ToolSpring()
+    path: ToolPath = ToolPath()
+    twin: LoadCell = _CELL
+    recording: str = quantity(
+        "", "1", "the recording; none: the shipped one of the generated body, else made in memory"
+    )
+
+
+def touchable_liver(p: TouchedLiver) -> Mesh:
+    """The body with the facet set "surface": all that is not held."""
+    mesh = p.body.mesh(p.body.which)
+    held = set(map(tuple, np.sort(mesh.facets["held"], axis=1).tolist()))
+    free = [tuple(f) not in held for f in np.sort(mesh.surface, axis=1).tolist()]
+    return replace(mesh, facets={**mesh.facets, "surface": mesh.surface[free]})
+
+
+def touched_place(mesh: Mesh) -> Floats:
+    """Where the hand goes to (d,) m: the free surface node in the middle of the body's top."""
+    return np.array(mesh.nodes[watched(mesh)["node_B"]])
+
+
+def way(p: ToolPath, above: Floats) -> tuple[Floats, Floats]:
+    """t (nt,) s and the tip's places (nt, 3) m over a place (3,) m of the surface."""
+    if not (p.depth > 0 and p.rate > 0 and p.tremor >= 0 and 0 < p.seconds <= STOPS[-1][0]):
+        raise SceneError(
+            f"tool path {1e3 * p.depth:g} mm deep at {p.rate:g} Hz for {p.seconds:g} s: depth and "
+            f"rate above 0, at most {STOPS[-1][0]:g} s"
+        )
+    t = np.arange(round(STOPS[-1][0] * p.rate) + 1) / p.rate
+    arrive = np.array([s[0] for s in STOPS])
+    places = np.array([(0.7 * side, 0.7 * side, -deep) for _, deep, side in STOPS])
+    x = above + p.depth * moved(t, arrive, places) + tremor(t, 3, p.tremor, p.seed)
+    walked = t <= p.seconds * (1 + 1e-9)
+    return np.round(t[walked], 9), np.round(x[walked], 9)  # a nanometre: short files
+
+
+def liver_under(p: TouchedLiver, tip: Floats) -> Scene:
+    """The held liver and the tool with its tip at (3,) m."""
+    mesh = touchable_liver(p)
+    return Scene(
+        mesh, p.material.material, (Support("held", (0, 1, 2)),),
+        tools=(Needle(TOOL, "surface", tuple(tip.tolist()), _DOWN),),
+        probes=(Probe("touched", tuple(touched_place(mesh).tolist())),),
+    )  # fmt: skip
+
+
+def load(p: TouchedLiver, folder: Path) -> tuple[Recording, ...]:
+    """The named recording, else the shipped one, else the data folder's body walked in memory.
+
+    Raises `RecordingError` for a recording of another body.
+    """
+    which = p.body.which
+    if which == "data" and not p.recording:
+        return (stamped(record(p, lambda _: None), p),)
+    path = Path(p.recording) if p.recording else folder.parent / "recordings" / SHIPPED
+    recording = read_recording(path)
+    of = recording.metadata.get("provenance", {}).get("body", which)
+    if of != which:
+        raise RecordingError(
+            f"{path.name} is of body '{of}', not of '{which}'; pass --set body.body={of}"
+        )
+    return (recording,)
+
+
+def record(p: TouchedLiver, progress: Progress) -> Recording:
+    """The path at every tick, and the force on the hand with a load cell's noise."""
+    progress("simulate")
+    t, x = way(p.path, touched_place(touchable_liver(p)))
+    scene = liver_under(p, x[0])
+    hand = {name: getattr(p.hand, name) for name in ("spring", "reach", "pad", "grip", "limit")}
+    loop = replace(EACH_TICK, dt=1 / p.path.rate, **hand)
+    run = march("twin", loop.prepare(build_system(scene)), t, x - x[0], np.array([len(t) - 1]), 0.0)
+    if not run.finished:
+        raise SceneError(f"the twin: {run.outcome.why}")
+    rng, some = streams(p.twin.seed, ("force",))["force"], slice(None, None, p.twin.every)
+    signals = {}
+    for c, a in enumerate(AXES):
+        signals[f"tip.{a}"] = Signal(t, x[:, [c]], "m", 0.0, _FRAME)
+        force = run.traces[f"{TOOL}.force.{a}"].y[some]
+        signals[f"force.{a}"] = signal(t[some], force, "N", p.twin.noise, _FRAME, rng)
+    provenance = {
+        "kind": "twin", "same_model": "true", "body": p.body.which, "seed": str(p.twin.seed),
+        "law": f"{scene.material.law}, central difference at every tick, the models' own mesh",
+        "element": f"P1 tetrahedra, {len(scene.mesh.nodes)} nodes, {len(scene.mesh.cells)} cells",
+        "hand": "minimum-jerk moves with tremor, synthetic",
+    }  # fmt: skip
+    return Recording(
+        "haptic_liver", Source("haptic_liver", "", 0, "made in memory"), START_NS,
+        signals=signals, metadata={"provenance": provenance},
+    )  # fmt: skip
+
+
+def build(recording: Recording, p: TouchedLiver, model: None) -> Scene:
+    return liver_under(p, _walkable(recording)[1][0])
+
+
+def place(recording: Recording, p: TouchedLiver, scene: Scene) -> Registered:
+    """The tip drives; what was recorded or given of the force is compared."""
+    t, x, sd, findings = _walkable(recording)
+    gone = x - np.array(scene.tools[0].tip)
+    drives = tuple(
+        SignalObservation(f"tip.{a}", "drives", t, gone[:, [c]], "m", sd)
+        for c, a in enumerate(AXES)
+    )
+    seen = tuple(
+        validating(recording, f"{kind}.{a}", "N", quantity=f"{kind}.{a}", trace=f"{TOOL}.force.{a}")
+        for kind in ("force", "given")
+        for a in AXES
+        if f"{kind}.{a}" in recording.signals
+    )
+    return Registered((*drives, *seen), findings=findings)
+
+
+def _walkable(recording: Recording) -> tuple[Floats, Floats, float, tuple[str, ...]]:
+    """The path's seen samples: t (nt,) s, x (nt, 3) m, sd m; what was left out, in words."""
+    t, x, sd = recorded_tip(recording, 3)
+    seen = np.isfinite(x).all(axis=1)
+    if seen.sum() < 2:
+        raise RecordingError(
+            f"{recording.name}: {int(seen.sum())} of {len(t)} samples of the tip are seen; at "
+            "least 2 are a path"
+        )
+    steps, findings = np.diff(t[seen]), []
+    if not seen.all():
+        findings.append(
+            f"the tip of {int((~seen).sum())} of {len(t)} samples is not seen: left out"
+        )
+    if steps.max() > 1.5 * np.median(steps):
+        findings.append(
+            f"the path's longest step is {steps.max():.3g} s, its median one "
+            f"{np.median(steps):.3g} s: every sample is taken as one tick"
+        )
+    return t[seen], x[seen], sd, tuple(findings)
+
+
+def sets(p: TouchedLiver, seen: Registered) -> Mapping[str, Any]:
+    """The tick is the recording's own."""
+    h = p.hand
+    return {
+        "dt": round(float(np.median(np.diff(seen.t))), 9), "spring": h.spring, "reach": h.reach,
+        "pad": h.pad, "grip": h.grip, "limit": h.limit,
+    }  # fmt: skip
+
+
+def follows(experiment: Experiment, recordings: Sequence[Recording], p: TouchedLiver) -> Experiment:
+    """The experiment as its recording has it: a live loop's own force, or a user's path."""
+    recording, twin = recordings[0], experiment.twin
+    if made_here(recording) or twin is None:
+        return experiment
+    if LIVE in recording.metadata:
+        return as_given(experiment, recording)
+    there: tuple[Accept, ...] = tuple(
+        a for a in experiment.accept if a.quantity in recording.signals
+    )
+    return replace(experiment, accept=there, twin=replace(twin, remake=()))

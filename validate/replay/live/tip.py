@@ -1,0 +1,45 @@
+"""The path of a tool's tip in a recording: signals `tip.x`, `tip.y`(, `tip.z`) in m, or the only
+point of a stream of markers `tip` (positions that a tracker did not see are null there)."""
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.types import Recording
+
+_AXES = "xyz"
+
+
+def recorded_tip(
+    recording: Recording, dimension: int, hint: str = ""
+) -> tuple[Floats, Floats, float]:
+    """Times t (nt,) s, places x (nt, d) m, NaN where not seen, and their sd m.
+
+    Raises `RecordingError` without such a path, or for one of another dimension, with the `hint`.
+    """
+    if "tip" in recording.markers:
+        marker = recording.marker("tip")
+        x = marker.x[:, 0]
+        _require_dimension(recording, x.shape[1], dimension, hint)
+        return marker.t, np.array(x), marker.sd
+    names = [f"tip.{a}" for a in _AXES]
+    there = sum(name in recording.signals for name in names)
+    parts = [recording.signal(name, "m") for name in names[: max(there, dimension)] if there]
+    if not parts:
+        raise RecordingError(
+            f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
+            f"{sorted(recording.streams)}"
+        )
+    _require_dimension(recording, len(parts), dimension, hint)
+    if any(not np.array_equal(s.t, parts[0].t) for s in parts):
+        raise RecordingError(
+            f"{recording.name}: tip.x .. tip.{_AXES[dimension - 1]} have "
+            f"{[len(s.t) for s in parts]} samples at different times; record them together"
+        )
+    return parts[0].t, np.hstack([s.y[:, :1] for s in parts]), max(s.sd for s in parts)
+
+
+def _require_dimension(recording: Recording, found: int, wanted: int, hint: str) -> None:
+    if found != wanted:
+        words = f"{recording.name}: a tip of {found} coordinates, a body of {wanted}"
+        raise RecordingError(f"{words}; {hint}" if hint else words)
