@@ -16,11 +16,11 @@ DECLARED = {
     "ecoflex_cylinder": 3,
     "ekf_cone": 20,
     "ekf_cube": 33,
-    "ekf_liver": 17,
+    "ekf_liver": 16,
     "fluid_block": 22,
     "fluid_phantom": 48,
     "fluid_phantom_large": 0,
-    "haptic_liver": 5,
+    "haptic_liver": 4,
     "kf_cube": 11,
     "kf_cube_inertia": 0,
     "needle_block": 13,
@@ -34,7 +34,6 @@ PRINTED = {
         0.01, 500, 70, 64, 0.5, 0.10, 0.13, 0.03, 0.485, 12e6, 0.040, 0.002, 0.003, 0.006, 0.009,
         512e6, 82,
     ),
-    "haptic_liver": (1000,),  # paper 003
     "needle_pocket": (512, 0.001, 1, 30, 2.0e9, 2.4e9, 3000),  # paper 000
     "kf_cube": (200, 672, 0.0116, 10, 0.1735, 0.0158, 63, 25),  # paper 001
     "bending_rod": (4.2,),  # paper 002

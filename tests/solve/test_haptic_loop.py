@@ -17,6 +17,7 @@ from validate.scene.tool import Needle
 from validate.solve.central import CentralDifference
 from validate.solve.extrapolate import between_answers
 from validate.solve.haptic_loop import HapticLoop, HapticStepper
+from validate.solve.spring_probe import Hold
 from validate.solve.types import State
 
 L, H = 0.1, 1e-3
@@ -207,6 +208,34 @@ def test_a_probe_that_takes_hold_of_a_bent_body_feels_nothing_at_first() -> None
     held = probe.follow(None, np.array(TIP), u)
     assert held is not None
     assert probe.force(held, np.array(TIP), u) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_change_of_hold_leaves_the_body_with_the_forces_of_its_new_spring() -> None:
+    """Held, let go and held again while it moves: r is the force at u, and work jumps as energy."""
+    one = stepper(replace(HAND, grip=0.0, reach=0.02))
+    state, changes = one.rest(), 0
+    path = np.concatenate([push(0.01, 60), -0.012 * np.ones(3), push(0.01, 60)])
+    for y in path:
+        last, state = state, one.step(state, np.array([0.0, 0.0, -y]))
+        read = state.inner.body
+        motion, body = read.state.inner.motion, one.body._holding(read.held).body
+        assert motion["r"] == pytest.approx(body.force(motion["u"]), abs=1e-9)
+        before, old = last.inner.body.state.inner, last.inner.body.held
+        if (old is None) != (read.held is None):
+            changes += 1
+            energies = [
+                one.body._holding(h).body.look(motion["u"]).energy for h in (old, read.held)
+            ]
+            own = one.body._holding(old).step(last.inner.body.state, _aimed(one, old, y))
+            jump = read.state.inner.work - own.inner.work
+            assert jump == pytest.approx(energies[1] - energies[0], abs=1e-12)
+            assert before.motion is not motion
+    assert changes >= 2
+
+
+def _aimed(one: HapticStepper, held: Hold | None, y: float) -> Floats:
+    tip = np.array([TIP[0], TIP[1], TIP[2] - y])
+    return np.zeros(3) if held is None else one.body._aim(held, tip)
 
 
 def test_no_force_beyond_the_limit_is_given() -> None:

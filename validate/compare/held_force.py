@@ -58,7 +58,7 @@ class HeldForce:
     @property
     def least(self) -> float:
         """J, the least that the device had taken: below 0 it gave what it never had."""
-        return float(self.taken.min())
+        return float(self.taken.min()) + 0.0  # no minus before nothing
 
     @property
     def damper(self) -> float:

@@ -110,7 +110,8 @@ def count(
 
 def _reached(name: str, hz: int, theirs: float) -> Figure:
     """Tetrahedra at a rate, of this machine: shown, never held, none if out of reach."""
-    label, figure = "EKF" if name == "filter" else "NFEM", "Fig. 4" if hz == 30 else "Fig. 7"
+    label = "EKF" if name == "filter" else "NFEM"
+    source = "section 3.3, Fig. 4" if hz == 30 else "section 3.5, Fig. 7"
 
     def of(values: Values) -> float | None:
         cells = values["told"][f"cells.{name}@{hz}Hz"]
@@ -119,7 +120,7 @@ def _reached(name: str, hz: int, theirs: float) -> Figure:
     return Figure(
         f"tetrahedra at {hz} Hz, {label}", of, theirs, None, "1", "not comparable",
         "another machine, and rates printed without their step; the report has dt, the critical "
-        "step and the real-time factor of every rate", f"section 3.3, {figure}",
+        "step and the real-time factor of every rate", source,
     )  # fmt: skip
 
 

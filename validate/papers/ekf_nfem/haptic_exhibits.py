@@ -20,7 +20,7 @@ from validate.replay.live import Lived, RecordedPath, live
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.extrapolate import NAMES, between_answers
-from validate.solve.haptic import HAPTIC_HZ, QUANTILES, RealTime, TickTimes
+from validate.solve.haptic import QUANTILES, RealTime, TickTimes
 from validate.solve.haptic_loop import HapticLoop, HapticStepper
 
 REFERENCE, JUDGED = "every_tick", "linear"
@@ -222,8 +222,10 @@ def _periods_exhibit(reference: Felt) -> Exhibit:
                 for wait in (0, every)
             )
             found.append(late.rms)
-            apart.append(float(np.sqrt(np.mean(late.off[smooth] ** 2))))
-            rows.append((_NAMES[name], _MILLI * every * dt, *_counted(at_once), *_counted(late)))
+            inside = float(np.sqrt(np.mean(late.off[smooth] ** 2))) if smooth.any() else None
+            apart.append(inside or 0.0)
+            rows.append((_NAMES[name], _MILLI * every * dt, *_counted(at_once), *_counted(late),
+                         inside))  # fmt: skip
         periods = _MILLI * dt * np.array(PERIODS, dtype=np.float64)
         lines.append(Series(_NAMES[name], periods, np.array(found)))
         if smooth.any():
@@ -232,7 +234,7 @@ def _periods_exhibit(reference: Felt) -> Exhibit:
         "periods", "Forces of every tick, read seldom: answered at once, or a period late.",
         ("extrapolation", "period / ms", "at once: peak / N", "rms / N", "created / mJ",
          "least taken / mJ", "late: peak / N", "late: rms / N", "late: created / mJ",
-         "late: least taken / mJ"), tuple(rows), folded=True,
+         "late: least taken / mJ", "late, within a contact: rms / N"), tuple(rows), folded=True,
     )  # fmt: skip
     charts = tuple(
         Chart(name, f"Error of a force that is a period late, {where}", "period / ms",
@@ -314,11 +316,6 @@ def _pace(scene: Scene, reference: Followed, dt: float) -> str:
 
 
 FIGURES = (
-    Figure(
-        "force updates that the device requires", lambda _: HAPTIC_HZ, 1000.0, None, "Hz",
-        "not comparable", "an input, taken as printed: a tick's deadline", "section 3.5",
-        1000.0, 1e-12,
-    ),
     Figure(
         "peak error of the extrapolated force over the largest", f"told:peak.{JUDGED}", None, None,
         "1", "not comparable",

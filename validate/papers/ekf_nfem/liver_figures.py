@@ -113,10 +113,6 @@ def _figures(ours: Ours) -> tuple[Figure, ...]:
         ),
         rate(4941, "EKF", "ekf_printed", 50.0),
         rate(4941, "NFEM", "nfem_implicit", 2.0),
-        given(
-            "Fig. 6: a liver touched by a needle", None, "1", "section 3.5, Fig. 6",
-            "two pictures, no number",
-        ),
     )  # fmt: skip
 
 
