@@ -17,7 +17,7 @@ from typing import Any
 
 PAGES = {
     "paper-000": ("fluid_block", "fluid_phantom", "needle_pocket"),
-    "paper-003": ("ekf_cube", "ekf_liver", "ekf_cone"),
+    "paper-003": ("ekf_cube", "ekf_liver", "ekf_cone", "haptic_liver"),
 }
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"

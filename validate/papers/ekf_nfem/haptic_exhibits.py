@@ -310,8 +310,9 @@ def _pace(scene: Scene, reference: Followed, dt: float) -> str:
         f"{_MICRO * times.dt:.3g} us ({times.ratio:.2f} of the critical step) on "
         f"{len(scene.mesh.cells)} tetrahedra and takes {_MILLI * seconds:.2g} ms: "
         f"{times.factor:.2g} times real time, on today's machine and its load. Below 1 no "
-        "extrapolation helps: the tissue itself falls behind. The paper's rates are steps a second "
-        "without their step."
+        "extrapolation helps: the tissue itself falls behind. The median tick of a slower "
+        "simulation is an extrapolation alone. The paper's rates are steps a second without their "
+        "step."
     )
 
 
