@@ -11,6 +11,7 @@ from pathlib import Path
 from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
+from validate.papers.ekf_nfem.ladder import LIVER_LADDER
 from validate.papers.ekf_nfem.liver import (
     PulledLiver,
     build,
@@ -97,6 +98,7 @@ EXPERIMENT = Experiment(
     sets=sets,
     axis="z",
     reference="nfem",
+    ladder=LIVER_LADDER,
     cases=CASES,
     exhibits=tell_liver,
     published=LIVER_FIGURES["generated"],

@@ -10,10 +10,11 @@ from validate.errors import RecordingError, SceneError
 from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build
 from validate.papers.ekf_nfem.cube import LargeStrain
+from validate.papers.ekf_nfem.ladder import LIVER_LADDER
 from validate.papers.ekf_nfem.liver import fiducials, liver_scene, watched
 from validate.papers.ekf_nfem.liver_body import FOLDER, LiverBody, generated_liver, with_sets
 from validate.scene.box import box
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
 
 NOTHING = str(Path(__file__).parent / "nowhere")
@@ -139,3 +140,17 @@ def test_a_body_without_such_faces_is_refused() -> None:
     coarse = box((0.1, 0.1, 0.1), (1, 1, 1))
     with pytest.raises(SceneError, match="no faces are held"):
         with_sets(coarse)
+
+
+def test_the_ladders_bodies_are_coarser_and_whole() -> None:
+    """Few enough unknowns that all modes of them are at hand."""
+    body = LIVER_LADDER.body
+    assert body is not None
+    sizes = []
+    for n in body.meshes:
+        scene = body.shaped(n, LargeStrain().material)
+        require_positive_cells(scene.mesh)
+        sizes.append(scene.mesh.nodes.size)
+        assert {"held", "loaded"} <= set(scene.mesh.facets)
+    assert sizes == sorted(sizes)
+    assert sizes[-1] <= 1000

@@ -165,7 +165,8 @@ CUBE_FIGURES = (
     given("Poisson ratio", 0.49, "1", "section 3.1", _INPUT),
     given(
         "force on the left face", 0.5, "N", "section 3.1",
-        "an input, read as a total; on every node it turns elements over, see the force readings",
+        "an input, read as a total; on every node it goes beyond the law's validity, see the force "
+        "readings",
     ),
     given("initial displacement", 0.0, "m", "section 3.1", _INPUT),
     given("initial error covariance", 1e-3, "1", "section 3.1", _NO_UNIT),

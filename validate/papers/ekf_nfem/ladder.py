@@ -1,8 +1,11 @@
-"""The ladder of paper 003's cube: where its steps are stable, and those of the cone's material."""
+"""The ladders of paper 003: where steps are stable on its cube, the cone's material, a liver."""
 
 from dataclasses import replace
 
 from validate.papers.ekf_nfem.cube import SIDE
+from validate.papers.ekf_nfem.figures import PRINTED_LIVER_STEP
+from validate.papers.ekf_nfem.liver import liver_scene
+from validate.papers.ekf_nfem.liver_body import generated_liver, with_sets
 from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, Turned
 from validate.scene.box import box
 from validate.scene.material import Material
@@ -30,6 +33,28 @@ CUBE_LADDER = Ladder(
         (
             PaperSetting("003 cube", "paper 003, coarser mesh", _COARSE, 0.001),
             PaperSetting("003 cone", "paper 003, the cone's material here", _CONE, 1e-4),
+        ),
+    )
+)
+
+
+def _liver(n: int, material: Material) -> Scene:
+    """The body made by formulas, coarser, so that all modes are at hand."""
+    return liver_scene(with_sets(generated_liver((2 * n, n + 1, n))), material)
+
+
+_LIVER = replace(_COARSE, mesh=3)
+LIVER_LADDER = Ladder(
+    body=StabilityBody(
+        "a liver made by formulas, coarser (tetrahedra)",
+        _liver,
+        _LIVER,
+        (2, 3, 4),
+        PRINTED_LIVER_STEP,
+        (
+            PaperSetting(
+                "003 liver", "paper 003, another and coarser mesh", _LIVER, PRINTED_LIVER_STEP
+            ),
         ),
     )
 )
