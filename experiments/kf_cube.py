@@ -81,6 +81,18 @@ METHODS = {
         markers=A,
         chosen=WALK_UNRECORDED,
     ),
+    "kf_gated": Method(
+        "20 modes and load bias, gate", ReducedKf(gate=0.999), markers=A, chosen=WALK_UNRECORDED
+    ),
+    "kf_unclocked": Method(
+        "20 modes and load bias, looks taken as on time",
+        ReducedKf(clock=0.0),
+        markers=A,
+        chosen=WALK_UNRECORDED,
+    ),
+    "kf_smoothed": Method(
+        "20 modes and load bias", ReducedKf(smooth=True), markers=A, chosen=WALK_UNRECORDED
+    ),
     "filterpy": Method(
         "filterpy's KalmanFilter, 5 modes", Guest(), markers=A, chosen=WALK_UNRECORDED
     ),
@@ -90,8 +102,11 @@ METHODS = {
 RIVALS = ("fem", "kf_printed", "kf_load", "load_scale", "kf_reduced")
 
 
-def _case(name: str, doc: str, **changes: Any) -> Case:
-    return Case(name, doc, changed("twin", **changes), methods=RIVALS)
+CAREFUL = (*RIVALS, "kf_gated", "kf_unclocked", "kf_smoothed")
+
+
+def _case(name: str, doc: str, methods: tuple[str, ...] = RIVALS, **changes: Any) -> Case:
+    return Case(name, doc, changed("twin", **changes), methods=methods)
 
 
 CASES = (
@@ -102,6 +117,9 @@ CASES = (
     _case("nu", "the truth has a Poisson ratio of 0.30", nu=0.30),
     _case("sparse", "models are 20 % stiffer, seen every 10th step, a fifth missing",
           stiffness=1 / 1.2, every=10, missing=0.2),
+    _case("outliers", "a fiftieth of the looks is 1 mm off", CAREFUL, outliers=0.02),
+    _case("late", "looks are off their time by 20 ms (sd), which their clock tells", CAREFUL,
+          late=20e-3),
 )  # fmt: skip
 
 

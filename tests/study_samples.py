@@ -50,6 +50,8 @@ class Filter:
     Q: float = quantity(1e-11, "m2", "process noise")
     R: float | None = quantity(None, "m2", "measurement noise")
     gains: str = quantity("shared", "1", "shared or every_step")
+    gate: float | None = quantity(None, "1", "of looks")
+    smooth: bool = quantity(False, "1", "by later looks")
     trap: str = quantity("", "1", "raise, or wait for a file")
 
     def prepare(self, system, looks):
@@ -61,7 +63,8 @@ class Filter:
             with (Path(self.trap[6:]) / "runs").open("a") as out:
                 out.write(f"{self.Q}\\n")
             time.sleep(float(os.environ.get("TRAP_SECONDS", "0")))
-        return KfFem(DT, self.Q, self.R, 1e-11, gains=self.gains).prepare(system, looks)
+        return KfFem(DT, self.Q, self.R, 1e-11, gains=self.gains, gate=self.gate,
+                     smooth=self.smooth).prepare(system, looks)
 
 
 def scene(E):

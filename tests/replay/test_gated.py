@@ -28,11 +28,11 @@ def gated(rejected: slice) -> Followed:
 
 
 def test_the_table_counts_looks_and_says_when() -> None:
-    found = gate_exhibit({"kf": gated(slice(3, 6))})
+    found = gate_exhibit({"kf": gated(slice(3, 6))}, {})
     assert found is not None
     (row,) = found.tables[0].rows
-    assert row[:4] == ("filter", "tip", 20, 3)
-    assert np.allclose([float(str(v)) for v in row[4:]], [0.2, T[6], T[10], 7.0])
+    assert row[:5] == ("recorded", "filter", "tip", 20, 3)
+    assert np.allclose([float(str(v)) for v in row[5:]], [0.2, T[6], T[10], 7.0])
     assert found.words == ()
     (chart,) = found.charts
     assert chart.series[0].y.tolist() == [7.0] * 3
@@ -42,15 +42,15 @@ def test_a_filter_that_rejects_most_of_its_looks_is_warned_of() -> None:
     assert gate_warnings({"kf": gated(slice(0, 10))}) == ()
     (words,) = gate_warnings({"kf": gated(slice(0, 11))})
     assert "its gate rejected 11 of 20 looks, 0.2 expected" in words
-    found = gate_exhibit({"kf": gated(slice(0, 11))})
+    found = gate_exhibit({"kf": gated(slice(0, 11))}, {})
     assert found is not None
     assert found.words == (words,)
 
 
 def test_without_a_gate_nothing_is_shown() -> None:
     one = np.ones(STEPS)
-    assert gate_exhibit({"kf": followed(one, one), "fem": followed(None, None)}) is None
-    quiet = gate_exhibit({"kf": gated(slice(0, 0))})
+    assert gate_exhibit({"kf": followed(one, one), "fem": followed(None, None)}, {}) is None
+    quiet = gate_exhibit({}, {"late": {"kf": gated(slice(0, 0))}})
     assert quiet is not None
     assert quiet.charts == ()
-    assert quiet.tables[0].rows[0][5:] == (None, None, None)
+    assert quiet.tables[0].rows[0][6:] == (None, None, None)

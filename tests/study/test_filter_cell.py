@@ -61,6 +61,20 @@ def test_shared_gains_give_the_scores_of_single_runs(
     assert len(set(together.scores["top.rmse"])) == 3  # every seed has its own noise
 
 
+def test_gated_and_smoothed_seeds_run_one_by_one(pulled: Experiment) -> None:
+    """Gains that depend on what was measured are nobody else's; a smoothed run has no step time."""
+    plain = first(pulled)
+    gated = first(pulled, methods__kf__gate="0.999999")
+    assert not gated.shared
+    assert gated.scores["top.rmse"] == pytest.approx(plain.scores["top.rmse"], rel=1e-4)
+    smoothed = first(pulled, methods__kf__smooth="true")
+    assert not smoothed.shared
+    assert smoothed.step_s is None
+    for one, other in zip(smoothed.scores["top.rmse"], plain.scores["top.rmse"], strict=True):
+        assert one != pytest.approx(other, rel=1e-3)
+    assert smoothed.scores["nis.per_dof"] == pytest.approx(plain.scores["nis.per_dof"], rel=1e-6)
+
+
 def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Experiment) -> None:
     scores = {s.name: s.value for s in compare(pulled, Options({}, ("kf",))).methods[0].scores}
     found = first(pulled).scores

@@ -8,13 +8,13 @@ from validate.study.score import FilterScores
 from validate.study.store import Record
 
 
-def ranked(**cells: tuple[Sequence[float], float]) -> Ranking:
+def ranked(**cells: tuple[Sequence[float], float | None]) -> Ranking:
     made = [FilterCell(name, (), (), key=name) for name in cells]
     records = {name: record(name, scores, step) for name, (scores, step) in cells.items()}
     return rankings(made, records, "e")[0]
 
 
-def record(key: str, scores: Sequence[float], step: float = 1.0) -> Record[FilterScores]:
+def record(key: str, scores: Sequence[float], step: float | None = 1.0) -> Record[FilterScores]:
     return Record(key, FilterScores({"e": tuple(scores)}, {"e": "m"}, step_s=step))
 
 
@@ -49,6 +49,13 @@ def test_a_cell_with_more_error_and_more_time_is_dominated() -> None:
         "exact": None, "same": None, "quick": None, "poor": 1, "jitter": 3,
     }  # fmt: skip
     assert [r.cell.method for r in found.front] == ["quick", "same", "exact"]
+
+
+def test_what_sees_the_future_is_first_by_error_and_no_rival_by_rate() -> None:
+    found = ranked(smoothed=((1.0, 1.0), None), quick=((5.0, 5.0), 1.0), exact=((2.0, 2.0), 9.0))
+    assert [r.cell.method for r in found.rows] == ["smoothed", "exact", "quick"]
+    assert [r.dominated_by for r in found.rows] == [None, None, None]
+    assert [r.cell.method for r in found.front] == ["quick", "exact"]
 
 
 def test_conditions_are_ranked_apart_and_failures_are_rows() -> None:

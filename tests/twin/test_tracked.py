@@ -194,3 +194,30 @@ def test_records_that_are_no_vectors_are_refused() -> None:
     spoilt = {**recording.metadata, "camera": {"up": "0 1"}}
     with pytest.raises(RegistrationError, match="camera 'up' is '0 1': expected three numbers"):
         placed_markers(replace(recording, metadata=spoilt), MESH)
+
+
+def test_mistaken_looks_are_as_many_and_as_far_off_as_declared() -> None:
+    """In any direction, never at the first look; noise and gaps stay what they were."""
+    right, odd = made(Camera(1e-5)), made(Camera(1e-5, outliers=0.1, astray=2e-3))
+    off = np.linalg.norm(odd.markers["markers"].x - right.markers["markers"].x, axis=2)
+    assert off[0].max() == 0.0
+    assert off[off > 0] == pytest.approx(2e-3)
+    assert (off[1:] > 0).mean() == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_late_look_sees_the_motion_of_its_own_time_and_says_how_sure_it_is() -> None:
+    """A moves by 10 mm/s along x: looks 2 ms off (sd) show it 20 um off; its clock's record says
+    so. What stands still shows nothing of it."""
+    exact, late = made(Camera(0.0)), made(Camera(0.0, late=2e-3))
+    off = displacement(late, "A") - displacement(exact, "A")
+    assert off[20:-20, 0].std() == pytest.approx(2e-5, rel=0.15)
+    assert np.abs(off[:, 1:]).max() < 1e-12
+    assert np.abs(late.markers["markers"].x[:, 2:] - exact.markers["markers"].x[:, 2:]).max() == 0
+    assert placed_markers(late, MESH).sd_t == 2e-3
+    assert placed_markers(exact, MESH).sd_t == 0.0
+
+
+@pytest.mark.parametrize("wrong", [{"outliers": 1.0}, {"astray": 0.0}, {"late": -1.0}])
+def test_a_careless_camera_has_its_limits(wrong: dict[str, float]) -> None:
+    with pytest.raises(RecordingError, match="0 <= outliers < 1, astray > 0, late >= 0"):
+        Camera(1e-5, **wrong)  # type: ignore[arg-type]

@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.replay.followed import Followed
+from validate.replay.followed import Cases, Followed
 
 _FAR = "gate.far."
+_DRAWN = 3  # rejected looks from which a picture says more than the table
 _MOST = 0.5  # share of rejected looks from which a filter follows itself, not the recording
 
 
-def gate_exhibit(main: Mapping[str, Followed]) -> Exhibit | None:
+def gate_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
     """None where no filter has a gate."""
-    gated = [f for f in main.values() if "gate.rejected" in f.run.traces and len(f.run.t)]
+    every = [*main.values(), *(f for case in others.values() for f in case.values())]
+    gated = [f for f in every if "gate.rejected" in f.run.traces and len(f.run.t)]
     if not gated:
         return None
     table = NumberTable(
@@ -22,13 +24,13 @@ def gate_exhibit(main: Mapping[str, Followed]) -> Exhibit | None:
         "Looks of a marker whose components together lie further off than the filter's own claim "
         "explains; they were treated as missing. Expected: of a filter whose claims hold. Far: by "
         "how many standard deviations of its innovation the farthest one lay off.",
-        ("filter", "marker", "looks", "rejected", "expected / 1", "first / s", "last / s",
+        ("case", "filter", "marker", "looks", "rejected", "expected / 1", "first / s", "last / s",
          "far / 1"),
         tuple(_row(f, marker) for f in gated for marker in _markers(f)),
         "NIS and whiteness above are of the looks that passed.",
     )  # fmt: skip
-    words = tuple(gate_warnings(main))
-    charts = tuple(_chart(f) for f in gated if _rejected(f))
+    words = gate_warnings(main)
+    charts = tuple(_chart(f) for f in gated if _rejected(f) >= _DRAWN)
     return Exhibit("gate", "Which measurements were rejected?", words, (table,), charts)
 
 
@@ -68,7 +70,7 @@ def _row(f: Followed, marker: str) -> tuple[Entry, ...]:
     when: tuple[Entry, ...] = (None, None, None)
     if off.any():
         when = (float(t[off][0]), float(t[off][-1]), float(far.max()))
-    return (f.label, marker, looks, int(off.sum()), share * looks, *when)
+    return (f.case or "recorded", f.label, marker, looks, int(off.sum()), share * looks, *when)
 
 
 def _passed(f: Followed, marker: str) -> NDArray[np.bool_]:
@@ -85,6 +87,7 @@ def _chart(f: Followed) -> Chart:
         if (far > 0).any():
             series.append(Series(marker, f.own_time[far > 0], far[far > 0], "points"))
     return Chart(
-        f"gate_{f.method}", f"Rejected looks of {f.label}", "recorded time / s",
+        "_".join(("gate", f.method, *filter(None, [f.case]))),
+        ", ".join((f"Rejected looks of {f.label}", *filter(None, [f.case]))), "recorded time / s",
         "standard deviations off / 1", tuple(series), log="y", scale=1.0,
     )  # fmt: skip

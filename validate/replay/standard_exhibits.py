@@ -33,7 +33,7 @@ def standard_exhibits(
         _speeds(experiment, main) if over_time else None,
         _maps(shown),
         consistency_exhibit(main, others, experiment.accepted),
-        gate_exhibit(main),
+        gate_exhibit(main, others),
     )
     return tuple(exhibit for exhibit in found if exhibit)
 
@@ -201,7 +201,7 @@ def _speed_row(f: Followed, base: float | None) -> tuple[Entry, ...]:
     times, end, factor = f.run.step_s, f.run.outcome, _real_time(f)
     ended = end.state if end.state == "finished" else f"{end.state} at step {end.step}: {end.why}"
     if times is None or factor is None:
-        return (f.label, f.run.setup_s, *(7 * (None,)), 0, ended)
+        return (f.label, f.run.setup_s, *(7 * (None,)), len(f.run.t), ended)
     parts = max(float(f.run.traces["updates"].y[0]), 1.0) if _limit(f) else 1.0
     dt = _step(f.run.t) / parts
     limit = _limit(f)

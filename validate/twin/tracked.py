@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, Ints, checked
 from validate.errors import RecordingError, UsageError
+from validate.recording.alignment import RECORD
 from validate.recording.types import Markers, Record, Recording, Source
 from validate.scene.scene import Scene
 from validate.solve.types import Run
@@ -53,13 +54,18 @@ class Camera:
 
     `every`: it looks at each that many steps. `missing`: share of the looks at which a point is not
     seen. `still`: looks at rest whose mean is the first sample, which the registration rests on; 1
-    leaves the registration as uncertain as any look.
+    leaves the registration as uncertain as any look. `outliers`: share of the looks at which a
+    point is taken for something else, `astray` m off in any direction. `late`: sd s by which the
+    time of a look is off, the same for all points; the recording declares it as its clock's.
     """
 
     sd: float
     every: int = 1
     missing: float = 0.0
     still: int = 100
+    outliers: float = 0.0
+    astray: float = 1e-3
+    late: float = 0.0
     turn: tuple[float, float, float] = (62.0, -17.0, 128.0)
     shift: tuple[float, float, float] = (0.412, -0.236, -1.137)
 
@@ -68,6 +74,11 @@ class Camera:
             raise RecordingError(
                 f"camera with sd {self.sd:g} m, every {self.every}, missing {self.missing:g}, "
                 f"still {self.still}: sd >= 0, every and still >= 1, 0 <= missing < 1"
+            )
+        if not (0 <= self.outliers < 1 and self.astray > 0 and self.late >= 0):
+            raise RecordingError(
+                f"camera with outliers {self.outliers:g}, astray {self.astray:g} m, late "
+                f"{self.late:g} s: 0 <= outliers < 1, astray > 0, late >= 0"
             )
 
     @property
@@ -78,14 +89,35 @@ class Camera:
     def looks(self, points: Points, seeds: Mapping[str, np.random.Generator]) -> Markers:
         """Every point at each `every`-th time; the first sample is seen whole."""
         pick = np.arange(0, len(points.t), self.every)
-        x = points.rest + points.u[pick]
+        x = points.rest + self._shown(points, pick, seeds["odd"])
         noise = self.sd * seeds["markers"].standard_normal(x.shape)
         noise[0] /= np.sqrt(self.still)
         x = (x + noise) @ self.rotation.T + np.array(self.shift)
+        x += self._strayed(x.shape, seeds["odd"])
         unseen = seeds["missing"].random(x.shape[:2]) < self.missing
         unseen[0] = False
         x[unseen] = np.nan
         return Markers(points.t[pick], points.names, x, self.sd, "camera")
+
+    def _shown(self, points: Points, pick: Ints, rng: np.random.Generator) -> Floats:
+        """Displacements (k, p, 3) m when the camera really looked."""
+        if not self.late:
+            return points.u[pick]
+        t = points.t[pick] + np.append(0.0, self.late * rng.standard_normal(len(pick) - 1))
+        t = np.clip(t, points.t[0], points.t[-1])
+        flat = points.u.reshape(len(points.t), -1)
+        seen = np.stack([np.interp(t, points.t, column) for column in flat.T], axis=1)
+        return seen.reshape(len(pick), *points.u.shape[1:])
+
+    def _strayed(self, shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
+        """How far off (k, p, 3) m looks are; the first one is not."""
+        off = np.zeros(shape)
+        if self.outliers:
+            odd = rng.random(shape[:2]) < self.outliers
+            odd[0] = False
+            way = rng.standard_normal((int(odd.sum()), 3))
+            off[odd] = self.astray * way / np.linalg.norm(way, axis=1)[:, None]
+        return off
 
 
 def require_noise(variance: float) -> None:
@@ -156,7 +188,8 @@ def record_tracked(
             f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm off their rest at t = 0 s: the "
             "registration needs the rest first"
         )
-    seeds = streams(origin.seed, ("markers", "missing", *readings))
+    seeds = streams(origin.seed, ("markers", "missing", *readings, "odd"))
+    clock = {f"{RECORD}markers": {"sd": repr(camera.late)}} if camera.late else {}
     return Recording(
         origin.name,
         Source(origin.name, "", 0, "made in memory"),
@@ -180,6 +213,7 @@ def record_tracked(
                 "seed": str(origin.seed),
                 **origin.declared,
             },
+            **clock,
         },
     )
 

@@ -29,7 +29,7 @@ from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark
 from validate.twin.stepped import SteppedTwin
-from validate.twin.tracked import Origin, Reading
+from validate.twin.tracked import Camera, Origin, Reading
 
 NODES = {"node_A": (2, 2, 7), "node_B": (2, 2, 5), "corner": (0, 0, 7)}  # in cells
 FIDUCIALS = {"f1": (0, 0, 0), "f2": (4, 0, 0), "f3": (0, 4, 0), "f4": (4, 4, 0)}
@@ -63,13 +63,20 @@ class Traction:
 
 @dataclass(frozen=True)
 class LayeredTwin(TrackedTwin):
-    """A twin that may hold what the models do not, and step finer."""
+    """A twin that may hold what the models do not, step finer, and look carelessly."""
 
     inside: Literal["nothing", "layer", "inclusion"] = quantity(
         "nothing", "1", "stiff layer at mid-height, or stiff inclusion"
     )
     contrast: float = quantity(5.0, "1", "modulus of layer or inclusion over the rest")
     finer: int = quantity(1, "1", "its steps in one of the models'")
+    outliers: float = quantity(0.0, "1", "share of the looks at which a marker is mistaken")
+    astray: float = quantity(1e-3, "m", "how far off it is then, in any direction")
+    late: float = quantity(0.0, "s", "sd of the time of a look, which its clock declares")
+
+    @property
+    def camera(self) -> Camera:
+        return replace(super().camera, outliers=self.outliers, astray=self.astray, late=self.late)
 
 
 @dataclass(frozen=True)
