@@ -106,8 +106,10 @@ def _inp(path: Path, mesh: Mesh) -> Path:
     return path
 
 
-def test_a_sphere_is_filled_to_its_volume(tmp_path: Path) -> None:
-    """The volume of the triangulated sphere, within the envelope of a thousandth."""
+def test_a_sphere_is_filled_to_its_volume(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The volume of the triangulated sphere, within the envelope of a thousandth; nothing is left
+    in the current folder, where the library would write."""
+    monkeypatch.chdir(tmp_path)
     surface = pv.Icosphere(radius=10.0, nsub=3)
     surface.save(tmp_path / "ball.stl")
     body = filled(tmp_path / "ball.stl", "mm", 4e-3)
@@ -117,6 +119,7 @@ def test_a_sphere_is_filled_to_its_volume(tmp_path: Path) -> None:
                            - body.mesh.nodes[body.mesh.cells[:, 1]], axis=1)  # fmt: skip
     assert 1.5e-3 < np.median(edges) < 6e-3
     assert "triangles around" in body.told["surface"]
+    assert [f.name for f in tmp_path.iterdir()] == ["ball.stl"]
 
 
 def test_an_open_surface_is_refused_with_its_open_edges(tmp_path: Path) -> None:

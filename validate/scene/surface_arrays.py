@@ -2,8 +2,9 @@
 
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -32,9 +33,11 @@ def arrays(path: Path, edge: float = 0.0) -> dict[str, NDArray[Any]]:
             f"{loose} open or doubled edges in {len(triangles)} triangles: the surface is not "
             "closed; repair it first"
         )
-    nodes, cells = tetrahedralize(
-        points, triangles.astype(np.int32), edge_length_abs=edge or None, num_threads=1, quiet=True
-    )
+    with TemporaryDirectory(prefix="validate-") as folder, chdir(folder):  # it leaves files there
+        nodes, cells = tetrahedralize(
+            points, triangles.astype(np.int32), edge_length_abs=edge or None, num_threads=1,
+            quiet=True,
+        )  # fmt: skip
     return {
         "points": np.asarray(nodes, dtype=np.float64),
         "cells.tetra": np.asarray(cells, dtype=np.int64),
