@@ -8,6 +8,7 @@ cost in force and phase, and from which size they pay, is told beside a Krylov m
 from pathlib import Path
 
 from validate.compare.verdict import Accept
+from validate.papers.async_regions.block_figures import BLOCK_FIGURES
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.touched_block import (
     TouchedBlock,
@@ -38,6 +39,7 @@ EXPERIMENT = Experiment(
     axis="x",
     reference="whole",
     exhibits=tell,
+    published=BLOCK_FIGURES,
     frames=40,
     quick=changed("probe", seconds=2.0),
     twin=Twin(

@@ -10,7 +10,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.method import WALK_UNRECORDED
 
 DECLARED = {
-    "async_block": 0,
+    "async_block": 3,
     "async_line": 23,
     "bending_rod": 7,
     "ecoflex_cylinder": 3,
@@ -52,6 +52,7 @@ PRINTED = {
         *(1e-3 * v for v in (0.060494, 0.086648, 0.062242, 0.007254, 0.009434, 0.006051)),
     ),
     "ecoflex_cylinder": (104e3, 4.5e3, 36.7e3),
+    "async_block": (26,),
     "async_line": (  # paper 004
         1.65, 1.66, 1.76, 1.70, 2.86, 0.5, 6.6, 2.7, 73, 0.175, 0.123, 0.094, 0.059, 0.017,
         29.7, 46.3, 66.3, 90.3, 24.96, 25.93, 31.07, 3.9, 24.5,

@@ -12,12 +12,11 @@ from validate.papers.async_regions.bodies import bar, growing, impedance, pad_of
 from validate.papers.async_regions.line import TouchedLine
 from validate.papers.async_regions.methods import LINE
 from validate.papers.async_regions.runs import growth, off, peak, pushed
+from validate.papers.async_regions.tables import ENERGY, FORCE, energy_table, force_table
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
 from validate.solve.regions import AsyncRegions
-from validate.solve.types import Run
 
-_FORCE = "probe.force.x"
 _HALF = 1.0  # s around the middle in which the paper's "approximately 20th second" is read
 _STIFF, _HZ, _DEEP = 25e3, 0.3, 0.05  # Pa, Hz, m: Table 2
 _SHORT, _NEAR = 10, 3  # free nodes and primary layers of the bar whose stability is mapped
@@ -54,9 +53,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
 
 
 _BORDERS = (
-    "Made energy is what body and spring have beyond what the hand put in and damping took. That "
-    "of the whole solve is the spring's, whose force is that of the tick's begin; the rest is made "
-    "by borders.",
+    ENERGY,
     "Growth is the spectral radius over a common period, per tick, with the probe held: above 1 "
     "some motion grows without bound.",
 )
@@ -73,35 +70,6 @@ def spring_words(p: TouchedLine) -> tuple[str, ...]:
         f"the probe held the whole solve grows by {grows:.4g} a tick, the force oscillates; take a "
         "softer spring or shorter ticks.",
     )
-
-
-def force_table(
-    name: str, title: str, main: Mapping[str, Followed], middle: float, within: float
-) -> tuple[NumberTable, dict[str, float]]:
-    """Peak (in `middle` +- `within` s), error, phase and ticks of every method, and as numbers."""
-    runs = {key: f.run for key, f in main.items() if f.run.finished}
-    whole = runs.get("whole")
-    rows: list[tuple[Entry, ...]] = []
-    numbers: dict[str, float] = {}
-    for key, run in runs.items():
-        top = peak(run.traces[_FORCE].y, run.t, middle, within)
-        mean, worst = _ticks(run)
-        row: list[Entry] = [main[key].label, top, None, None, 1e3 * mean, 1e3 * worst]
-        numbers |= {f"peak.{key}": top, f"tick.{key}": 1e3 * mean}
-        if whole is not None:
-            error = 100 * (top / peak(whole.traces[_FORCE].y, whole.t, middle, within) - 1)
-            row[2:4] = [error, 100 * off(run.traces[_FORCE].y, whole.traces[_FORCE].y)]
-            gain = 100 * (1 - mean / _ticks(whole)[0])
-            numbers |= {f"error.{key}": error, f"gain.{key}": gain}
-        rows.append(tuple(row))
-    heads = ("method", "peak / N", "error / %", "rms / %", "median tick / ms", "worst tick / ms")
-    return NumberTable(name, title, heads, tuple(rows)), numbers
-
-
-def _ticks(run: Run) -> tuple[float, float]:
-    """Median and longest tick, s."""
-    assert run.step_s is not None
-    return run.step_s.p50, run.step_s.max
 
 
 def _table_2(p: TouchedLine) -> tuple[NumberTable, dict[str, float]]:
@@ -139,7 +107,7 @@ def _impedances(p: TouchedLine, main: Mapping[str, Followed]) -> NumberTable:
         if f.run.finished:
             at = [(x - p.probe.lowest) / rise for x in hz]
             tops = [
-                peak(f.run.traces[_FORCE].y, f.run.t, a, 1 / x) for a, x in zip(at, hz, strict=True)
+                peak(f.run.traces[FORCE].y, f.run.t, a, 1 / x) for a, x in zip(at, hz, strict=True)
             ]
             rows.append((f.label, *tops))
     heads = ("method", *(f"{x:.3g} Hz / N" for x in hz))
@@ -148,17 +116,13 @@ def _impedances(p: TouchedLine, main: Mapping[str, Followed]) -> NumberTable:
 
 
 def _energies(p: TouchedLine, main: Mapping[str, Followed]) -> NumberTable:
-    """The first tenth of the chirp's time, at its highest frequency, with energies."""
+    """The first tenth of the chirp's time, at its highest frequency."""
     t: Floats = p.dt * np.arange(1, round(min(4.0, p.probe.seconds) / p.dt) + 1, dtype=np.float64)
     depth = p.probe.depth * np.sin(2 * np.pi * p.probe.highest * t)
-    scene = bar(p.body.E, p.body.cells, p.body.damping)
-    rows: list[tuple[Entry, ...]] = []
     given = {"dt": p.dt, "spring": p.probe.spring, "pad": pad_of(p.body.cells)}
-    for name in (name for name in main if name in LINE):
-        found = pushed(scene, LINE[name].given(given), depth, account=True)
-        rows.append((main[name].label, 1e3 * found.made, 1e3 * found.put, "; ".join(found.words)))
-    heads = ("method", "made at most / mJ", "put in at most / mJ", "said")
-    return NumberTable("energy", f"Energy at {p.probe.highest:g} Hz.", heads, tuple(rows))
+    rivals = {main[n].label: LINE[n].given(given) for n in main if n in LINE}
+    scene = bar(p.body.E, p.body.cells, p.body.damping)
+    return energy_table(f"Energy at {p.probe.highest:g} Hz.", scene, rivals, depth)
 
 
 def _stability(p: TouchedLine) -> Heat:

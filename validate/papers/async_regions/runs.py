@@ -5,6 +5,7 @@ from time import thread_time
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.fem.system import System, build
@@ -21,8 +22,10 @@ class Pushed:
     """Force (nt,) N on the hand along x, CPU time of the ticks (nt,) s, layers (nt,) of the primary
     region (0: there is none).
 
-    `made` J is the largest energy of body and spring beyond what the hand put in and damping took;
-    `put` J the largest that the hand had put in. `words` on rounding and how it ended.
+    `made` J is the largest energy of body and spring beyond what the hand put in and damping took,
+    `lost` J the most that they lacked of it; `put` J the largest that the hand had put in.
+    `changed` (nt,): whether regions or contact changed in the tick. `words` on rounding and
+    how it ended.
     """
 
     force: Floats
@@ -30,6 +33,8 @@ class Pushed:
     layers: Floats
     made: float
     put: float
+    lost: float
+    changed: NDArray[np.bool_]
     words: tuple[str, ...]
 
 
@@ -45,7 +50,7 @@ def pushed(
     if path.ndim == 1:
         path = np.pad(-path[:, None], [(0, 0), (0, scene.mesh.dimension - 1)])
     state, ledger = stepper.rest(), Ledger.of(scene, settings) if account else None
-    forces, seconds, layers = [], [], []
+    forces, seconds, layers, changed = [], [], [], []
     names = [f"{PROBE}.force.{a}" for a in "xyz"[: path.shape[1]]]
     for x in path:
         start = thread_time()
@@ -55,21 +60,23 @@ def pushed(
             break
         forces.append([state.numbers[name] for name in names])
         layers.append(state.numbers.get(f"{PROBE}.layers", 0.0))
+        changed.append(state.numbers.get(f"{PROBE}.changed", 0.0) > 0)
         if ledger:
             ledger = ledger.after(stepper.field(state), x, np.array(forces[-1]))
     words = stepper.notices(state) if isinstance(stepper, Noticing) else ()
     ends = (state.failure[1],) if state.failure else ()
     return Pushed(
         np.array(forces).reshape(-1, len(names))[:, 0], np.array(seconds), np.array(layers),
-        ledger.made if ledger else 0.0, ledger.most if ledger else 0.0, words + ends,
+        ledger.made if ledger else 0.0, ledger.most if ledger else 0.0,
+        ledger.missing if ledger else 0.0, np.array(changed, dtype=np.bool_), words + ends,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Ledger:
     """Energies J of a linear body and the probe's spring: `put` in by the hand, `lost` to damping;
-    `made` and `most` are the largest made and put in so far. `u` (N,), `x` (d,), `f` (d,) N of the
-    last tick."""
+    `made`, `missing` and `most` are the largest made, lacked and put in so far. `u` (N,), `x` (d,),
+    `f` (d,) N of the last tick."""
 
     system: System
     spring: float
@@ -81,6 +88,7 @@ class Ledger:
     lost: float = 0.0
     made: float = 0.0
     most: float = 0.0
+    missing: float = 0.0
 
     @classmethod
     def of(cls, scene: Scene, settings: AsyncRegions | TouchedKrylov) -> "Ledger":
@@ -99,6 +107,7 @@ class Ledger:
         return replace(
             self, u=u, x=x, f=f, put=put, lost=lost,
             made=max(self.made, held + lost - put), most=max(self.most, put),
+            missing=max(self.missing, put - held - lost),
         )  # fmt: skip
 
 

@@ -13,11 +13,14 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
+from validate.papers.async_regions.block_figures import ring_nodes
 from validate.papers.async_regions.bodies import PROBE, block, chirp
 from validate.papers.async_regions.line import HapticProbe, LoadCell, probed
-from validate.papers.async_regions.line_exhibits import force_table
+from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import pushed
 from validate.papers.async_regions.sizes import size_rows, size_table
+from validate.papers.async_regions.sliding import sliding_exhibit
+from validate.papers.async_regions.tables import ENERGY, energy_table, force_table
 from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
@@ -30,6 +33,10 @@ from validate.solve.regions import AsyncRegions
 SIZES = ((2, 18), (2, 26), (3, 6), (3, 8), (3, 12))  # 343, 729 and 2197 nodes in 3-D
 _TICKS, _HZ, _DEEP = 400, 2.5, 5e-3
 _VECTORS = 4
+_TICK_WORDS = (
+    "Ticks are those of the runs above, by the wall's clock. A mean hides the slow tick: of "
+    "regions it is the one in which the far region is due, once in its period.",
+)
 _PUSH = HapticProbe(depth=5e-3, lowest=0.5, highest=1.5, seconds=4.0)
 _CELL = LoadCell(every=20)
 
@@ -82,9 +89,9 @@ def sets(p: TouchedBlock, seen: Registered) -> Mapping[str, Any]:
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """Force, phase and ticks of every method, and at which size regions pay."""
-    p = cast(TouchedBlock, parameters)
+    p, main = cast(TouchedBlock, parameters), cases[""]
     forces, numbers = force_table(
-        "force", "Largest force of the whole run, against the whole solve.", cases[""],
+        "force", "Largest force of the whole run, against the whole solve.", main,
         p.probe.seconds / 2, p.probe.seconds / 2,
     )  # fmt: skip
     t: Floats = p.dt * np.arange(1, _TICKS + 1, dtype=np.float64)
@@ -96,4 +103,18 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "for a linear one. Regions pay where matrices change at every tick, or where the far "
         "region is solved elsewhere.",
     )
-    return Told((Exhibit("sizes", "What regions cost and gain", words, (forces, sizes)),), numbers)
+    progress("energy of borders, sliding contact")
+    given = sets(p, main["whole"].registered[0])
+    rivals = {main[name].label: BLOCK[name].given(given) for name in main}
+    scene = build(None, p, None)
+    swing = p.probe.depth * np.sin(2 * np.pi * p.probe.highest * t)
+    energies = energy_table(f"Energy at {p.probe.highest:g} Hz.", scene, rivals, swing)
+    return Told(
+        (
+            Exhibit("ticks", "What regions cost", _TICK_WORDS, (forces,)),
+            Exhibit("energy", "What borders make and lose", (ENERGY,), (energies,)),
+            sliding_exhibit(scene, rivals, main["whole"].label),
+            Exhibit("sizes", "At which size regions pay", words, (sizes,)),
+        ),
+        numbers | ring_nodes(),
+    )

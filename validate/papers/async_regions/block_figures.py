@@ -1,0 +1,43 @@
+"""What paper 004 shows of 2-D and 3-D, beside ours: pictures of regions, and no force or time."""
+
+import numpy as np
+
+from validate.compare.published import Figure
+from validate.fem.system import build
+from validate.scene.box import grid
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support
+from validate.solve.region_map import layers_from, node_graph, split
+
+_WIDE = 12  # cells of Fig. 2's square: its rows of the list are 13 nodes apart
+_NEAR = 2  # layers of the red region there: 3 by 3 nodes
+_NONE = (
+    "no force, size or time is printed in 2-D or 3-D: 'a one dimensional model is used' (section "
+    "6); Figs 1 and 2 show how regions lie"
+)
+_LIST = (
+    "the list of Fig. 2(b) begins (42,48), its other rows at 54, 67, 80 and 93, 13 apart: the "
+    "first must be 41 to 47; and a ring 7 nodes wide and 5 high around 3 by 3 is no whole number "
+    "of layers. By distance in the mesh one layer has 16 nodes, two have 40"
+)
+
+
+def ring_nodes() -> dict[str, float]:
+    """Nodes of the one layer around 3 by 3 in the middle of a square of quadrilaterals."""
+    scene = Scene(grid((1.0, 1.0), (_WIDE, _WIDE)), Material(1.0, 0.0, rho=1.0),
+                  (Support("x0", (0, 1)),))  # fmt: skip
+    K = build(scene).K
+    graph = node_graph(K, np.arange(K.shape[0]) // 2)
+    middle = scene.mesh.nearest_node(np.array([0.5, 0.5]))
+    of = split(layers_from(graph, np.array([middle])), (_NEAR, 1), graph).of
+    return {"ring.nodes": float((of == 1).sum())}
+
+
+BLOCK_FIGURES = (
+    Figure("green region of Fig. 2(b), 100 Hz: its nodes", "told:ring.nodes", 26, None, "1",
+           "not reproducible as printed", _LIST, "Fig. 2(b) and section 5.1", 16, 0.5),
+    Figure("peak force error of regions in 3-D", "told:error.near", None, None, "%",
+           "not comparable", _NONE, "Figs 1 and 2"),
+    Figure("gain of regions in 3-D, mean tick", "told:gain.near", None, None, "%",
+           "not comparable", _NONE, "Figs 1 and 2"),
+)  # fmt: skip
