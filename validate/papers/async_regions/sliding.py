@@ -50,7 +50,7 @@ def sliding_exhibit(
                      float(jumps[~found.changed].max(initial=0.0)),
                      100 * off(found.force, whole[: len(t)])))  # fmt: skip
         series.append(Series(label, t, found.force))
-    heads = ("method", "changes while drawn / 1", "largest step of the force at one / N",
+    heads = ("method", "changes of contact or regions / 1", "largest step of the force at one / N",
              "at other ticks / N", "rms force error / %")  # fmt: skip
     title = (
         f"Pushed in by {1e3 * _DEEP:g} mm in {_PUSHED:g} s, drawn {1e3 * _FAR:g} mm along the face "
