@@ -8,8 +8,10 @@ one on any such mesh: it is shown refused and run; every other method takes a so
 from pathlib import Path
 
 from validate.compare.verdict import Accept
+from validate.estimate.ensemble_kf import EnsembleKf
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
+from validate.estimate.roukf import Roukf
 from validate.papers.ekf_nfem.cube import CubeMesh, PushedCube, build, place, record, sets, truth
 from validate.papers.ekf_nfem.cube_exhibits import tell_cube
 from validate.papers.ekf_nfem.figures import CUBE_FIGURES
@@ -58,10 +60,14 @@ METHODS = {
         markers=A,
         chosen=CHOSEN,
     ),
+    "roukf": Method("unscented filter of the stiffness, 2 runs", Roukf(), markers=A),
+    "enkf": Method(
+        "ensemble filter of the stiffness, 10 runs of half steps", EnsembleKf(substeps=2), markers=A
+    ),
 }
 
 
-SOUND = ("nfem", "ekf_held", "ekf_companion", "reduced_modes", "reduced_pod")
+SOUND = ("nfem", "ekf_held", "ekf_companion", "reduced_modes", "reduced_pod", "roukf", "enkf")
 CASES = (
     Case(
         "stiff_model",

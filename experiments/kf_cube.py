@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from validate.compare.verdict import Accept
+from validate.estimate.ensemble_kf import EnsembleKf
 from validate.estimate.filterpy_guest import Guest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.reduced_kf import ReducedKf
-from validate.papers.kf_fem.block import PulledBlock, build, place, record, sets, truth
+from validate.estimate.roukf import Roukf
+from validate.papers.kf_fem.block import BlockModel, PulledBlock, build, place, record, sets, truth
 from validate.papers.kf_fem.figures import FIGURES
 from validate.papers.kf_fem.ladders import PRINTED_LADDER
 from validate.papers.kf_fem.seeds import tell
@@ -93,6 +95,24 @@ METHODS = {
     "kf_smoothed": Method(
         "20 modes and load bias", ReducedKf(smooth=True), markers=A, chosen=WALK_UNRECORDED
     ),
+    "roukf": Method("unscented filter of the stiffness, 2 runs", Roukf(), markers=A),
+    "roukf_layer": Method(
+        "unscented filter of the layer's stiffness and the rest's, 3 runs",
+        Roukf(parameters=("stiffness.layer", "stiffness.body"), sd=(1.0, 0.25)),
+        BlockModel(layer=True),
+        markers=A,
+    ),
+    "roukf_tied": Method(
+        "unscented filter of stiffness and load, 3 runs",
+        Roukf(parameters=("stiffness", "load.pull")),
+        markers=A,
+    ),
+    "enkf": Method(
+        "ensemble filter of the stiffness, 10 runs, inflated by 1 %",
+        EnsembleKf(inflation=1.01),
+        markers=A,
+        chosen="inflation chosen on this twin",
+    ),
     "filterpy": Method(
         "filterpy's KalmanFilter, 5 modes", Guest(), markers=A, chosen=WALK_UNRECORDED
     ),
@@ -110,9 +130,12 @@ def _case(name: str, doc: str, methods: tuple[str, ...] = RIVALS, **changes: Any
 
 
 CASES = (
-    _case("stiff_model", "the models are 20 % stiffer than the truth", stiffness=1 / 1.2),
+    _case("stiff_model", "the models are 20 % stiffer than the truth", (*RIVALS, "roukf", "enkf"),
+          stiffness=1 / 1.2),
     _case("soft_model", "the models are 20 % softer than the truth", stiffness=1 / 0.8),
-    _case("layer", "the truth has a stiff layer (five times) at mid-height", inside="layer"),
+    _case("layer", "the truth has a stiff layer (five times) at mid-height",
+          (*RIVALS, "roukf", "roukf_layer"),
+          inside="layer"),
     _case("inclusion", "the truth has a stiff inclusion (five times)", inside="inclusion"),
     _case("nu", "the truth has a Poisson ratio of 0.30", nu=0.30),
     _case("sparse", "models are 20 % stiffer, seen every 10th step, a fifth missing",

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from validate.compare.verdict import Accept
 from validate.estimate.reduced_kf import ReducedKf
+from validate.estimate.roukf import Roukf
 from validate.papers.released_beam.beam import build, heeded, place, sets
 from validate.papers.released_beam.cards import TIPS, HungMass, Relaxation, ReleasedBeam
 from validate.papers.released_beam.cards import BeamModel as Model
@@ -56,6 +57,13 @@ METHODS = {
         LINEAR,
         markers=("Tip - 1",),
         chosen="R and the load's walk, on the recording under gravity",
+    ),
+    "roukf": Method(
+        "unscented filter of the modulus, linear, given Tip - 1 to .2 mm",
+        Roukf(R=4e-8),
+        LINEAR,
+        markers=("Tip - 1",),
+        chosen="R, as for the filter of the load",
     ),
 }
 

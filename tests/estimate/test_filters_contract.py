@@ -29,7 +29,7 @@ SETTINGS: tuple[Filter, ...] = (
     Roukf(points="canonical", parameters=("stiffness", "load.pull"), sd=(0.2, 0.1)),
     EnsembleKf(update="deterministic", inflation=1.02),
     EnsembleKf(
-        parameters=("bias.pull",), bias_sd=1e-3, load_walk=1e-2, coordinates="nodes", radius=0.002
+        parameters=("bias.pull",), bias_sd=1e-3, bias_walk=1e-2, coordinates="nodes", radius=0.002
     ),
 )
 
@@ -88,7 +88,7 @@ def test_traces_hold_nis_and_innovations(settings: Filter, pulled: Case) -> None
 
 def still(settings: MemberModel) -> dict[str, float]:
     """Nothing walks."""
-    return {"walk": 0.0, "load_walk": 0.0} if isinstance(settings, EnsembleKf) else {}
+    return {"walk": 0.0, "bias_walk": 0.0} if isinstance(settings, EnsembleKf) else {}
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=repr)

@@ -39,13 +39,13 @@ class EnsembleKf(MemberModel):
     )
     radius: float | None = quantity(None, "m", "of localisation, along the mesh; none: everywhere")
     walk: float = quantity(0.0, "1/s^0.5", "random walk of every scale's logarithm")
-    load_walk: float = quantity(0.0, "N/s^0.5", "random walk of every bias")
+    bias_walk: float = quantity(0.0, "N/s^0.5", "random walk of every bias")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.runs < 3 or min(self.walk, self.load_walk) < 0:
+        if self.runs < 3 or min(self.walk, self.bias_walk) < 0:
             raise UsageError(
-                f"{self.runs} members, walks {self.walk:g} and {self.load_walk:g}: at least 3, 0, 0"
+                f"{self.runs} members, walks {self.walk:g} and {self.bias_walk:g}: at least 3, 0, 0"
             )
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
@@ -58,7 +58,7 @@ class EnsembleKf(MemberModel):
             raise UsageError(
                 f"{self.runs} members for {len(doubtful)} parameters: at least {len(doubtful) + 2}"
             )
-        walks = [self.load_walk if p.kind == "bias" else self.walk for p in doubtful]
+        walks = [self.bias_walk if p.kind == "bias" else self.walk for p in doubtful]
         reach = None if self.radius is None else reached(members, measurements, self.radius)
         analysis = DrawnRuns(self, members.doubts.sd, np.array(walks) * np.sqrt(self.h), reach)
         looks = sight(self, members, measurements)

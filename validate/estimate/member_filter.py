@@ -13,6 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
+from validate.estimate import node_ekf_kernel as kernel
 from validate.estimate.care import (
     Care,
     care_of,
@@ -209,7 +210,7 @@ class MemberStepper:
 
     def step(self, state: State, inputs: Floats) -> State:
         """The posterior at the end of a step of `substeps` parts; `inputs` are the loads there."""
-        if failure := self._refused(state.inner.x):
+        if state.k == 0 and (failure := self._refused(state.inner.x)):
             return replace(state, failure=failure)
         last, found = cast(MemberStates, state.inner), nothing(len(self.sight.names))
         now, parts = last, self.model.substeps
@@ -295,7 +296,13 @@ class MemberStepper:
 
     def _lost(self, X: Floats) -> tuple[Ending, str] | None:
         far = FAR * float(np.ptp(self.scene.mesh.nodes, axis=0).max())
-        largest = float(np.abs(in_nodes(self.members, X)).max())
+        shapes = self.members.displaced
+        if shapes is None:
+            u = X
+        else:
+            own = self.members.nodes is not None
+            u = X[:, : len(shapes)] if own else in_nodes(self.members, X)
+        largest = kernel.farthest(np.ravel(u))
         if largest < far:
             return None
         found = f"moved by {largest:.3g} m" if np.isfinite(largest) else "is beyond all numbers"

@@ -9,6 +9,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable
 from validate.compare.track import TRACK_METRICS, TrackError, nrmse, track_error
 from validate.register.markers import MarkerObservation
 from validate.replay.consistency import consistency_exhibit, nis_of
+from validate.replay.estimated import estimated_exhibit
 from validate.replay.experiment import Experiment
 from validate.replay.followed import Cases, Followed
 from validate.replay.gated import gate_exhibit
@@ -34,6 +35,7 @@ def standard_exhibits(
         _maps(shown),
         consistency_exhibit(main, others, experiment.accepted),
         gate_exhibit(main, others),
+        estimated_exhibit(main, others),
     )
     return tuple(exhibit for exhibit in found if exhibit)
 

@@ -24,7 +24,7 @@ from validate.replay.followed import Truth, truth_of
 from validate.scene.box import box, centroids
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Probe, Scene, Support
+from validate.scene.scene import Foundation, Load, Probe, Scene, Support
 from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark
@@ -70,6 +70,7 @@ class LayeredTwin(TrackedTwin):
     )
     contrast: float = quantity(5.0, "1", "modulus of layer or inclusion over the rest")
     finer: int = quantity(1, "1", "its steps in one of the models'")
+    springs: float = quantity(0.0, "N/m^3", "of an elastic support below it; 0: held")
     outliers: float = quantity(0.0, "1", "share of the looks at which a marker is mistaken")
     astray: float = quantity(1e-3, "m", "how far off it is then, in any direction")
     late: float = quantity(0.0, "s", "sd of the time of a look, which its clock declares")
@@ -77,6 +78,14 @@ class LayeredTwin(TrackedTwin):
     @property
     def camera(self) -> Camera:
         return replace(super().camera, outliers=self.outliers, astray=self.astray, late=self.late)
+
+
+@dataclass(frozen=True)
+class BlockModel:
+    """What a method's scene has besides: a region of the body's own material, or springs."""
+
+    layer: bool = quantity(False, "1", "the middle rows of cells are a region, 'layer'")
+    springs: float = quantity(0.0, "N/m^3", "of an elastic support below; 0: held")
 
 
 @dataclass(frozen=True)
@@ -93,15 +102,23 @@ class PulledBlock:
     recording: str = quantity("", "1", "the recording")
 
 
-def build(recording: Recording, p: PulledBlock, model: None) -> Scene:
-    return _scene(p, p.material.material)
+def build(recording: Recording, p: PulledBlock, model: BlockModel | None) -> Scene:
+    model = model or BlockModel()
+    scene = _scene(p, p.material.material, model.springs)
+    if not model.layer:
+        return scene
+    layer = Region("layer", _stiff_cells(scene.mesh, "layer"), scene.material)
+    return replace(scene, regions=(layer,))
 
 
-def _scene(p: PulledBlock, material: Material) -> Scene:
+def _scene(p: PulledBlock, material: Material, springs: float) -> Scene:
+    """On springs N/m^3, or held below."""
+    every = (0, 1, 2)
     return Scene(
         p.body.mesh,
         material,
-        (Support("z0", (0, 1, 2)),),
+        () if springs else (Support("z0", every),),
+        foundations=(Foundation("z0", every, springs),) if springs else (),
         loads=(Load("pull", "z1", (0.0, 0.0, 1.0), p.loading.spread),),
         probes=tuple(Probe(name, at) for name, at in p.body.places(NODES).items()),
     )
@@ -134,18 +151,20 @@ def twin_of(p: PulledBlock) -> SteppedTwin:
 
 def _true_scene(p: PulledBlock) -> Scene:
     twin = p.twin
-    scene = _scene(p, twin.true(p.material.material))
+    scene = _scene(p, twin.true(p.material.material), twin.springs)
     if twin.inside == "nothing":
         return scene
     stiff = replace(scene.material, E=twin.contrast * scene.material.E)
-    return replace(scene, regions=(Region(twin.inside, _stiff_cells(p, scene.mesh), stiff),))
+    return replace(
+        scene, regions=(Region(twin.inside, _stiff_cells(scene.mesh, twin.inside), stiff),)
+    )
 
 
-def _stiff_cells(p: PulledBlock, mesh: Mesh) -> Ints:
+def _stiff_cells(mesh: Mesh, inside: str) -> Ints:
     """The middle two rows of seven, or the upper middle half of the block."""
     share = centroids(mesh) / mesh.nodes.max(axis=0)
     layer = (share[:, 2] > 2.99 / 7) & (share[:, 2] < 5.01 / 7)
-    if p.twin.inside == "layer":
+    if inside == "layer":
         return np.flatnonzero(layer)
     middle = np.abs(share[:, :2] - 0.5).max(axis=1) < 0.2501
     return np.flatnonzero(layer & middle)

@@ -1,0 +1,114 @@
+"""What filters found of the model itself: stiffness, supports and loads over time, and whether the
+markers that they were given can tell them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
+from validate.replay.consistency import nis_of
+from validate.replay.followed import Cases, Followed
+
+# Share of the start's sd: with more left, less than three quarters of what is known were measured.
+LEFT = 0.5
+TIED = 0.95  # |correlation| from which two parameters are known together only
+_AXIS = {"Pa": ("kPa", 1e-3)}
+_OF, _BETWEEN = "estimate.", "correlation."
+
+
+def estimated_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
+    """None where no filter estimates parameters."""
+    runs = [f for f in (*main.values(), *(f for c in others.values() for f in c.values()))
+            if parameters_of(f)]  # fmt: skip
+    if not runs:
+        return None
+    table = NumberTable(
+        "estimates",
+        "Parameters at the end of the run with their 95 % intervals, as the filter claims them, "
+        "and the share of the sd at its start that is left (of a scale's logarithm).",
+        ("case", "filter", "parameter", "value", "95 % from", "to", "sd left / 1", "says"),
+        tuple(_row(f, name) for f in runs for name in parameters_of(f)),
+        "Intervals hold for a truth of the model's own kind: read NIS and its alarm beside them.",
+        below="says",
+    )
+    told = tuple(s for f in main.values() for s in sentences(f))
+    charts = tuple(_chart(f, name) for f in main.values() for name in parameters_of(f))
+    title = "What filters found of stiffness, supports and loads"
+    return Exhibit("estimates", title, told, (table,), charts)
+
+
+def parameters_of(f: Followed) -> tuple[str, ...]:
+    """Names of what a filter's run estimated."""
+    ends = [n for n in f.run.traces if n.startswith(_OF) and n.endswith(".left")]
+    found = [n.removeprefix(_OF).removesuffix(".left") for n in ends]
+    return tuple(found) if len(f.run.t) else ()
+
+
+def sentences(f: Followed) -> tuple[str, ...]:
+    """One on every parameter that the markers could not tell."""
+    return tuple(
+        f"{f.label}, {name}: {said}" for name in parameters_of(f) if (said := doubt(f, name))
+    )
+
+
+def doubt(f: Followed, name: str) -> str:
+    """Why a parameter is not identifiable, or its interval does not hold; empty where both do."""
+    nis = nis_of(f)
+    if nis and nis.mean > nis.band_999.high:
+        return (
+            f"the interval does not hold: NIS {nis.mean:.3g} per degree of freedom, at most "
+            f"{nis.band_999.high:.3g} by chance: the model is of another kind than the truth"
+        )
+    left, (other, tie) = _last(f, f"{_OF}{name}.left"), _tied(f, name)
+    if left <= LEFT:
+        return ""
+    words = f"not identifiable from these markers: {left:.2g} of the sd at the start is left"
+    return f"{words}; known only together with {other}, correlation {tie:.3f}" if other else words
+
+
+def _tied(f: Followed, name: str) -> tuple[str, float]:
+    """The parameter that this one moves with most, and how; none below `TIED`."""
+    found = [("", 0.0)]
+    for trace in f.run.traces:
+        pair = trace.removeprefix(_BETWEEN).split("~")
+        if trace.startswith(_BETWEEN) and name in pair:
+            found.append((next(p for p in pair if p != name), _last(f, trace)))
+    most = max(found, key=lambda pair: abs(pair[1]))
+    return most if abs(most[1]) >= TIED else ("", 0.0)
+
+
+def _last(f: Followed, trace: str) -> float:
+    return float(f.run.traces[trace].y[-1])
+
+
+def _row(f: Followed, name: str) -> tuple[TableCell | str | float, ...]:
+    unit = f.run.traces[_OF + name].unit
+    numbers = (_last(f, f"{_OF}{name}{end}") for end in ("", ".low", ".high"))
+    shown = (TableCell(v, unit, text=_words(v, unit)) for v in numbers)
+    said = doubt(f, name) or "identified, if the model is of the truth's kind"
+    left = _last(f, f"{_OF}{name}.left")
+    return (f.case or "recorded", f.label, name, *shown, left, said)
+
+
+def _words(value: float, unit: str) -> str:
+    """Five digits: an interval may be narrow."""
+    axis, factor = _AXIS.get(unit, (unit, 1.0))
+    return f"{factor * value:.5g}{'' if axis == '1' else ' ' + axis}"
+
+
+def _chart(f: Followed, name: str) -> Chart:
+    unit = f.run.traces[_OF + name].unit
+    axis, factor = _AXIS.get(unit, (unit, 1.0))
+
+    def over_time(end: str) -> Floats:
+        return np.asarray(factor * f.run.traces[f"{_OF}{name}{end}"].y)
+
+    series = (
+        Series("95 % interval", f.own_time, over_time(".low"), "band", over_time(".high")),
+        Series(f.label, f.own_time, over_time("")),
+    )
+    return Chart(
+        f"estimate_{f.method}_{name.replace('.', '_')}", f"{name}, by {f.label}",
+        "recorded time / s", f"{name} / {axis}", series,
+    )  # fmt: skip
