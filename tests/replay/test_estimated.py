@@ -1,8 +1,14 @@
 """What filters found of the model itself, told from hand-made traces."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
+import pytest
 from test_consistency_tables import STEPS, followed
 
+from validate.errors import UsageError
+from validate.replay import compare, load
 from validate.replay.estimated import doubt, estimated_exhibit, sentences
 from validate.replay.followed import Followed
 from validate.solve.types import Trace
@@ -32,7 +38,7 @@ def test_the_table_has_values_in_their_units() -> None:
     value, low, high = (rows[0][i] for i in (3, 4, 5))
     assert [getattr(v, "text", "") for v in (value, low, high)] == ["11 kPa", "9.9 kPa", "12.1 kPa"]
     assert [getattr(v, "value", 0) for v in (value, low)] == [11e3, 0.9 * 11e3]
-    assert rows[1][6:] == (0.1, "identified, if the model is of the truth's kind")
+    assert rows[1][6:] == (0.1, "identified")
     chart = found.charts[0]
     assert chart.y == "stiffness / kPa"
     assert chart.series[1].y[-1] == 11.0
@@ -65,3 +71,22 @@ def test_without_parameters_nothing_is_shown() -> None:
     case = estimated_exhibit({}, {"soft": {"kf": estimating(0.1)}})
     assert case is not None
     assert case.charts == ()
+
+
+def test_on_the_road_parameters_are_chosen_by_name_and_the_report_has_them(
+    project_root: Path,
+) -> None:
+    """`--set methods.roukf.parameters=...`; the block creeps alike whatever its modulus."""
+    cube = load(str(project_root / "experiments" / "kf_cube.py"))
+    methods = {name: cube.methods[name] for name in ("fem", "roukf")}
+    short = replace(
+        cube, methods=methods, accepted=("fem",), cases=(), published=(), exhibits=None, frames=5
+    )
+    result = compare(short, {"methods.roukf.parameters": "stiffness,load.pull"})
+    found = next(e for e in result.exhibits if e.anchor == "estimates")
+    assert [row[2] for row in found.tables[0].rows] == ["stiffness", "load.pull"]
+    assert all("correlation 1.000" in str(row[-1]) for row in found.tables[0].rows)
+    scores = {s.name for m in result.methods if m.name == "roukf" for s in m.scores}
+    assert {"nis.per_dof", "node_B.nees.per_dof"} <= scores
+    with pytest.raises(UsageError, match=r"'stiffness.core': this scene has stiffness, load.pull"):
+        compare(short, {"methods.roukf.parameters": "stiffness.core"})

@@ -86,7 +86,7 @@ def _row(f: Followed, name: str) -> tuple[TableCell | str | float, ...]:
     unit = f.run.traces[_OF + name].unit
     numbers = (_last(f, f"{_OF}{name}{end}") for end in ("", ".low", ".high"))
     shown = (TableCell(v, unit, text=_words(v, unit)) for v in numbers)
-    said = doubt(f, name) or "identified, if the model is of the truth's kind"
+    said = doubt(f, name) or "identified"
     left = _last(f, f"{_OF}{name}.left")
     return (f.case or "recorded", f.label, name, *shown, left, said)
 
