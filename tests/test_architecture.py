@@ -11,7 +11,7 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh
 
 # Grows while one file is read and never leaves its reader.
-ACCUMULATORS = {"streams.py:Collected"}
+ACCUMULATORS = {"streams.py:Collected", "foreign.py:Gathered", "threads.py:Team"}
 
 
 def modules(root: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from validate.fem import threads
-from validate.fem.threads import Choice, Team, candidates, chosen, idle_of, pilot
+from validate.fem.threads import Team, ThreadChoice, candidates, chosen, idle_of, pilot
 
 US = 1e-6
 
@@ -53,7 +53,7 @@ def test_a_busy_machine_runs_no_pilot() -> None:
     def step(threads: int) -> None:
         raise AssertionError("a step was run")
 
-    assert pilot(step, 2, idle=1) == Choice(1, 2, {})
+    assert pilot(step, 2, idle=1) == ThreadChoice(1, 2, {})
 
 
 def test_numbers_of_threads_take_turns() -> None:
@@ -65,7 +65,7 @@ def test_numbers_of_threads_take_turns() -> None:
 
 
 def test_a_team_falls_back_on_one_where_its_steps_take_longer_than_one_did() -> None:
-    team = Team(Choice(2, 2, {1: 100 * US, 2: 60 * US}))
+    team = Team(ThreadChoice(2, 2, {1: 100 * US, 2: 60 * US}))
     for seconds in [400 * US] * 5 + [60 * US] * 20:
         team.saw(seconds)
     assert team.threads == 2  # a few late steps are not a busy machine

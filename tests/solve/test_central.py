@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 from validate.errors import SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import System
-from validate.fem.threads import Choice, Team
+from validate.fem.threads import Team, ThreadChoice
 from validate.solve.central import CentralDifference, CentralStepper, Damping
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.newton import StaticNewton
@@ -62,7 +62,7 @@ def test_threads_change_no_more_than_rounding() -> None:
     for seconds in (1.0, 0.0):  # of one thread's step: two stay, or take longer from the start
         stepper = CentralDifference(dt, watch=1).prepare(system)
         assert isinstance(stepper, CentralStepper)
-        team = Team(Choice(2, 2, {1: seconds, 2: seconds / 2}))
+        team = Team(ThreadChoice(2, 2, {1: seconds, 2: seconds / 2}))
         stepper.body.share(2)
         two = marched(replace(stepper, team=team), inputs, dt)
         assert team.threads == (2 if seconds else 1)

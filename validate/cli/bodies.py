@@ -10,7 +10,7 @@ from validate.scene.body_facts import POOR, facts, quality
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.foreign_mesh import Body, read_foreign
+from validate.scene.foreign_mesh import ForeignBody, read_foreign
 from validate.scene.mesh import quadratic
 from validate.scene.mesh_file import read_mesh, write_mesh
 from validate.units import in_si, split
@@ -36,10 +36,10 @@ def body(file: Path, unit: str | None, edge: str | None, out: Path | None, *, cu
         say(f"{out}: {out.stat().st_size / 1e3:.0f} kB", indent="  ")
 
 
-def _read(file: Path, unit: str | None, edge: str | None) -> Body:
+def _read(file: Path, unit: str | None, edge: str | None) -> ForeignBody:
     suffix = file.suffix.lower()
     if suffix not in (*FOREIGN, *SURFACES):
-        return Body(read_mesh(file), {})
+        return ForeignBody(read_mesh(file), {})
     if unit is None:
         raise UsageError(f"{file.name}: a file of this kind states no unit; say it: --unit mm")
     if suffix in FOREIGN:

@@ -22,7 +22,7 @@ _LOADAVG = Path("/proc/loadavg")
 
 
 @dataclass(frozen=True)
-class Choice:
+class ThreadChoice:
     """`threads` of at most `most`; `seconds` are the medians of a step by number of threads, none
     where no core but this one was idle."""
 
@@ -39,13 +39,13 @@ class Choice:
         return f"{taken}, pilot {times}"
 
 
-def chosen(most: int, seconds: Mapping[int, Sequence[float]]) -> Choice:
+def chosen(most: int, seconds: Mapping[int, Sequence[float]]) -> ThreadChoice:
     """The number of threads with the least median, one unless another is clearly faster.
 
     `seconds` of steps by number of threads, of 1 among them; empty where no core was idle.
     """
     if not seconds:
-        return Choice(1, most, {})
+        return ThreadChoice(1, most, {})
     medians = {n: median(own) for n, own in seconds.items()}
     pays = [
         n
@@ -53,7 +53,7 @@ def chosen(most: int, seconds: Mapping[int, Sequence[float]]) -> Choice:
         if medians[n] <= CLEARLY * medians[1] and min(own) <= CLEARLY * min(seconds[1])
     ]
     best = min(pays, key=lambda n: medians[n], default=1)
-    return Choice(best, most, medians)
+    return ThreadChoice(best, most, medians)
 
 
 def candidates(most: int, idle: int) -> tuple[int, ...]:
@@ -93,7 +93,7 @@ def _running() -> float:
     return float(median(found))
 
 
-def pilot(step: Callable[[int], object], most: int, idle: int) -> Choice:
+def pilot(step: Callable[[int], object], most: int, idle: int) -> ThreadChoice:
     """Times `step(threads)`; numbers of threads take turns, so that a busy machine slows all."""
     numbers = candidates(most, idle)
     seconds: dict[int, list[float]] = {n: [] for n in numbers}
@@ -114,7 +114,7 @@ def pilot(step: Callable[[int], object], most: int, idle: int) -> Choice:
 class Team:
     """The threads of a run: those chosen, until their steps take longer than one thread's did."""
 
-    choice: Choice
+    choice: ThreadChoice
     threads: int = field(init=False)
     said: str = ""
     _recent: deque[float] = field(default_factory=lambda: deque(maxlen=_RECENT))

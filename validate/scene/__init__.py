@@ -5,7 +5,7 @@ from validate.exports import lazily, names
 _HOMES = {
     "mesh": ("Mesh", "quadratic"),
     "filled": ("filled",),
-    "foreign_mesh": ("Body", "read_foreign"),
+    "foreign_mesh": ("ForeignBody", "read_foreign"),
     "mesh_file": ("read_mesh", "write_mesh"),
     "scene": (
         "Cavity",

@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.errors import RecordingError, SceneError
 from validate.recording.formats.apart import decoded
-from validate.scene.foreign_mesh import Body, metres, require_readable
+from validate.scene.foreign_mesh import ForeignBody, metres, require_readable
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 
 SUFFIXES = (".stl", ".obj", ".ply")
@@ -14,7 +14,7 @@ _SECONDS = 300  # of meshing
 _TURN = [0, 2, 1, 3]
 
 
-def filled(path: Path, unit: str, edge: float = 0.0) -> Body:
+def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
     """The body inside a surface with lengths in `unit`, of edges of about `edge` m (0: a twentieth
     of its diagonal).
 
@@ -41,4 +41,4 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> Body:
         "filled": f"{1e6 * cell_volumes(mesh).sum():.4g} cm3 "
         f"({100 * (cell_volumes(mesh).sum() / enclosed - 1):+.2f} %)",
     }
-    return Body(mesh, told)
+    return ForeignBody(mesh, told)

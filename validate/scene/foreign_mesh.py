@@ -33,7 +33,7 @@ _TURNED: Mapping[Kind, tuple[int, ...]] = {
 
 
 @dataclass(frozen=True)
-class Body:
+class ForeignBody:
     """A mesh, and what was done to the file's to make it, in words."""
 
     mesh: Mesh
@@ -59,7 +59,7 @@ def require_readable(path: Path) -> None:
         raise SceneError(f"{path.name}: {why}")
 
 
-def read_foreign(path: Path, unit: str) -> Body:
+def read_foreign(path: Path, unit: str) -> ForeignBody:
     """The body, lengths in `unit`; nodes that no element has are left out.
 
     Elements whose nodes are told the other way round are turned, but in .inp, whose order has a
@@ -76,7 +76,9 @@ def read_foreign(path: Path, unit: str) -> Body:
     return _body(path.name, found, factor, turn=path.suffix.lower() != ".inp")
 
 
-def _body(name: str, found: Mapping[str, NDArray[Any]], factor: float, *, turn: bool) -> Body:
+def _body(
+    name: str, found: Mapping[str, NDArray[Any]], factor: float, *, turn: bool
+) -> ForeignBody:
     shapes = {k.removeprefix(_CELLS): v for k, v in found.items() if k.startswith(_CELLS)}
     if len(shapes) != 1 or next(iter(shapes)) not in _KINDS:
         listed = ", ".join(f"{len(v)} {k}" for k, v in shapes.items()) or "none"
@@ -98,7 +100,7 @@ def _body(name: str, found: Mapping[str, NDArray[Any]], factor: float, *, turn: 
         "not used": f"{len(points) - len(used)} of {len(points)} nodes",
     }
     mesh = replace(mesh, facets=_facets(mesh, used, found))
-    return Body(quadratic(mesh) if shape == "tetra10" else mesh, told)
+    return ForeignBody(quadratic(mesh) if shape == "tetra10" else mesh, told)
 
 
 def _turned(mesh: Mesh) -> tuple[Mesh, int]:

@@ -71,7 +71,7 @@ class Beyond(Protocol):
 
 
 @dataclass(frozen=True)
-class LargeStrain:
+class LargeStrainRegion:
     """`body` are the cells alone, whose unknowns `put` (w, s) among the region's; K (w, w) is their
     linear stiffness."""
 
@@ -88,7 +88,7 @@ class LargeStrain:
     def rest(self) -> Any:
         return self.branches.at_rest(self.body.weights.shape) if self.branches else None
 
-    def after(self, memory: Any, dt: float) -> "LargeStrain":
+    def after(self, memory: Any, dt: float) -> "LargeStrainRegion":
         if self.branches is None:
             return self
         return replace(self, body=self.body.after(self.branches, memory, dt))
@@ -215,7 +215,7 @@ class PrimaryLaw:
             return Relaxing(K_iso, np.array(self.prony.g), np.array(self.prony.tau))
         large = self._of(part)
         K = sparse.csr_array(put @ stiffness(part) @ put.T)
-        return LargeStrain(Body(relaxed(large)), cell_branches(large), put, K)
+        return LargeStrainRegion(Body(relaxed(large)), cell_branches(large), put, K)
 
 
 def _part(scene: Scene, inside: NDArray[np.bool_], nodes: Ints) -> Scene:

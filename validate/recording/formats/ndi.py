@@ -18,7 +18,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.poses import pose_signals, rotations
 from validate.recording.formats.recorded import begun, distinct, recorded
-from validate.recording.formats.text_rows import Row, TextRows, numbers, text_rows, told_left
+from validate.recording.formats.text_rows import TextRow, TextRows, numbers, text_rows, told_left
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Recording, Stream
 
@@ -93,7 +93,7 @@ def _recording(
     return recorded(path.stem, source, begun(streams), told, never)
 
 
-def _header(held: TextRows) -> Row:
+def _header(held: TextRows) -> TextRow:
     for row in held.rows:
         if _tools(row):
             return row
@@ -102,7 +102,7 @@ def _header(held: TextRows) -> Row:
     )
 
 
-def _tools(header: Row) -> tuple[Tool, ...]:
+def _tools(header: TextRow) -> tuple[Tool, ...]:
     """Groups of seven columns."""
     cells = [c.lower() for c in header.cells]
     found: list[tuple[tuple[int, ...], tuple[int, ...], int | None]] = []
@@ -145,7 +145,7 @@ def _group(cells: Sequence[str]) -> tuple[tuple[int, ...], tuple[int, ...], str]
     return None
 
 
-def _clock(header: Row) -> list[tuple[int, float]]:
+def _clock(header: TextRow) -> list[tuple[int, float]]:
     """Columns that make up the time, and the seconds of one of their units."""
     cells = [c.lower().strip(": ") for c in header.cells]
     parts = [(i, _CLOCK[c]) for i, c in enumerate(cells) if c in _CLOCK]
@@ -170,7 +170,7 @@ def _times(held: TextRows, values: Floats, factors: Sequence[float], options: Op
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9)
 
 
-def _seen(pose: Floats, tool: Tool, rows: Sequence[Row]) -> NDArray[np.bool_]:
+def _seen(pose: Floats, tool: Tool, rows: Sequence[TextRow]) -> NDArray[np.bool_]:
     """Which rows (n,) hold a pose."""
     good: NDArray[np.bool_] = ~np.isnan(pose).any(axis=1) & (pose != 0).any(axis=1)
     if tool.state is not None:
@@ -181,7 +181,7 @@ def _seen(pose: Floats, tool: Tool, rows: Sequence[Row]) -> NDArray[np.bool_]:
 def _recognises(path: Path) -> bool:
     text = head(path).decode("utf-8", "replace")
     lines = [re.split(r"[,;\t]", line) for line in text.splitlines()[:12]]
-    return any(_tools(Row(0, tuple(c.strip() for c in cells))) for cells in lines)
+    return any(_tools(TextRow(0, tuple(c.strip() for c in cells))) for cells in lines)
 
 
 NDI = Reader(

@@ -12,7 +12,7 @@ from validate.recording.formats.options import metres, spread
 from validate.recording.formats.poses import pose_signals, rotations
 from validate.recording.formats.recorded import begun, distinct, recorded
 from validate.recording.formats.text_rows import (
-    Row,
+    TextRow,
     TextRows,
     numbers,
     text_rows,
@@ -32,16 +32,16 @@ _TIME = 1  # the column
 
 
 @dataclass(frozen=True)
-class Table:
+class MotiveTable:
     """What stands above the columns and in them: `values` (nt, w), NaN in columns that hold no
     position, rotation or time."""
 
     held: TextRows
-    types: Row
-    names: Row
-    parts: Row
-    axes: Row
-    rows: tuple[Row, ...]
+    types: TextRow
+    names: TextRow
+    parts: TextRow
+    axes: TextRow
+    rows: tuple[TextRow, ...]
     values: Floats
 
     def triples(self, kinds: Sequence[str]) -> list[tuple[str, list[int]]]:
@@ -101,7 +101,7 @@ def _header(held: TextRows) -> dict[str, str]:
     return dict(zip(first[::2], first[1::2], strict=False))
 
 
-def _table(held: TextRows) -> tuple[Table, tuple[str, ...]]:
+def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
     """The table, and what was left out of it."""
     at = next((i for i, r in enumerate(held.rows) if r.cell(0) == "Frame"), None)
     if at is None:
@@ -116,10 +116,10 @@ def _table(held: TextRows) -> tuple[Table, tuple[str, ...]]:
     found, rows, left = numbers(held, below, width, kept)
     values = np.full((len(rows), width), np.nan)
     values[:, kept] = found
-    return Table(held, above[0], above[1], parts, axes, rows, values), left
+    return MotiveTable(held, above[0], above[1], parts, axes, rows, values), left
 
 
-def _points(table: Table, factor: float, sd: float, frame: str) -> dict[str, Stream]:
+def _points(table: MotiveTable, factor: float, sd: float, frame: str) -> dict[str, Stream]:
     """Markers by topic; those of a kind that the file does not have are left out."""
     found: dict[str, Stream] = {}
     for topic, kinds in _POINTS.items():
@@ -132,7 +132,9 @@ def _points(table: Table, factor: float, sd: float, frame: str) -> dict[str, Str
     return found
 
 
-def _poses(table: Table, factor: float, frame: str) -> tuple[dict[str, Stream], dict[str, str]]:
+def _poses(
+    table: MotiveTable, factor: float, frame: str
+) -> tuple[dict[str, Stream], dict[str, str]]:
     """Poses of rigid bodies where they were seen, and why others have none."""
     found: dict[str, Stream] = {}
     unread = {}

@@ -8,7 +8,7 @@ from validate.errors import RecordingError
 from validate.recording.formats.options import length, spread
 from validate.recording.formats.recorded import distinct, recorded
 from validate.recording.formats.text_rows import (
-    Row,
+    TextRow,
     TextRows,
     numbers,
     text_rows,
@@ -53,7 +53,7 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     return recorded(path.stem, source, {"markers": markers}, told | told_left(left))
 
 
-def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[Row]]:
+def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRow]]:
     """Header, names of the points, and the rows of numbers."""
     if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
         raise RecordingError(f"{held.name}: no Qualisys text: its first cell is not NO_OF_FRAMES")
@@ -97,7 +97,7 @@ def _rate(held: TextRows, header: dict[str, str]) -> float:
     return rate
 
 
-def _before(rows: list[Row], points: int) -> int:
+def _before(rows: list[TextRow], points: int) -> int:
     """Columns before the first coordinate: none, or frame and time."""
     width = max((sum(1 for _ in r.cells) for r in rows), default=0)
     return 2 if width >= 3 * points + 2 else 0

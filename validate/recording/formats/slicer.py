@@ -11,7 +11,7 @@ from validate.errors import RecordingError
 from validate.recording.exports.encoding import whole_file
 from validate.recording.formats.options import length, spread
 from validate.recording.formats.recorded import distinct, recorded
-from validate.recording.formats.text_rows import Row, TextRows, text_rows
+from validate.recording.formats.text_rows import TextRow, TextRows, text_rows
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Markers, Recording
 
@@ -55,7 +55,7 @@ def _columns(stated: Sequence[Sequence[str]]) -> Sequence[str]:
     return _COLUMNS
 
 
-def _require_whole(held: TextRows, rows: Sequence[Row]) -> None:
+def _require_whole(held: TextRows, rows: Sequence[TextRow]) -> None:
     cells = [len(r.cells) for r in rows]
     if held.open_end and cells and cells[-1] < max(cells):
         raise RecordingError(
@@ -63,7 +63,7 @@ def _require_whole(held: TextRows, rows: Sequence[Row]) -> None:
         )
 
 
-def _point(held: TextRows, row: Row, names: Sequence[str]) -> _Point:
+def _point(held: TextRows, row: TextRow, names: Sequence[str]) -> _Point:
     at = {name: i for i, name in enumerate(names)}
     label = row.cell(at.get("label", 0))
     if row.cell(_STATUS) not in _DEFINED:

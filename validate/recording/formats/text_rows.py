@@ -22,7 +22,7 @@ _ABSENT = {"", "nan", "NaN", "NAN", "-"}
 
 
 @dataclass(frozen=True)
-class Row:
+class TextRow:
     """The cells of a line, counted from 1."""
 
     line: int
@@ -38,7 +38,7 @@ class TextRows:
     """All lines as cells; `open_end`: the last line has no line end."""
 
     name: str
-    rows: tuple[Row, ...]
+    rows: tuple[TextRow, ...]
     open_end: bool
     told: dict[str, str] = field(default_factory=dict)
 
@@ -58,15 +58,17 @@ def text_rows(path: Path) -> TextRows:
     separator = max("\t;,", key=begin.count)
     cells = csv.reader(lines, delimiter=separator, skipinitialspace=True, quoting=csv.QUOTE_MINIMAL)
     try:
-        rows = tuple(Row(i + 1, tuple(c.strip() for c in found)) for i, found in enumerate(cells))
+        rows = tuple(
+            TextRow(i + 1, tuple(c.strip() for c in found)) for i, found in enumerate(cells)
+        )
     except csv.Error as error:
         raise RecordingError(f"{path.name}: no table of cells ({error})") from None
     return TextRows(path.name, rows, not text.endswith(("\n", "\r")))
 
 
 def numbers(
-    held: TextRows, rows: Sequence[Row], width: int, columns: Sequence[int] | None = None
-) -> tuple[Floats, tuple[Row, ...], tuple[str, ...]]:
+    held: TextRows, rows: Sequence[TextRow], width: int, columns: Sequence[int] | None = None
+) -> tuple[Floats, tuple[TextRow, ...], tuple[str, ...]]:
     """Numbers (n, k) of k columns (all `width` where none are named), NaN where a cell is blank,
     the rows that they stand in, and what was left out.
 
@@ -100,7 +102,7 @@ def _plain(cell: str) -> str:
     return "nan" if cell in _ABSENT else cell
 
 
-def _first_odd(rows: Sequence[Row], columns: Sequence[int]) -> str:
+def _first_odd(rows: Sequence[TextRow], columns: Sequence[int]) -> str:
     for row in rows:
         for i in columns:
             try:
@@ -111,8 +113,8 @@ def _first_odd(rows: Sequence[Row], columns: Sequence[int]) -> str:
 
 
 def _whole(
-    held: TextRows, rows: Sequence[Row], width: int
-) -> tuple[Sequence[Row], tuple[str, ...]]:
+    held: TextRows, rows: Sequence[TextRow], width: int
+) -> tuple[Sequence[TextRow], tuple[str, ...]]:
     """The rows without an unfinished last one."""
     if not rows or not held.open_end or rows[-1] is not held.rows[-1]:
         return rows, ()
@@ -131,7 +133,9 @@ def _decimals(cell: str) -> int:
     return len(found[1]) if found else 0
 
 
-def whole_points(held: TextRows, x: Floats, names: Sequence[str], rows: Sequence[Row]) -> Floats:
+def whole_points(
+    held: TextRows, x: Floats, names: Sequence[str], rows: Sequence[TextRow]
+) -> Floats:
     """Coordinates (nt, k, 3), where a point with one that is blank has none.
 
     Raises `RecordingError` naming line and point: a damaged line, not a point that was not seen.

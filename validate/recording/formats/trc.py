@@ -9,7 +9,7 @@ from validate.errors import RecordingError
 from validate.recording.formats.options import above_zero, metres, spread
 from validate.recording.formats.recorded import distinct, recorded
 from validate.recording.formats.text_rows import (
-    Row,
+    TextRow,
     TextRows,
     numbers,
     text_rows,
@@ -72,7 +72,7 @@ def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
     return distinct(named, len(named))
 
 
-def _rows(held: TextRows) -> list[Row]:
+def _rows(held: TextRows) -> list[TextRow]:
     """From the first that begins with a number, blank lines apart."""
     body = held.rows[4:]
     begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))

@@ -15,7 +15,7 @@ from validate.errors import RecordingError
 from validate.recording.formats.options import metres, spread
 from validate.recording.formats.recorded import begun, distinct, recorded
 from validate.recording.formats.text_rows import (
-    Row,
+    TextRow,
     TextRows,
     numbers,
     text_rows,
@@ -32,14 +32,14 @@ _BEFORE = 2  # columns before the first value: frame, sub-frame
 
 
 @dataclass(frozen=True)
-class Block:
+class CsvBlock:
     """`rate` Hz; names (k,) above their first columns, columns and units (w,), and the rows."""
 
     rate: float
     names: tuple[str, ...]
     columns: tuple[str, ...]
     units: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[TextRow, ...]
 
     @property
     def width(self) -> int:
@@ -80,7 +80,7 @@ def read_vicon(path: Path, options: Options) -> Recording:
     return recorded(path.stem, source, begun(streams), told, unread)
 
 
-def _blocks(held: TextRows) -> dict[str, Block]:
+def _blocks(held: TextRows) -> dict[str, CsvBlock]:
     """Blocks by title; one without rows is left out."""
     begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
     ends = [*begins[1:], len(held.rows)]
@@ -92,11 +92,11 @@ def _blocks(held: TextRows) -> dict[str, Block]:
     return found
 
 
-def _lone(row: Row) -> bool:
+def _lone(row: TextRow) -> bool:
     return not any(row.cells[1:])
 
 
-def _block(held: TextRows, rows: tuple[Row, ...]) -> Block | None:
+def _block(held: TextRows, rows: tuple[TextRow, ...]) -> CsvBlock | None:
     if len(rows) < 6:
         return None
     _, rate, names, columns, units, *values = rows
@@ -110,10 +110,10 @@ def _block(held: TextRows, rows: tuple[Row, ...]) -> Block | None:
         )
     end = next((i for i, r in enumerate(values) if not any(r.cells)), len(values))
     width = max((i + 1 for i, c in enumerate(columns.cells) if c), default=0)
-    return Block(hz, names.cells, columns.cells[:width], units.cells, tuple(values[:end]))
+    return CsvBlock(hz, names.cells, columns.cells[:width], units.cells, tuple(values[:end]))
 
 
-def _points(held: TextRows, block: Block, options: Options) -> tuple[Markers, Mapping[str, str]]:
+def _points(held: TextRows, block: CsvBlock, options: Options) -> tuple[Markers, Mapping[str, str]]:
     """Named triples X, Y, Z; derivatives (X', X'') are passed over."""
     axes = tuple(c.upper() for c in block.columns)
     at = [i for i in range(_BEFORE, block.width - 2) if axes[i : i + 3] == ("X", "Y", "Z")]
@@ -135,7 +135,7 @@ def _points(held: TextRows, block: Block, options: Options) -> tuple[Markers, Ma
 
 
 def _signals(
-    held: TextRows, block: Block, options: Options
+    held: TextRows, block: CsvBlock, options: Options
 ) -> tuple[dict[str, Signal], dict[str, str]]:
     """Channels of devices; one with blank cells is left out and told."""
     values, _, left = numbers(held, block.rows, block.width)

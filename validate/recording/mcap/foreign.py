@@ -16,7 +16,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import length
 from validate.recording.mcap.decoders import Plain, decoder_of
-from validate.recording.mcap.known_messages import Part, parts_of
+from validate.recording.mcap.known_messages import MessagePart, parts_of
 from validate.recording.mcap.records import Channel, Message, Schema
 from validate.recording.mcap.schemas import MIRROR_OF
 from validate.recording.mcap.streams import MAX_NUMBERS, ours
@@ -32,8 +32,8 @@ class Gathered:
     """The parts of one channel while they are read; `error` is the first that was wrong."""
 
     channel: Channel
-    parts: Callable[[bytes], Iterable[Part]]
-    samples: dict[str, list[tuple[Part, int, int]]] = field(default_factory=dict)
+    parts: Callable[[bytes], Iterable[MessagePart]]
+    samples: dict[str, list[tuple[MessagePart, int, int]]] = field(default_factory=dict)
     error: str = ""
 
     def add(self, message: Message) -> int:
@@ -85,7 +85,7 @@ def _require_topics(verified: Verified, fields: Mapping[str, str]) -> None:
 
 def _parts(
     schema: Schema | None, channel: Channel, asked: Mapping[str, str]
-) -> Callable[[bytes], Iterable[Part]] | str:
+) -> Callable[[bytes], Iterable[MessagePart]] | str:
     """What takes a channel's messages apart, or why nothing does."""
     decode = decoder_of(schema, channel)
     if isinstance(decode, str):
@@ -101,22 +101,22 @@ def _parts(
 
 
 def _both(
-    decode: Callable[[bytes], Plain], parts: Callable[[Plain], Iterable[Part]]
-) -> Callable[[bytes], Iterable[Part]]:
+    decode: Callable[[bytes], Plain], parts: Callable[[Plain], Iterable[MessagePart]]
+) -> Callable[[bytes], Iterable[MessagePart]]:
     return lambda data: parts(decode(data))
 
 
-def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[Part]]:
+def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[MessagePart]]:
     """Parts of the named fields, stamped by a header where there is one."""
 
-    def parts(message: Plain) -> Iterable[Part]:
+    def parts(message: Plain) -> Iterable[MessagePart]:
         stamp = message.get("header", {}).get("stamp", message.get("timestamp"))
         ns = None if stamp is None else _ns(stamp)
         frame = str(message.get("header", {}).get("frame_id", message.get("frame_id", "")))
         for key, unit in asked.items():
             path = key.removeprefix(topic)
             values = np.atleast_1d(np.asarray(_at(message, path[1:]), dtype=np.float64)).ravel()
-            yield Part(path, ns, frame or "topic", values, unit=unit)
+            yield MessagePart(path, ns, frame or "topic", values, unit=unit)
 
     return parts
 
@@ -147,7 +147,7 @@ def fill(gathered: Mapping[int, Gathered], messages: Iterable[Message]) -> None:
 
 
 @dataclass(frozen=True)
-class Found:
+class ForeignStreams:
     """Streams with absolute times int64 ns (n,), their clocks, what was told, what is no stream."""
 
     make: Mapping[str, Callable[[int], Stream]]
@@ -157,7 +157,7 @@ class Found:
     never: Mapping[str, str]
 
 
-def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Found:
+def found_streams(gathered: Mapping[int, Gathered], options: Options) -> ForeignStreams:
     """The streams of all gatherers; one whose samples do not make a stream is told, not raised.
 
     Raises `UsageError` for a wrong `m_per_px`.
@@ -188,10 +188,10 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Found:
                 topic, ns[topic], *(np.array([s[k] for s in samples], np.int64)[order]
                                     for k in (1, 2)),
             )  # fmt: skip
-    return Found(make, ns, clocks, told, never)
+    return ForeignStreams(make, ns, clocks, told, never)
 
 
-def _why_none(parts: list[Part], side: float | None) -> str:
+def _why_none(parts: list[MessagePart], side: float | None) -> str:
     """Why samples are no one stream; empty where they are."""
     first = parts[0]
     if first.image is not None:
@@ -209,7 +209,7 @@ def _why_none(parts: list[Part], side: float | None) -> str:
     return ""
 
 
-def _maker(parts: list[Part], ns: Ints, side: float | None) -> Callable[[int], Stream]:
+def _maker(parts: list[MessagePart], ns: Ints, side: float | None) -> Callable[[int], Stream]:
     def make(t0: int) -> Stream:
         t, first = (ns - t0) / 1e9, parts[0]
         frame = first.frame or "not stated"

@@ -25,7 +25,7 @@ _CHANNELS = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4,
 
 
 @dataclass(frozen=True)
-class Part:
+class MessagePart:
     """A sample of the stream `<topic><name>`, measured at `ns` (none: when it was published).
 
     Points (k, 3) m of `names`, or numbers (c,) in `unit`, or an `image`.
@@ -40,7 +40,7 @@ class Part:
     image: Pixels | None = None
 
 
-Parts = Callable[[Plain], Sequence[Part]]
+Parts = Callable[[Plain], Sequence[MessagePart]]
 
 
 def parts_of(schema: str) -> Parts | None:
@@ -66,59 +66,59 @@ def _xyz(value: Mapping[str, Any]) -> list[float]:
     return [float(value[axis]) for axis in "xyz"]
 
 
-def _pose(name: str, ns: int, frame: str, place: Any, turn: Any) -> list[Part]:
+def _pose(name: str, ns: int, frame: str, place: Any, turn: Any) -> list[MessagePart]:
     q = np.array([[*_xyz(turn), float(turn["w"])]])
     R = rotations(q, name or "pose").reshape(9)
     x = np.array(_xyz(place))
     return [
-        Part(f"{name}/{ROTATION}", ns, frame, R, unit="1"),
-        Part(f"{name}/{TRANSLATION}", ns, frame, x, unit="m"),
+        MessagePart(f"{name}/{ROTATION}", ns, frame, R, unit="1"),
+        MessagePart(f"{name}/{TRANSLATION}", ns, frame, x, unit="m"),
     ]
 
 
-def _points(ns: int, frame: str, x: Floats) -> list[Part]:
+def _points(ns: int, frame: str, x: Floats) -> list[MessagePart]:
     if len(x) > MAX_POINTS:
         raise RecordingError(f"{len(x)} points, the limit is {MAX_POINTS}")
-    return [Part("", ns, frame, x, tuple(str(i + 1) for i in range(len(x))))]
+    return [MessagePart("", ns, frame, x, tuple(str(i + 1) for i in range(len(x))))]
 
 
-def _pose_stamped(m: Plain) -> Sequence[Part]:
+def _pose_stamped(m: Plain) -> Sequence[MessagePart]:
     return _pose("", *_header(m), m["pose"]["position"], m["pose"]["orientation"])
 
 
-def _transform_stamped(m: Plain) -> Sequence[Part]:
+def _transform_stamped(m: Plain) -> Sequence[MessagePart]:
     inner = m["transform"]
     name = f"/{m['child_frame_id']}"
     return _pose(name, *_header(m), inner["translation"], inner["rotation"])
 
 
-def _tf(m: Plain) -> Sequence[Part]:
+def _tf(m: Plain) -> Sequence[MessagePart]:
     return [part for one in m["transforms"] for part in _transform_stamped(one)]
 
 
-def _pose_array(m: Plain) -> Sequence[Part]:
+def _pose_array(m: Plain) -> Sequence[MessagePart]:
     x = np.array([_xyz(p["position"]) for p in m["poses"]]).reshape(-1, 3)
     return _points(*_header(m), x)
 
 
-def _point_stamped(m: Plain) -> Sequence[Part]:
+def _point_stamped(m: Plain) -> Sequence[MessagePart]:
     return _points(*_header(m), np.array([_xyz(m["point"])]))
 
 
-def _wrench(m: Plain) -> Sequence[Part]:
+def _wrench(m: Plain) -> Sequence[MessagePart]:
     ns, frame = _header(m)
     inner = m["wrench"]
     return [
-        Part("/force", ns, frame, np.array(_xyz(inner["force"])), unit="N"),
-        Part("/torque", ns, frame, np.array(_xyz(inner["torque"])), unit="N m"),
+        MessagePart("/force", ns, frame, np.array(_xyz(inner["force"])), unit="N"),
+        MessagePart("/torque", ns, frame, np.array(_xyz(inner["torque"])), unit="N m"),
     ]
 
 
-def _joints(m: Plain) -> Sequence[Part]:
+def _joints(m: Plain) -> Sequence[MessagePart]:
     """Revolute and prismatic joints look alike: their units are not stated."""
     ns, frame = _header(m)
     return [
-        Part(f"/{name}.{what}", ns, frame or "joints", np.array([float(values[i])]),
+        MessagePart(f"/{name}.{what}", ns, frame or "joints", np.array([float(values[i])]),
              unit=NOT_STATED)
         for what in ("position", "velocity", "effort")
         for values in (m[what],)
@@ -127,14 +127,14 @@ def _joints(m: Plain) -> Sequence[Part]:
     ]  # fmt: skip
 
 
-def _ros_cloud(m: Plain) -> Sequence[Part]:
+def _ros_cloud(m: Plain) -> Sequence[MessagePart]:
     order = ">" if m["is_bigendian"] else "<"
     offsets = {f["name"]: (f["offset"], f["datatype"]) for f in m["fields"]}
     count = int(m["width"]) * int(m["height"])
     return _points(*_header(m), _packed(binary(m["data"]), offsets, m["point_step"], order, count))
 
 
-def _foxglove_cloud(m: Plain) -> Sequence[Part]:
+def _foxglove_cloud(m: Plain) -> Sequence[MessagePart]:
     offsets = {f["name"]: (f["offset"], f["type"]) for f in m["fields"]}
     data, stride = binary(m["data"]), int(m["point_stride"])
     return _points(*_own(m), _packed(data, offsets, stride, "<", len(data) // max(stride, 1)))
@@ -157,14 +157,14 @@ def _packed(data: bytes, offsets: Mapping[str, Any], stride: int, order: str, co
     return np.stack(columns, axis=1)
 
 
-def _ros_image(m: Plain) -> Sequence[Part]:
+def _ros_image(m: Plain) -> Sequence[MessagePart]:
     ns, frame = _header(m)
-    return [Part("", ns, frame, image=_raw(m))]
+    return [MessagePart("", ns, frame, image=_raw(m))]
 
 
-def _foxglove_image(m: Plain) -> Sequence[Part]:
+def _foxglove_image(m: Plain) -> Sequence[MessagePart]:
     ns, frame = _own(m)
-    return [Part("", ns, frame, image=_raw(m))]
+    return [MessagePart("", ns, frame, image=_raw(m))]
 
 
 def _raw(m: Plain) -> Pixels:
@@ -184,31 +184,31 @@ def _raw(m: Plain) -> Pixels:
     return np.asarray(np.rint(colour @ _LUMA), dtype=np.uint8)
 
 
-def _ros_picture(m: Plain) -> Sequence[Part]:
+def _ros_picture(m: Plain) -> Sequence[MessagePart]:
     ns, frame = _header(m)
-    return [Part("", ns, frame, image=decode_picture(binary(m["data"])))]
+    return [MessagePart("", ns, frame, image=decode_picture(binary(m["data"])))]
 
 
-def _foxglove_picture(m: Plain) -> Sequence[Part]:
+def _foxglove_picture(m: Plain) -> Sequence[MessagePart]:
     ns, frame = _own(m)
-    return [Part("", ns, frame, image=decode_picture(binary(m["data"])))]
+    return [MessagePart("", ns, frame, image=decode_picture(binary(m["data"])))]
 
 
-def _pose_in_frame(m: Plain) -> Sequence[Part]:
+def _pose_in_frame(m: Plain) -> Sequence[MessagePart]:
     return _pose("", *_own(m), m["pose"]["position"], m["pose"]["orientation"])
 
 
-def _poses_in_frame(m: Plain) -> Sequence[Part]:
+def _poses_in_frame(m: Plain) -> Sequence[MessagePart]:
     x = np.array([_xyz(p["position"]) for p in m["poses"]]).reshape(-1, 3)
     return _points(*_own(m), x)
 
 
-def _frame_transform(m: Plain) -> Sequence[Part]:
+def _frame_transform(m: Plain) -> Sequence[MessagePart]:
     ns, frame = _ns(m["timestamp"]), str(m["parent_frame_id"])
     return _pose(f"/{m['child_frame_id']}", ns, frame, m["translation"], m["rotation"])
 
 
-def _frame_transforms(m: Plain) -> Sequence[Part]:
+def _frame_transforms(m: Plain) -> Sequence[MessagePart]:
     return [part for one in m["transforms"] for part in _frame_transform(one)]
 
 

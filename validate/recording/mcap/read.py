@@ -16,7 +16,7 @@ from pathlib import Path
 from validate.errors import RecordingError
 from validate.recording.alignment import moved
 from validate.recording.clocks import clock_of
-from validate.recording.mcap.foreign import Found, found_streams, gatherers
+from validate.recording.mcap.foreign import ForeignStreams, found_streams, gatherers
 from validate.recording.mcap.foreign import fill as fill_foreign
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import by_name, name_of, own_records
@@ -106,7 +106,11 @@ def read_all(path: Path, options: Options) -> Recording:
 
 
 def _together(
-    path: Path, verified: Verified, own: Recording | None, found: Found, never: Mapping[str, str]
+    path: Path,
+    verified: Verified,
+    own: Recording | None,
+    found: ForeignStreams,
+    never: Mapping[str, str],
 ) -> Recording:
     """Own and foreign streams on one clock."""
     begins = [int(ns[0]) for ns in found.ns.values()] + ([own.t0_ns] if own else [])
