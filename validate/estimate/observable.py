@@ -23,11 +23,11 @@ _LEFT = 1e-12  # share of A^k H^T outside the space that is taken as none
 _NOTHING = 1e-14  # singular value, of the largest, that is rounding
 _WORTH = 5  # times narrower than the whole, or the whole is cheaper
 
-Spaces = dict[Hashable, "Space"]
+Spaces = dict[Hashable, "NarrowSpace"]
 
 
 @dataclass(frozen=True)
-class Space:
+class NarrowSpace:
     """V (n, r) and W (n, w), orthonormal, in which A is diagonal: `theta` (r,) and `phi` (w,)."""
 
     V: Floats
@@ -43,7 +43,7 @@ class Observed:
     QV and PV0 (w, r) are Q V and P0 V in the span of W; `rows` (m, r) = H V, H (m, w) = H W.
     """
 
-    space: Space
+    space: NarrowSpace
     QV: Floats
     PV0: Floats
     rows: Floats
@@ -88,13 +88,13 @@ def observed(covariance: Decoupled, steps: int, known: Spaces) -> Observed | Non
     return Observed(space, W.T @ QV, W.T @ PV0, H @ V, H @ W, covariance.R)
 
 
-def _space(f: Floats, V: Floats, QV: Floats, PV0: Floats, steps: int) -> Space:
+def _space(f: Floats, V: Floats, QV: Floats, PV0: Floats, steps: int) -> NarrowSpace:
     sizes = (float(np.linalg.norm(X)) or 1.0 for X in (QV, PV0))
     X = np.hstack([X / size for X, size in zip((QV, PV0), sizes, strict=True)])
     W = _span(X, f, steps, len(f) // 2)
     if W is None:
-        return Space(*_diagonal(V, f), np.eye(len(f)), f)
-    return Space(*_diagonal(V, f), *_diagonal(W, f))
+        return NarrowSpace(*_diagonal(V, f), np.eye(len(f)), f)
+    return NarrowSpace(*_diagonal(V, f), *_diagonal(W, f))
 
 
 def _diagonal(V: Floats, f: Floats) -> tuple[Floats, Floats]:
