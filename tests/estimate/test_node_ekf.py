@@ -108,6 +108,22 @@ def _by_filterpy(
     return np.array(us), np.array(Ps)
 
 
+@pytest.mark.parametrize("block", ["component", "node", "companion"])
+def test_forces_of_single_precision_leave_six_digits(system: System, block: Any) -> None:
+    """Covariances are doubles whatever the forces are."""
+    inputs = ramp(H, 60, 0.5, 0.02)
+    seen = noisy(system, plain(system, H, inputs), [node_a(system)])
+    single, double = (
+        run(NodeEKF(H, block=block, precision=p).prepare(system, seen), H, inputs)
+        for p in ("single", "double")
+    )
+    assert single.sd is not None
+    assert double.sd is not None
+    assert single.sd.dtype == np.float64
+    assert 0 < np.abs(single.u - double.u).max() < 1e-6 * np.abs(double.u).max()
+    assert np.abs(single.sd - double.sd).max() < 1e-5 * double.sd.max()
+
+
 @pytest.mark.parametrize("block", ["component", "node"])
 def test_the_printed_gain_at_the_measured_node_is_99_percent(system: System, block: Any) -> None:
     """P = K R after an update: .990 leaves 99 % of the noise in."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from law_samples import NAMES, sample
+from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import SceneError
@@ -71,6 +72,35 @@ def test_tangents_are_those_of_the_numpy_body(law: str) -> None:
     assert apart(blocks, own) < 1e-13
     v = np.random.default_rng(5).standard_normal(len(u))
     assert apart(fast.tangent_product(u, v), K @ v) < 1e-13
+
+
+@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+@pytest.mark.parametrize("size", [1.0, 0.1, 1e-3])
+def test_single_precision_has_seven_digits(law: str, size: float) -> None:
+    """Displacements are rounded to 6e-8 of their size, which edges feel as many times larger as
+    the body is longer than they are; rounding of 24 cells' forces besides."""
+    body, u = scene(law), deformed(jittered(), size)
+    single, double = ExplicitBody(body, precision="single"), ExplicitBody(body)
+    assert 1e-9 < apart(single.force(u), double.force(u)) < 2e-6
+    f, d = single.force_and_diagonal(u)
+    assert apart(f, double.force(u)) < 2e-6
+    assert apart(d, double.force_and_diagonal(u)[1]) < 2e-6
+    assert apart(single.force_and_blocks(u)[1], double.force_and_blocks(u)[1]) < 2e-6
+    assert single.look(u) == double.look(u)
+
+
+def test_single_precision_is_for_two_laws() -> None:
+    with pytest.raises(SceneError, match="single precision is for tet4"):
+        ExplicitBody(scene("ogden"), precision="single")
+
+
+def test_more_springs_leave_a_body_as_it_was() -> None:
+    body = ExplicitBody(scene("svk"))
+    before, u = body.packed, deformed(jittered())
+    stiff = body.sprung(sparse.csr_array(sparse.eye_array(body.size)))
+    assert stiff.packed[4].size == body.size
+    assert body.packed is before
+    assert stiff.force_and_diagonal(u)[1] == pytest.approx(body.force_and_diagonal(u)[1] + 1)
 
 
 @pytest.mark.parametrize("threads", [2, 3])

@@ -88,6 +88,20 @@ def test_a_measured_number_of_threads_is_told(monkeypatch: pytest.MonkeyPatch) -
     assert re.match(r"threads: [12] of 2, pilot 1: \S+ us, 2: \S+ us", run.said[0])
 
 
+@pytest.mark.parametrize("law", ["svk", "neo_hooke"])
+def test_single_precision_stays_near_over_many_steps(law: str) -> None:
+    """Increments add up in doubles: after 800 steps the motion still has six digits."""
+    system = pulled(law)
+    dt = 0.5 * limit(system)
+    single, double = (
+        ran(CentralDifference(dt, precision=p), system, rise(800, 15.0), dt)
+        for p in ("single", "double")
+    )
+    apart = np.abs(single.u - double.u).max() / np.abs(double.u).max()
+    assert single.finished
+    assert 1e-12 < apart < 1e-6
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_energy_is_what_the_load_brought(law: str) -> None:
     system = pulled(law)

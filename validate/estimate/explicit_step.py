@@ -15,7 +15,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.estimate import node_ekf_kernel as kernel
 from validate.fem.critical import critical_step
-from validate.fem.explicit import ExplicitBody
+from validate.fem.explicit import ExplicitBody, Precision
 from validate.fem.system import System
 from validate.solve.central import lumped_damping
 
@@ -74,7 +74,9 @@ class ExplicitStep:
         )  # fmt: skip
 
 
-def explicit_step(system: System, dt: float, parts: int) -> ExplicitStep:
+def explicit_step(
+    system: System, dt: float, parts: int, precision: Precision = "double"
+) -> ExplicitStep:
     """The step of h = dt/parts; raises `SceneError` for damping that is not diagonal."""
     h, lags = dt / parts, system.scene.per_cell(lambda m: m.stiffness_damping)
     if lags.any():
@@ -87,7 +89,7 @@ def explicit_step(system: System, dt: float, parts: int) -> ExplicitStep:
     free[system.free] = 1 / (1 + half[system.free])
     loaded, driven = (np.flatnonzero(X.any(axis=1)) for X in (system.loads, system.moves))
     return ExplicitStep(
-        system, ExplicitBody(system.scene), h, parts,
+        system, ExplicitBody(system.scene, precision=precision), h, parts,
         2 * free, (1 - half) * free, free * h * h / system.masses,
         loaded, np.ascontiguousarray(system.loads[loaded]),
         driven, np.ascontiguousarray(system.moves[driven]),

@@ -23,6 +23,7 @@ from validate.estimate.explicit_filter import ExplicitFilterStepper
 from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
 from validate.estimate.kalman import Innovation
 from validate.estimate.measurements import Measurements, timetable
+from validate.fem.explicit import Precision
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
@@ -57,6 +58,7 @@ class NodeEKF:
     correct_previous: bool = quantity(False, "1", "shift U_{t-dt} with U_t")
     overflow: Literal["stop", "hold"] = quantity("stop", "1", "what to do when P overflows")
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    precision: Precision = quantity("double", "1", "of the element loops: double or single")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
 
@@ -70,7 +72,7 @@ class NodeEKF:
         """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
         measurements that are no components of nodes or that land between the steps."""
         require_handled(system.scene, self)
-        explicit = explicit_step(system, self.dt, self.substeps)
+        explicit = explicit_step(system, self.dt, self.substeps, self.precision)
         free = np.zeros(len(system.moves))
         free[system.free] = 1.0
         rows, R = _components(measurements), measurements.variances(self.Qm)

@@ -9,9 +9,9 @@ import math
 import os
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from operator import attrgetter
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from scipy import sparse
@@ -34,6 +34,7 @@ from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
 from validate.scene.stability import coupled_lambda
 
+Precision = Literal["double", "single"]
 RowName = Literal["u", "d", "r", "old", "v", "a"]
 _ROWS: tuple[RowName, ...] = get_args(RowName)
 # Turns that a thread waits awake for the next step; read when GNU OpenMP is loaded. With its own
@@ -104,10 +105,12 @@ class ExplicitBody:
     of `force` and `advance`, with the same results to rounding: two are 1.8 times as fast at 8640
     tets where the cores are idle, and several times slower than one where they are not. Without
     OpenMP numba bears only one caller a process with threads. `force` of a viscoelastic body is the
-    relaxed one; in `advance` its branches act.
+    relaxed one; in `advance` its branches act. In single `precision` the element loops of forces
+    and blocks reckon in float32, from displacements rounded to it; what they give is added up over
+    time in doubles, and looks and products stay double.
     """
 
-    def __init__(self, scene: Scene, threads: int = 1) -> None:
+    def __init__(self, scene: Scene, threads: int = 1, precision: Precision = "double") -> None:
         _require(scene)
         require_threads(threads)
         mesh = scene.mesh
@@ -118,8 +121,10 @@ class ExplicitBody:
         if self.branches:
             _require_one_caller(mesh, threads)
             self._taut = _packed(taut(scene))[0]
+        self._swift = self._in(precision)
         self.work = np.zeros(kernels.work_size(len(mesh.nodes)))
-        self._places = {1: self.work}
+        self._quick = self.work if precision == "double" else _in_single(self.work)
+        self._places = {1: self._quick}
         self.share(threads)
         springs = sparse.csr_array((self.size, self.size))
         for foundation in scene.foundations:
@@ -130,12 +135,26 @@ class ExplicitBody:
         """So many threads from now on."""
         if threads not in self._places:
             os.environ.setdefault("GOMP_SPINCOUNT", _PATIENCE)
-            self._places[threads] = np.zeros((threads, self.size + len(self.work)))
+            rows = np.zeros((threads, self.size + len(self.work)), self._quick.dtype)
+            self._places[threads] = rows
         self._parts = self._places[threads]
+
+    def _in(self, precision: Precision) -> Floats:
+        """The geometry that forces and blocks are reckoned with."""
+        if precision == "double":
+            return self.geometry
+        if not knows_single(self.scene):
+            raise SceneError(
+                "single precision is for tet4 of St. Venant-Kirchhoff or neo-Hooke in its split "
+                "form, without a Prony series; take precision='double'"
+            )
+        return _in_single(self.geometry)
 
     def _spring(self, springs: sparse.csr_array) -> None:
         self.springs, self._own_springs = springs, np.asarray(springs.diagonal())
-        self._rows = springs.indptr.astype(np.int32), springs.indices.astype(np.int32), springs.data
+        rows = springs.indptr.astype(np.int32), springs.indices.astype(np.int32), springs.data
+        own = self._own_springs if springs.nnz else np.zeros(0)
+        self._packed = self.law, self._swift, self.cells, rows, own, self._quick
 
     def sprung(self, springs: sparse.csr_array) -> "ExplicitBody":
         """The same body with more linear springs (N, N) N/m; both share one workspace."""
@@ -143,18 +162,17 @@ class ExplicitBody:
         other._spring(sparse.csr_array(self.springs + springs))
         return other
 
-    @cached_property
+    @property
     def packed(self) -> PackedBody:
         """What compiled loops take of a body of tetrahedra."""
         self._require_tets()
-        own = self._own_springs if self.springs.nnz else np.zeros(0)
-        return self.law, self.geometry, self.cells, self._rows, own, self.work
+        return self._packed
 
     def force(self, u: Floats) -> Floats:
         """Internal nodal forces (N,) N."""
         f = self._pull(u)
         add = kernels.add_forces if self._parts.ndim == 1 else kernels.add_forces_in_parts
-        add(self.law, self.geometry, self.cells, _own(u), f, self._parts)
+        add(self.law, self._swift, self.cells, _own(u), f, self._parts)
         return f
 
     def force_and_diagonal(self, u: Floats) -> tuple[Floats, Floats]:
@@ -202,7 +220,7 @@ class ExplicitBody:
         rows[:4] = motion.rows[:4]
         memory, series = self._remembered(motion, rule.dt)
         work, taken, size = central_kernel.advance(
-            self.law, self.geometry, self.cells, self._rows, rows,
+            self.law, self._swift, self.cells, self._packed[3], rows,
             rule.keep, rule.gain, rule.lag, rule.dt,
             rule.held, rule.moves, rule.loaded, rule.loads, _own(begin), _own(end), substeps,
             self._parts, memory, series,
@@ -232,7 +250,19 @@ class ExplicitBody:
 
     def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
         self._require_tets()
-        kernels.add_forces_and_blocks(self.law, self.geometry, self.cells, _own(u), f, d, self.work)
+        law, geometry, cells, *_, work = self._packed
+        kernels.add_forces_and_blocks(law, geometry, cells, _own(u), f, d, work)
+
+
+def _in_single(x: Floats) -> Floats:
+    """In float32, for which loops are compiled as they are for doubles."""
+    return cast(Floats, x.astype(np.float32))
+
+
+def knows_single(scene: Scene) -> bool:
+    """Whether a body's element loops are written for single precision."""
+    known = scene.mesh.kind == "tet4" and _code(scene.material) in (SVK, NEO_HOOKE)
+    return known and cell_branches(scene) is None
 
 
 def require_threads(threads: int) -> None:

@@ -97,9 +97,10 @@ class _Corners:
         builder, step = self.builder, ir.Constant(self.index.type, corner * BLOCK + lane)
         node = builder.load(builder.gep(self.cells, [builder.add(self.index, step)]))
         start, eighth = builder.zext(node, ir.IntType(64)), wide * self.align // 8
-        if eighth not in (2, 4, 8):
-            start, eighth = builder.mul(start, ir.Constant(start.type, eighth // 4)), 4
-        numbers = builder.bitcast(self.data, ir.IntType(8 * eighth).as_pointer())
+        unit = eighth & -eighth  # the power of two in it
+        if unit < eighth:
+            start = builder.mul(start, ir.Constant(start.type, eighth // unit))
+        numbers = builder.bitcast(self.data, ir.IntType(8 * unit).as_pointer())
         kind = vector(self.typ.dtype, 1).element.as_pointer()
         first = builder.bitcast(builder.gep(numbers, [start]), kind)
         first = builder.gep(first, [ir.Constant(start.type, k)]) if k else first

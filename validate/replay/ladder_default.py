@@ -12,6 +12,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError, UsageError
+from validate.fem.explicit import knows_single
 from validate.fem.locate import barycentric_rows
 from validate.replay.experiment import Experiment
 from validate.replay.ladder import (
@@ -42,6 +43,7 @@ from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.refine import linear, of_element
 from validate.scene.scene import Load, Scene
+from validate.solve.central import CentralDifference
 
 _LEVELS = (400, 300, 200, 150, 125, 100, 75, 50, 35, 25, 18, 12)  # of a hundred: own mesh
 _COARSER = (0.5, 0.7, 1.0)  # of the reference's level
@@ -256,7 +258,10 @@ def _solvers(
 
 
 def _handles(solver: Rival, dt: float, scene: Scene) -> bool:
-    return solver.make(dt).handles.covers(with_law(scene, solver.law))
+    scheme, body = solver.make(dt), with_law(scene, solver.law)
+    if isinstance(scheme, CentralDifference) and scheme.precision == "single":
+        return scheme.handles.covers(body) and knows_single(body)
+    return scheme.handles.covers(body)
 
 
 def _points(

@@ -38,7 +38,7 @@ def exact_in_ramps(dt: float) -> Scheme:
 def swinging(
     steps: tuple[float, ...], small: int, medium: int, law: LawName = "neo_hooke"
 ) -> tuple[Rival, ...]:
-    """Every scheme of linear dynamics, and both of large strain on tetrahedra.
+    """Every scheme of linear dynamics, and those of large strain on tetrahedra.
 
     Baselines that solve anew at every step run on meshes up to `small`, dense ones up to `medium`.
     """
@@ -66,8 +66,20 @@ def swinging(
         Rival("explicit, lumped, C = alpha M", "explicit", ExplicitLinear),
         Rival("large strain, explicit", "large strain",
                lambda dt: CentralDifference(dt, _PARTS, "lagged"), elements=("P1",), **large),
+        *_single(law),
         Rival("large strain, implicit", "large strain", _newton_dynamics,
                elements=("P1", "P2"), finest=medium, shortest=steps[0], **large),
+    )  # fmt: skip
+
+
+def _single(law: LawName) -> tuple[Rival, ...]:
+    """The explicit scheme in single precision, for the laws whose loops know it."""
+    if law not in ("svk", "neo_hooke"):
+        return ()
+    return (
+        Rival("large strain, explicit, single precision", "large strain",
+               lambda dt: CentralDifference(dt, _PARTS, "lagged", precision="single"),
+               elements=("P1",), law=law),
     )  # fmt: skip
 
 

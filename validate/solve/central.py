@@ -20,7 +20,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assemble import lumped, mass
 from validate.fem.critical import lanczos_step
-from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitMotion
+from validate.fem.explicit import BodyLook, CentralRule, ExplicitBody, ExplicitMotion, Precision
 from validate.fem.system import System
 from validate.fem.threads import Team, idle_cores, pilot
 from validate.parameters import quantity
@@ -49,6 +49,7 @@ class CentralDifference:
     and, when the body has deformed further, the critical step are looked at; traces hold between.
     Up to `threads` share the cells of a step, as many as a measured pilot shows to pay and no more
     than cores are idle; what was chosen is in the run's notes. Several change results by rounding.
+    With `precision` "single" forces are of 7 digits; the motion is the velocity form, in doubles.
     """
 
     handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, contact=("foundations", "rigid"))
@@ -60,6 +61,7 @@ class CentralDifference:
     margin: float = quantity(0.05, "1", "share of the critical step kept free")
     watch: int = quantity(20, "1", "steps between looks at energy, det F, critical step")
     threads: int = quantity(1, "1", "most cores to share the cells of a step, where it pays")
+    precision: Precision = quantity("double", "1", "of the element loops: double or single")
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1 and self.watch >= 1):
@@ -84,8 +86,9 @@ class CentralDifference:
         past = Past(ExplicitMotion(np.zeros((6, len(still)))), still, inputs)
         plates = system.moves[system.held]
         feels_loads = bool(system.loads[system.held].any())
-        body, masses = ExplicitBody(system.scene, self.threads), system.masses[system.free]
+        body = ExplicitBody(system.scene, self.threads, self.precision)
         body.share(1)  # until a pilot has shown that more pay
+        masses = system.masses[system.free]
         if body.branches and system.scene.contacts:
             raise SceneError(
                 "explicit contact knows no Prony series: drop one of them, or take NewtonDynamics "
