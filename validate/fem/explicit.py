@@ -11,7 +11,7 @@ from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
-from typing import Literal, cast, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from scipy import sparse
@@ -25,6 +25,7 @@ from validate.fem.assemble import shape_gradients
 from validate.fem.brick_packing import packed_bricks, require_bricks
 from validate.fem.cell_kernels import ROWS
 from validate.fem.lane_nodes import BLOCK
+from validate.fem.lanes import on_lines
 from validate.fem.point_kernels import NEO_HOOKE, SVK
 from validate.fem.surface import foundation_stiffness
 from validate.fem.viscous import cell_branches, taut
@@ -122,7 +123,7 @@ class ExplicitBody:
             _require_one_caller(mesh, threads)
             self._taut = _packed(taut(scene))[0]
         self._swift = self._in(precision)
-        self.work = np.zeros(kernels.work_size(len(mesh.nodes)))
+        self.work = on_lines(np.zeros(kernels.work_size(len(mesh.nodes))))
         self._quick = self.work if precision == "double" else _in_single(self.work)
         self._places = {1: self._quick}
         self.share(threads)
@@ -135,8 +136,8 @@ class ExplicitBody:
         """So many threads from now on."""
         if threads not in self._places:
             os.environ.setdefault("GOMP_SPINCOUNT", _PATIENCE)
-            rows = np.zeros((threads, self.size + len(self.work)), self._quick.dtype)
-            self._places[threads] = rows
+            size = kernels.parts_size(self.size // 3)
+            self._places[threads] = on_lines(np.zeros((threads, size), self._quick.dtype))
         self._parts = self._places[threads]
 
     def _in(self, precision: Precision) -> Floats:
@@ -256,7 +257,7 @@ class ExplicitBody:
 
 def _in_single(x: Floats) -> Floats:
     """In float32, for which loops are compiled as they are for doubles."""
-    return cast(Floats, x.astype(np.float32))
+    return on_lines(x.astype(np.float32))
 
 
 def knows_single(scene: Scene) -> bool:
@@ -326,8 +327,8 @@ def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
     volumes, mu = cell_volumes(mesh), scene.per_cell(lambda m: m.shear_modulus)
     rows[:e, 9], rows[:e, 10], rows[:e, ROWS:] = volumes * bulk, volumes * mu, cards
     cells[:e] = 8 * mesh.cells
-    packed = np.ascontiguousarray(rows.reshape(blocks, BLOCK, n).swapaxes(1, 2))
-    lanes = np.ascontiguousarray(cells.reshape(blocks, BLOCK, 4).swapaxes(1, 2))
+    packed = on_lines(rows.reshape(blocks, BLOCK, n).swapaxes(1, 2))
+    lanes = on_lines(cells.reshape(blocks, BLOCK, 4).swapaxes(1, 2))
     return packed if cards.shape[1] else packed.reshape(blocks, n * BLOCK), lanes
 
 

@@ -35,6 +35,7 @@ from validate.fem.cell_kernels import (
 from validate.fem.compiled import compiled
 from validate.fem.kernel_tensors import FAST
 from validate.fem.lane_kernels import add_lane_blocks, add_lane_forces, add_lane_products
+from validate.fem.lane_nodes import BLOCK, FOUR
 from validate.fem.point_kernels import INVARIANTS
 
 Cells = NDArray[np.int32]
@@ -50,7 +51,12 @@ _threaded = compiled(*MODULES, nogil=True, parallel=True, error_model="numpy")
 
 def work_size(nodes: int) -> int:
     """Length of the workspace of a body."""
-    return max(brick_kernels.WORK, 16 * nodes)
+    return max(brick_kernels.WORK, 4 * -(-nodes // BLOCK) * BLOCK * FOUR)
+
+
+def parts_size(nodes: int) -> int:
+    """Length of a thread's row: forces, and the workspace from a line of the cache on."""
+    return -(-3 * nodes // BLOCK) * BLOCK + work_size(nodes)
 
 
 @_compiled
@@ -84,17 +90,18 @@ def add_late_forces(
 def add_forces_in_parts(
     law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, parts: Floats
 ) -> None:
-    """The same by as many threads as `parts` (threads, N + workspace) has rows, each for itself.
+    """The same by as many threads as `parts` (threads, `parts_size`) has rows, each for itself.
 
     A thread adds up its share of the blocks in its own row; the rows are added in their order, so
     results do not depend on which thread was first.
     """
     threads, blocks, size = parts.shape[0], cells.shape[0], f.size
+    begin = -(-size // BLOCK) * BLOCK
     for t in prange(threads):
         first, end = t * blocks // threads, (t + 1) * blocks // threads
         own = parts[t, :size]
         own[:] = 0.0
-        add_forces(law, geometry[first:end], cells[first:end], u, own, parts[t, size:])
+        add_forces(law, geometry[first:end], cells[first:end], u, own, parts[t, begin:])
     for t in range(threads):
         for i in range(size):
             f[i] += parts[t, i]

@@ -42,6 +42,13 @@ def _moduli(geometry: Floats, o: int) -> tuple[float, float]:
 
 
 @inlined
+def room(nodes: int) -> int:
+    """Numbers that fours of all nodes take in a workspace, up to where the next ones may begin
+    without lying across the lines of a cache."""
+    return -(-nodes // BLOCK) * BLOCK * FOUR
+
+
+@inlined
 def _padded(u: Floats, to: Floats) -> None:
     for n in range(u.size // 3):
         to[FOUR * n], to[FOUR * n + 1], to[FOUR * n + 2] = u[3 * n], u[3 * n + 1], u[3 * n + 2]
@@ -83,12 +90,12 @@ def _add_first(law: int, geometry: Floats, cells: Any, x: Floats, r: Floats) -> 
 def add_lane_forces(
     law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, w: Floats
 ) -> None:
-    """Adds internal forces to f (N,); w (8 n,) is a workspace of the numbers of `geometry`.
+    """Adds internal forces to f (N,); w is a workspace (2 `room`) of the numbers of `geometry`.
 
     Each law has a loop of its own: a choice within it would cost a tenth.
     """
     nodes = u.size // 3
-    x, r = w[: FOUR * nodes], w[FOUR * nodes : 2 * FOUR * nodes]
+    x, r = w[: room(nodes)], w[room(nodes) : 2 * room(nodes)]
     _padded(u, x)
     r[:] = 0
     if geometry.ndim == 3:
@@ -118,10 +125,10 @@ def _first_of_card(H: Nine, a: float, b: float, geometry: Floats, o: int) -> Nin
 def add_lane_products(
     law: int, geometry: Floats, cells: Any, u: Floats, v: Floats, f: Floats, w: Floats
 ) -> None:
-    """Adds K_t(u) v to f (N,); w (12 n,)."""
+    """Adds K_t(u) v to f (N,); w (3 `room`)."""
     nodes, count, size = u.size // 3, lanes_of(w), geometry[0].size
-    x, y = w[: FOUR * nodes], w[FOUR * nodes : 2 * FOUR * nodes]
-    r = w[2 * FOUR * nodes : 3 * FOUR * nodes]
+    x, y = w[: room(nodes)], w[room(nodes) : 2 * room(nodes)]
+    r = w[2 * room(nodes) : 3 * room(nodes)]
     _padded(u, x)
     _padded(v, y)
     r[:] = 0
@@ -173,10 +180,10 @@ def _add_nodes(law: int, rows: int, geometry: Floats, cells: Any, x: Floats, r: 
 def add_lane_blocks(
     law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats, w: Floats
 ) -> None:
-    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (16 n,)."""
+    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (4 `room`)."""
     nodes, rows = u.size // 3, 3 * d.size // f.size
     wide = 12 if rows == 6 else 8
-    x, r = w[: FOUR * nodes], w[FOUR * nodes : (FOUR + wide) * nodes]
+    x, r = w[: room(nodes)], w[room(nodes) : (1 + wide // FOUR) * room(nodes)]
     _padded(u, x)
     r[:] = 0
     if law == SVK and rows == 6:

@@ -11,6 +11,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, cast
 
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -18,6 +19,16 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 
 _BITS = 512  # of a register; a machine with less takes two or four
 _INT = ir.IntType(32)
+
+
+def on_lines(x: np.ndarray) -> np.ndarray:
+    """A copy that begins with a line of the cache, so that no vector of it lies across two."""
+    line = _BITS // 8
+    room = np.empty(x.nbytes + line, np.uint8)
+    start = -room.ctypes.data % line
+    copy = room[start : start + x.nbytes].view(x.dtype).reshape(x.shape)
+    copy[...] = x
+    return copy
 
 
 def emitted(function: Callable[..., Any]) -> Callable[..., Any]:
