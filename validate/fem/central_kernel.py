@@ -64,11 +64,18 @@ def _rates(rows: Floats, keep: Floats, gain: Floats, lag: float, dt: float) -> f
 
 
 @inlined
-def _input(columns: Floats, j: int, begin: Floats, end: Floats, share: float, first: int) -> float:
-    """Row j of `columns` (., k) times the inputs from `first` on, a share of the way."""
+def _inputs(begin: Floats, end: Floats, share: float, to: Floats) -> None:
+    """Inputs (k + l,) a share of the way."""
+    for c in range(to.size):
+        to[c] = begin[c] + share * (end[c] - begin[c])
+
+
+@inlined
+def _input(columns: Floats, j: int, inputs: Floats, first: int) -> float:
+    """Row j of `columns` (., k) times the inputs from `first` on."""
     total = 0.0
     for c in range(columns.shape[1]):
-        total += columns[j, c] * (begin[first + c] + share * (end[first + c] - begin[first + c]))
+        total += columns[j, c] * inputs[first + c]
     return total
 
 
@@ -109,10 +116,13 @@ def advance(
     k = moves.shape[1]
     work, taken = 0.0, 0.0
     damped = lag > 0 or bool((keep[gain > 0] < 1).any())
+    old_inputs, inputs = begin.copy(), begin.copy()
     for s in range(substeps):
+        _inputs(begin, end, s / substeps, old_inputs)
+        _inputs(begin, end, (s + 1) / substeps, inputs)
         for j in range(loaded.size):
             i = loaded[j]
-            work += _input(loads, j, begin, end, s / substeps, k) * d[i] / 2
+            work += _input(loads, j, old_inputs, k) * d[i] / 2
             v[i], a[i] = d[i], lag * (r[i] - old[i])
         for j in range(held.size):
             work += r[held[j]] * d[held[j]] / 2
@@ -121,7 +131,7 @@ def advance(
         else:
             _moved(u, d, r, keep, gain)
         for j in range(loaded.size):
-            i, f = loaded[j], _input(loads, j, begin, end, s / substeps, k)
+            i, f = loaded[j], _input(loads, j, old_inputs, k)
             way, drag = (v[i] + d[i]) / 2, (1 - keep[i]) / gain[i]
             d[i] += gain[i] * f
             u[i] += gain[i] * f
@@ -131,7 +141,7 @@ def advance(
                 taken += drag * more * (2 * way + more) + a[i] * more
         for j in range(held.size):
             i = held[j]
-            d[i] = _input(moves, j, begin, end, (s + 1) / substeps, 0) - u[i]
+            d[i] = _input(moves, j, inputs, 0) - u[i]
             u[i] += d[i]
             work += r[i] * d[i] / 2
         pull(springs, u, r)
@@ -144,7 +154,7 @@ def advance(
             add_forces(law, geometry, cells, u, r, w)
     size = _rates(rows, keep, gain, lag, dt)
     for j in range(loaded.size):
-        i, more = loaded[j], gain[loaded[j]] * _input(loads, j, begin, end, 1.0, k)
+        i, more = loaded[j], gain[loaded[j]] * _input(loads, j, inputs, k)
         v[i] += more / (2 * dt)
         a[i] += more / (dt * dt)
     for j in range(held.size):

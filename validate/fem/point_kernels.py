@@ -59,11 +59,23 @@ def _shares(H: Nine, dJ: float, y: float, a: float, b: float) -> Three:
 
 
 @inlined
+def stretched(H: Nine) -> float:
+    """J^(-1/3)."""
+    return inverse_cube_root(1 + volume(H)[0])
+
+
+@inlined
 def first_neo_hooke(H: Nine, a: float, b: float) -> Nine:
-    """V P, with cof F - I = tr(H) I - H^T + cof H."""
+    """V P."""
+    return first_of_stretched(H, stretched(H), a, b)
+
+
+@inlined
+def first_of_stretched(H: Nine, y: float, a: float, b: float) -> Nine:
+    """V P of neo-Hooke where y = J^(-1/3) is known, with cof F - I = tr(H) I - H^T + cof H."""
     K, t = cofactor(H), H[0] + H[4] + H[8]
     dJ = t + K[0] + K[4] + K[8] + (H[0] * K[0] + H[1] * K[1] + H[2] * K[2])
-    i, h, k = _shares(H, dJ, inverse_cube_root(1 + dJ), a, b)
+    i, h, k = _shares(H, dJ, y, a, b)
     i, d = i + k * t, h - k
     return (
         i + d * H[0] + k * K[0], h * H[1] + k * (K[1] - H[3]), h * H[2] + k * (K[2] - H[6]),
