@@ -5,7 +5,7 @@ OMP_NUM_THREADS=1 python benchmarks/filters.py [STEPS]    STEPS of each filter (
 Steps of the filters take turns with plain ones, so that a busy machine slows both; times are
 medians of steps without and with a measurement, ratios those of the mean step at 200 Hz. Counted
 in flop, a node EKF is 1.47 plain steps, its 3 x 3 block 1.76 (`benchmarks/explicit.py` counts the
-element loops; an unknown adds 10, a 3 x 3 node 110).
+element loops; an unknown adds 10, a 3 x 3 node 110); what is done besides is alike in both.
 """
 
 import sys

@@ -3,6 +3,9 @@
 St. Venant-Kirchhoff, neo-Hooke, and Mooney-Rivlin and Yeoh in their split form. A block of 16 cells
 has its numbers side by side, row by row; the nodes' displacements are copied with a pad, so that a
 node is one load, and forces are added up in rows of their own.
+
+A force of St. Venant-Kirchhoff is 228 flop, in 120 instructions of 8 cells; gathering and adding up
+are as many again. The order of the cells makes no difference while the nodes stay in the caches.
 """
 
 from typing import Any
