@@ -1,4 +1,4 @@
-"""The tables of docs/paper-000.md and -003.md: every number and picture of a paper, of stored runs.
+"""The tables of docs/paper-00x.md: every number and picture of a paper, of stored runs.
 
 validate run fluid_block fluid_phantom needle_pocket --out DIR
 python benchmarks/paper_table.py DIR paper-000            prints it
@@ -17,10 +17,14 @@ from typing import Any
 
 PAGES = {
     "paper-000": ("fluid_block", "fluid_phantom", "needle_pocket"),
+    "paper-001": ("kf_cube",),
+    "paper-002": ("needle_block", "bending_rod"),
     "paper-003": ("ekf_cube", "ekf_liver", "ekf_cone", "haptic_liver"),
+    "paper-004": ("async_line", "async_block"),
 }
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
+_NUMERALS = ("", "I", "II", "III", "IV", "V", "VI", "VII")
 HEAD = ("paper", "what", "theirs", "ours", "verdict", "why", "experiment")
 
 
@@ -31,8 +35,12 @@ def path(page: str) -> Path:
 
 def place(source: str) -> tuple[float, str]:
     """The first section that a source names, to read the paper from its top."""
-    found = re.search(r"sections? (\d+(?:\.\d+)?)", source)
-    return (float(found[1]) if found else 99.0), source
+    if source.startswith("abstract"):
+        return 0.0, source
+    found = re.search(r"sections? (?:(\d+(?:\.\d+)?)|([IVX]+)\b)", source)
+    if not found:
+        return 99.0, source
+    return float(found[1] or _NUMERALS.index(found[2])), source
 
 
 def shown(value: float | None, unit: str) -> str:

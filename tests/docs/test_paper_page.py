@@ -21,8 +21,14 @@ def script(project_root: Path) -> ModuleType:
     return module
 
 
-PICTURES = {"paper-000": 10, "paper-003": 7}
-SECTIONS = {"paper-000": {2, 3, 4, 5, 6}, "paper-003": {2, 3}}
+PICTURES = {"paper-000": 10, "paper-001": 5, "paper-002": 11, "paper-003": 7, "paper-004": 8}
+SECTIONS = {
+    "paper-000": {2, 3, 4, 5, 6},
+    "paper-001": {0, 2, 3},
+    "paper-002": {3, 4, 5, 6, 7},
+    "paper-003": {2, 3},
+    "paper-004": {1, 4, 5, 6},
+}
 
 
 def page_rows(script: ModuleType, page: str) -> list[list[str]]:
@@ -71,3 +77,14 @@ def test_every_picture_of_the_paper_is_named(script: ModuleType, page: str) -> N
     named = {int(n) for first in re.findall(r"Figs?\. ([\d, and]+)", said)
              for n in re.findall(r"\d+", first)}  # fmt: skip
     assert named >= set(range(1, PICTURES[page] + 1))
+
+
+def test_the_readme_gives_the_same_verdicts(script: ModuleType, project_root: Path) -> None:
+    """Rows of its table of printed figures that a page has, too."""
+    readme = (project_root / "README.md").read_text("utf-8")
+    text = readme.split("<!-- printed: begin -->")[1].split("<!-- printed: end -->")[0]
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
+    paged = {f"{r[6]}: {r[1]}": r[4] for page in PICTURES for r in page_rows(script, page)[2:]}
+    shared = [(row[0], row[3].split(" (within")[0]) for row in rows[2:] if row[0] in paged]
+    assert len(shared) >= 3
+    assert [verdict for _, verdict in shared] == [paged[what] for what, _ in shared]

@@ -19,6 +19,7 @@ from validate.papers.async_regions.bodies import (
     impedance,
     pad_of,
 )
+from validate.papers.async_regions.claims import claims
 from validate.papers.async_regions.line import HapticProbe, LoadCell, TouchedLine, place, record
 from validate.papers.async_regions.line_exhibits import spring_words
 from validate.papers.async_regions.methods import BLOCK
@@ -165,3 +166,15 @@ def test_the_rows_of_table_1_that_are_printed() -> None:
     for layers, rates, theirs in rows:
         found = pushed(bar(E, 40), replace(base, layers=layers, rates=rates), depth)
         assert peak(found.force, t, 20.0, 1.0) == pytest.approx(theirs, abs=0.02)
+
+
+def test_sentences_of_the_paper_as_numbers() -> None:
+    """A linear model's relative error knows no size; eq 4 is 2/w_max of the bar, nearly."""
+    p = TouchedLine(probe=HapticProbe(seconds=3.0))
+    errors = {"error.n5_f5": 100.0, "error.n5_f500": 2.0, "error.n30_f50": 5.0}
+    found = claims(p, errors)
+    assert found["error.by.size"] == pytest.approx(1, abs=1e-9)
+    assert found["eq4"] == pytest.approx(1, abs=1e-3)
+    assert found["size.over.rate"] == 0.4
+    assert found["stiff.over.soft"] == found["stiff.error"] / 100
+    assert 4.5 < found["stiff.whole"] < 5.5  # static: 5 N

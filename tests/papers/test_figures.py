@@ -11,8 +11,8 @@ from validate.replay.method import WALK_UNRECORDED
 
 DECLARED = {
     "async_block": 3,
-    "async_line": 23,
-    "bending_rod": 7,
+    "async_line": 68,
+    "bending_rod": 23,
     "ecoflex_cylinder": 3,
     "ekf_cone": 20,
     "ekf_cube": 33,
@@ -21,9 +21,9 @@ DECLARED = {
     "fluid_phantom": 48,
     "fluid_phantom_large": 0,
     "haptic_liver": 4,
-    "kf_cube": 11,
+    "kf_cube": 34,
     "kf_cube_inertia": 0,
-    "needle_block": 13,
+    "needle_block": 43,
     "needle_pocket": 12,
 }
 # Every number of a paper's tables and results that one of our experiments could stand beside.
@@ -35,9 +35,14 @@ PRINTED = {
         512e6, 82,
     ),
     "needle_pocket": (512, 0.001, 1, 30, 2.0e9, 2.4e9, 3000),  # paper 000
-    "kf_cube": (200, 672, 0.0116, 10, 0.1735, 0.0158, 63, 25),  # paper 001
-    "bending_rod": (4.2,),  # paper 002
-    "needle_block": (1e-6, 1 / 30, 1),
+    "kf_cube": (  # paper 001
+        200, 672, 0.0116, 10, 0.1735, 0.0158, 63, 25, 500, 0.05, 4e-3, 7e-3, 1e-3, 2e-3, 1.0, 3000,
+        0.0, 0.1, 1068, 0.47, 10e3, 0.001, 3.4e9, 8e9,
+    ),
+    "bending_rod": (4.2, 7000, 0.2, 0.25, 0.5, 10_000, 1.0, 0.1, 0.05, 1 / 30),  # paper 002
+    "needle_block": (
+        1e-6, 1 / 30, 1, 200, 0.47, 2000, 0.1, 60e3, 0.495, 1140, 0.08, 2, 0.5, 750e6, 128e6,
+    ),
     "ekf_cube": (  # paper 003
         839, 3760, 1e-3, 75 / 3.5, 75, 3.5, 8500, 600, 400, 30, 0.1, 1000, 30e3, 0.49, 0.5, 0,
         0.001, 2.2e9, 16e9,
@@ -55,7 +60,8 @@ PRINTED = {
     "async_block": (26,),
     "async_line": (  # paper 004
         1.65, 1.66, 1.76, 1.70, 2.86, 0.5, 6.6, 2.7, 73, 0.175, 0.123, 0.094, 0.059, 0.017,
-        29.7, 46.3, 66.3, 90.3, 24.96, 25.93, 31.07, 3.9, 24.5,
+        29.7, 46.3, 66.3, 90.3, 24.96, 25.93, 31.07, 3.9, 24.5, 1000, 100, 10, 5e3, 35e3, 6e3, 11e3,
+        3.5e3, 9.3e3, 25e3, 40e-4, 0.1, 6.5, 40, 0.01, 1.0, 20, 30, 0.05, 50, 4,
     ),
 }  # fmt: skip
 

@@ -13,6 +13,7 @@ from validate.papers.accuracy.errors import (
     Errors,
     errors_of,
     ordered_share,
+    read_off,
     shape_maps,
     stable_of,
     sum_ratio,
@@ -87,7 +88,18 @@ def test_limits_of_the_printed_rules() -> None:
     assert numbers["misprint.0"] == pytest.approx(2 / 3**0.5, abs=1e-6)
     assert numbers["misprint.1"] == pytest.approx(1.29, abs=5e-3)
     assert numbers["misprint.3"] == pytest.approx(1.55, abs=5e-3)
+    assert numbers["order"] == pytest.approx(2, abs=0.01)
     assert limit_of(lambda wh: np.full(len(wh), 0.5)) == np.inf
+
+
+def test_curves_are_read_off_at_two_seconds() -> None:
+    t, zero = np.array([1.0, 2.0]), np.zeros(2)
+    lumped = {"E_n": np.array([1.0, 2.0]), "E_s": np.array([3.0, np.nan]), "E_i": zero + 4}
+    errors = {
+        "explicit_lumped": Errors("lumped", t, lumped, ()),
+        "quasi_static": Errors("still", t, {"E_i": np.array([5.0, 6.0])}, ()),
+    }
+    assert read_off(errors) == {"E_n@2s": 2.0, "E_i@2s": 4.0, "E_i@2s.quasi_static": 6.0}
 
 
 def test_critical_steps_of_the_block() -> None:

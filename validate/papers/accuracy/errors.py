@@ -174,6 +174,14 @@ def sum_ratio(errors: Mapping[str, Errors], name: str = "E_i") -> tuple[float, f
     return float(np.median(both / (explicit + lumped))), float(np.median(explicit / lumped))
 
 
+def read_off(errors: Mapping[str, Errors]) -> dict[str, float]:
+    """What the paper's curves show at 2 s, by the names of its figures' numbers."""
+    lumped, still = errors["explicit_lumped"], errors["quasi_static"]
+    found = {f"{name}@2s": lumped.at(name, 2.0) for name in DRAWN}
+    found["E_i@2s.quasi_static"] = still.at("E_i", 2.0)
+    return {name: value for name, value in found.items() if value is not None}
+
+
 SWITCHED = (
     "implicit_lumped_full",
     "implicit_restricted",

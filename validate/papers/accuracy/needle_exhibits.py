@@ -27,6 +27,7 @@ from validate.papers.accuracy.errors import (
     limit_row,
     mesh_words,
     ordered_share,
+    read_off,
     shape_maps,
     stable_of,
     static_exhibit,
@@ -93,6 +94,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "explicit.over.lumped": sum_ratio(errors)[1],
         "restriction.over.lumping": ratio,
         "static.end": end,
+        **read_off(errors),
         "peaks": float(_peaks(errors["quasi_static"].line("E_s"))),
         "limit.printed": stable_of(_block(30, "MP2", "strain"), "consistent", "printed"),
         "limit.lagged": stable_of(_block(30, "MP2", "strain"), "consistent", "lagged"),
@@ -183,7 +185,8 @@ def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
         "materials", "MP1's answers, and MP2's own quasi-statics, against implicit MP2.", found,
         ("E_n", "E_s", "E_i"), units_in(2),
     )  # fmt: skip
-    share = (own.at("E_s", 10.0) or 0.0) / (errors["implicit"].at("E_s", 10.0) or 1.0)
+    wrong = errors["implicit"].at("E_s", 10.0) or 0.0
+    share = (own.at("E_s", 10.0) or 0.0) / (wrong or 1.0)
     mean = float(np.nanmean(own.values["E_s"]) / np.nanmean(errors["implicit"].values["E_s"]))
     words = (
         _refusals(p),
@@ -193,7 +196,7 @@ def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     )
     return (
         Exhibit("materials", "The wrong material", words, (table, _by_scene(p)), (chart,)),
-        {"material.end": share, "material.mean": mean},
+        {"material.end": share, "material.mean": mean, "E_s@10s.MP1": wrong},
     )
 
 

@@ -35,9 +35,9 @@ def ring_nodes() -> dict[str, float]:
 
 BLOCK_FIGURES = (
     Figure("green region of Fig. 2(b), 100 Hz: its nodes", "told:ring.nodes", 26, None, "1",
-           "not reproducible as printed", _LIST, "Fig. 2(b) and section 5.1", 16, 0.5),
+           "not reproducible as printed", _LIST, "section 5.1, Fig. 2(b)", 16, 0.5),
     Figure("peak force error of regions in 3-D", "told:error.near", None, None, "%",
-           "not comparable", _NONE, "Figs 1 and 2"),
+           "not comparable", _NONE, "section 5, Figs. 1 and 2"),
     Figure("gain of regions in 3-D, mean tick", "told:gain.near", None, None, "%",
-           "not comparable", _NONE, "Figs 1 and 2"),
+           "not comparable", _NONE, "section 5, Figs. 1 and 2"),
 )  # fmt: skip

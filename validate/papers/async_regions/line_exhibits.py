@@ -9,6 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, Heat, NumberTable
 from validate.papers.async_regions.bodies import bar, growing, impedance, pad_of
+from validate.papers.async_regions.claims import DEEP, HALF, HZ, STIFF, claims
 from validate.papers.async_regions.line import TouchedLine
 from validate.papers.async_regions.methods import LINE
 from validate.papers.async_regions.runs import growth, off, peak, pushed
@@ -17,8 +18,6 @@ from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
 from validate.solve.regions import AsyncRegions
 
-_HALF = 1.0  # s around the middle in which the paper's "approximately 20th second" is read
-_STIFF, _HZ, _DEEP = 25e3, 0.3, 0.05  # Pa, Hz, m: Table 2
 _SHORT, _NEAR = 10, 3  # free nodes and primary layers of the bar whose stability is mapped
 _RATIOS = (1, 2, 5, 10, 20, 50, 100, 200)
 
@@ -27,10 +26,12 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """Both tables, the oracle beside, energies of borders, and growth over the step ratio."""
     p, main = cast(TouchedLine, parameters), cases[""]
     middle = p.probe.seconds / 2
-    title = f"Table 1: peak force within {_HALF:g} s of {middle:g} s, against the whole solve."
-    first, numbers = force_table("table_1", title, main, middle, _HALF)
+    title = f"Table 1: peak force within {HALF:g} s of {middle:g} s, against the whole solve."
+    first, numbers = force_table("table_1", title, main, middle, HALF)
     progress("growing push")
     second, more = _table_2(p)
+    progress("the paper's sentences")
+    sentences = claims(p, numbers)
     progress("energy of borders")
     energy = _energies(p, main)
     progress("stability")
@@ -49,7 +50,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         (_impedances(p, main), energy),
         heats=(maps,),
     )
-    return Told((tables, bounds), {**numbers, **more})
+    return Told((tables, bounds), {**numbers, **more, **sentences})
 
 
 _BORDERS = (
@@ -75,9 +76,9 @@ def spring_words(p: TouchedLine) -> tuple[str, ...]:
 def _table_2(p: TouchedLine) -> tuple[NumberTable, dict[str, float]]:
     """A growing push on the stiff bar: whole, fixed and adaptable primary region."""
     t: Floats = p.dt * np.arange(
-        1, round(9.25 / _HZ / p.dt) + 1, dtype=np.float64
+        1, round(9.25 / HZ / p.dt) + 1, dtype=np.float64
     )  # ends on its tenth peak
-    depth, scene = growing(t, _DEEP, _HZ), bar(_STIFF, p.body.cells, p.body.damping)
+    depth, scene = growing(t, DEEP, HZ), bar(STIFF, p.body.cells, p.body.damping)
     whole = AsyncRegions(p.dt, (), (), spring=p.probe.spring, pad=pad_of(p.body.cells))
     fixed = replace(whole, layers=(10,), rates=(50.0,))
     kinds = {"whole": whole, "fixed": fixed, "adaptable": replace(fixed, adapt="linear", most=30)}
@@ -93,7 +94,7 @@ def _table_2(p: TouchedLine) -> tuple[NumberTable, dict[str, float]]:
         numbers |= {f"growing.{name}": top, f"growing.error.{name}": error}
     heads = ("primary region", "peak / N", "error / %", "rms / %", "layers at most / 1",
              "energy made / J")  # fmt: skip
-    title = f"Table 2: a push that grows to {100 * _DEEP:g} cm at {_HZ:g} Hz, {_STIFF / 1e3:g} kPa."
+    title = f"Table 2: a push that grows to {100 * DEEP:g} cm at {HZ:g} Hz, {STIFF / 1e3:g} kPa."
     return NumberTable("table_2", title, heads, tuple(rows)), numbers
 
 

@@ -20,6 +20,7 @@ from validate.papers.fluid_block.updates import (
     several_exhibit,
     updates_exhibit,
 )
+from validate.papers.stated import taken
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases
 from validate.solve.pressure_curve import RATIOS
@@ -53,15 +54,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
 
 
 _ASSUMED = "cavity, boundary, plane state and tool are not printed: ours"
-_INPUT = "an input, taken as printed"
 _P = FluidBlock()
-
-
-def _taken(name: str, theirs: float, ours: float, unit: str, reason: str = _INPUT) -> Figure:
-    return Figure(
-        name, lambda _: ours, theirs, None, unit, "not comparable", reason, "section 3.3", ours,
-        1e-12,
-    )  # fmt: skip
 
 
 def _drawn(name: str, number: str, theirs: float | None, unit: str, source: str,
@@ -85,20 +78,22 @@ FIGURES = (
     ),
     _drawn("updates to 1 %, cold start, .3..15 % strain, under a patch", "patch.cold", 1.0, "1",
            "section 3.3", _ASSUMED),
-    _taken("width of the block", 0.05, _P.body.width, "m"),
-    _taken("height of the block", 0.05, _P.body.height, "m"),
+    taken("width of the block", 0.05, _P.body.width, "m", "section 3.3"),
+    taken("height of the block", 0.05, _P.body.height, "m", "section 3.3"),
     Figure(
         "thickness of the block", None, 0.012, None, "m", "not comparable",
         "plane: forces are per metre, and a thickness changes neither pressure nor volume ratio",
         "section 3.3",
     ),
-    _taken("modulus of the block", 34e3, _P.material.E, "Pa"),
-    _taken("Poisson ratio of the block", 0.35, _P.material.nu, "1"),
-    _taken("least strain", 0.003, _P.strains[0], "1", "read as displacement over height"),
-    _taken("largest strain", 0.15, _P.strains[-1], "1", "read as displacement over height"),
-    _taken("tolerance of the volume", 0.01, PressureLoop().tolerance, "1"),
-    _taken("least volume of the curve", 0.7, float(RATIOS[0]), "1"),
-    _taken("largest volume of the curve", 1.3, float(RATIOS[-1]), "1"),
+    taken("modulus of the block", 34e3, _P.material.E, "Pa", "section 3.3"),
+    taken("Poisson ratio of the block", 0.35, _P.material.nu, "1", "section 3.3"),
+    taken("least strain", 0.003, _P.strains[0], "1", "section 3.3",
+          "read as displacement over height"),
+    taken("largest strain", 0.15, _P.strains[-1], "1", "section 3.3",
+          "read as displacement over height"),
+    taken("tolerance of the volume", 0.01, PressureLoop().tolerance, "1", "section 3.3"),
+    taken("least volume of the curve", 0.7, float(RATIOS[0]), "1", "section 3.3"),
+    taken("largest volume of the curve", 1.3, float(RATIOS[-1]), "1", "section 3.3"),
     _drawn("Fig. 4a: the curve is not linear, largest departure", "off.line", None, "Pa",
            "section 3.3, Fig. 4a"),
     _drawn("Fig. 4a: R2 of its line", "r_squared", None, "1", "section 3.3, Fig. 4a",

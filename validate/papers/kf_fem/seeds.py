@@ -25,6 +25,7 @@ VARIANCES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # mm^2
 PRINTED = 1e-3  # mm^2, the paper's noise intensity
 _MM2 = 1e-6
 _SEED = 1000  # of the first repetition
+_SETTLING = 100  # steps in which gains that do not decay have settled
 
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
@@ -36,9 +37,14 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     }
     raw = _raw(parameters, cases[""]["kf_printed"])
     mean, half = _interval(found[PRINTED, "prior"])
+    exact = _nrmse(parameters, cases[""]["kf_printed"], 0.0, "prior", progress)
     mesh = cases[""]["kf_printed"].scene.mesh
     numbers = {"nodes": float(len(mesh.nodes)), "elements": float(len(mesh.cells))}
     numbers |= {"nrmse.mean": mean, "nrmse.half_interval": half, "nrmse.raw": _interval(raw)[0]}
+    numbers |= {
+        "nrmse.without_q": float(exact.mean()),
+        "uncertain.steps": _uncertain_steps(parameters, cases[""]["kf_printed"]),
+    }
     return Told((_ensemble(found, raw), _oracle()), numbers)
 
 
@@ -48,18 +54,39 @@ def _nrmse(
     """NRMSE (seeds,) at the measured node, along z, of the filter as printed."""
     progress(f"{SEEDS} seeds, Q = {Q:g} mm2, {recursion}")
     system = build_system(followed.body)
+    stepper = _printed(parameters, followed, system, Q, recursion)
+    row = _z_row(system, followed)
+    batch = shared_gain_run(stepper, followed.seen.inputs, _noisy(followed), row)
+    reference = followed.truth.probes["node_A"][:, 2]
+    off = batch.values[..., 0] - reference
+    return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))
+
+
+def _printed(
+    parameters: Any, followed: Followed, system: System, Q: float, recursion: str
+) -> DisplacementStepper:
+    """The filter as printed, seen at the observed node at every step."""
     settings = ModalKf(
         parameters.clock.dt, Q * _MM2, PRINTED * _MM2, PRINTED * _MM2,
         recursion=recursion, gains="shared", a0=parameters.loading.a0,  # type: ignore[arg-type]
     )  # fmt: skip
     given = measurements(followed.seen, system.scene.mesh).of("node_A")
     every = replace(given, t=followed.seen.t, z=np.zeros((len(followed.run.t), 3)))
-    stepper = cast(DisplacementStepper, settings.prepare(system, every))
-    row = _z_row(system, followed)
-    batch = shared_gain_run(stepper, followed.seen.inputs, _noisy(followed), row)
-    reference = followed.truth.probes["node_A"][:, 2]
-    off = batch.values[..., 0] - reference
-    return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))
+    return cast(DisplacementStepper, settings.prepare(system, every))
+
+
+def _uncertain_steps(parameters: Any, followed: Followed) -> float:
+    """Steps after which the claimed sd of the observed node stays within 1 % of its last."""
+    system = build_system(followed.body)
+    stepper = _printed(parameters, followed, system, PRINTED, "prior")
+    point = next(p.point for p in followed.scene.probes if p.name == "node_A")
+    node = system.scene.mesh.nearest_node(np.array(point))
+    state, sd = stepper.rest(), []
+    for load in followed.seen.inputs[:_SETTLING]:
+        state = stepper.step(state, load)
+        sd.append(float(stepper.sd(state)[node, 2]))
+    away = np.flatnonzero(np.abs(np.array(sd) / sd[-1] - 1) > 0.01)
+    return float(away[-1] + 1) if len(away) else 0.0
 
 
 def _noisy(followed: Followed) -> Floats:

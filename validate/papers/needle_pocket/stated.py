@@ -1,31 +1,23 @@
 """Numbers that sections 5.2 and 5.3 of paper 000 state about their machines, and its Fig. 10."""
 
 from validate.compare.published import Figure
+from validate.papers.stated import MACHINE, said, taken
 from validate.solve.haptic import DEVICE_HZ
 
-_MACHINE = "another machine: ours stands in the report's environment"
-
-
-def _said(name: str, theirs: float | None, unit: str, source: str, reason: str) -> Figure:
-    return Figure(name, None, theirs, None, unit, "not comparable", reason, source)
-
-
 STATED = (
-    Figure(
-        "rate of the device", lambda _: float(DEVICE_HZ), 512.0, None, "Hz", "not comparable",
-        "an input, taken as printed: a tick's deadline", "section 5.2", 512.0, 1e-12,
-    ),
+    taken("rate of the device", 512.0, float(DEVICE_HZ), "Hz", "section 5.2",
+          "an input, taken as printed: a tick's deadline"),
     Figure(
         "largest deviation of the volume", "told:volume.largest", 0.001, None, "1",
         "not comparable", "a limit, which the share of ticks above holds", "section 5.2, Fig. 10",
     ),
-    _said("rate of the graphics", 30.0, "Hz", "section 5.2",
+    said("rate of the graphics", 30.0, "Hz", "section 5.2",
           "nothing is drawn in the loop: replay.mcap is, by its viewer"),
-    _said("clock of the device's machine", 2.0e9, "Hz", "section 5.2", _MACHINE),
-    _said("clock of the machine that was timed", 2.4e9, "Hz", "section 5.3", _MACHINE),
-    _said("Fig. 10a: the device in use", None, "1", "section 5.2, Fig. 10a", "a photograph"),
-    _said("Fig. 10b: pocket under tension", None, "1", "section 5.2, Fig. 10b",
+    said("clock of the device's machine", 2.0e9, "Hz", "section 5.2", MACHINE),
+    said("clock of the machine that was timed", 2.4e9, "Hz", "section 5.3", MACHINE),
+    said("Fig. 10a: the device in use", None, "1", "section 5.2, Fig. 10a", "a photograph"),
+    said("Fig. 10b: pocket under tension", None, "1", "section 5.2, Fig. 10b",
           "a picture without numbers: ours is drawn under 'Compression and tension'"),
-    _said("Fig. 10c: pocket under compression", None, "1", "section 5.2, Fig. 10c",
+    said("Fig. 10c: pocket under compression", None, "1", "section 5.2, Fig. 10c",
           "a picture without numbers: ours is drawn under 'Compression and tension'"),
 )  # fmt: skip

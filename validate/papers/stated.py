@@ -1,0 +1,26 @@
+"""Rows for what a paper states, sets, cites or draws: no verdict, but none is left out."""
+
+from validate.compare.published import Figure
+
+INPUT = "an input, taken as printed"
+CITED = "cited from others, nothing of the paper's own"
+MACHINE = "another machine: ours stands in the report's environment"
+
+
+def taken(name: str, theirs: float, ours: float, unit: str, source: str,
+          reason: str = INPUT) -> Figure:  # fmt: skip
+    """A number of the set-up, with the one that the experiment runs with."""
+    return Figure(
+        name, lambda _: ours, theirs, None, unit, "not comparable", reason, source, ours,
+        1e-12 * max(1.0, abs(ours)),
+    )  # fmt: skip
+
+
+def said(name: str, theirs: float | None, unit: str, source: str, reason: str) -> Figure:
+    """A number or picture beside which nothing of ours can stand."""
+    return Figure(name, None, theirs, None, unit, "not comparable", reason, source)
+
+
+def drawn(name: str, score: str, unit: str, source: str, reason: str) -> Figure:
+    """A curve or picture without a printed number, with a number of ours."""
+    return Figure(name, score, None, None, unit, "not comparable", reason, source)
