@@ -49,6 +49,15 @@ def test_a_touched_body_is_climbed_by_its_own_methods(trial: Trial) -> None:
     assert "shared by the nodes within" in trial.notes[1]
 
 
+def test_a_bar_is_refined_as_one_body(project_root: Path) -> None:
+    trial = trial_of(load_file(project_root / "experiments" / "async_line.py"), quick=True)
+    element, finest = trial.reference
+    bodies = [trial.build(element, n, "linear") for n in (*trial.meshes[element], finest)]
+    assert len({len(b.mesh.nodes) for b in bodies}) == len(bodies) >= 2
+    for body in bodies:
+        assert np.ptp(body.mesh.nodes, axis=0) == pytest.approx([0.1, 0.0025])
+
+
 def test_the_reference_is_the_whole_solve_in_shorter_steps() -> None:
     """A step of eight parts is eight steps, the probe halfway after half of them."""
     scene, whole = block(5e3, 2, 2), AsyncRegions(1e-3, (), ())

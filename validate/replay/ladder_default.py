@@ -164,14 +164,16 @@ def _touched(own: OwnBody, quick: bool) -> Trial:
 
 
 def _touched_levels(own: OwnBody, most: int) -> tuple[int, ...]:
-    """Three rising meshes, or two, of at most so many unknowns. Raises `UsageError` for one."""
-    fitting = [n for n in own.levels(_LEVELS) if own.at(n).mesh.nodes.size <= most]
-    if len(fitting) < 2:
-        raise UsageError(
-            f"'{own.experiment.name}' has {own.scene.mesh.nodes.size} unknowns and cannot be "
-            f"meshed twice with at most {most}; give it a number of cells as a parameter"
-        )
-    return tuple(sorted({fitting[0], fitting[len(fitting) // 2], fitting[-1]}))
+    """Rising meshes as `_meshes` takes them, the finest of at most so many unknowns. Raises
+    `UsageError` where there are not two."""
+    for top in own.levels(_LEVELS)[::-1]:
+        levels = own.levels([round(share * top) for share in _COARSER])
+        if len(levels) > 1 and own.at(levels[-1]).mesh.nodes.size <= most:
+            return levels
+    raise UsageError(
+        f"'{own.experiment.name}' has {own.scene.mesh.nodes.size} unknowns and cannot be meshed "
+        f"twice with at most {most}; give it a number of cells as a parameter"
+    )
 
 
 def _elements(mesh: Mesh, scene: Scene) -> tuple[str, ...]:

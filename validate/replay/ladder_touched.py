@@ -86,8 +86,8 @@ class TouchedLadder:
         return (
             f"The probe's spring of {self.whole.spring:g} N/m is shared by the nodes within "
             f"{1e3 * self.whole.pad:.3g} mm of the contact on every mesh: a point contact's answer "
-            "has no limit under refinement. The reference is the whole solve in steps of an "
-            f"{_PARTS}th of the shortest."
+            "has no limit under refinement. Layers of a region are those of each mesh. The "
+            f"reference is the whole solve, every shortest step in {_PARTS} parts."
         )
 
 

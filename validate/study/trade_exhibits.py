@@ -68,7 +68,8 @@ def _front_exhibit(trade: Trade) -> Exhibit:
     ]
     words += [s for by in _NAMES for s in _dominated(trade.front(by))]
     words += [*scene.notes, *trade.locking]
-    fronts = [trade.front(by) for by in _NAMES]
+    named = [by for by in _NAMES if by == "error" or trade.law_error is not None]
+    fronts = [trade.front(by) for by in named]
     return Exhibit(
         "front", "Error against time per step", tuple(words),
         tables=tuple(_front_table(f, trade) for f in fronts),

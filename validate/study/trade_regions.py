@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from validate.compare.exhibit import Exhibit, NumberTable
+from validate.study.ranking import SAME_TIME
 from validate.study.trade import Trade, TradeRow
 
 _MS = 1e3
@@ -35,8 +36,9 @@ def pays(trade: Trade) -> Iterator[str]:
             yield words
     yield (
         "The slow steps of regions are those in which far regions are due, too: a deadline must "
-        "hold them. A reduced model holds for a linear body whose contact stays; regions pay where "
-        "matrices change at every step, or where the far region is solved elsewhere."
+        "hold them (a busy machine lengthens slow steps of all). A reduced model holds for a "
+        "linear body whose contact stays; regions pay where matrices change at every step, or "
+        "where the far region is solved elsewhere."
     )
 
 
@@ -46,8 +48,8 @@ def _of_size(rows: list[TradeRow]) -> str:
     whole, reduced = _fastest(rows, "prefactored"), _fastest(rows, "modal")
     if regions is None or whole is None or not (regions.step and whole.step):
         return ""
-    faster = "faster" if regions.step.p50 < whole.step.p50 else "not faster"
-    holds = "shorter" if regions.step.p99 < whole.step.p99 else "not shorter"
+    faster = "faster" if SAME_TIME * regions.step.p50 < whole.step.p50 else "not faster"
+    holds = "shorter" if SAME_TIME * regions.step.p99 < whole.step.p99 else "not shorter"
     words = (
         f"{rows[0].unknowns} unknowns: regions ({regions.solver.name}) are {faster} than the whole "
         f"solve in the median ({_MS * regions.step.p50:.3g} for {_MS * whole.step.p50:.3g} ms) and "

@@ -1,6 +1,6 @@
 """Bodies of paper 004: its bar, and blocks in 2-D and 3-D of the same tissue, touched by a probe.
 
-The bar is one row of square cells of a material without lateral contraction, so every cross-section
+The bar is one row of cells of a material without lateral contraction, so every cross-section
 moves as one and the equations are those of the paper's 1-D elements: 40 free nodes, 0.1 m, 40 cm2.
 """
 
@@ -23,20 +23,26 @@ PROBE = "probe"
 
 def pad_of(cells: int) -> float:
     """Distance m within which the bar's end is one contact: its two nodes."""
-    return 1.01 * LENGTH / cells
+    return 1.01 * _height(cells)
+
+
+def _height(cells: int) -> float:
+    """Of the bar's row of cells, m: square ones, on finer meshes than the paper's as high as its
+    own, so that all of them are one body."""
+    return LENGTH / min(cells, 40)
 
 
 def bar(E: float, cells: int, damping: float = DAMPING) -> Scene:
     """The bar with x = 0 held and the probe "probe" at its free end, pushing along -x."""
     if cells < 2:
         raise SceneError(f"bar of {cells} cells: at least 2")
-    side = LENGTH / cells
+    height = _height(cells)
     return Scene(
-        grid((LENGTH, side), (cells, 1)),
+        grid((LENGTH, height), (cells, 1)),
         Material(E, 0.0, "linear", DENSITY, damping),
         (Support("x0", (0, 1)), Support("y0", (1,)), Support("y1", (1,))),
         plane="stress",
-        thickness=AREA / side,
+        thickness=AREA / height,
         tools=(Needle(PROBE, "x1", (LENGTH, 0.0), (-1.0, 0.0)),),
         probes=(Probe("end", (LENGTH, 0.0)),),
     )
