@@ -179,7 +179,13 @@ def test_inspect_and_import(tmp_path: Path, project_root: Path, shared_data: Pat
     assert all(word in shown for word in ("load_cell", "371", "Pa", "integrity: verified"))
     log = shared_data / "force" / "ecoflex-compression" / "EF30_0T_A1.csv"
     out = tmp_path / "a.mcap"
-    assert here("import", str(log), "--as", "instron", "-o", str(out))[0] == 0
+    code, told, _ = here("import", str(log), "--as", "instron", "-o", str(out))
+    assert code == 0
+    told = " ".join(told.split())
+    for found in (told, " ".join(here("inspect", str(out))[1].split())):
+        assert "test: compression: the header says 'Compression test'" in found
+        assert "signs: flipped: none, so that compression is positive" in found
+        assert "units: 'Time (s)' in s x 1, 'Compression (mm)' in mm x 0.001, 'Load (N)'" in found
     topics = json.loads(here("inspect", str(out), "--json")[1])["topics"]
     assert {(t["name"], t["count"], t["unit"]) for t in topics} == {
         ("displacement", 1202, "m"), ("force", 1202, "N"),

@@ -212,6 +212,13 @@ def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> Non
     assert run(["new", "mine", "--from", str(tmp_path / "absent.mcap")]) == 2
 
 
+def test_a_test_in_tension_is_not_pressed() -> None:
+    with pytest.raises(
+        UsageError, match=r"a test in tension; .* again with --map test=compression"
+    ):
+        written("gel", log(test="tension"), "x.mcap")
+
+
 def test_the_file_of_an_inclusion_is_short(project_root: Path) -> None:
     recording = read_recording(project_root / "recordings" / "fluid_phantom.mcap")
     assert len(written("mine", recording, "../x.mcap").splitlines()) <= 60

@@ -27,10 +27,17 @@ def rows(
     return "".join(separator.join(map(form, r)) + "\n" for r in zip(T, d, f, strict=True))
 
 
-def read(folder: Path, text: str, encoding: str = "utf-8", **mapping: str) -> Recording:
+def read(
+    folder: Path,
+    text: str,
+    encoding: str = "utf-8",
+    test: str | None = "compression",
+    **mapping: str,
+) -> Recording:
+    """Said to be a compression test, which most of these tables do not tell themselves."""
     path = folder / "log.csv"
     path.write_bytes(text.encode(encoding))
-    return read_instron(path, mapping)
+    return read_instron(path, {**({"test": test} if test else {}), **mapping})
 
 
 def assert_test(recording: Recording, d_mm: np.ndarray = D, f: np.ndarray = F) -> None:

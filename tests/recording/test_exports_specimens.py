@@ -63,7 +63,9 @@ def test_several_specimens_are_named_and_chosen(name: str, tmp_path: Path) -> No
 
 
 def test_each_specimen_has_its_own_header_over_the_common_one(tmp_path: Path) -> None:
-    first, second = (read(tmp_path, STACKED, specimen=k).record("specimen") for k in "12")
+    first, second = (
+        read(tmp_path, STACKED, test=None, specimen=k).record("specimen") for k in "12"
+    )
     assert float(first["diameter_m"]) == pytest.approx(0.025)
     assert float(second["diameter_m"]) == pytest.approx(0.026)
     assert first["test"] == second["test"] == "compression"

@@ -155,7 +155,7 @@ def test_force_scales_with_its_unit(
     name, factor = unit
     rows = [f"{t!r},{d!r},{scale * f / factor!r}" for t, d, f in SAMPLES]
     text = "\n".join([f"Time (s),Displacement (mm),Force ({name})", *rows])
-    recording = read(tmp_path_factory.mktemp("scale"), text.encode())
+    recording = read(tmp_path_factory.mktemp("scale"), text.encode(), {"test": "compression"})
     assert np.allclose(recording.signals["force"].y[:, 0], scale * F, rtol=1e-12, atol=1e-15)
 
 
@@ -196,7 +196,8 @@ def test_remarks_below_the_table_are_kept(tmp_path: Path) -> None:
 def test_thousands_beside_a_decimal_sign_are_read(tmp_path: Path) -> None:
     rows = [f'{t!r};{d!r};"{1000 * f:,.3f}"' for t, d, f in SAMPLES]
     text = "\n".join(["Time (s);Displacement (mm);Force (mN)", *rows])
-    assert np.allclose(read(tmp_path, text.encode()).signals["force"].y[:, 0], F, atol=1e-6)
+    recording = read(tmp_path, text.encode(), {"test": "compression"})
+    assert np.allclose(recording.signals["force"].y[:, 0], F, atol=1e-6)
 
 
 def test_two_columns_of_one_motion_are_one(tmp_path: Path) -> None:

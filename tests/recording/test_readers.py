@@ -35,7 +35,7 @@ def make_mcap(path: Path) -> None:
 
 
 def make_export(path: Path) -> None:
-    path.write_text("Time (s),Extension (mm),Load (N)\n" + rows())
+    path.write_text("Time (s),Compressive extension (mm),Load (N)\n" + rows())
 
 
 def make_stack(path: Path) -> None:

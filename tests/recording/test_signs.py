@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validate.recording.exports.signs import Signs, signs
+from validate.recording.exports.signs import signs
 
 
 def pick(slope: float, sign: int | None = None) -> SimpleNamespace:
@@ -27,4 +27,8 @@ def test_the_other_signal_follows_the_sign_that_is_said(
     displacement: SimpleNamespace, force: SimpleNamespace, expected: tuple[int, int]
 ) -> None:
     found = signs(displacement, force, None, None, None)
-    assert found == Signs(*expected, "sign given by the user")
+    assert (found.displacement, found.force) == expected
+    assert found.why == "sign given by the user"
+    pressed = displacement.values[-1] * expected[0] > 0
+    assert found.kind is not None
+    assert found.kind.name == ("compression" if pressed else "tension")

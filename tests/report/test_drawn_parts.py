@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from report_samples import small_result
 
 from validate.compare.effects import Change, Effect
+from validate.recording.types import Recording, Source
 from validate.report import curves, cut, markers, outlines
 from validate.report.body import shown_body
 from validate.report.discrimination import _budget
-from validate.report.provenance import _points
+from validate.report.provenance import _assumed, _metadata, _points
 from validate.report.registration import _residuals
 from validate.report.renders import _fill, _View, renders
 
@@ -162,3 +163,11 @@ def test_lines_hide_each_other_within_a_share_of_the_largest_range(
         monkeypatch.setattr(curves, name, value)
     assert curves._lines(Made(methods=(method,)), "force") == ([line], [])
     assert within == [pytest.approx(0.1)]
+
+
+def test_what_was_assumed_of_a_file_stands_apart_and_unfolded() -> None:
+    records = {"assumed": {"test": "tension: said by the user"}, "header": {"a": "b"}}
+    recording = Recording("gel", Source("x", "", 0, "x"), 0, metadata=records)
+    assumed = _assumed(recording)
+    assert (assumed.rows, assumed.folded) == ((("test", "tension: said by the user"),), False)
+    assert _metadata(recording).rows == (("header", "a", "b"),)

@@ -35,7 +35,7 @@ def _print(found: Inspection) -> None:
     say(found.source.path, "bold")
     table("", [*head, "schema (encoding)"], rows)
     say(_head(found) if found.chunks or found.read_as == "mcap" else _other(found), indent="  ")
-    for line in found.clock_offsets:
+    for line in (*found.clock_offsets, *(found.facts if found.read_as == "mcap" else ())):
         say(line, indent="  ")
     say(f"defects: {len(found.defects)}")
     for defect in found.defects:

@@ -9,7 +9,7 @@ from validate.cli.display import say
 from validate.errors import UsageError
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
-from validate.recording.formats.text_rows import LEFT_OUT
+from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
@@ -29,6 +29,8 @@ def import_file(
     write_recording(recording, out)
     why = "as said" if kind else f"because {reader.sign}"
     say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
+    for key, text in recording.metadata.get(ASSUMED, {}).items():
+        say(f"{key}: {text}", indent="  ")
     written(recording, out)
     for line in _besides(recording):
         complain(line)

@@ -17,6 +17,7 @@ from validate.arrays import Ints
 from validate.errors import RecordingError
 from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks import GAP_FACTOR, clock_of
+from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP
@@ -72,7 +73,7 @@ class Inspection:
     defects: tuple[str, ...]
     clock_offsets: tuple[str, ...] = ()  # streams that were moved, one line each
     read_as: str = "mcap"
-    facts: tuple[str, ...] = ()  # what the reader of another format told, one line each
+    facts: tuple[str, ...] = ()  # what the reader of another format told or assumed, one line each
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts, lists, texts and finite numbers for JSON; None where nothing is known."""
@@ -157,6 +158,7 @@ def _inspection(
         topics=tuple(topic for topic, _ in topics),
         defects=(*defects, *(line for _, found in topics for line in found)),
         clock_offsets=tuple(_offset_lines(verified)),
+        facts=tuple(_assumed(verified)),
     )
 
 
@@ -175,6 +177,16 @@ def _offset_lines(verified: Verified) -> list[str]:
         f"{record.name}: {', '.join(f'{key} {value}' for key, value in record.values.items())}"
         for record in verified.metadata
         if record.name.startswith(CLOCK_OFFSET)
+    ]
+
+
+def _assumed(verified: Verified) -> list[str]:
+    """What the file that a recording was made of did not say in so many words."""
+    return [
+        f"{key}: {text}"
+        for record in verified.metadata
+        if record.name.split("/")[0] == ASSUMED
+        for key, text in record.values.items()
     ]
 
 

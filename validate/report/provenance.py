@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.result import Result
+from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.types import Recording
 from validate.report.environment import environment, file_name, without_folder
 from validate.report.made import Commit, Made
@@ -23,6 +24,7 @@ def recording(result: Result) -> Exhibit | None:
     several = len(result.recordings) > 1
     tables = [_files(result.recordings), _used(result)]
     tables += [_streams(r, several) for r in result.recordings]
+    tables += [_assumed(r) for r in result.recordings if r.metadata.get(ASSUMED)]
     tables += [_metadata(r) for r in result.recordings if any(r.metadata.values())]
     unused = [s for s in result.streams if not s.used]
     words = tuple(f"Not used: {s.kind} '{s.topic}' of {s.recording}: {s.why}." for s in unused)
@@ -86,10 +88,18 @@ def _metadata(record: Recording) -> NumberTable:
     rows = tuple(
         (name, key, str(without_folder(value)))
         for name, found in record.metadata.items()
+        if name != ASSUMED
         for key, value in found.items()
     )
     title = f"Metadata records of {record.name}."
     return NumberTable("", title, ("record", "key", "value"), rows, folded=len(rows) > _FEW)
+
+
+def _assumed(record: Recording) -> NumberTable:
+    """What stands between the file as written and the recording; never folded."""
+    rows = tuple(record.metadata[ASSUMED].items())
+    title = f"Assumed of {record.name} where its file does not say it in so many words."
+    return NumberTable("assumed", title, ("", "what, and why"), rows)
 
 
 def parameters(result: Result) -> Exhibit:

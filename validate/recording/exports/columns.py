@@ -25,7 +25,7 @@ QUANTITY = {
     "strain": "strain",
     "stress": "stress",
 }
-KEYS = (*NEEDED, "specimen", "encoding", "decimal", "repeated")  # of columns, then of the file
+KEYS = (*NEEDED, "test", "specimen", "encoding", "decimal", "repeated")  # of columns, of the file
 _SIGNS = {":-": -1, ":+": 1}
 
 

@@ -20,6 +20,7 @@ from validate.recording.exports.columns import (
     derived_pick,
     needed_pick,
     parse_mapping,
+    role_of,
 )
 from validate.recording.exports.consistency import (
     MIN_SAMPLES,
@@ -31,10 +32,12 @@ from validate.recording.exports.consistency import (
 )
 from validate.recording.exports.encoding import whole_file
 from validate.recording.exports.geometry import loaded_area, specimen_of
+from validate.recording.exports.kinds import Kind, kind_of_test
 from validate.recording.exports.repeats import without_repeats
-from validate.recording.exports.signs import Signs, kind_of_test, signs
+from validate.recording.exports.signs import Signs, signs
 from validate.recording.exports.specimens import chosen, specimen_tables
 from validate.recording.exports.table import Column, Table
+from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.reader import Reader, head, require_known
 from validate.recording.types import Record, Recording, Signal, Source
 from validate.units import si_factor
@@ -47,9 +50,9 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
 
     Returns signals `displacement` (nt, 1) m and `force` (nt, 1) N, compression positive, on the
     file's own time in s (sd 0: not stated), and the records `header` (as written), `specimen`
-    (`diameter_m`, `height_m`, ..., in SI; `test`: compression, tension or not stated) and
-    `provenance` (columns, unit factors, sign flips, what was compared). Strain and stress columns
-    only check the others.
+    (`diameter_m`, `height_m`, ..., in SI; `test`: compression or tension), `assumed` (kind of test,
+    signs, unit factors, each with what decided) and `provenance` (columns, unit factors, sign
+    flips, what was compared). Strain and stress columns only check the others.
 
     `mapping` overrides what the file says (`--map KEY=VALUE` of the command line):
 
@@ -57,14 +60,15 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         displacement=COLUMN[:UNIT][:-]   `:+` keeps it; COLUMN is the header text, with or without
         time=COLUMN[:UNIT]               its unit, or #3 for the third column
         time=every:STEP UNIT             no or useless time column: constant step, `every:0.1s`
+        test=compression|tension         where neither words nor the sign of strain say it
         specimen=LABEL                   which of several specimens, by the file's label or number
         repeated=first|last              which row counts where several have the same time
         encoding=cp1250, decimal=,       how the text is written, where that cannot be found out
 
     A column or unit given so is believed: checks of it are reported in `provenance`, not raised.
-    Raises `UsageError` for a missing file and an unknown key or column, `RecordingError` for a file
-    that is no such table, is damaged or contradicts itself, or holds several specimens and none is
-    named; nothing is ever returned in part.
+    Raises `UsageError` for a missing file, an unknown key or column, and a test that may press or
+    pull; `RecordingError` for a file that is no such table, is damaged or contradicts itself, or
+    holds several specimens and none is named; nothing is ever returned in part.
     """
     said = dict(mapping or {})
     require_known(said, KEYS)
@@ -88,7 +92,7 @@ def _recording(
         )
     picks = {role: _needed(role, table, said.get(role)) for role in NEEDED}
     specimen = specimen_of(table.header, table.decimal)
-    kind = kind_of_test(table.header, tuple(picks[r].column.label for r in NEEDED))
+    kind = kind_of_test(mapping.get("test"), table.header, _labels(table))
     flips, notes = _checked(table, picks, specimen, kind)
     time, signals = _signals(picks, flips)
     stamps = np.round(time * 1e9).astype(np.int64)
@@ -103,10 +107,16 @@ def _recording(
         clock={topic: clock_of(topic, None, stamps, stamps) for topic in signals},
         metadata={
             "header": dict(table.header),
-            "specimen": {**sizes, "test": kind or "not stated"},
+            "specimen": {**sizes, "test": flips.kind.name if flips.kind else "not stated"},
+            ASSUMED: _assumed(picks, flips),
             "provenance": {**origin, **_provenance(table, picks, flips, notes)},
         },
     )
+
+
+def _labels(table: Table) -> list[str]:
+    """The names of the columns that the test is made of, whether they are taken or not."""
+    return [c.label for c in table.columns if role_of(c)]
 
 
 def _needed(role: str, table: Table, said: Said | None) -> Pick:
@@ -133,7 +143,7 @@ def _step(said: Said) -> tuple[float, str]:
 
 
 def _checked(
-    table: Table, picks: Mapping[str, Pick], specimen: Mapping[str, float], kind: str | None
+    table: Table, picks: Mapping[str, Pick], specimen: Mapping[str, float], kind: Kind | None
 ) -> tuple[Signs, list[str]]:
     """All checks; the flips and what the derived columns said."""
     time, displacement, force = (picks[role] for role in NEEDED)
@@ -173,12 +183,10 @@ def _column(x: Floats) -> Floats:
 
 def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: list[str]) -> Record:
     used = {picks[role].column.label for role in NEEDED}
-    flipped = [role for role in ("displacement", "force") if getattr(flips, role) < 0]
     return {
         **{f"{role} column": picks[role].column.label for role in NEEDED},
         **{f"{role} unit": f"{p.unit} x {p.factor!r}" for role, p in picks.items()},
-        "signs flipped": ", ".join(flipped) or "none",
-        "signs because": flips.why,
+        "signs flipped": _flipped(flips),
         "given by the user": ", ".join(role for role in NEEDED if picks[role].said) or "nothing",
         "compared": "; ".join(notes) or "nothing: no strain or stress with known geometry",
         "columns not used": ", ".join(c.label for c in table.columns if c.label not in used),
@@ -186,6 +194,25 @@ def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: li
         "text": f"{table.encoding} ({table.encoding_why}), "
         f"{_SEPARATOR_NAMES[table.separator]} separated, decimal sign {table.decimal}, "
         f"{len(table.lines)} rows",
+    }
+
+
+def _flipped(flips: Signs) -> str:
+    flipped = [role for role in ("displacement", "force") if getattr(flips, role) < 0]
+    return ", ".join(flipped) or "none"
+
+
+def _assumed(picks: Mapping[str, Pick], flips: Signs) -> Record:
+    """What the file did not say in so many words, a line each."""
+    kind = f"{flips.kind.name}: {flips.kind.why}" if flips.kind else "not stated"
+    units = [
+        f"'{p.column.label}' in {p.unit} x {p.factor:.6g}{' (said)' if p.unit_is_said else ''}"
+        for p in picks.values()
+    ]
+    return {
+        "test": kind,
+        "signs": f"flipped: {_flipped(flips)}, so that compression is positive; {flips.why}",
+        "units": ", ".join(units),
     }
 
 

@@ -1,61 +1,80 @@
 """Which way compression points in a force-displacement table, and which columns to flip for it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.recording.exports.columns import Pick
-from validate.recording.exports.vocabulary import COMPRESSION, TENSION, holds
+from validate.recording.exports.kinds import ASK, Kind, KindName
+
+_NAMES: dict[int, KindName] = {1: "compression", -1: "tension"}
 
 
 @dataclass(frozen=True)
 class Signs:
-    """Factors (+1 or -1) that make compression positive, and the reason for the provenance."""
+    """Factors (+1 or -1) that make compression positive, their reason, and the kind of test."""
 
     displacement: int
     force: int
     why: str
-
-
-def kind_of_test(header: Mapping[str, str], labels: tuple[str, ...]) -> str | None:
-    """`compression` or `tension` as the header says, else the column names; None: neither."""
-    for text in (" ".join(f"{k} {v}" for k, v in header.items()), " ".join(labels)):
-        squeezed, pulled = holds(text, COMPRESSION), holds(text, TENSION)
-        if squeezed != pulled:
-            return "compression" if squeezed else "tension"
-    return None
+    kind: Kind | None = None
 
 
 def signs(
-    displacement: Pick, force: Pick, kind: str | None, strain: Pick | None, stress: Pick | None
+    displacement: Pick, force: Pick, kind: Kind | None, strain: Pick | None, stress: Pick | None
 ) -> Signs:
     """The flips that make compression positive in both signals.
 
-    Signs are those of the largest change since the first sample. Raises `RecordingError` when
-    displacement and force move opposite ways, or both against the declared kind of test, and
-    nothing in the file decides; the message says what to pass.
+    Signs are those of the largest change since the first sample. `kind` is the stated one; None:
+    strain and stress, or displacement and force that both go negative, decide. Raises `UsageError`
+    when nothing does, `RecordingError` when both go negative in a stated test in tension; the
+    message says what to pass.
     """
     d, f = excursion(displacement.values), excursion(force.values)
     said_d, said_f = _said_sign(displacement), _said_sign(force)
     if said_d or said_f:
         flip_d = said_d or _matching(d, f * (said_f or 1))
         flip_f = said_f or _matching(f, d * flip_d)
-        return Signs(flip_d, flip_f, "sign given by the user")
-    if d * f >= 0:
-        return _alike(d or f, kind, displacement, force)
-    if kind is None and _both_negative(strain, stress):
-        kind = "compression"
+        given = _NAMES.get(flip_d * d or flip_f * f)
+        shown = Kind(given, "the sign given by the user says so") if given else None
+        return Signs(flip_d, flip_f, "sign given by the user", kind or shown)
+    kind = kind or _by_strain(d, f, strain, stress)
     if kind is None:
-        raise RecordingError(
-            f"'{displacement.column.label}' goes {_way(d)} and '{force.column.label}' {_way(f)}, "
-            "and the file names neither compression nor tension; for a compression test say "
-            + _advice(displacement if d < 0 else force)
+        raise UsageError(
+            f"nothing says whether this test presses or pulls: '{displacement.column.label}' goes "
+            f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}"
         )
-    wanted = 1 if kind == "compression" else -1
-    return Signs(wanted * d or 1, wanted * f or 1, f"opposite signs in a {kind} test")
+    if kind.name == "tension" and not kind.said and d + f < 0 and d * f >= 0:
+        raise RecordingError(
+            f"'{displacement.column.label}' and '{force.column.label}' both go negative in a "
+            f"tension test ({kind.why}); {ASK}"
+        )
+    wanted = 1 if kind.name == "compression" else -1
+    return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, _reason(d, f, kind), kind)
+
+
+def _reason(d: int, f: int, kind: Kind) -> str:
+    if d * f < 0:
+        return f"opposite signs in a {kind.name} test"
+    return f"{_way(d or f)} as written in a {kind.name} test"
+
+
+def _by_strain(d: int, f: int, strain: Pick | None, stress: Pick | None) -> Kind | None:
+    """Compression, where what derives from the test says so: tension is positive by convention.
+
+    Positive strain tells nothing: many machines write compression so.
+    """
+    derived = [p for p in (strain, stress) if p]
+    ways = {excursion(p.values) for p in derived} - {0}
+    names = " and ".join(f"'{p.column.label}'" for p in derived)
+    if ways == {-1} and (d * f >= 0 or len(derived) == 2):
+        return Kind("compression", f"{names} go negative, and tension is positive by convention")
+    if not ways and d + f < 0 and d * f >= 0:
+        why = "displacement and force both go negative, and tension is positive by convention"
+        return Kind("compression", why)
+    return None
 
 
 def excursion(x: Floats) -> int:
@@ -66,21 +85,6 @@ def excursion(x: Floats) -> int:
     return int(np.sign(largest)) if abs(largest) > 6 * noise else 0
 
 
-def _alike(way: int, kind: str | None, displacement: Pick, force: Pick) -> Signs:
-    if way >= 0 and kind != "tension":
-        said = "says compression" if kind else "does not say which; taken as compression"
-        return Signs(1, 1, f"both positive as written; the file {said}")
-    if way >= 0:
-        return Signs(-1, -1, "a tension test, positive as written: compression is negative")
-    if kind == "tension":
-        raise RecordingError(
-            f"'{displacement.column.label}' and '{force.column.label}' both go negative in a "
-            f"tension test; if it was a compression test say {_advice(displacement)} and "
-            f"{_advice(force)}"
-        )
-    return Signs(-1, -1, "both negative as written: compression was negative")
-
-
 def _said_sign(pick: Pick) -> int | None:
     return pick.said.sign if pick.said else None
 
@@ -89,13 +93,5 @@ def _matching(own: int, other: int) -> int:
     return -1 if own * other < 0 else 1
 
 
-def _both_negative(strain: Pick | None, stress: Pick | None) -> bool:
-    return bool(strain and stress and excursion(strain.values) < 0 and excursion(stress.values) < 0)
-
-
 def _way(sign: int) -> str:
-    return "negative" if sign < 0 else "positive"
-
-
-def _advice(pick: Pick) -> str:
-    return f"--map '{pick.role}={pick.column.label}:-'"
+    return {-1: "negative", 0: "nowhere", 1: "positive"}[sign]

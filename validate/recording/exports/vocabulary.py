@@ -15,8 +15,9 @@ _ROLES = {
         напряжение 应力 応力""",
     "strain": """strain dehnung nominaldehnung odksztalcenie nyulas
         应变 ひずみ 歪み""",
-    "time": """time t zeit prufzeit pruefzeit testzeit temps duree czas tiempo tempo cas ido
-        время 时间 時間""",
+    "time": """time t elapsed zeit prufzeit pruefzeit testzeit messzeit versuchszeit laufzeit dauer
+        temps duree czas tiempo duracion tempo durata duracao cas ido tijd tid zaman sure aika timp
+        время 时间 時間 시간""",
     "force": """force load f kraft standardkraft prufkraft pruefkraft druckkraft zugkraft last
         effort charge sila obciazenie fuerza carga forza carico forca zatizeni ero сила нагрузка
         усилие 力 载荷 负荷 荷重""",
@@ -58,15 +59,32 @@ SIZES = {
 }
 OTHER_PARTS = """platen plate anvil probe plunger indenter grip final cell stempel druckplatte
     druckplatten plateau plytka piston 压盘 压头"""
-COMPRESSION = """compression compressive compressed compress closing druckversuch druckprufung druck
-    stauchversuch ecrasement sciskanie sciskania compresion compressione compressao tlakem tlakova
-    tlakove nyomo nyomovizsgalat сжатие 压缩 圧縮"""
-TENSION = """tensile tension zugversuch zugprufung traction rozciaganie rozciagania traccion
-    trazione tracao tahem tahova tahove растяжение 拉伸 引張"""
+# Beginnings of words, so that inflected and compound ones count: `Zugversuchs`, `сжатия`. Bare
+# `Druck`, `tlak` (pressure) and `extension` (the crosshead's way in any test) are not among them.
+COMPRESSION = """compress compresion compresiv closing druckversuch druckpruf druckpruef druckkraft
+    druckspannung druckfestigkeit druckbelast druckmodul druckverform stauch ecrasement sciska
+    skrocen tlakem tlakov stlacen nyomo сжати сжима сжимающ drukproef drukkracht 压缩 抗压 壓縮 圧縮
+    압축"""
+TENSION = """tensil tension traction tracci trazion tracao tracoes zugversuch zugpruf zugpruef
+    zugkraft zugspannung zugfestigkeit zugbelast zugmodul zugdehnung zugverform rozciag tahem tahov
+    huzo szakito растяж растягив trekproef trekkracht dragprov 拉伸 抗拉 引張 引っ張 인장"""
+# Of neither test: what a specimen is loaded with before it, and the air that shuts a grip.
+_NO_KIND = re.compile(
+    r"pre[-_ ]?(tension|compression)\w*|surface tension|(compressed|сжат\w+) (air|воздух)\w*"
+    r"|compressor\w*|aria compressa|data compression"
+)
+STOPPED = """aborted cancelled canceled interrupted abgebrochen interrompu interrotto interrotta
+    interrumpido interrumpida abortado abortada interrompido прерван прервано przerwano przerwane
+    preruseno megszakitva 中止 中断"""
+_BY_HAND = re.compile(r"\b(stopped|ended|terminated) by (the )?(operator|user)\b")
+NEGATED = "no false none nein non nie нет off 否"
 SPECIMEN = """specimen sample test probe prufling eprouvette echantillon essai probka probeta
     muestra provino campione vzorek amostra proba образец 试样 试件 样品 試験片"""
 UNIT_LABELS = "unit units einheit einheiten unite unites jednostka unidad unita jednotka 单位 単位"
-_ENCODING_EVIDENCE = """prufung prufer prufnorm prufen fur operateur numero prenom annee ecole
+_ENCODING_EVIDENCE = """druckprufung zugprufung ecrasement sciskanie sciskania rozciaganie
+    rozciagania compresion compressao traccion tracao tlakova tahova nyomovizsgalat сжатие сжатия
+    растяжение растяжения
+    prufung prufer prufnorm prufen fur operateur numero prenom annee ecole
     uzytkownik data badania badanie operator wykonal nazwa probki wartosc modul dlugosci zkouska
     cislo rychlosti merici rozmery zeleznicni ubytek vzorku numer naprezenia predkosci metoda
     编号 单位 日期 试验 试样 实验 样品 名称 材料 压缩 操作 测试 単位 試験 試験力 名前 日付
@@ -95,6 +113,20 @@ def holds(text: str, vocabulary: str) -> bool:
     wanted = terms(vocabulary)
     inside = plain(text)
     return bool(words(text) & wanted) or any(w in inside for w in wanted if is_ideographic(w))
+
+
+def kind_word(text: str, kind: str) -> str | None:
+    """The first word that begins as one of a kind's does, plain; an ideographic one anywhere."""
+    inside = _NO_KIND.sub(" ", " ".join(text.casefold().split()))
+    stems = tuple(terms(kind))
+    first = (w for w in re.findall(r"[^\W\d_]+", plain(inside)) if w.startswith(stems))
+    whole = (w for w in sorted(stems) if is_ideographic(w) and w in plain(inside))
+    return next(first, None) or next(whole, None)
+
+
+def tells_a_stop(text: str) -> bool:
+    """Whether it says that a test was ended before its end."""
+    return not holds(text, NEGATED) and (holds(text, STOPPED) or bool(_BY_HAND.search(plain(text))))
 
 
 def is_ideographic(word: str) -> bool:

@@ -1,0 +1,49 @@
+"""Whether a test pulls or presses: by the user, the header, the columns, or the sign of strain."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from validate.errors import UsageError
+from validate.recording.exports.vocabulary import COMPRESSION, TENSION, kind_word
+
+KindName = Literal["compression", "tension"]
+KINDS: dict[str, KindName] = {"compression": "compression", "tension": "tension"}
+ASK = "say --map test=compression or --map test=tension"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """The kind of test and what says so; `said`: by the user, whom nothing contradicts."""
+
+    name: KindName
+    why: str
+    said: bool = False
+
+
+def kind_of_test(said: str | None, header: Mapping[str, str], labels: Iterable[str]) -> Kind | None:
+    """What is stated; None where nothing is, or header and columns contradict each other.
+
+    A line that names both (`Load cell: tension/compression`) tells nothing. Raises `UsageError`
+    for a kind that is neither.
+    """
+    if said is not None:
+        if said not in KINDS:
+            raise UsageError(f"--map test={said}: a test is one of tension, compression")
+        return Kind(KINDS[said], "said by the user", said=True)
+    lines = [
+        value if key.startswith("line ") else f"{key}: {value}" for key, value in header.items()
+    ]
+    found = {**_stated(labels, "column"), **_stated(lines, "header")}
+    return next(iter(found.values())) if len(found) == 1 else None
+
+
+def _stated(texts: Iterable[str], where: str) -> dict[KindName, Kind]:
+    """The kinds that the texts name, each with the first text that does."""
+    found: dict[KindName, Kind] = {}
+    for text in texts:
+        words = {"compression": kind_word(text, COMPRESSION), "tension": kind_word(text, TENSION)}
+        named = [KINDS[name] for name, word in words.items() if word]
+        if len(named) == 1:
+            found.setdefault(named[0], Kind(named[0], f"the {where} says '{text[:60]}'"))
+    return found
