@@ -99,6 +99,7 @@ def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
 @click.option("--anyway", is_flag=True, help="Predict with what is not identifiable, too.")
 @click.option("--json", "as_json", is_flag=True, help="results.json of all on one list.")
+@click.option("--vtu", is_flag=True, help="Series for ParaView beside the report, in paraview/.")
 def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
     """Replay, simulate, compare and write a report."""
     from validate.cli import running

@@ -45,6 +45,7 @@ def run(
     methods: str,
     anyway: bool,
     as_json: bool,
+    vtu: bool,
 ) -> int:
     """Runs experiments and writes their reports; 0 when all checks hold and all figures stand."""
     gl.ask()
@@ -54,7 +55,7 @@ def run(
 
     def one(experiment: Experiment) -> bool:
         start = perf_counter()
-        result, page = _reported(experiment, options, out)
+        result, page = _reported(experiment, options, out, vtu=vtu)
         if as_json:
             found.append((page.parent / "results.json").read_text(encoding="utf-8").strip())
         else:
@@ -72,7 +73,9 @@ def run(
     return code
 
 
-def _reported(experiment: Experiment, options: Options, out: Path | None) -> tuple[Result, Path]:
+def _reported(
+    experiment: Experiment, options: Options, out: Path | None, *, vtu: bool
+) -> tuple[Result, Path]:
     folder = run_folder(experiment, options, out)
     by = rests_on(experiment, options, command_line())
     try_results(folder, (STUDIES,))
@@ -81,7 +84,7 @@ def _reported(experiment: Experiment, options: Options, out: Path | None) -> tup
         result = compare(experiment, options, report, _identify(experiment, options, out, report))
         created = datetime.now(UTC).isoformat(timespec="seconds")
         page = write_report(
-            result, folder, created=created, made=by,
+            result, folder, created=created, made=by, vtu=vtu,
             progress=lambda part: report(1, 1, f"writes the report: {part}"),
         )  # fmt: skip
     if old := replaced(page.parent, created):

@@ -21,12 +21,14 @@ def write_report(
     created: str,
     made: Made | None = None,
     progress: Progress | None = None,
+    vtu: bool = False,
 ) -> Path:
     """Replaces `folder` by the report of `result`; returns the path of its report.html.
 
-    `created` is a UTC time, ISO-8601; `made` says what made the result. The old folder stays until
-    the new one is complete; after any failure nothing of the new one is left; folders of studies in
-    it are kept, and a line of the run that was there, unless all that made it is equal. Raises
+    `created` is a UTC time, ISO-8601; `made` says what made the result; `vtu` adds `paraview/`. The
+    old folder stays until the new one is complete; after any failure nothing of the new one is
+    left; folders of studies in it are kept, and a line of the run that was there, unless all that
+    made it is equal. Raises
     `UsageError` when `folder` holds something other than a report, or cannot be written;
     `ComparisonError` when two parts of the exhibits share a name.
     """
@@ -37,6 +39,10 @@ def write_report(
     def fill(fresh: Path) -> None:
         write_lines(lines, fresh)
         _fill(result, fresh, content, by, told)
+        if vtu:
+            from validate.report.paraview import write_series
+
+            write_series(result, fresh / "paraview", told)
 
     folder = replace_folder(folder, fill, (STUDIES,))
     return folder / "report.html"
