@@ -60,7 +60,7 @@ def _chosen(count: int) -> Ints:
 
 
 def _cells(scene: Scene) -> tuple[Ints, Ints]:
-    """VTK's packed cells and their kinds; middles of edges stand as ours, hex27 has corners only."""
+    """VTK's packed cells and their kinds; middles of edges stand as ours do. hex27: its corners."""
     mesh = scene.mesh
     cells = mesh.cells[:, : _CORNERS.get(mesh.kind, mesh.cells.shape[1])]
     packed = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
