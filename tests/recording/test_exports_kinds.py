@@ -14,6 +14,7 @@ from validate.recording.exports.vocabulary import (
     TENSION,
     is_ideographic,
     kind_word,
+    tells_a_stop,
     terms,
 )
 from validate.recording.formats.text_rows import ASSUMED
@@ -120,6 +121,7 @@ def test_strain_that_goes_negative_is_compression(tmp_path: Path) -> None:
         "Compression test\nTime (s),Tensile extension (mm),Load (N)\n" + rows(),
         "Compressed air: 6 bar\nPre-compression: 1 N\nDruck (bar): 6\n" + BARE + rows(),
     ],
+    ids=range(10),
 )
 def test_what_says_nothing_or_both_is_asked_and_the_answer_is_taken(
     text: str, tmp_path: Path
@@ -158,3 +160,29 @@ def test_a_sign_that_is_said_makes_the_kind_immaterial(tmp_path: Path) -> None:
 def test_a_kind_that_is_neither_is_refused() -> None:
     with pytest.raises(UsageError, match="test=bending: a test is one of tension, compression"):
         kind_of_test("bending", {}, ())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Test aborted at machine limit",
+        "Status: stopped by operator",
+        "Versuch abgebrochen",
+        "Essai interrompu",
+        "Prova interrotta",
+        "Ensayo interrumpido",
+        "Испытание прервано",
+        "试验中止",
+    ],
+)
+def test_an_aborted_run_is_remarked(line: str, tmp_path: Path) -> None:
+    for text in (f"{line}\n{BARE}{rows()}", f"{BARE}{rows()}\n{line}\n"):
+        recording = read(tmp_path, text, test="compression")
+        assert recording.record(ASSUMED)["run"].startswith(f"aborted: the file says '{line}'")
+        assert len(recording.signals["force"].t) == len(T)
+
+
+def test_words_that_no_run_was_aborted_are_no_remark(tmp_path: Path) -> None:
+    recording = read(tmp_path, f"Aborted: no\n{BARE}{rows()}", test="compression")
+    assert "run" not in recording.record(ASSUMED)
+    assert not tells_a_stop("Test ended at 3 mm")

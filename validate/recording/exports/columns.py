@@ -5,13 +5,14 @@ column's unit decides.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.recording.exports.numerals import looks_numeric
 from validate.recording.exports.table import Column, Table
 from validate.recording.exports.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
 from validate.recording.reader import did_you_mean
@@ -114,8 +115,9 @@ def _measures(column: Column, quantity: str) -> bool:
 def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
     """The column of a needed role in SI.
 
-    Raises `RecordingError` when no column has the role, several differ, the unit is missing or of
-    another kind, or a cell is not a number; `UsageError` when the mapping names two columns.
+    A column that cannot be of the role, by its unit or without numbers, is no rival of one that
+    can. Raises `RecordingError` when no column has the role, several differ, the unit is missing or
+    of another kind, or a cell is not a number; `UsageError` when the mapping names two columns.
     """
     if said is not None:
         named = _named(said.column, table)
@@ -132,19 +134,60 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
         raise RecordingError(
             f"no {role} column among {labels}; name it with --map {role}=COLUMN{synthetic}"
         )
-    return _one_of(_moving([_pick(role, column, table, None) for column in found]), role)
+    able = [column for column in found if not _unusable(role, column)] or found
+    return _one_of(_moving([_pick(role, column, table, None) for column in able]), role)
 
 
 def derived_pick(role: str, table: Table) -> Pick | None:
     """The strain or stress column that checks the others; None when there is no single sure one."""
-    found = [c for c in table.columns if role_of(c) == role and c.unit and all(c.cells)]
+    found = [c for c in table.columns if role_of(c) == role and not _uncompared(role, c, table)]
     if len(found) > 1:
         found = [c for c in found if re.search(r"engineering|nominal", c.name, re.IGNORECASE)]
     return _pick(role, found[0], table, None) if len(found) == 1 else None
 
 
+def left_columns(table: Table, used: Collection[str]) -> list[str]:
+    """The columns of interest that cannot be used, each with why, and those without numbers."""
+    found = {c.label: _left(c, table) for c in table.columns if c.label not in used}
+    return [f"column '{label}': {why}" for label, why in found.items() if why]
+
+
+def _left(column: Column, table: Table) -> str:
+    role = role_of(column)
+    if role in ("strain", "stress"):
+        return _uncompared(role, column, table)
+    return _unusable(role, column) if role else _without_numbers(column)
+
+
+def _unusable(role: str, column: Column) -> str:
+    """Why a column cannot be of a role, by its unit or cells; empty where it can."""
+    if column.problem or _without_numbers(column):
+        return column.problem or _without_numbers(column)
+    if not column.unit:
+        return f"no unit for {role}"
+    return "" if _measures(column, QUANTITY[role]) else f"'{column.unit}' is no unit of {role}"
+
+
+def _uncompared(role: str, column: Column, table: Table) -> str:
+    """Why a derived column cannot be compared with the others; empty where it can."""
+    why = _unusable(role, column)
+    if why:
+        return why
+    try:
+        table.numbers(column)
+    except RecordingError as error:
+        return f"not compared: {error}"
+    return ""
+
+
+def _without_numbers(column: Column) -> str:
+    return "" if any(map(looks_numeric, column.cells)) else "empty"
+
+
 def _pick(role: str, column: Column, table: Table, said: Said | None) -> Pick:
     unit = (said.unit if said else None) or column.unit
+    if column.problem and not (said and said.unit):
+        raise RecordingError(f"column '{column.label}': {column.problem}")
     if not unit:
         raise RecordingError(
             f"column '{column.label}': no unit for {role}; give it with --map "

@@ -18,6 +18,7 @@ from validate.recording.exports.columns import (
     Pick,
     Said,
     derived_pick,
+    left_columns,
     needed_pick,
     parse_mapping,
     role_of,
@@ -37,7 +38,8 @@ from validate.recording.exports.repeats import without_repeats
 from validate.recording.exports.signs import Signs, signs
 from validate.recording.exports.specimens import chosen, specimen_tables
 from validate.recording.exports.table import Column, Table
-from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.exports.vocabulary import tells_a_stop
+from validate.recording.formats.text_rows import ASSUMED, told_left
 from validate.recording.reader import Reader, head, require_known
 from validate.recording.types import Record, Recording, Signal, Source
 from validate.units import si_factor
@@ -108,7 +110,7 @@ def _recording(
         metadata={
             "header": dict(table.header),
             "specimen": {**sizes, "test": flips.kind.name if flips.kind else "not stated"},
-            ASSUMED: _assumed(picks, flips),
+            ASSUMED: {**_assumed(picks, flips), **_stop(table.header)},
             "provenance": {**origin, **_provenance(table, picks, flips, notes)},
         },
     )
@@ -190,6 +192,7 @@ def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: li
         "given by the user": ", ".join(role for role in NEEDED if picks[role].said) or "nothing",
         "compared": "; ".join(notes) or "nothing: no strain or stress with known geometry",
         "columns not used": ", ".join(c.label for c in table.columns if c.label not in used),
+        **told_left(left_columns(table, used)),
         "besides": "; ".join(table.notes) or "nothing",
         "text": f"{table.encoding} ({table.encoding_why}), "
         f"{_SEPARATOR_NAMES[table.separator]} separated, decimal sign {table.decimal}, "
@@ -214,6 +217,13 @@ def _assumed(picks: Mapping[str, Pick], flips: Signs) -> Record:
         "signs": f"flipped: {_flipped(flips)}, so that compression is positive; {flips.why}",
         "units": ", ".join(units),
     }
+
+
+def _stop(header: Mapping[str, str]) -> Record:
+    """Words that tell that the run was ended early; how far it got is in the rows."""
+    told = (v if k.startswith("line ") else f"{k}: {v}" for k, v in header.items())
+    said = next((text for text in told if tells_a_stop(text)), None)
+    return {"run": f"aborted: the file says '{said[:60]}'; taken as far as it goes"} if said else {}
 
 
 def _is_text(path: Path) -> bool:

@@ -27,12 +27,16 @@ _GLUED = re.compile(
 
 @dataclass(frozen=True)
 class Column:
-    """One column as written: header text, name without its unit, unit or None, a cell per row."""
+    """One column as written: header text, name without its unit, unit or None, a cell per row.
+
+    `problem` is why it cannot be used; empty where nothing speaks against it.
+    """
 
     label: str
     name: str
     unit: str | None
     cells: tuple[str, ...]
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,7 @@ class Table:
 
 
 def columns_of(names: list[str], units: list[str], rows: Sequence[Line]) -> tuple[Column, ...]:
-    """Columns of rows of equal length; raises `RecordingError` where two units contradict."""
+    """Columns of rows of equal length; one with two units has that as its problem."""
     count = len(rows[0][1])
     padded = units + [""] * (count - len(units))
     columns = []
@@ -90,12 +94,14 @@ def columns_of(names: list[str], units: list[str], rows: Sequence[Line]) -> tupl
         below = below.strip("()[]<>{} ") if below else ""
         if below and unit and not is_unit(unit):
             name, unit = label, None
-        if below and unit and below != unit:
-            raise RecordingError(
-                f"column '{label}': unit '{unit}' in its name, '{below}' in the row below; keep one"
-            )
+        twice = bool(below and unit and below != unit)
+        problem = f"unit '{unit}' in its name, '{below}' in the row below; keep one"
         cells = tuple(row[i] for _, row in rows)
-        columns.append(Column(label or f"#{i + 1}", name, below or unit or None, cells))
+        columns.append(
+            Column(
+                label or f"#{i + 1}", name, below or unit or None, cells, problem if twice else ""
+            )
+        )
     return tuple(columns[:count])
 
 
