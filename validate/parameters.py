@@ -119,11 +119,9 @@ def with_values(settings: Any, values: Mapping[str, str]) -> Any:
     """A copy with the texts parsed into the fields at their paths.
 
     Raises `UsageError` for an unknown path (naming the nearest), a value of another type or a unit
-    of another dimension.
+    of another dimension. Values of one part are set at once: they may have to agree.
     """
-    for path, text in values.items():
-        settings = _set(settings, _names(settings, path), path, text)
-    return settings
+    return _set(settings, [(_names(settings, path), path, text) for path, text in values.items()])
 
 
 def doubts(settings: Any, values: Mapping[str, str]) -> tuple[str, ...]:
@@ -239,17 +237,24 @@ def _hints(kind: type) -> Mapping[str, Any]:
     return get_type_hints(kind)
 
 
-def _set(settings: Any, names: list[str], path: str, text: str) -> Any:
-    head, rest = names[0], names[1:]
-    inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
-    if rest:
-        value = _set(inner, rest, path, text)
-    else:
-        unit, _ = _leaf(settings, names)
-        value = _parse(_hints(settings.__class__)[head], path, text, unit)
+def _set(settings: Any, asked: Sequence[tuple[list[str], str, str]]) -> Any:
+    """A copy with every text parsed into the field at the end of its way."""
+    below: dict[str, list[tuple[list[str], str, str]]] = {}
+    for names, path, text in asked:
+        below.setdefault(names[0], []).append((names[1:], path, text))
+    new = {head: _member(settings, head, inner) for head, inner in below.items()}
     if isinstance(settings, Mapping):
-        return types.MappingProxyType({**settings, head: value})
-    return replace(settings, **{head: value})
+        return types.MappingProxyType({**settings, **new})
+    return replace(settings, **new) if new else settings
+
+
+def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, str]]) -> Any:
+    names, path, text = asked[-1]
+    if names:
+        inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
+        return _set(inner, asked)
+    unit, _ = _leaf(settings, [head])
+    return _parse(_hints(settings.__class__)[head], path, text, unit)
 
 
 def _parse(hint: Any, path: str, text: str, unit: str) -> Any:

@@ -64,6 +64,23 @@ def test_values_are_parsed_by_type_and_the_original_stays() -> None:
     assert with_values({"m": Inner()}, {"m.n": "9"})["m"] == Inner(n=9)
 
 
+@dataclass(frozen=True)
+class Paired:
+    layers: tuple[int, ...] = quantity((5,), "1", "one for each rate")
+    rates: tuple[float, ...] = quantity((50.0,), "Hz", "one for each count of layers")
+
+    def __post_init__(self) -> None:
+        if len(self.layers) != len(self.rates):
+            raise UsageError(f"{len(self.layers)} layer counts, {len(self.rates)} rates")
+
+
+def test_values_that_must_agree_change_together() -> None:
+    both = {"m.layers": "5,10", "m.rates": "500,50"}
+    assert with_values({"m": Paired()}, both)["m"] == Paired((5, 10), (500.0, 50.0))
+    with pytest.raises(UsageError, match="2 layer counts, 1 rates"):
+        with_values({"m": Paired()}, {"m.layers": "5,10"})
+
+
 @pytest.mark.parametrize(
     ("path", "text", "says"),
     [

@@ -329,6 +329,8 @@ def test_what_is_rounded_or_left_out_is_said_by_the_run_once() -> None:
         ({"rates": (0.0,)}, "0 Hz beside"),
         ({"rates": ()}, "1 layer counts and 0 rates"),
         ({"solvers": ("static",) * 3}, "3 solvers for 2 regions"),
+        ({"layers": (5, 0), "rates": (50.0, 5.0)}, "at least 1 each, or the region is empty"),
+        ({"adapt": "linear", "most": 3}, "4 layers that grows to 3 at most"),
         ({"dt": 0.0}, "tick of 0 s"),
         ({"overlap": -1}, "overlap -1"),
         ({"border": "joint", "overlap": 1}, "no overlap"),

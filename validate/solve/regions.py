@@ -92,6 +92,15 @@ class AsyncRegions:
                 f"{len(self.solvers)} solvers for {len(self.layers) + 1} regions: one, or one each"
             )
         ratios(self.rates, self.dt)
+        if any(count < 1 for count in self.layers):
+            raise SceneError(
+                f"regions of {self.layers} layers: at least 1 each, or the region is empty"
+            )
+        if self.layers and self.adapt != "fixed" and self.most < self.layers[0]:
+            raise SceneError(
+                f"a primary region of {self.layers[0]} layers that grows to {self.most} at most: "
+                "raise most, or take adapt fixed"
+            )
         if self.overlap < 0 or not (self.spring >= 0 and self.reach > 0 and self.pad >= 0):
             raise SceneError(
                 f"overlap {self.overlap}, spring {self.spring:g} N/m, reach {self.reach:g} m, pad "
@@ -225,7 +234,7 @@ class RegionStepper:
     def _size(self, length: float) -> PrimarySize:
         s = self.settings
         least = s.layers[0] if s.layers else 1
-        most = max(least, s.most)
+        most = max(least, s.most)  # a fixed one never reads it
         return PrimarySize(s.adapt, least, most, s.slope, s.moved, length)
 
     def _told(self, k: int, tick: RegionTick, hand: Floats, *, changed: bool) -> State:
