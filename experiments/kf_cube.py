@@ -10,7 +10,7 @@ from typing import Any
 
 from validate.compare.verdict import Accept
 from validate.estimate.ensemble_kf import EnsembleKf
-from validate.estimate.filterpy_guest import Guest
+from validate.estimate.filterpy_guest import FilterpyGuest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
@@ -114,7 +114,7 @@ METHODS = {
         chosen="inflation chosen on this twin",
     ),
     "filterpy": Method(
-        "filterpy's KalmanFilter, 5 modes", Guest(), markers=A, chosen=WALK_UNRECORDED
+        "filterpy's KalmanFilter, 5 modes", FilterpyGuest(), markers=A, chosen=WALK_UNRECORDED
     ),
 }
 

@@ -10,7 +10,7 @@ from cubes import case
 
 from validate.errors import ComparisonError
 from validate.estimate import filterpy_oracle
-from validate.estimate.filterpy_guest import GUESTS, Guest, ensemble, kalman
+from validate.estimate.filterpy_guest import GUESTS, FilterpyGuest, ensemble, kalman
 from validate.estimate.filterpy_names import drawing
 from validate.estimate.filterpy_oracle import OracleRow, oracle_table
 from validate.estimate.kalman import Gaussian
@@ -60,7 +60,7 @@ def test_a_guest_is_our_own_filter_to_rounding() -> None:
     ours = pulled.march(ReducedKf(modes=5, settled=0.0).prepare(pulled.system, seen))
     # The unscented one subtracts G S G^T from P and has no form that keeps its digits.
     for name, rounding in (("KalmanFilter", 1e-9), ("UnscentedKalmanFilter", 1e-3)):
-        run = pulled.march(Guest(name).prepare(pulled.system, seen))
+        run = pulled.march(FilterpyGuest(name).prepare(pulled.system, seen))
         assert np.abs(run.u - ours.u).max() < rounding * np.abs(ours.u).max()
         assert run.sd is not None
         assert ours.sd is not None
@@ -69,7 +69,7 @@ def test_a_guest_is_our_own_filter_to_rounding() -> None:
 
 def test_a_guest_that_draws_repeats_itself_and_leaves_the_generator_alone() -> None:
     pulled = case()
-    guest = Guest("EnsembleKalmanFilter")
+    guest = FilterpyGuest("EnsembleKalmanFilter")
     before = np.random.get_state()[1].copy()  # type: ignore[union-attr,index]  # noqa: NPY002
     runs = [pulled.march(guest.prepare(pulled.system, pulled.measured(1))) for _ in range(2)]
     assert np.array_equal(runs[0].u, runs[1].u)
@@ -101,15 +101,15 @@ def broken(name: str, value: Any) -> Callable[[LinearModel], Any]:
 def test_a_guest_of_wrong_shape_is_refused(name: str, value: Any, says: str) -> None:
     pulled = case()
     with pytest.raises(ComparisonError, match=says):
-        Guest(broken(name, value)).prepare(pulled.system, pulled.measured(1))
+        FilterpyGuest(broken(name, value)).prepare(pulled.system, pulled.measured(1))
 
 
 def test_unknown_guests_and_what_is_no_filter() -> None:
     pulled = case()
     with pytest.raises(ComparisonError, match=f"by name: {', '.join(GUESTS)}"):
-        Guest("Kalman").prepare(pulled.system, pulled.measured(1))
+        FilterpyGuest("Kalman").prepare(pulled.system, pulled.measured(1))
     with pytest.raises(ComparisonError, match=r"dict.x: shape None"):
-        Guest(lambda _: {}).prepare(pulled.system, pulled.measured(1))
+        FilterpyGuest(lambda _: {}).prepare(pulled.system, pulled.measured(1))
 
 
 def test_models_are_checked_at_the_door() -> None:

@@ -66,7 +66,7 @@ def test_the_linear_law_has_no_large_stretch() -> None:
 def test_every_solver_of_whole_scenes_is_in_the_tuple(project_root: Path) -> None:
     """A class with `solve` and `handles`: linear solvers handle no scenes."""
     found = {}
-    for path in (project_root / "validate" / "solve").glob("*.py"):
+    for path in (project_root / "validate" / "solve").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef) and "Protocol" not in map(ast.unparse, node.bases):
                 given = [f.target for f in node.body if isinstance(f, ast.AnnAssign)]

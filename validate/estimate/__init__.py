@@ -7,7 +7,7 @@ _HOMES = {
     "measurements": ("Measurements", "measurements"),
     "consistency": ("Consistency", "nees_consistency", "nis_consistency"),
     "kf_fem": ("KfFem",),
-    "filterpy_guest": ("Guest",),
+    "filterpy_guest": ("FilterpyGuest",),
 }
 
 __all__ = names(_HOMES)

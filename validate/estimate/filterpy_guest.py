@@ -114,7 +114,7 @@ def _root(P: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Guest:
+class FilterpyGuest:
     """A filterpy filter of the reduced model (`reduced_linear`), named or made by `make`.
 
     `make` takes the `LinearModel` and gives a filter with x (n,), P, Q, R set, whose `predict`

@@ -3,7 +3,7 @@
 from typing import ClassVar, Protocol
 
 from validate.estimate.ensemble_kf import EnsembleKf
-from validate.estimate.filterpy_guest import Guest
+from validate.estimate.filterpy_guest import FilterpyGuest
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.measurements import Measurements
@@ -30,7 +30,7 @@ FILTERS: tuple[type[Filter], ...] = (
     ModalKf,
     ReducedKf,
     LoadScale,
-    Guest,
+    FilterpyGuest,
     NodeEKF,
     ReducedEKF,
     Roukf,

@@ -95,7 +95,7 @@ def march(
     traces |= probe_traces(stepper.scene, np.array(walk.probes))
     traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
     seconds = None if smooths else np.array(walk.seconds)[:done]
-    times = _times(seconds)
+    times = step_times(seconds)
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     at = at[at < done]
@@ -233,12 +233,13 @@ def output_frames(steps: int, frames: int) -> Ints:
     return np.unique(np.linspace(0, steps - 1, min(frames, steps)).round().astype(np.int64))
 
 
-def _times(seconds: Floats | None) -> StepTimes | None:
+def step_times(seconds: Floats | None) -> StepTimes | None:
+    """Of steps that took (nt,) s, without the first ones; None where none was timed."""
     if seconds is None or not len(seconds):
         return None
-    return _step_times(seconds[_UNTIMED if len(seconds) > 2 * _UNTIMED else 0 :])
+    return _quantiles(seconds[_UNTIMED if len(seconds) > 2 * _UNTIMED else 0 :])
 
 
-def _step_times(seconds: Floats) -> StepTimes:
+def _quantiles(seconds: Floats) -> StepTimes:
     p50, p99 = np.quantile(seconds, [0.5, 0.99])
     return StepTimes(float(p50), float(p99), float(seconds.max()), len(seconds))

@@ -6,6 +6,7 @@ from validate.solve.central import CentralDifference
 from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
+from validate.solve.guests.guest import Guest
 from validate.solve.handles import Handles
 from validate.solve.haptic_loop import HapticLoop
 from validate.solve.harmonic import Harmonic
@@ -58,6 +59,7 @@ SOLVERS: tuple[type[SceneSolver], ...] = (
     ViscousModes,
     LetGo,
     Harmonic,
+    Guest,
 )
 
 

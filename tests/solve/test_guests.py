@@ -1,0 +1,302 @@
+"""A guest is a stranger: what it does wrong is a row, and what it does right is its run."""
+
+import json
+import os
+import shlex
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats
+from validate.errors import SceneError, UsageError
+from validate.fem.system import build
+from validate.parameters import with_values
+from validate.replay.method import Method
+from validate.scene.box import grid
+from validate.scene.material import Material, Region
+from validate.scene.scene import Drive, Load, Pin, Probe, Scene, Support, Weight
+from validate.scene.vtu import write_vtu
+from validate.solve.guests.answer import echoed
+from validate.solve.guests.guest import Guest, run_of
+from validate.solve.guests.job import write_job
+from validate.solve.guests.ran import Ended
+from validate.solve.march import run_scheme
+from validate.solve.quasi_static import QuasiStatic
+from validate.solve.types import Run
+
+SIZE = (0.02, 0.02, 0.04)
+SCENE = Scene(
+    grid(SIZE, (1, 1, 2)),
+    Material(1e4, 0.0, rho=1000.0),
+    (Support("z0", (0, 1)),),
+    pins=(Pin((0.0, 0.0, 0.04), (0, 1)),),
+    drives=(Drive("lift", "z0", (0.0, 0.0, 1.0)),),
+    probes=(Probe("top", (0.01, 0.01, 0.04)),),
+)
+T = np.array([0.5, 1.0])
+INPUTS = np.array([[0.0005], [0.001]])
+
+# Follows its drive as a rigid body does, which is what SCENE does.
+HONEST = """
+import json, os, sys
+from pathlib import Path
+import numpy as np
+folder = Path(sys.argv[-1])
+job = json.loads((folder / "job.json").read_text())
+t = np.array(job["times"])
+u = np.zeros((len(t), job["mesh"]["nodes"], 3))
+for drive in job["drives"]:
+    u[:, :, 2] = np.array(drive["history"])[-len(t):, None]
+fields = {"t": t, "u": u, "reactions": np.zeros_like(u)}
+answer = {
+    "schema": "validate-guest-answer/1", "name": "fake", "version": "1", "state": "finished",
+    "used": job["material"], "mesh_sha256": job["mesh"]["sha256"],
+    "setup_s": 1e-6, "step_s": [1e-6] * len(t),
+}
+"""
+WRITTEN = """
+np.savez(folder / "fields.npz", **fields)
+(folder / "answer.json").write_text(json.dumps(answer))
+"""
+
+
+def guest(tmp_path: Path, twist: str = "", rest: str = WRITTEN, **settings: float) -> Guest:
+    """One whose program does something else before it writes."""
+    script = tmp_path / "guest.py"
+    script.write_text(HONEST + twist + rest, "utf-8")
+    return Guest(shlex.join([sys.executable, str(script)]), seconds=20.0, **settings)  # type: ignore[arg-type]
+
+
+def answered(
+    tmp_path: Path,
+    twist: str,
+    rest: str = WRITTEN,
+    scene: Scene = SCENE,
+    inputs: Floats = INPUTS,
+) -> Run:
+    """The same without a process of its own, which takes most of the time."""
+    job = write_job(tmp_path, scene, T, inputs, False, 1e-6)
+    program = (HONEST + twist + rest).replace("sys.argv[-1]", repr(str(tmp_path)))
+    exec(compile(program, "guest.py", "exec"), {})
+    return run_of(tmp_path, job, Ended(1.0, "", ""))
+
+
+def shell(script: str, **settings: float) -> Guest:
+    """One that is a line of the shell: it starts at once."""
+    return Guest(shlex.join(["sh", "-c", script]), **settings)  # type: ignore[arg-type]
+
+
+def solved(one: Guest, scene: Scene = SCENE) -> Run:
+    return run_scheme("guest", one, scene, T, INPUTS, np.array([0, 1]))
+
+
+def test_an_honest_guest_is_a_run(tmp_path: Path) -> None:
+    run = solved(guest(tmp_path))
+    assert run.finished
+    assert np.array_equal(run.u[1], np.tile([0.0, 0.0, 0.001], (12, 1)))
+    assert run.traces["top.z"].y == pytest.approx([0.0005, 0.001])
+    assert run.traces["lift.displacement"].y.tolist() == [0.0005, 0.001]
+    assert run.traces["lift.force"].y.tolist() == [0.0, 0.0]
+    assert (run.setup_s, run.step_s.n if run.step_s else 0) == (1e-6, 2)
+    assert run.said == ("guest: fake 1",)
+
+
+@pytest.mark.parametrize(
+    ("twist", "state", "why"),
+    [
+        ("u[1, 3, 0] = np.nan", "diverged", "no finite field at step 1"),
+        ("u[0] = 1e300", "diverged", "no finite field at step 0"),
+        ("answer['mesh_sha256'] = '0' * 64", "invalid", "not that of the job's mesh"),
+        ("fields['u'] = u[:, 1:]", "invalid", r"u of shape \(2, 11, 3\), expected \(2, 12, 3\)"),
+        ("fields['t'] = 2 * t", "invalid", "time 0 is 1 s, asked 0.5 s"),
+        ("fields = {k: v[:1] for k, v in fields.items()}", "invalid", "1 of 2 times, yet finish"),
+        ("del fields['u']", "invalid", r"arrays \['reactions', 't'\], expected t and u"),
+        ("fields['u'] = u.astype(str)", "invalid", "unpacked|of type|limit"),
+        ("fields['u'] = np.zeros((2, 12, 3), dtype=object)", "invalid", "fields.npz: damaged"),
+        ("fields['more'] = np.zeros(10**6)", "invalid", "bytes"),
+        ("answer['setup_s'] = float('nan')", "invalid", "NaN is no number"),
+        ("answer = [answer]", "invalid", "no object of schema"),
+        ("answer['state'] = 'fine'", "invalid", "state 'fine', expected finished"),
+        ("answer = {**answer, 'state': 'cannot_run', 'reason': 'no\\nsuch law'}", "refused",
+         "cannot run: no such law"),
+        ("answer = {**answer, 'state': 'not_converged', 'reason': 'at 40 %'}; "
+         "fields = {k: v[:1] for k, v in fields.items()}", "not_converged", "at 40 %"),
+    ],
+)  # fmt: skip
+def test_what_goes_wrong_is_an_outcome(tmp_path: Path, twist: str, state: str, why: str) -> None:
+    run = answered(tmp_path, twist)
+    assert run.outcome.state == state
+    with pytest.raises(AssertionError, match=why):
+        raise AssertionError(run.outcome.why)
+    assert len(run.u) == len(run.t) == (1 if "1, 3" in twist or "40" in twist else 0)
+
+
+@pytest.mark.parametrize(
+    ("script", "why"),
+    [
+        ("kill -SEGV $$", "ended by signal 11 (SIGSEGV)"),
+        ("echo out of licences; echo; exit 1", "ended with code 1: out of licences"),
+        ("exit 0", "no answer.json was written"),
+    ],
+)
+def test_a_crash_is_an_outcome(script: str, why: str) -> None:
+    run = solved(shell(script))
+    assert (run.outcome.state, run.outcome.why) == ("invalid", why)
+
+
+def test_no_answer_is_read_through_a_link_or_a_pipe(tmp_path: Path) -> None:
+    for twist in ("os.symlink('/dev/zero', ", "os.mkfifo("):
+        run = answered(tmp_path, f"{twist}folder / 'answer.json')", rest="")
+        assert "no ordinary file" in run.outcome.why
+        (tmp_path / "answer.json").unlink()
+
+
+def test_one_that_hangs_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
+    """The limit is seen on a clock of its own; its child is gone with it."""
+    note = tmp_path / "child"
+    script = f"trap '' TERM; sleep 600 & echo $! > {shlex.quote(str(note))}; wait"
+    run = solved(shell(script, seconds=2.0))
+    assert (run.outcome.state, run.outcome.why) == ("invalid", "over the limit of 2 s, ended")
+    assert _gone(int(note.read_text()))
+
+
+def test_what_one_leaves_behind_is_ended(tmp_path: Path) -> None:
+    note = tmp_path / "child"
+    run = solved(shell(f"sleep 600 & echo $! > {shlex.quote(str(note))}"))
+    assert run.outcome.why == "no answer.json was written"
+    assert _gone(int(note.read_text()))
+
+
+def _gone(pid: int) -> bool:
+    """Ended, if perhaps not yet collected by whoever inherited it."""
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return True
+        if state in "ZX":
+            return True
+        os.sched_yield()
+    return False
+
+
+def test_output_and_memory_are_bounded(tmp_path: Path) -> None:
+    run = solved(shell("exec head -c 3000000 /dev/zero > x", output=1.0))
+    assert "limit of its output" in run.outcome.why or "File too large" in run.outcome.why
+    run = solved(shell("for i in 1 2 3 4; do head -c 500000 /dev/zero > $i; done", output=1.0))
+    assert "bytes in its folder, the limit is" in run.outcome.why
+    greedy = shlex.join([sys.executable, "-S", "-c", "bytes(2**31)"])
+    run = solved(Guest(greedy, memory=1024.0))
+    assert (run.outcome.state, "MemoryError" in run.outcome.why) == ("invalid", True)
+
+
+def test_an_ignored_or_changed_parameter_is_a_finding(tmp_path: Path) -> None:
+    run = answered(tmp_path, "answer['used'] = {'law': 'linear', 'E': 9e3}")
+    assert run.finished
+    assert run.said[1:] == ("used E = 9000.0 instead of 10000.0", "ignored parameter nu = 0.0")
+    assert echoed({"E": 1.0}, None) == ("does not say which law and parameters it used",)
+    assert echoed({"a": [1.0, 2.0]}, {"a": [1.0, 2.0 + 1e-9]}) == ()
+    assert echoed({"a": [1.0, 2.0]}, {"a": {"b": 1}}) != ()
+
+
+def test_forces_out_of_balance_and_a_drive_not_followed_are_findings(tmp_path: Path) -> None:
+    def findings(twist: str) -> str:
+        run = answered(tmp_path, twist)
+        assert run.finished
+        return " | ".join(run.said)
+
+    assert "no reaction forces" in findings("del fields['reactions']")
+    assert "out of balance by 1 N" in findings("fields['reactions'][1, 0, 2] = 1.0")
+    assert "0.5 mm from where it should be" in findings("u[1, 0, 2] = 0.0015")
+    assert "could not: be quick" in findings("answer['could_not'] = ['be quick', 3]")
+    assert "says that it took 1e+05 s" in findings("answer['setup_s'] = 1e5")
+
+
+def test_weight_is_in_the_balance(tmp_path: Path) -> None:
+    """The weight of the body, 0.016 kg, is what its supports push."""
+    scene = Scene(SCENE.mesh, SCENE.material, (Support("z0", (0, 1, 2)),),
+                  loads=(Weight("gravity", (0.0, 0.0, -1.0)),))  # fmt: skip
+    twist = (
+        "g = job['weights'][0]['history'][-1]\n"
+        "fields['reactions'][:, 0, 2] = .02 * .02 * .04 * 1000 * g"
+    )
+    scales = [(" ", ()), ("/ 2 ", "reactions and weight are out of balance by 0.0785 N of 0.157 N")]
+    for half, found in scales:
+        said = answered(tmp_path, f"{twist}{half}", scene=scene, inputs=np.full((2, 1), 9.81)).said
+        assert said[1:] == ((found,) if found else ())
+
+
+def test_it_is_at_home_in_the_folder_alone(tmp_path: Path) -> None:
+    twist = (
+        "inside = [os.getcwd(), *(os.environ[k] for k in ('HOME', 'TMPDIR', 'XDG_CACHE_HOME'))]\n"
+        "assert all(Path(p).is_dir() and Path(p).is_relative_to(folder) for p in inside), inside"
+    )
+    assert solved(guest(tmp_path, twist)).finished
+
+
+def test_the_job_is_the_scene(tmp_path: Path) -> None:
+    """Of a linear scene, what the job says is enough to solve it."""
+    scene = Scene(
+        grid(SIZE, (2, 2, 2)), Material(1e4, 0.3), (Support("z0", (0, 1, 2)),),
+        drives=(Drive("press", "z1", (0.0, 0.0, -1.0)),), loads=(Load("pull", "x1", (1.0, 0, 0)),),
+    )  # fmt: skip
+    job = write_job(tmp_path, scene, T, np.array([[1e-3, 0.1], [2e-3, 0.2]]), False, 1e-6)
+    said = json.loads((tmp_path / "job.json").read_text())
+    f, known = np.zeros((27, 3)), np.full((27, 3), np.nan)
+    (drive,), (load,) = said["drives"], said["loads"]
+    known[said["held"]["nodes"], said["held"]["components"]] = 0.0
+    known[drive["nodes"], drive["components"]] = np.array(drive["per_unit"]) * drive["history"][-1]
+    f[load["nodes"]] = np.array(load["forces"]) * load["history"][-1]
+    K, u = build(scene).K.toarray(), known.ravel().copy()
+    free = np.isnan(u)
+    u[free] = np.linalg.solve(
+        K[np.ix_(free, free)], f.ravel()[free] - K[np.ix_(free, ~free)] @ u[~free]
+    )
+    ours = run_scheme("ours", QuasiStatic(), scene, T, job.inputs, np.array([1]))
+    assert u.reshape(-1, 3) == pytest.approx(ours.u[0], abs=1e-12)
+    assert said["instants"] == [0.0, 0.5, 1.0]
+    assert drive["history"] == [0.0, 1e-3, 2e-3]
+    assert load["history"] == [0.1, 0.1, 0.2]
+    assert said["material"] == {"law": "linear", "E": 1e4, "nu": 0.3}
+
+
+def test_what_a_job_does_not_carry_is_refused(tmp_path: Path) -> None:
+    stiff = Region("stiff", np.array([0]), Material(2e4, 0.0))
+    scene = Scene(SCENE.mesh, SCENE.material, SCENE.supports, drives=SCENE.drives, regions=(stiff,))
+    with pytest.raises(SceneError, match="carries no regions"):
+        solved(Guest(sys.executable), scene)
+    with pytest.raises(SceneError, match="rising"):
+        Guest(sys.executable).solve(SCENE, T[::-1], INPUTS)
+    flat = grid((0.02, 0.02), (2, 2))
+    with pytest.raises(SceneError, match="not quad4"):
+        write_job(tmp_path, Scene(flat, SCENE.material), T, INPUTS, False, 1e-6)
+    with pytest.raises(SceneError, match="carries tet4"):
+        write_vtu(flat, tmp_path / "flat.vtu")
+    for command, why in (("", "no command"), ("no-such-program x", "no program"), ("'", "closing")):
+        with pytest.raises(UsageError, match=why):
+            solved(Guest(command))
+
+
+@pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8"])
+def test_the_mesh_is_read_by_another_library(tmp_path: Path, kind: str) -> None:
+    meshio = pytest.importorskip("meshio")
+    from validate.scene.box import box
+    from validate.scene.mesh import quadratic
+
+    mesh = grid(SIZE, (1, 2, 2)) if kind == "hex8" else box(SIZE, (1, 2, 2))
+    mesh = quadratic(mesh) if kind == "tet10" else mesh
+    write_vtu(mesh, tmp_path / "mesh.vtu")
+    read = meshio.read(tmp_path / "mesh.vtu")
+    assert np.array_equal(read.points, mesh.nodes)
+    assert np.array_equal(read.cells[0].data, mesh.cells)
+    volume = {"tet4": "tetra", "tet10": "tetra10", "hex8": "hexahedron"}
+    assert read.cells[0].type == volume[kind]
+
+
+def test_it_stands_in_an_experiment_and_is_set_as_others_are() -> None:
+    method = with_values(Method("a guest", Guest()), {"command": "python g.py", "seconds": "3"})
+    assert (method.settings.command, method.settings.seconds) == ("python g.py", 3.0)

@@ -1,0 +1,1 @@
+"""Programs of others that solve our scenes: a folder with a job goes out, an answer comes back."""

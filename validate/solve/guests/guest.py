@@ -1,0 +1,110 @@
+"""Any program as a scheme: a job's folder goes out, an answer comes back, and both are checked."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, cast
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.fem.locate import probe_rows
+from validate.parameters import quantity
+from validate.scene.scene import Scene
+from validate.solve.guests.answer import GuestAnswer, NoAnswerError, read_answer
+from validate.solve.guests.job import GuestJob, write_job
+from validate.solve.guests.ran import Ended, Limits, run_guest, size_of, words
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.march import given_traces, probe_traces, step_times
+from validate.solve.types import Ending, Outcome, Run, Trace
+
+_FOLDER = "validate-guest-"
+
+
+@dataclass(frozen=True)
+class Guest:
+    """Settings of a program of others, called as `command FOLDER` (docs/guests.md).
+
+    What it cannot do, and a crash, a hang or a wrong answer, is the outcome of its run.
+    """
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear", *LARGE), inertia=True, cavities=False, contact=()
+    )
+    command: str = quantity("", "1", "command line of the guest; the job's folder is put behind it")
+    inertia: bool = quantity(False, "1", "masses count; else every time is an equilibrium")
+    tolerance: float = quantity(1e-6, "1", "relative tolerance that is asked of its equations")
+    seconds: float = quantity(600.0, "s", "wall time until it is ended")
+    memory: float = quantity(8192.0, "1", "MB of memory that each of its processes may have")
+    output: float = quantity(1024.0, "1", "MB that it may write into its folder")
+
+    def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
+        """Under inputs (nt, k) at t (nt,) s, from rest at 0 s.
+
+        Raises `SceneError` for what a job does not carry and `UsageError` for a command that is no
+        program's.
+        """
+        require_handled(scene, self)
+        command = words(self.command)
+        with tempfile.TemporaryDirectory(prefix=_FOLDER, ignore_cleanup_errors=True) as place:
+            folder = Path(place).resolve()
+            job = write_job(folder, scene, t, inputs, self.inertia, self.tolerance)
+            most = size_of(folder) + int(self.output * 2**20)
+            limits = Limits(self.seconds, int(self.memory * 2**20), most)
+            ended = run_guest(command, folder, limits)
+            return run_of(folder, job, ended)
+
+
+def run_of(folder: Path, job: GuestJob, ended: Ended) -> Run:
+    """A run of what came back, or one without steps that says why there is none."""
+    if ended.why:
+        return _none(job, "invalid", f"{ended.why}{ended.said and ': '}{ended.said}", ended)
+    try:
+        answer = read_answer(folder, job)
+    except NoAnswerError as error:
+        return _none(job, "invalid", str(error), ended)
+    if answer.state == "cannot_run":
+        return _none(job, "refused", f"cannot run: {answer.why}", ended, answer.findings)
+    return _answered(job, answer, ended)
+
+
+def _none(job: GuestJob, state: Ending, why: str, ended: Ended, said: tuple[str, ...] = ()) -> Run:
+    shape = job.scene.mesh.nodes.shape
+    traces = {"updates": Trace(np.zeros(0), "1")}
+    at = np.zeros(0, dtype=np.int64)
+    return Run("", job.times[:0], at, np.zeros((0, *shape)), traces, Outcome(state, 0, why),
+               ended.seconds, None, said=said)  # fmt: skip
+
+
+def _answered(job: GuestJob, answer: GuestAnswer, ended: Ended) -> Run:
+    u, steps = answer.u, len(answer.u)
+    said = (f"guest: {answer.name}", *answer.findings, *_overdrawn(answer, ended))
+    return Run(
+        "", job.times[:steps], np.arange(steps), u, _traces(job, answer),
+        Outcome(cast(Ending, answer.state), steps, answer.why), answer.setup_s,
+        step_times(answer.step_s), seconds=answer.step_s, said=said,
+    )  # fmt: skip
+
+
+def _traces(job: GuestJob, answer: GuestAnswer) -> dict[str, Trace]:
+    """Inputs and probes; `<drive>.force` N of the whole body, compression positive, where told."""
+    scene, steps = job.scene, len(answer.u)
+    traces = {"updates": Trace(np.zeros(steps), "1")}
+    traces |= given_traces(scene, job.inputs[:steps])
+    if answer.reactions is not None:
+        forces = scene.copies * answer.reactions.reshape(steps, len(job.system.moves))
+        for drive, moves in zip(scene.drives, job.system.moves.T, strict=True):
+            traces[f"{drive.name}.force"] = Trace(forces @ moves, scene.force_unit)
+    if scene.probes:
+        rows = probe_rows(scene.mesh, scene.probes)
+        seen = np.array([rows.apply(field) for field in answer.u])
+        traces |= probe_traces(scene, seen.reshape(steps, len(scene.probes), 3))
+    return traces
+
+
+def _overdrawn(answer: GuestAnswer, ended: Ended) -> tuple[str, ...]:
+    """Its own times are believed as far as they fit into the time that it took."""
+    told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
+    if told <= ended.seconds:
+        return ()
+    return (f"says that it took {told:.3g} s, and ran for {ended.seconds:.3g} s",)

@@ -1,0 +1,146 @@
+"""A program of others is run: alone in its process group, within limits, at home in one folder."""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from validate.errors import UsageError
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_CACHES = (
+    "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "MPLCONFIGDIR",
+    "NUMBA_CACHE_DIR", "PYTHONPYCACHEPREFIX", "WARP_CACHE_PATH", "CUDA_CACHE_PATH",
+)  # fmt: skip
+_SAID = "said.txt"
+_LAST_WORDS = 2000  # bytes of what it printed that are read
+
+
+@dataclass(frozen=True)
+class Limits:
+    """`seconds` of wall time, `memory` bytes of each of its processes, `output` bytes of all files
+    in its folder."""
+
+    seconds: float
+    memory: int
+    output: int
+
+
+@dataclass(frozen=True)
+class Ended:
+    """After `seconds` s of wall time; `why` is empty where it ended well, `said` its last line."""
+
+    seconds: float
+    why: str
+    said: str
+
+
+def words(command: str) -> tuple[str, ...]:
+    """A command line as words, files of the current folder by their whole path.
+
+    Raises `UsageError` for a program that is not there.
+    """
+    try:
+        given = shlex.split(command)
+    except ValueError as error:
+        raise UsageError(f"command {command!r}: {error}") from None
+    if not given:
+        raise UsageError("no command of a guest; give methods.NAME.command='python my_guest.py'")
+    program = shutil.which(given[0])
+    if program is None:
+        raise UsageError(f"command {command!r}: no program '{given[0]}'; give its path")
+    rest = (str(Path(w).absolute()) if Path(w).is_file() else w for w in given[1:])
+    return str(Path(program).absolute()), *rest
+
+
+def run_guest(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
+    """Runs a command with the folder as its last argument until it ends or a limit ends it.
+
+    Whatever of its process group is left then is ended too. The limit of memory is each process's;
+    what it writes outside of the folder is not watched.
+    """
+    apart = (sys.executable, "-I", str(Path(__file__).with_name("limits.py")))
+    start = time.monotonic()
+    with (folder / _SAID).open("wb") as said:
+        process = subprocess.Popen(
+            [*apart, str(limits.memory), str(limits.output), *command, str(folder)],
+            cwd=folder,
+            env=_surroundings(folder),
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    try:
+        why = _watched(process.pid, folder, limits, start)
+    finally:  # before it is reaped: its number is nobody else's
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    seconds = time.monotonic() - start
+    return Ended(seconds, why or _ending(process.returncode), _last_line(folder / _SAID))
+
+
+def _watched(pid: int, folder: Path, limits: Limits, start: float) -> str:
+    """Waits; why it has to be ended, empty where it ended by itself."""
+    pause = 0.002
+    while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+        if time.monotonic() - start > limits.seconds:
+            return f"over the limit of {limits.seconds:g} s, ended"
+        if size_of(folder) > limits.output:
+            break
+        time.sleep(pause)
+        pause = min(0.1, 1.5 * pause)
+    if (size := size_of(folder)) > limits.output:
+        return f"{size} bytes in its folder, the limit is {limits.output}"
+    return ""
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of all files below a folder, as they are now; links are not followed."""
+    total = 0
+    for where, _, files in os.walk(folder, onerror=None):
+        for name in files:
+            try:
+                total += os.lstat(Path(where) / name).st_size
+            except OSError:  # gone since
+                continue
+    return total
+
+
+def _ending(code: int) -> str:
+    if code >= 0:
+        return f"ended with code {code}" if code else ""
+    if -code == signal.SIGXFSZ:
+        return "ended by the limit of its output"
+    return f"ended by signal {-code} ({signal.Signals(-code).name})"
+
+
+def _surroundings(folder: Path) -> dict[str, str]:
+    """Home, temporary files and caches in the folder; one thread."""
+    places = {name: folder / ".home" / name.lower() for name in _CACHES}
+    places |= {"HOME": folder / ".home"} | dict.fromkeys(("TMPDIR", "TMP", "TEMP"), folder / ".tmp")
+    for place in places.values():
+        place.mkdir(parents=True, exist_ok=True)
+    own = {name: str(place) for name, place in places.items()}
+    return {**os.environ, **dict.fromkeys(_THREADS, "1"), **own, "PWD": str(folder)}
+
+
+def _last_line(path: Path) -> str:
+    if path.is_symlink() or not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _LAST_WORDS))
+        lines = file.read(_LAST_WORDS).decode("utf-8", "replace").splitlines()
+    return next((plain(line) for line in reversed(lines) if line.strip()), "")
+
+
+def plain(text: str, most: int = 200) -> str:
+    """One printable line of what a stranger wrote."""
+    line = " ".join(text[: 4 * most].split())
+    return "".join(c for c in line if c.isprintable())[:most]
