@@ -25,8 +25,8 @@ def clock_of(topic: str, stamps_ns: Ints | None, publish_ns: Ints, log_ns: Ints)
     if counts[0] == 0 or len(set(counts)) != 1:
         raise RecordingError(f"{topic!r}: {counts} stamps, publish and log times, expected equal")
     steps = np.diff(times)
-    forward = steps[steps > 0]
-    gaps = forward[forward > GAP_FACTOR * np.median(forward)] if len(forward) else forward
+    duplicates, backward = int((steps == 0).sum()), int((steps < 0).sum())
+    gaps = _gaps(steps[steps > 0])
     duration = _seconds(int(times.max()) - int(times.min()))
     return Clock(
         topic=topic,
@@ -35,11 +35,18 @@ def clock_of(topic: str, stamps_ns: Ints | None, publish_ns: Ints, log_ns: Ints)
         rate_hz=(len(times) - 1) / duration if duration > 0 else None,
         gaps=len(gaps),
         longest_gap=_seconds(int(gaps.max(initial=0))),
-        duplicates=int((steps == 0).sum()),
-        backward=int((steps < 0).sum()),
+        duplicates=duplicates,
+        backward=backward,
         stamp_minus_publish=None if stamps_ns is None else _largest(stamps_ns, publish_ns),
         publish_minus_log=_largest(publish_ns, log_ns),
     )
+
+
+def _gaps(forward: Ints) -> Ints:
+    """The steps that are gaps; reorders `forward`, as a copy costs 8 bytes a sample."""
+    if not len(forward):
+        return forward
+    return forward[forward > GAP_FACTOR * np.median(forward, overwrite_input=True)]
 
 
 def _seconds(ns: int) -> float:
@@ -47,4 +54,5 @@ def _seconds(ns: int) -> float:
 
 
 def _largest(a: Ints, b: Ints) -> float:
-    return _seconds(int(np.abs(a - b).max()))
+    apart = a - b
+    return _seconds(int(np.abs(apart, out=apart).max()))

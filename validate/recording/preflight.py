@@ -21,9 +21,18 @@ from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP
-from validate.recording.mcap.records import Channel
-from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, MIRROR, MIRROR_OF, SIGNAL
-from validate.recording.mcap.streams import Collected, fill, ours, stream_of
+from validate.recording.mcap.records import Channel, Schema
+from validate.recording.mcap.schemas import (
+    CONTOUR,
+    IMAGE,
+    MARKERS,
+    MIRROR,
+    MIRROR_OF,
+    SIGNAL,
+    Sample,
+)
+from validate.recording.mcap.seen import AllSeen, ChannelSeen
+from validate.recording.mcap.streams import our_channels
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.reader import Options, require_known
 from validate.recording.readers import READERS, named, recognised
@@ -131,16 +140,21 @@ def inspect_recording(path: Path) -> Inspection:
 
     The error counts the chunks and messages that can be read before the damage.
     """
+    seen = AllSeen()
     with opened(path) as stream:
-        verified = _verified(stream, path)
-        collected = ours(verified)
-        defects = _file_defects(verified)
-        try:
-            fill(collected, messages_of(stream, verified, collected.keys()))
-        except RecordingError as error:
-            defects.append(str(error))
-    topics = [_topic(verified, n, c, collected.get(n)) for n, c in verified.channels.items()]
+        verified = _verified(stream, path, seen)
+        _look_again(stream, verified, seen)
+    defects = [*_file_defects(verified), *([seen.limit] if seen.limit else [])]
+    topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
     return _inspection(verified, topics, defects)
+
+
+def _look_again(stream: BinaryIO, verified: Verified, seen: AllSeen) -> None:
+    """Channels without messages, and images whose calibration came after them."""
+    late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
+    seen.channels.update({n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()})
+    for message in messages_of(stream, verified, late.keys()):
+        seen.take(message.channel_id, [message.data])
 
 
 def _inspection(
@@ -162,9 +176,9 @@ def _inspection(
     )
 
 
-def _verified(stream: BinaryIO, path: Path) -> Verified:
+def _verified(stream: BinaryIO, path: Path, seen: AllSeen) -> Verified:
     try:
-        return verify(stream, path)
+        return verify(stream, path, seen)
     except RecordingError as error:
         other = next((r.name for r in READERS if r is not MCAP and r.recognises(path)), None)
         hint = f"; or first `validate import {path.name} --as {other} -o X.mcap`" if other else ""
@@ -191,58 +205,58 @@ def _assumed(verified: Verified) -> list[str]:
 
 
 def _topic(
-    verified: Verified, number: int, channel: Channel, raw: Collected | None
+    verified: Verified, number: int, channel: Channel, seen: ChannelSeen | None
 ) -> tuple[Topic, list[str]]:
     schema = verified.schemas.get(channel.schema_id)
     log, publish = verified.log_ns[number], verified.publish_ns[number]
-    stamps, defects = _content(verified, raw)
+    stamps, defects = _content(verified, seen, publish)
     times = publish if stamps is None else stamps
     clock = clock_of(channel.topic, stamps, publish, log) if len(publish) else None
-    samples = raw.samples if raw else []
+    first = seen.first if seen else None
     topic = Topic(
         name=channel.topic,
-        kind=_kind(channel, schema.name if schema else "", raw),
+        kind=_kind(channel, schema.name if schema else "", seen),
         schema=schema.name if schema else "",
         schema_encoding=schema.encoding if schema else "",
         message_encoding=channel.encoding,
         count=len(publish),
         first_ns=int(times.min()) if len(times) else None,
         last_ns=int(times.max()) if len(times) else None,
-        unit=_unit(raw) if raw and samples else "",
-        frame=samples[0].frame if samples else "",
+        unit=_unit(schema, first) if schema and first else "",
+        frame=first.frame if first else "",
         clock=clock,
     )
     silent = clock is None and verified.header.profile == _ROS2  # it declares what it could record
     return topic, [*defects, *([] if silent else _clock_defects(channel.topic, clock, log))]
 
 
-def _unit(raw: Collected) -> str:
-    return {SIGNAL: raw.samples[0].unit, IMAGE: "grey level"}.get(raw.schema, "m")
+def _unit(schema: Schema, first: Sample) -> str:
+    return {SIGNAL: first.unit, IMAGE: "grey level"}.get(schema.name, "m")
 
 
-def _kind(channel: Channel, schema: str, raw: Collected | None) -> str:
+def _kind(channel: Channel, schema: str, seen: ChannelSeen | None) -> str:
     if schema == MIRROR and MIRROR_OF in channel.metadata:
         return "mirror"
-    if raw is None:
-        return "foreign"
-    return _KINDS.get(schema, "foreign")
+    return "foreign" if seen is None else _KINDS.get(schema, "foreign")
 
 
-def _content(verified: Verified, raw: Collected | None) -> tuple[Ints | None, list[str]]:
+def _content(
+    verified: Verified, seen: ChannelSeen | None, publish: Ints
+) -> tuple[Ints | None, list[str]]:
     """Stamps of a channel of ours where all its messages can be read, and what is wrong in them."""
-    if raw is None or not len(raw.publish_ns):
+    if seen is None or not len(publish):
         return None, []
     stamps: Ints | None = None
     try:
-        raw.checked()
-        stamps = raw.stamps_ns
-        if len(raw.samples) != len(raw.publish_ns):
+        stamps = seen.stamps_ns()
+        if seen.count != len(publish):
             return None, []  # stopped at a limit, which the file's defects name
-        stream = stream_of(raw, int(raw.times_ns.min()), by_name(verified.metadata))
+        times = publish if stamps is None else stamps
+        stream = seen.stream(times, by_name(verified.metadata))
     except RecordingError as error:
         return stamps, [str(error)]
     odd = odd_stream(stream)
-    return stamps, [f"{raw.channel.topic!r}: {odd}"] if odd else []
+    return stamps, [f"{seen.channel.topic!r}: {odd}"] if odd else []
 
 
 def _file_defects(verified: Verified) -> list[str]:
@@ -259,7 +273,7 @@ def _file_defects(verified: Verified) -> list[str]:
     found += [f"{topic!r} is on {n} channels" for topic, n in topics.items() if n > 1]
     for number, channel in verified.channels.items():
         schema = verified.schemas.get(channel.schema_id)
-        if schema is not None and schema.name == IMAGE and number not in ours(verified):
+        if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
             found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
     names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
     found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]

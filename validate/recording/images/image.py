@@ -2,7 +2,8 @@
 
 A PNG is checked before OpenCV sees it: signature, size declared in IHDR, CRC of every chunk, length
 of the unpacked pixels. OpenCV returns half an image for a cut file and prints to standard error;
-only the chunks that make the picture are handed on.
+only the chunks that make the picture are handed on. OpenCV is loaded by its first use:
+16 MB that a recording without images is inspected without.
 """
 
 import struct
@@ -10,7 +11,6 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +33,8 @@ class _Header:
 
 def encode_png(image: Pixels) -> bytes:
     """A grey image (h, w) uint8 as PNG; raises `RecordingError` for other arrays or sizes."""
+    import cv2
+
     if image.dtype != np.uint8 or image.ndim != 2:
         raise RecordingError(f"image {image.shape} {image.dtype}: expected (h, w) uint8")
     _require_size(image.shape[1], image.shape[0])
@@ -48,6 +50,8 @@ def decode_png(data: bytes) -> Pixels:
     Colour is accepted where all pixels are grey (equal channels, opaque). Raises `RecordingError`
     for a damaged PNG, one over `MAX_SIDE`, interlaced, with a palette or of another depth.
     """
+    import cv2
+
     header, packed = _checked(data)
     _require_unpacked(packed, header.height * (1 + header.width * header.channels))
     plain = np.frombuffer(_bare(data, packed), dtype=np.uint8)
@@ -142,6 +146,8 @@ def _grey(image: Pixels) -> Pixels:
 
 def blurred(image: Floats, sd: tuple[float, float]) -> Floats:
     """Gaussian blur; sd (x, y) in pixels, 0 leaves that axis as it is."""
+    import cv2
+
     sizes = [2 * int(np.ceil(3.5 * s)) + 1 for s in sd]
     out = cv2.sepFilter2D(
         image,
@@ -155,18 +161,24 @@ def blurred(image: Floats, sd: tuple[float, float]) -> Floats:
 
 def shrunk(image: Floats, shape: tuple[int, int]) -> Floats:
     """The image (h, w) as means over the areas of `shape` (rows, columns) larger pixels."""
+    import cv2
+
     small = cv2.resize(image, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.float64)
 
 
 def correlated(image: Floats, kernel: Floats) -> Floats:
     """Sums of the image under a centred kernel; the border pixels go on outside."""
+    import cv2
+
     out = cv2.filter2D(image, cv2.CV_64F, kernel, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(out, dtype=np.float64)
 
 
 def sampled(image: Floats, x: Floats, y: Floats) -> Floats:
     """Bilinear values at pixel places x, y (any shape); NaN outside the image."""
+    import cv2
+
     values = cv2.remap(
         image.astype(np.float32),
         x.astype(np.float32),
@@ -181,6 +193,8 @@ def sampled(image: Floats, x: Floats, y: Floats) -> Floats:
 
 def ellipse_through(points: Floats) -> tuple[Floats, Floats, float]:
     """Centre (2,), half axes (2,) and turn rad of the least-squares ellipse of points (k, 2)."""
+    import cv2
+
     scale = float(np.abs(points - points.mean(axis=0)).max())
     middle = points.mean(axis=0)
     plain = ((points - middle) / scale).astype(np.float32)

@@ -4,7 +4,8 @@ One pass reads each byte once: magic at both ends, every record's length, chunk,
 data-section and summary CRCs (the `mcap` package never checks the last), ids that are used before
 they are declared, and nothing after the closing magic. The same pass makes the index by which the
 file is then read, so a summary that is absent, partial or wrong cannot hide a message. A data CRC
-of 0 means "none": the file is read, and its integrity is called not provable.
+of 0 means "none": the file is read, and its integrity is called not provable. A taker gets the
+messages it wants on the way, so that a file is inspected in the same pass.
 """
 
 import hashlib
@@ -12,9 +13,10 @@ import os
 import zlib
 from array import array
 from collections import Counter
+from collections.abc import Set
 from pathlib import Path
 from types import MappingProxyType
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 import numpy as np
 
@@ -42,13 +44,24 @@ from validate.recording.types import Source
 
 MAX_MESSAGES = 10_000_000
 NOT_PROVABLE = "integrity not provable: no data CRC"
+_MESSAGE = int(Op.MESSAGE)  # a plain number: compared for every message
 _KNOWN = frozenset(int(op) for op in Op)
 _IN_DATA = {Op.HEADER, Op.MESSAGE, Op.CHUNK, Op.ATTACHMENT, Op.METADATA}
 
 
-def verify(stream: BinaryIO, path: Path) -> Verified:
+class MessageTaker(Protocol):
+    """Who looks at messages while the file is checked."""
+
+    def wants(self, channel: Channel, schema: Schema | None, records: Set[str]) -> bool:
+        """Asked at a channel's first message, with the names of the metadata before it."""
+
+    def take(self, channel: int, messages: list[bytes]) -> None:
+        """JSON or whatever else of a channel's messages, in order of the file."""
+
+
+def verify(stream: BinaryIO, path: Path, taker: MessageTaker | None = None) -> Verified:
     """Check the whole open file; `RecordingError` names the byte and counts what precedes it."""
-    walk = _Walk(stream)
+    walk = _Walk(stream, taker)
     try:
         walk.run()
     except RecordingError as error:
@@ -65,10 +78,12 @@ def verify(stream: BinaryIO, path: Path) -> Verified:
 class _Walk:
     """The state of one pass over a file; `found` freezes it."""
 
-    def __init__(self, stream: BinaryIO) -> None:
+    def __init__(self, stream: BinaryIO, taker: MessageTaker | None) -> None:
         self.size = os.fstat(stream.fileno()).st_size
         self.record_at = self.chunks = self.messages = 0
         self._stream = stream
+        self._taker = taker
+        self._kept: dict[int, list[bytes] | None] = {}  # None: nobody wants them
         self._at = self._crc = self._attachments = 0
         self._sha = hashlib.sha256()
         self._header: Header | None = None
@@ -174,35 +189,56 @@ class _Walk:
             raise RecordingError(f"channel {channel.id} declared twice, differently")
 
     def _take_message(self, content: bytes) -> None:
-        span = Span(self._at - len(content), len(content), False, frozenset([self._count(content)]))
-        self._spans.append(span)
+        channel = self._count(content)
+        at = self._at - len(content)
+        self._spans.append(Span(at, len(content), False, frozenset([channel])))
+        self._hand_on()
 
     def _count(self, content: bytes) -> int:
         if len(content) < MESSAGE_HEAD.size:
             raise RecordingError(f"a message record of {len(content)} bytes, at least 22 needed")
         channel, _, log, publish = MESSAGE_HEAD.unpack_from(content)
-        if channel not in self._channels:
-            raise RecordingError(f"a message of channel {channel}, undeclared")
+        if channel not in self._kept:
+            self._first_of(channel)
         if self.messages >= MAX_MESSAGES:
             raise RecordingError(f"more than {MAX_MESSAGES} messages, the limit; split the file")
-        self._log.setdefault(channel, array("Q")).append(log)
-        self._publish.setdefault(channel, array("Q")).append(publish)
+        self._log[channel].append(log)
+        self._publish[channel].append(publish)
         self.messages += 1
+        kept = self._kept[channel]
+        if kept is not None:
+            kept.append(content[MESSAGE_HEAD.size :])
         return int(channel)
+
+    def _first_of(self, number: int) -> None:
+        if number not in self._channels:
+            raise RecordingError(f"a message of channel {number}, undeclared")
+        channel = self._channels[number]
+        schema, names = self._schemas.get(channel.schema_id), {m.name for m in self._metadata}
+        wanted = self._taker is not None and self._taker.wants(channel, schema, names)
+        self._log[number], self._publish[number] = array("Q"), array("Q")
+        self._kept[number] = [] if wanted else None
+
+    def _hand_on(self) -> None:
+        """What was kept of a chunk that is whole."""
+        for channel, messages in self._kept.items():
+            if messages and self._taker is not None:
+                self._taker.take(channel, messages)
+                self._kept[channel] = []
 
     def _take_chunk(self, content: bytes) -> None:
         chunk = Chunk.read(content)
         channels: set[int] = set()
         for opcode, body in records_in(chunk.data):
-            match opcode:
-                case Op.SCHEMA:
-                    self._take_schema(body)
-                case Op.CHANNEL:
-                    self._take_channel(body)
-                case Op.MESSAGE:
-                    channels.add(self._count(body))
-                case _ if opcode in _KNOWN:
-                    raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
+            if opcode == _MESSAGE:
+                channels.add(self._count(body))
+            elif opcode == Op.SCHEMA:
+                self._take_schema(body)
+            elif opcode == Op.CHANNEL:
+                self._take_channel(body)
+            elif opcode in _KNOWN:
+                raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
+        self._hand_on()
         self.chunks += 1
         self._compressions[chunk.compression or "none"] += 1
         self._chunk_places.add((self.record_at, HEAD.size + len(content)))
@@ -257,9 +293,9 @@ class _Walk:
 
 
 def _int64(times: "array[int] | None", which: str) -> Ints:
-    unsigned = np.array(times if times is not None else [], dtype=np.uint64)
+    unsigned = np.frombuffer(times, dtype=np.uint64) if times else np.empty(0, np.uint64)
     if unsigned.size and unsigned.max() > np.iinfo(np.int64).max:
         raise RecordingError(f"{which} time {unsigned.max()} ns is beyond int64; re-record it")
-    signed = unsigned.astype(np.int64)
+    signed = unsigned.view(np.int64)
     signed.setflags(write=False)
     return signed

@@ -5,7 +5,7 @@ samples out of order, a unit, frame, spread or set of names that changes on the 
 messages only. Markers whose names are the same in another order are put in the first message's.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.mcap.metadata import CALIBRATION, FOUND_IN, POSE, pose_of, scale_of
-from validate.recording.mcap.records import Channel, Message
+from validate.recording.mcap.records import Channel, Message, Schema
 from validate.recording.mcap.schemas import (
     CONTOUR,
     IMAGE,
@@ -69,11 +69,7 @@ class Collected:
         stamps = [s.stamp_ns for s in self.samples if s.stamp_ns is not None]
         if not stamps:
             return None
-        if len(stamps) != len(self.samples):
-            raise RecordingError(
-                f"{self.channel.topic!r}: {len(stamps)} of {len(self.samples)} messages are "
-                "stamped; stamp all or none"
-            )
+        require_all_stamped(self.channel.topic, len(stamps), len(self.samples))
         return np.array(stamps, dtype=np.int64)
 
     @property
@@ -86,22 +82,36 @@ class Collected:
 def ours(verified: Verified) -> dict[int, Collected]:
     """An empty collector for every channel with a schema of ours, and of images calibrated."""
     found: dict[int, Collected] = {}
-    records = {record.name for record in verified.metadata}
-    for number, channel in verified.channels.items():
-        schema = verified.schemas.get(channel.schema_id)
-        if schema is None:
-            continue
-        calibrated = schema.name == IMAGE and CALIBRATION + channel.topic in records
-        if schema.name in OURS or calibrated:
-            log, publish = verified.log_ns[number], verified.publish_ns[number]
-            found[number] = Collected(channel, schema.name, publish, log)
-            if (schema.encoding, channel.encoding) != (SCHEMA_ENCODING, MESSAGE_ENCODING):
-                encodings = f"{schema.encoding}/{channel.encoding}"
-                found[number].error = (
-                    f"{channel.topic!r}: {schema.name} in {encodings!r}, "
-                    f"expected '{SCHEMA_ENCODING}/{MESSAGE_ENCODING}'"
-                )
+    for number, (channel, schema) in our_channels(verified).items():
+        log, publish = verified.log_ns[number], verified.publish_ns[number]
+        error = wrong_encoding(channel, schema)
+        found[number] = Collected(channel, schema.name, publish, log, error=error)
     return found
+
+
+def our_channels(verified: Verified) -> dict[int, tuple[Channel, Schema]]:
+    """The channels that are streams of ours, by number."""
+    records = {record.name for record in verified.metadata}
+    all_ = {n: (c, verified.schemas.get(c.schema_id)) for n, c in verified.channels.items()}
+    return {n: (c, s) for n, (c, s) in all_.items() if s is not None and is_ours(c, s, records)}
+
+
+def is_ours(channel: Channel, schema: Schema | None, records: Set[str]) -> bool:
+    """Whether a channel has a schema of ours, or images whose calibration is in `records`."""
+    if schema is None:
+        return False
+    calibrated = schema.name == IMAGE and CALIBRATION + channel.topic in records
+    return schema.name in OURS or calibrated
+
+
+def wrong_encoding(channel: Channel, schema: Schema) -> str:
+    """What is wrong with the encodings of a channel of ours; "" for nothing."""
+    if (schema.encoding, channel.encoding) == (SCHEMA_ENCODING, MESSAGE_ENCODING):
+        return ""
+    return (
+        f"{channel.topic!r}: {schema.name} in '{schema.encoding}/{channel.encoding}', "
+        f"expected '{SCHEMA_ENCODING}/{MESSAGE_ENCODING}'"
+    )
 
 
 def not_ours(verified: Verified) -> dict[str, str]:
@@ -138,11 +148,11 @@ def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stre
     topic, first = raw.channel.topic, raw.samples[0]
     t, frame, sd = _times(raw, t0_ns), _constant(raw, "frame"), _constant(raw, "sd")
     if raw.schema == MARKERS:
-        x = np.stack([_in_order(raw, i, first) for i in range(len(raw.samples))])
+        x = np.stack([in_order(topic, i, s, first) for i, s in enumerate(raw.samples)])
         return _named(topic, lambda: Markers(t, first.names, x, sd, frame))
     if raw.schema == SIGNAL:
         unit = _constant(raw, "unit")
-        y = np.stack([_like_first(raw, i) for i in range(len(raw.samples))])
+        y = np.stack([like_first(topic, i, s, first) for i, s in enumerate(raw.samples)])
         return _named(topic, lambda: Signal(t, y, unit, sd, frame))
     pose = pose_of(records, topic)
     if raw.schema == CONTOUR:
@@ -161,52 +171,73 @@ def _named(topic: str, make: Callable[[], Stream]) -> Stream:
         raise RecordingError(f"{topic!r}: {error}") from None
 
 
-def _times(raw: Collected, t0_ns: int) -> Floats:
-    ns = raw.times_ns
-    t: Floats = (ns - t0_ns) / 1e9
+def require_all_stamped(topic: str, stamped: int, messages: int) -> None:
+    """Raises `RecordingError` where only some messages have a stamp."""
+    if stamped != messages:
+        raise RecordingError(
+            f"{topic!r}: {stamped} of {messages} messages are stamped; stamp all or none"
+        )
+
+
+def require_forward(topic: str, ns: Ints, t0_ns: int) -> None:
+    """Raises `RecordingError` where times (n,) ns run backward; the error has s from `t0_ns`."""
     backward = np.flatnonzero(np.diff(ns) < 0)
     if len(backward):
         i = int(backward[0]) + 1
+        before, after = ((int(ns[k]) - t0_ns) / 1e9 for k in (i - 1, i))
         raise RecordingError(
-            f"{raw.channel.topic!r}: time runs backward at sample {i} "
-            f"({t[i - 1]:.9f} s -> {t[i]:.9f} s), {len(backward)} times in all; "
+            f"{topic!r}: time runs backward at sample {i} "
+            f"({before:.9f} s -> {after:.9f} s), {len(backward)} times in all; "
             "write the messages in order of their stamps"
         )
+
+
+def _times(raw: Collected, t0_ns: int) -> Floats:
+    ns = raw.times_ns
+    require_forward(raw.channel.topic, ns, t0_ns)
+    t: Floats = (ns - t0_ns) / 1e9
     return t
 
 
 def _constant(raw: Collected, what: str) -> Any:
     """The value that the field `what` has in every sample."""
-    values = [getattr(sample, what) for sample in raw.samples]
-    for i, value in enumerate(values):
-        if value != values[0]:
-            raise RecordingError(
-                f"{raw.channel.topic!r}: {what} changes at message {i}, {values[0]!r} -> {value!r}"
-            )
-    return values[0]
+    for i, sample in enumerate(raw.samples):
+        require_same(raw.channel.topic, what, i, sample, raw.samples[0])
+    return getattr(raw.samples[0], what)
 
 
-def _in_order(raw: Collected, i: int, first: Sample) -> Floats:
-    """Sample i with its points in the order of the first sample's names."""
-    values, names = _like_first(raw, i), raw.samples[i].names
+def require_same(topic: str, what: str, i: int, sample: Sample, first: Sample) -> None:
+    """Raises `RecordingError` where the field `what` of sample i is not the first's."""
+    want, got = getattr(first, what), getattr(sample, what)
+    if got != want:
+        raise RecordingError(f"{topic!r}: {what} changes at message {i}, {want!r} -> {got!r}")
+
+
+def in_order(topic: str, i: int, sample: Sample, first: Sample) -> Floats:
+    """Values of sample i of markers with its points in the order of the first sample's names.
+
+    Raises `RecordingError` where a name or the number of axes changes.
+    """
+    same_points = sample.values.shape[0] == first.values.shape[0]  # else the names say which
+    values = like_first(topic, i, sample, first) if same_points else sample.values
+    names = sample.names
     if names == first.names:
         return values
     if sorted(names) != sorted(first.names):
         differ = sorted(set(names) ^ set(first.names))
         raise RecordingError(
-            f"{raw.channel.topic!r}: names change at message {i}, not in both: {differ}; "
+            f"{topic!r}: names change at message {i}, not in both: {differ}; "
             "write null for a point that is not seen"
         )
     place = {name: k for k, name in enumerate(names)}
     return values[[place[name] for name in first.names]]
 
 
-def _like_first(raw: Collected, i: int) -> Floats:
-    got, want = raw.samples[i].values, raw.samples[0].values
-    if raw.schema == MARKERS and got.shape[0] != want.shape[0]:
-        return got  # the names say which point came or went
+def like_first(topic: str, i: int, sample: Sample, first: Sample) -> Floats:
+    """Values of sample i; raises `RecordingError` where their shape is not the first's."""
+    got, want = sample.values, first.values
     if got.shape != want.shape:
         raise RecordingError(
-            f"{raw.channel.topic!r}: message {i} holds {got.shape} numbers, the first {want.shape}"
+            f"{topic!r}: message {i} holds {got.shape} numbers, the first {want.shape}"
         )
     return got
