@@ -8,6 +8,7 @@ from pathlib import Path
 import ezc3d
 import nrrd
 import numpy as np
+import openpyxl
 import pytest
 from exports import rows
 from mcap_samples import sample_recording
@@ -36,6 +37,13 @@ def make_mcap(path: Path) -> None:
 
 def make_export(path: Path) -> None:
     path.write_text("Time (s),Compressive extension (mm),Load (N)\n" + rows())
+
+
+def make_xlsx(path: Path) -> None:
+    book = openpyxl.Workbook()
+    for line in ("Time (s),Compressive extension (mm),Load (N)\n" + rows()).splitlines():
+        book.active.append([float(c) if c[-1].isdigit() else c for c in line.split(",")])
+    book.save(path)
 
 
 def make_stack(path: Path) -> None:
@@ -154,6 +162,7 @@ MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "metaimage": (make_metaimage, {}),
     "nrrd": (make_nrrd, {}),
     "instron": (make_export, {}),
+    "xlsx": (make_xlsx, {}),
     "matlab": (make_matlab, {"unit": "0.4um"}),
     "png-stack": (make_stack, {"m_per_px": "1e-4", "rate": "10"}),
 }

@@ -5,6 +5,7 @@ from pathlib import Path
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.recording.exports.instron import INSTRON
+from validate.recording.exports.xlsx import XLSX
 from validate.recording.formats.c3d import C3D
 from validate.recording.formats.dicom import DICOM
 from validate.recording.formats.matlab import MATLAB
@@ -23,7 +24,7 @@ from validate.recording.reader import Reader
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
     MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
-    INSTRON, PNG_STACK,
+    XLSX, INSTRON, PNG_STACK,
 )  # fmt: skip
 
 

@@ -78,14 +78,20 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
     try:
         tables = specimen_tables(parse_tables(data, said.get("encoding"), said.get("decimal")))
         label, table = chosen(tables, said.get("specimen"))
-        return _recording(path, data, table, said, label)
+        return recording_of(path, data, table, said, label)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
 
 
-def _recording(
-    path: Path, data: bytes, table: Table, mapping: Mapping[str, str], label: str
+def recording_of(
+    path: Path,
+    data: bytes,
+    table: Table,
+    mapping: Mapping[str, str],
+    label: str,
+    written_as: str = "text file",
 ) -> Recording:
+    """The recording of the table of one specimen; `data` are the bytes of the file."""
     said = parse_mapping(mapping, table)
     table = without_repeats(table, said.get("time"), mapping.get("repeated"))
     if len(table.lines) < MIN_SAMPLES:
@@ -103,7 +109,7 @@ def _recording(
     sizes = {key: repr(value) for key, value in specimen.items()}
     return Recording(
         name=path.stem,
-        source=Source(path.name, digest, len(data), "text file: integrity not provable"),
+        source=Source(path.name, digest, len(data), f"{written_as}: integrity not provable"),
         t0_ns=0,
         signals=signals,
         clock={topic: clock_of(topic, None, stamps, stamps) for topic in signals},

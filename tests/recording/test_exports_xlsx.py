@@ -1,0 +1,93 @@
+"""A testing machine's workbook, written by openpyxl: the same numbers as its text."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from exports import D, F, T, assert_test
+
+from validate.errors import RecordingError, UsageError
+from validate.recording.exports.xlsx import read_xlsx
+from validate.recording.formats import apart, xlsx_arrays
+from validate.recording.readers import recognised
+
+TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
+SAMPLES = [[float(t), float(d), float(f)] for t, d, f in zip(T, D, F, strict=True)]
+TEST = [["Durchmesser", 25.0, "mm"], ["Probenhöhe", "20 mm"], [], *TABLE, *SAMPLES]
+
+
+def written(folder: Path, **sheets: list[list[object]]) -> Path:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, cells in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in cells:
+            sheet.append(row)
+    book.save(folder / "log.xlsx")
+    return folder / "log.xlsx"
+
+
+def test_the_first_sheet_with_a_test_is_read(tmp_path: Path) -> None:
+    path = written(tmp_path, Info=[["made by", 'a "machine"\tof 2\nlines']], Data=TEST)
+    assert recognised(path).name == "xlsx"
+    recording = read_xlsx(path, {})
+    assert_test(recording)
+    force = recording.signals["force"].y[:, 0]
+    assert np.allclose(force, F, rtol=1e-15, atol=0)  # 16 digits are written
+    specimen = recording.record("specimen")
+    assert float(specimen["diameter_m"]) == pytest.approx(0.025)
+    assert float(specimen["height_m"]) == pytest.approx(0.020)
+    assert specimen["test"] == "compression"
+    provenance = recording.record("provenance")
+    assert provenance["text"].startswith("sheet 'Data' (of a workbook)")
+    assert "sheet 'Info' not used" in provenance["besides"]
+    assert recording.source.bytes == path.stat().st_size
+
+
+def test_several_sheets_with_a_test_are_asked_for(tmp_path: Path) -> None:
+    doubled = [[*r[:2], 2 * r[2]] for r in SAMPLES]
+    path = written(tmp_path, A=[*TABLE, *SAMPLES], B=[*TABLE, *doubled], C=[["words"]])
+    with pytest.raises(RecordingError, match=r"2 sheets may hold the test: 'A', 'B'; .*sheet=A"):
+        read_xlsx(path, {})
+    assert_test(read_xlsx(path, {"sheet": "B"}), f=2 * F)
+    with pytest.raises(UsageError, match="sheet=X: no such sheet; the workbook has 'A', 'B', 'C'"):
+        read_xlsx(path, {"sheet": "X"})
+    with pytest.raises(RecordingError, match=r"log\.xlsx: sheet 'C': no table of numbers"):
+        read_xlsx(path, {"sheet": "C"})
+
+
+def test_lines_of_errors_are_rows_of_the_sheet(tmp_path: Path) -> None:
+    bad = [list(row) for row in TEST]
+    bad[19][2] = None
+    with pytest.raises(RecordingError, match=r"log\.xlsx: line 20, column 'Kraft': '' is not"):
+        read_xlsx(written(tmp_path, Data=bad), {})
+
+
+def test_a_workbook_without_a_table_says_so(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no table in the sheets 'Data' of this workbook"):
+        read_xlsx(written(tmp_path, Data=[["words"]]), {})
+
+
+def test_what_unpacks_to_too_much_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path, Data=TEST)
+    monkeypatch.setattr(xlsx_arrays, "MOST_CELLS", 50)
+    with pytest.raises(RecordingError, match="more than 50 cells"):
+        xlsx_arrays.arrays(path)
+    monkeypatch.setattr(xlsx_arrays, "MOST_BYTES", 100)
+    with pytest.raises(RecordingError, match="bytes unpacked, the limit is 100"):
+        xlsx_arrays.arrays(path)
+
+
+def test_without_the_library_the_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path, Data=TEST)
+    blocked = "import sys; sys.modules['openpyxl'] = None; sys.argv.pop(0); import runpy; "
+    run = blocked + "runpy.run_module('validate.recording.formats.apart', run_name='__main__')"
+    monkeypatch.setattr(apart, "_RUN", (sys.executable, "-c", run, "-"))
+    with pytest.raises(UsageError, match=r"openpyxl.* pip install 'validate-tissue\[xlsx\]'"):
+        read_xlsx(path, {})

@@ -1,0 +1,115 @@
+"""Testing machines' exports as workbooks (.xlsx): the sheet with the test, read as text is."""
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from validate.errors import RecordingError, UsageError
+from validate.recording.exports.blocks import parse_tables
+from validate.recording.exports.columns import KEYS, role_of
+from validate.recording.exports.encoding import whole_file
+from validate.recording.exports.instron import recording_of
+from validate.recording.exports.specimens import chosen, specimen_tables
+from validate.recording.exports.table import Table
+from validate.recording.formats.apart import decoded
+from validate.recording.reader import Options, Reader, head, require_known
+from validate.recording.types import Recording
+
+_WORKBOOK = "xl/workbook.xml"
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """A sheet's tables by specimen; none and why where it holds no table."""
+
+    name: str
+    tables: Mapping[str, Table]
+    why: str = ""
+
+    @property
+    def is_test(self) -> bool:
+        return any(
+            {"force", "displacement"} <= {role_of(c) for c in t.columns}
+            for t in self.tables.values()
+        )
+
+
+def read_xlsx(path: Path, options: Options) -> Recording:
+    """The sheet of a workbook that holds displacement and force, as `instron.read_instron` reads
+    text, with its options and `sheet` (a name) where several hold a test.
+
+    The other sheets are named in the notes. Raises as it does, `UsageError` for an unknown sheet
+    and without the library, `RecordingError` where no sheet holds a table, or several hold a test
+    and none is named.
+    """
+    require_known(options, (*KEYS, "sheet"))
+    data = whole_file(path)
+    found = decoded("xlsx_arrays", path, "xlsx")
+    texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
+    said = {key: value for key, value in options.items() if key != "sheet"}
+    try:
+        sheets = [_sheet(name, text, said.get("decimal")) for name, text in texts.items()]
+        sheet = _chosen(sheets, options.get("sheet"))
+        label, table = chosen(sheet.tables, said.get("specimen"))
+        return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+
+
+def _sheet(name: str, text: bytes, decimal: str | None) -> _Sheet:
+    try:
+        return _Sheet(name, specimen_tables(parse_tables(text, "utf-8", decimal or ".")))
+    except RecordingError as error:
+        return _Sheet(name, {}, str(error))
+
+
+def _chosen(sheets: list[_Sheet], said: str | None) -> _Sheet:
+    names = ", ".join(f"'{s.name}'" for s in sheets[:8])
+    if said is not None:
+        named = [s for s in sheets if s.name == said]
+        if not named:
+            raise UsageError(f"--map sheet={said}: no such sheet; the workbook has {names}")
+        if not named[0].tables:
+            raise RecordingError(f"sheet '{said}': {named[0].why}")
+        return named[0]
+    tests = [s for s in sheets if s.is_test] or [s for s in sheets if s.tables]
+    if not tests:
+        why = sheets[0].why if sheets else "no sheet"
+        raise RecordingError(f"no table in the sheets {names} of this workbook: {why}")
+    if len(tests) > 1:
+        held = ", ".join(f"'{s.name}'" for s in tests[:8])
+        raise RecordingError(
+            f"{len(tests)} sheets may hold the test: {held}; choose one with "
+            f"--map 'sheet={tests[0].name}'"
+        )
+    return tests[0]
+
+
+def _noted(table: Table, used: _Sheet, sheets: list[_Sheet]) -> Table:
+    others = [f"sheet '{s.name}' not used" for s in sheets if s is not used]
+    return replace(
+        table,
+        encoding=f"sheet '{used.name}'",
+        encoding_why="of a workbook",
+        notes=(*table.notes, *others),
+    )
+
+
+def _is_workbook(path: Path) -> bool:
+    if not head(path, 4).startswith(b"PK\x03\x04"):
+        return False
+    try:
+        with zipfile.ZipFile(path) as packed:
+            return _WORKBOOK in packed.namelist()
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        return False
+
+
+XLSX = Reader(
+    "xlsx",
+    "a testing machine's export, workbook",
+    _is_workbook,
+    read_xlsx,
+    "it is an archive that holds a workbook",
+)
