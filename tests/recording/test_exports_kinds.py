@@ -157,6 +157,13 @@ def test_a_sign_that_is_said_makes_the_kind_immaterial(tmp_path: Path) -> None:
     assert sense(read(tmp_path, BARE + rows(), force="Load:-")) == PULLS
 
 
+def test_a_sign_that_is_said_is_believed_over_the_header(tmp_path: Path) -> None:
+    text = "Tensile test\n" + BARE + rows()
+    assert sense(read(tmp_path, text, force="Load:+")) == PRESSES
+    with pytest.raises(UsageError, match=r"test=tension: the signs given .* make it compression"):
+        read(tmp_path, text, test="tension", force="Load:+")
+
+
 def test_a_kind_that_is_neither_is_refused() -> None:
     with pytest.raises(UsageError, match="test=bending: a test is one of tension, compression"):
         kind_of_test("bending", {}, ())
@@ -183,6 +190,7 @@ def test_an_aborted_run_is_remarked(line: str, tmp_path: Path) -> None:
 
 
 def test_words_that_no_run_was_aborted_are_no_remark(tmp_path: Path) -> None:
-    recording = read(tmp_path, f"Aborted: no\n{BARE}{rows()}", test="compression")
-    assert "run" not in recording.record(ASSUMED)
+    for answer in ("no", "0", "false"):
+        recording = read(tmp_path, f"Aborted: {answer}\n{BARE}{rows()}", test="compression")
+        assert "run" not in recording.record(ASSUMED)
     assert not tells_a_stop("Test ended at 3 mm")

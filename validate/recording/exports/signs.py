@@ -29,17 +29,12 @@ def signs(
 
     Signs are those of the largest change since the first sample. `kind` is the stated one; None:
     strain and stress, or displacement and force that both go negative, decide. Raises `UsageError`
-    when nothing does, `RecordingError` when both go negative in a stated test in tension; the
-    message says what to pass.
+    when nothing does, or kind and sign that are said contradict each other, `RecordingError` when
+    both go negative in a stated test in tension; the message says what to pass.
     """
     d, f = excursion(displacement.values), excursion(force.values)
-    said_d, said_f = _said_sign(displacement), _said_sign(force)
-    if said_d or said_f:
-        flip_d = said_d or _matching(d, f * (said_f or 1))
-        flip_f = said_f or _matching(f, d * flip_d)
-        given = _NAMES.get(flip_d * d or flip_f * f)
-        shown = Kind(given, "the sign given by the user says so") if given else None
-        return Signs(flip_d, flip_f, "sign given by the user", kind or shown)
+    if _said_sign(displacement) or _said_sign(force):
+        return _as_said(d, f, displacement, force, kind)
     kind = kind or _by_strain(d, f, strain, stress)
     if kind is None:
         raise UsageError(
@@ -53,6 +48,18 @@ def signs(
         )
     wanted = 1 if kind.name == "compression" else -1
     return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, _reason(d, f, kind), kind)
+
+
+def _as_said(d: int, f: int, displacement: Pick, force: Pick, kind: Kind | None) -> Signs:
+    """The flips that the user gives; the kind of test is then what they make of it."""
+    said_d, said_f = _said_sign(displacement), _said_sign(force)
+    flip_d = said_d or _matching(d, f * (said_f or 1))
+    flip_f = said_f or _matching(f, d * flip_d)
+    given = _NAMES.get(flip_d * d or flip_f * f)
+    if kind and kind.said and given and given != kind.name:
+        raise UsageError(f"--map test={kind.name}: the signs given beside it make it {given}")
+    shown = Kind(given, "the sign given by the user makes it so") if given else kind
+    return Signs(flip_d, flip_f, "sign given by the user", shown)
 
 
 def _reason(d: int, f: int, kind: Kind) -> str:

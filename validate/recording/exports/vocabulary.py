@@ -126,7 +126,9 @@ def kind_word(text: str, kind: str) -> str | None:
 
 def tells_a_stop(text: str) -> bool:
     """Whether it says that a test was ended before its end."""
-    return not holds(text, NEGATED) and (holds(text, STOPPED) or bool(_BY_HAND.search(plain(text))))
+    if holds(text, NEGATED) or re.search(r"[:=]\s*0\b", text):
+        return False
+    return holds(text, STOPPED) or bool(_BY_HAND.search(plain(text)))
 
 
 def is_ideographic(word: str) -> bool:
