@@ -13,7 +13,8 @@ from click.testing import CliRunner
 from validate.cli.main import cli, run
 from validate.cli.new import _kind, written
 from validate.compare.score import bias
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
+from validate.identify.modulus import fit_modulus
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
@@ -213,10 +214,9 @@ def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> Non
 
 
 def test_a_test_in_tension_is_not_pressed() -> None:
-    with pytest.raises(
-        UsageError, match=r"a test in tension; .* again with --map test=compression"
-    ):
-        written("gel", log(test="tension"), "x.mcap")
+    for use in (lambda r: written("gel", r, "x.mcap"), fit_modulus):
+        with pytest.raises(RecordingError, match=r"a test in tension; .* --map test=compression"):
+            use(log(test="tension", **SIZES))
 
 
 def test_the_file_of_an_inclusion_is_short(project_root: Path) -> None:

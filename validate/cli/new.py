@@ -15,6 +15,7 @@ import numpy as np
 from validate.cli.display import say
 from validate.cli.recordings import ask_back
 from validate.errors import UsageError
+from validate.identify.modulus import require_compression
 from validate.places import try_folder, write_whole
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
@@ -65,7 +66,7 @@ def written(name: str, recording: Recording, source: str) -> str:
 def _kind(recording: Recording) -> str:
     units = {topic: s.unit for topic, s in recording.signals.items()}
     if units.get("displacement") == "m" and units.get("force") == "N":
-        _require_compression(recording)
+        require_compression(recording)
         return "force"
     known = {"marker_layout", "inclusion"} <= recording.metadata.keys()
     if recording.contours and recording.markers and "m" in units.values() and known:
@@ -75,14 +76,6 @@ def _kind(recording: Recording) -> str:
         "an experiment is written from signals 'displacement' (m) and 'force' (N), or from "
         "outlines, a stage (m) and markers with records 'inclusion' and 'marker_layout'"
     )
-
-
-def _require_compression(recording: Recording) -> None:
-    if recording.metadata.get("specimen", {}).get("test") == "tension":
-        raise UsageError(
-            f"{recording.name} is a test in tension; an experiment of two plates is written from "
-            "one in compression. If it presses, import it again with --map test=compression"
-        )
 
 
 def _topics(recording: Recording) -> list[str]:

@@ -185,8 +185,10 @@ class Log:
 def loading(recording: Recording) -> Log:
     """Signals `displacement` and `force` at the displacement's times, by their clocks.
 
-    Raises `RecordingError` where they have fewer than 10 samples in common.
+    Raises `RecordingError` where they have fewer than 10 samples in common, and for a test that
+    pulls.
     """
+    require_compression(recording)
     moved, force = (_samples(recording, *s) for s in (("displacement", "m"), ("force", "N")))
     if len(moved.t) == len(force.t) and np.abs(moved.t - force.t).max(initial=0.0) <= SAME:
         return Log(moved.t, moved.y[:, 0], force.y[:, 0], 0.0)
@@ -199,6 +201,15 @@ def loading(recording: Recording) -> Log:
             f" at least {MIN_SAMPLES} needed; check the clocks with `validate inspect`"
         )
     return Log(moved.t[both], moved.y[both, 0], shown[both, 0], float(np.sqrt(squared[0])))
+
+
+def require_compression(recording: Recording) -> None:
+    """Raises `RecordingError` for a recording that says of itself that it is a test in tension."""
+    if recording.metadata.get("specimen", {}).get("test") == "tension":
+        raise RecordingError(
+            f"{recording.name} is a test in tension; between two plates one in compression is "
+            "needed. If it presses, import it again with --map test=compression"
+        )
 
 
 def _samples(recording: Recording, topic: str, unit: str) -> Signal:
