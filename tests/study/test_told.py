@@ -63,7 +63,8 @@ def test_a_point_of_the_front_is_drawn_under_its_method(monkeypatch: pytest.Monk
         "ekf": ([2.0], [1.0]),
         "Pareto front": ([1.0, 2.0], [2.0, 1.0]),
     }
-    assert "2 without any error" in chart.caption
+    assert "1 without any error" in chart.caption
+    assert "1 smoothed, which see the future" in chart.caption
 
 
 # --- stability maps -------------------------------------------------------------------------------

@@ -41,7 +41,7 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "nodes": float(len(explicit.body.mesh.nodes)),
         "cells": float(len(explicit.body.mesh.cells)),
         "locking": float(plain(locked.rows[-1][1]) or 0.0),
-        "fields_apart": fields_apart(cases["small"]["ekf_held"], cases["small"]["nfem"]),
+        "fields_apart": fields_apart(cases.get("small", {}), ("ekf_held", "nfem")),
     }
     if share is not None:
         numbers["kinetic_share"] = share

@@ -51,7 +51,7 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "critical_step": critical_step(build_system(scene)).lanczos,
         "nodes": float(len(scene.mesh.nodes)),
         "cells": float(len(scene.mesh.cells)),
-        "fields_apart": fields_apart(cases[""]["ekf_held"], cases[""]["nfem"]),
+        "fields_apart": fields_apart(cases[""], ("ekf_held", "nfem")),
     }
     for name, label in (("explicit", EXPLICIT), ("filter", FILTER), ("implicit", IMPLICIT)):
         for hz in (VISUAL_HZ, HAPTIC_HZ):

@@ -54,7 +54,7 @@ def tell_liver(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "nodes": float(len(scene.mesh.nodes)),
         "tetrahedra": float(len(scene.mesh.cells)),
         "duration": float(main["nfem"].seen.t[-1]),
-        "fields_apart": fields_apart(main["ekf_held"], main["nfem"]),
+        "fields_apart": fields_apart(main, ("ekf_held", "nfem")),
     }
     return Told((sets_exhibit(scene, body), model), numbers)
 

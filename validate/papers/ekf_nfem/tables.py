@@ -1,6 +1,7 @@
 """What the printed numbers of paper 003 leave open: readings of the force, steps, elements, fields
 that are "nearly same"."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -82,11 +83,12 @@ def locking_table(scene: Scene, values: tuple[float, ...]) -> NumberTable:
     )
 
 
-def fields_apart(one: Followed, other: Followed) -> float:
-    """Largest distance of two fields at the last common frame over the largest displacement of the
-    other there; NaN where one of the runs ended early."""
-    if not (one.whole and other.whole):
+def fields_apart(methods: Mapping[str, Followed], names: tuple[str, str]) -> float:
+    """Largest distance of two methods' fields at the last common frame over the largest
+    displacement of the second there; NaN where one of them was not run, or ended early."""
+    if any(name not in methods or not methods[name].whole for name in names):
         return float("nan")
+    one, other = (methods[name] for name in names)
     u, reference = one.run.u[-1], other.run.u[-1]
     apart = np.linalg.norm(u - reference, axis=1).max()
     return float(apart / np.linalg.norm(reference, axis=1).max())
