@@ -195,7 +195,7 @@ def _offset_lines(verified: Verified) -> list[str]:
 
 
 def _assumed(verified: Verified) -> list[str]:
-    """What the file that a recording was made of did not say in so many words."""
+    """What was assumed in reading the file that a recording was made of."""
     return [
         f"{key}: {text}"
         for record in verified.metadata

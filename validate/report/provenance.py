@@ -98,8 +98,8 @@ def _metadata(record: Recording) -> NumberTable:
 def _assumed(record: Recording) -> NumberTable:
     """What stands between the file as written and the recording; never folded."""
     rows = tuple(record.metadata[ASSUMED].items())
-    title = f"Assumed of {record.name} where its file does not say it in so many words."
-    return NumberTable("assumed", title, ("", "what, and why"), rows)
+    title = f"Assumed in reading {record.name}, and what decided."
+    return NumberTable("", title, ("", "what, and why"), rows)
 
 
 def parameters(result: Result) -> Exhibit:

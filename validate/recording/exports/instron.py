@@ -212,7 +212,7 @@ def _flipped(flips: Signs) -> str:
 
 
 def _assumed(picks: Mapping[str, Pick], flips: Signs) -> Record:
-    """What the file did not say in so many words, a line each."""
+    """Kind of test, signs and unit factors, each with what decided."""
     kind = f"{flips.kind.name}: {flips.kind.why}" if flips.kind else "not stated"
     units = [
         f"'{p.column.label}' in {p.unit} x {p.factor:.6g}{' (said)' if p.unit_is_said else ''}"

@@ -17,7 +17,7 @@ from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.exports.encoding import decode, whole_file
 
-ASSUMED = "assumed"  # a record: what its file does not say in so many words, a line each
+ASSUMED = "assumed"  # a record: what was taken of a file and what decided, a line each
 LEFT_OUT = "left out"  # a record's key: what of the file did not become data
 _ABSENT = {"", "nan", "NaN", "NAN", "-"}
 
