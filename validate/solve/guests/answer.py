@@ -28,7 +28,6 @@ _JSON_BYTES, _HEADER_BYTES = 4_000_000, 4096
 _LINES = 20  # of what it could not do
 _ECHO = 1e-6  # relative difference of a parameter that is the same
 _UNBALANCED = 1e-3  # of the largest force
-_ROUNDED = 1e-9  # of E L^2, where there is hardly a force
 _HUGE = 1e12  # m or N
 
 
@@ -236,7 +235,8 @@ def _balance(job: GuestJob, reactions: Floats | None) -> tuple[str, ...]:
     total = (pushed + given).reshape(k, len(held) // 3, 3).sum(axis=1)
     scale = max(float(np.abs(x).sum(axis=1).max(initial=0.0)) for x in (pushed, given))
     worst = float(np.abs(total).max(initial=0.0))
-    rounding = _ROUNDED * system.scene.material.E * float(np.ptp(system.scene.mesh.nodes)) ** 2
+    mesh, E = system.scene.mesh, system.scene.material.E
+    rounding = job.document["tolerance"] * E * float(np.ptp(mesh.nodes)) ** 2
     if worst <= max(_UNBALANCED * scale, rounding):
         return ()
     name = "weight" if any(isinstance(p, Weight) for p in system.scene.loads) else "loads"
