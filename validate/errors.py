@@ -5,8 +5,18 @@ that were found and a next step.
 """
 
 
+def one_line(text: str) -> str:
+    """The text with line ends and tabs as spaces, other signs that cannot be shown escaped: what a
+    file or its name holds reaches a terminal through errors."""
+    spaced = " ".join(text.split()) if any(c in text for c in "\n\r\t\v\f") else text
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in spaced)
+
+
 class ValidateError(Exception):
-    """Base of every error a user can mend."""
+    """Base of every error a user can mend; its text is one line that a terminal can show."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class UsageError(ValidateError):

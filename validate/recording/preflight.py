@@ -35,7 +35,7 @@ from validate.recording.mcap.seen import AllSeen, ChannelSeen
 from validate.recording.mcap.streams import our_channels
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.reader import Options, require_known
-from validate.recording.readers import READERS, named, recognised
+from validate.recording.readers import named, no_mcap, recognised
 from validate.recording.scales import odd_stream
 from validate.recording.types import Clock, Frames, Recording, Signal, Source
 
@@ -180,9 +180,7 @@ def _verified(stream: BinaryIO, path: Path, seen: AllSeen) -> Verified:
     try:
         return verify(stream, path, seen)
     except RecordingError as error:
-        other = next((r.name for r in READERS if r is not MCAP and r.recognises(path)), None)
-        hint = f"; or first `validate import {path.name} --as {other} -o X.mcap`" if other else ""
-        raise RecordingError(f"{error}{hint}") from None
+        raise no_mcap(path, error) from None
 
 
 def _offset_lines(verified: Verified) -> list[str]:

@@ -7,11 +7,15 @@ import difflib
 import hashlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
 from validate.recording.types import Recording, Source
 
+LARGEST = 2**29  # bytes of a file that is read as a whole
+MAX_SIZE = 2**63  # bytes: no limit
 Options = Mapping[str, str]  # what a file does not say itself: `--map KEY=VALUE`
 
 
@@ -22,6 +26,9 @@ class Reader:
     `recognises` looks at a path and its first bytes and raises nothing. `read` gives a `Recording`
     or raises one `ValidateError` of one line: for a path that cannot be read, a file that is empty,
     cut or of another kind, and an option that it does not know.
+
+    Both are guarded here, for all formats alike: only files of at most `largest` bytes and folders
+    are opened (a pipe would wait for ever), and what is wrong in a file names the file.
     """
 
     name: str
@@ -29,14 +36,50 @@ class Reader:
     recognises: Callable[[Path], bool]
     read: Callable[[Path, Options], Recording]
     sign: str
+    largest: int = LARGEST
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "read", _guarded(self.read, self.largest))
+
+
+def _guarded(
+    read: Callable[[Path, Options], Recording], largest: int
+) -> Callable[[Path, Options], Recording]:
+    @wraps(read)
+    def guarded(path: Path, options: Options) -> Recording:
+        require_readable(path, largest)
+        try:
+            return read(path, options)
+        except RecordingError as error:
+            if path.name in error.args[0]:
+                raise
+            raise RecordingError(f"{path.name}: {error}") from error
+
+    return guarded
+
+
+def require_readable(path: Path, largest: int) -> None:
+    """Raises `RecordingError` for what cannot be looked at, is neither file nor folder, or is a
+    file of over `largest` bytes."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:  # ValueError: a NUL in its name
+        why = getattr(error, "strerror", error)
+        raise RecordingError(f"{path}: cannot be read ({why})") from None
+    if not (S_ISREG(found.st_mode) or S_ISDIR(found.st_mode)):
+        raise RecordingError(f"{path}: cannot be read (neither a file nor a folder)")
+    if S_ISREG(found.st_mode) and found.st_size > largest:
+        size = f"{found.st_size} bytes, the limit is {largest}"
+        raise RecordingError(f"{path.name}: {size}; split it")
 
 
 def head(path: Path, count: int = 4096) -> bytes:
     """The first bytes of a file; none of what is no readable file."""
     try:
+        require_readable(path, MAX_SIZE)
         with path.open("rb") as stream:
             return stream.read(count)
-    except OSError:
+    except (OSError, RecordingError):
         return b""
 
 

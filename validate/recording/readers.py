@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
 from validate.parameters import nearest_names
 from validate.recording.exports.instron import INSTRON
 from validate.recording.exports.xlsx import XLSX
@@ -26,6 +26,27 @@ READERS: tuple[Reader, ...] = (
     MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
     XLSX, INSTRON, PNG_STACK,
 )  # fmt: skip
+
+
+def told_apart(path: Path) -> str:
+    """What a file is whose format shows, and the command that takes it; empty where none shows (any
+    text may be a testing machine's)."""
+    reader = next((r for r in READERS if r is not INSTRON and r.recognises(path)), None)
+    if reader is None:
+        return ""
+    takes = "new NAME --from {}" if reader is MCAP else "import {} -o " + f"{path.stem}.mcap"
+    return f"{path.name} is {reader.doc}: validate {takes.format(path.name)}"
+
+
+def no_mcap(path: Path, error: RecordingError) -> RecordingError:
+    """The error about a file that was expected to be MCAP, with what it is instead."""
+    if MCAP.recognises(path):
+        return error
+    if said := told_apart(path):
+        return RecordingError(said)
+    may = INSTRON.recognises(path)
+    way = f"; if it is {INSTRON.doc}: validate import {path.name} -o {path.stem}.mcap"
+    return RecordingError(f"{error}{way}") if may else error
 
 
 def named(kind: str) -> Reader:

@@ -25,6 +25,10 @@ def find(name: str, start: Path, named: Sequence[Path] = ()) -> Experiment:
         return load_file(Path(name))
     files = experiment_files(start, named)
     if name not in files:
+        from validate.recording.readers import told_apart  # all formats: only where needed
+
+        if said := told_apart(Path(name)):
+            raise UsageError(said)
         raise UsageError(f"unknown experiment '{name}'; {nearest_names(name, set(files))}")
     return load_file(files[name])
 

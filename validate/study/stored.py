@@ -92,7 +92,10 @@ def read_as(path: Path, make: Callable[[Any], T]) -> T:
             f"no stored run at {path}: {error.strerror}; name a report folder or its results.json"
         ) from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"{file} is no results.json of validate: {error!r:.80}") from error
+        from validate.recording.readers import told_apart  # all formats: only where needed
+
+        said = told_apart(file) or f"{file} is no results.json of validate: {error!r:.80}"
+        raise UsageError(said) from error
 
 
 def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:

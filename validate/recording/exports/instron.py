@@ -236,7 +236,7 @@ def _is_text(path: Path) -> bool:
     """Whether the file begins with text: with a UTF-16 mark, or without control characters."""
     start = head(path)
     wide = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    return wide or (bool(start) and not re.search(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]", start))
+    return wide or (any(start) and not re.search(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]", start))
 
 
 INSTRON = Reader(

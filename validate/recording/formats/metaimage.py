@@ -5,6 +5,7 @@ ITK's own reader, the library for this format, refuses sequences of transforms w
 limit to a line, within one to the whole. Pixels are raw or one zlib stream.
 """
 
+import re
 import zlib
 from pathlib import Path
 
@@ -39,17 +40,16 @@ def _header(path: Path) -> tuple[dict[str, str], int]:
     """Texts by key, and where the header ends; the name of the pixels' file is its last line."""
     if not path.is_file():
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
-    text = head(path, _HEADER)
-    at = text.find(f"\n{_LAST}".encode()) + 1
-    end = text.find(b"\n", at) + 1
-    if not at or not end or not _recognises(path):
+    text = head(path, _HEADER) if _recognises(path) else b""
+    last = re.search(rf"\n{_LAST}[ \t]*=[^\n]*\n".encode(), text)
+    if last is None:
         raise RecordingError(
             f"{path.name}: no MetaImage, or its header does not end with '{_LAST} = ...' within "
             f"{min(len(text), _HEADER)} bytes: cut or damaged"
         )
-    lines = text[:end].decode("utf-8", "replace").splitlines()
+    lines = text[: last.end()].decode("utf-8", "replace").splitlines()
     pairs = (line.partition("=") for line in lines)
-    return {key.strip(): value.strip() for key, sign, value in pairs if sign}, end
+    return {key.strip(): value.strip() for key, sign, value in pairs if sign}, last.end()
 
 
 def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[np.uint8], ...]:

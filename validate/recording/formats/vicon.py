@@ -6,6 +6,7 @@ frame (devices: a row a sub-frame) until a blank line.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -83,9 +84,8 @@ def read_vicon(path: Path, options: Options) -> Recording:
 def _blocks(held: TextRows) -> dict[str, CsvBlock]:
     """Blocks by title; one without rows is left out."""
     begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
-    ends = [*begins[1:], len(held.rows)]
     found = {}
-    for begin, end in zip(begins, ends, strict=True):
+    for begin, end in pairwise([*begins, len(held.rows)]):
         block = _block(held, held.rows[begin:end])
         if block is not None:
             found[held.rows[begin].cell(0)] = block

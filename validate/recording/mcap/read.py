@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import BinaryIO
 
 from validate.errors import RecordingError
 from validate.recording.alignment import moved
@@ -23,7 +24,7 @@ from validate.recording.mcap.metadata import by_name, name_of, own_records
 from validate.recording.mcap.records import MAGIC
 from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
-from validate.recording.reader import Options, Reader, head
+from validate.recording.reader import MAX_SIZE, Options, Reader, head
 from validate.recording.types import Clock, Recording, by_kind
 
 
@@ -35,13 +36,22 @@ def read_recording(path: Path) -> Recording:
     no topic of ours, or whose samples are out of order or change their unit, frame or names.
     """
     with opened(path) as stream:
-        verified = verify(stream, path)
+        verified = _verified(stream, path)
         try:
             collected = _topics(verified)
             fill(collected, messages_of(stream, verified, collected.keys()))
             return _recording(path, verified, list(collected.values()))
         except RecordingError as error:
             raise RecordingError(f"{path.name}: {error}") from None
+
+
+def _verified(stream: BinaryIO, path: Path) -> Verified:
+    try:
+        return verify(stream, path)
+    except RecordingError as error:
+        from validate.recording.readers import no_mcap  # which knows this reader
+
+        raise no_mcap(path, error) from None
 
 
 def _topics(verified: Verified) -> dict[int, Collected]:
@@ -134,4 +144,5 @@ MCAP = Reader(
     lambda path: head(path, len(MAGIC)) == MAGIC,
     read_all,
     "its first 8 bytes are MCAP's",
+    largest=MAX_SIZE,  # read piece by piece
 )

@@ -18,6 +18,7 @@ from validate.recording.mcap.records import (
     Schema,
     records_in,
 )
+from validate.recording.reader import MAX_SIZE, require_readable
 from validate.recording.types import Source
 
 
@@ -55,6 +56,7 @@ class Verified:
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
     """The file for reading; every failure of the disk is a `RecordingError`."""
+    require_readable(path, MAX_SIZE)
     try:
         with path.open("rb") as stream:
             yield stream
