@@ -1,5 +1,6 @@
 """A damaged or forged file is one clear error, never a crash and never other values."""
 
+import re
 import struct
 import tracemalloc
 import zlib
@@ -91,8 +92,7 @@ def test_a_cut_file_is_refused_at_every_length(whole: bytes, tmp_path: Path) -> 
     for length in np.linspace(0, len(whole) - 1, 60).astype(int):
         got = _read(whole[:length], tmp_path / "cut.mcap")
         assert isinstance(got, str)
-        with pytest.raises(RecordingError, match=r"chunks, \d+ messages"):
-            inspect_recording(tmp_path / "cut.mcap")
+        assert re.search(r"chunks, \d+ messages", got)
 
 
 def test_a_cut_file_says_what_can_be_read(tmp_path: Path) -> None:

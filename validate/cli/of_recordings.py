@@ -46,13 +46,17 @@ def inspect(
 @click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
 @click.option("--rate", type=float, help="png-stack: images a second, Hz.")
 @click.option("--topic", help="png-stack: its topic (default: images).")
+@click.option("--recover", is_flag=True, help="MCAP without an end: save what of it is whole.")
 def import_(
-    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], **given: Any
+    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], recover: bool, **given: Any
 ) -> None:
     """Turn a file of another program into a recording: motion capture, trackers, images, logs."""
     from validate.cli import recordings
 
-    recordings.import_file(file, kind, out, mapping, given)
+    if recover:
+        recordings.recover_file(file, kind, out, mapping, given)
+    else:
+        recordings.import_file(file, kind, out, mapping, given)
 
 
 @click.command()

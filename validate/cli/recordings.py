@@ -11,6 +11,7 @@ from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
 from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.recover import recover
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
 from validate.recording.readers import named, recognised
@@ -35,6 +36,20 @@ def import_file(
     for line in _besides(recording):
         complain(line)
     ask_back(recording)
+
+
+def recover_file(
+    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], given: Mapping[str, Any]
+) -> None:
+    """Saves what of an MCAP file without an end is whole, and says what is missing."""
+    if kind not in (None, "mcap") or mapping or any(v is not None for v in given.values()):
+        raise UsageError("--recover copies messages as they are: it takes FILE and -o only")
+    try_file(out)
+    found = recover(file, out)
+    for line in found.lines:
+        say(line, indent="  ")
+    topics = ", ".join(f"{topic} ({count})" for topic, count in found.counts.items())
+    say(f"{out}: {topics}; {out.stat().st_size / 1e3:.0f} kB", indent="  ")
 
 
 def _besides(recording: Recording) -> list[str]:

@@ -2,8 +2,8 @@
 
 An MCAP file is inspected as it is; one of another format by what its reader makes of it.
 
-Encodings of others are listed, not decoded. Every defect is one line in `Inspection.defects`; only
-a file that cannot be read to its end is a `RecordingError`.
+Encodings of others are listed, not decoded. Every defect is one line in `Inspection.defects`, and
+so is a file that stops short, as if its writer was ended; only other damage is a `RecordingError`.
 """
 
 from collections import Counter
@@ -138,15 +138,29 @@ def _unread_topic(name: str, why: str) -> Topic:
 def inspect_recording(path: Path) -> Inspection:
     """Inspect any MCAP file; raises `RecordingError` for one that is damaged or no MCAP.
 
+    A file that stops short is inspected as far as it is whole.
+
     The error counts the chunks and messages that can be read before the damage.
     """
     seen = AllSeen()
     with opened(path) as stream:
         verified = _verified(stream, path, seen)
         _look_again(stream, verified, seen)
-    defects = [*_file_defects(verified), *([seen.limit] if seen.limit else [])]
+    defects = [*_cut(verified), *_file_defects(verified), *([seen.limit] if seen.limit else [])]
     topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
     return _inspection(verified, topics, defects)
+
+
+def _cut(verified: Verified) -> list[str]:
+    cut, source = verified.cut, verified.source
+    if cut is None:
+        return []
+    what = "the file, behind its data," if cut.ended else "the data section"
+    return [
+        f"no end of {what}: whole up to byte {cut.at} of {source.bytes}, {verified.messages} "
+        "messages; the writer was ended; save them by "
+        f"`validate import {source.path} --recover -o X.mcap`"
+    ]
 
 
 def _look_again(stream: BinaryIO, verified: Verified, seen: AllSeen) -> None:
@@ -178,7 +192,7 @@ def _inspection(
 
 def _verified(stream: BinaryIO, path: Path, seen: AllSeen) -> Verified:
     try:
-        return verify(stream, path, seen)
+        return verify(stream, path, seen, cut=True)
     except RecordingError as error:
         raise no_mcap(path, error) from None
 

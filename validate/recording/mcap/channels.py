@@ -6,8 +6,8 @@ metadata give equal bytes.
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -54,10 +54,20 @@ def write_channels(
     cannot be written.
     """
     _check(path, channels)
+    with replacing(path) as stream:
+        _write(stream, path.name, channels, messages, metadata)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file beside `path` that takes its place once all is written; else nothing is left.
+
+    Raises `RecordingError` for a path that cannot be written, or text that is no UTF-8.
+    """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with part.open("xb") as stream:
-            _write(stream, path.name, channels, messages, metadata)
+            yield stream
             stream.flush()
             os.fsync(stream.fileno())
         part.replace(path)

@@ -39,10 +39,11 @@ from validate.recording.mcap.records import (
     records_in,
     statistics_messages,
 )
-from validate.recording.mcap.verified import Span, Verified
+from validate.recording.mcap.verified import Cut, Span, Verified
 from validate.recording.types import Source
 
 MAX_MESSAGES = 10_000_000
+_BLOCK = 2**20  # bytes hashed at once
 NOT_PROVABLE = "integrity not provable: no data CRC"
 _MESSAGE = int(Op.MESSAGE)  # a plain number: compared for every message
 _KNOWN = frozenset(int(op) for op in Op)
@@ -59,16 +60,29 @@ class MessageTaker(Protocol):
         """JSON or whatever else of a channel's messages, in order of the file."""
 
 
-def verify(stream: BinaryIO, path: Path, taker: MessageTaker | None = None) -> Verified:
-    """Check the whole open file; `RecordingError` names the byte and counts what precedes it."""
+class _ShortError(RecordingError):
+    """The bytes end before the record does."""
+
+
+def verify(
+    stream: BinaryIO, path: Path, taker: MessageTaker | None = None, *, cut: bool = False
+) -> Verified:
+    """Check the whole open file; `RecordingError` names the byte and counts what precedes it.
+
+    `cut` takes a file that only stops short as far as it is whole, and says so in `Verified.cut`.
+    """
     walk = _Walk(stream, taker)
     try:
         walk.run()
     except RecordingError as error:
-        raise RecordingError(
-            f"{path.name}: at byte {walk.record_at} of {walk.size}: {error}; readable before it: "
-            f"{walk.chunks} chunks, {walk.messages} messages; copy the file again from its source"
-        ) from None
+        stopped = isinstance(error, _ShortError) and walk.stops_short()
+        if not (cut and stopped):
+            what = f"; or `validate import {path.name} --recover -o X.mcap`" if stopped else ""
+            raise RecordingError(
+                f"{path.name}: at byte {walk.record_at} of {walk.size}: {error}; readable before "
+                f"it: {walk.chunks} chunks, {walk.messages} messages; copy the file again from its "
+                f"source{what}"
+            ) from None
     try:
         return walk.found(path)
     except RecordingError as error:
@@ -88,6 +102,8 @@ class _Walk:
         self._sha = hashlib.sha256()
         self._header: Header | None = None
         self._data_crc: int | None = None  # None: still in the data section
+        self._data = (0, 0)  # bytes and CRC of the data section, once it has ended
+        self._cut: Cut | None = None
         self._summary_at = 0
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
@@ -115,15 +131,30 @@ class _Walk:
     def _read(self, count: int) -> bytes:
         got = self._stream.read(min(count, self.size - self._at))
         if len(got) < count:
-            raise RecordingError(f"the file ends {count - len(got)} bytes too early")
+            raise _ShortError(f"the file ends {count - len(got)} bytes too early")
         self._at += count
         self._sha.update(got)
         return got
 
+    def stops_short(self) -> bool:
+        """Whether what was read is a file whose writer was ended: no other damage, no end."""
+        self._stream.seek(max(0, self.size - len(MAGIC)))
+        if self._header is None or self._stream.read() == MAGIC:
+            return False
+        ended = self._data_crc is not None
+        data, crc = self._data if ended else (self.record_at, self._crc)
+        self._cut = Cut(self.record_at, data, crc, ended)
+        self._stream.seek(0)
+        self._sha = hashlib.sha256()
+        while block := self._stream.read(_BLOCK):
+            self._sha.update(block)
+        return True
+
     def _magic(self, which: str) -> None:
         got = self._read(min(len(MAGIC), self.size - self._at))
         if got != MAGIC:
-            raise RecordingError(f"the {which} 8 bytes are no MCAP magic ({got.hex()})")
+            kind = _ShortError if which == "last" and MAGIC.startswith(got) else RecordingError
+            raise kind(f"the {which} 8 bytes are no MCAP magic ({got.hex()})")
         self._crc = zlib.crc32(got)
 
     def _record(self) -> int:
@@ -132,7 +163,8 @@ class _Walk:
         opcode, length = HEAD.unpack(head)
         if length > self.size - self._at:
             left = self.size - self._at
-            raise RecordingError(f"a record declares {length} bytes where the file has {left} left")
+            short = _ShortError if length <= MAX_RECORD else RecordingError
+            raise short(f"a record declares {length} bytes where the file has {left} left")
         if length > MAX_RECORD:
             raise RecordingError(f"a record of {length} bytes, the limit is {MAX_RECORD}")
         content = self._read(length)
@@ -252,6 +284,7 @@ class _Walk:
         if len(content) < 4 or declared not in (0, self._crc):
             raise RecordingError(f"data section CRC {self._crc:#010x}, declared {declared:#010x}")
         self._data_crc = declared
+        self._data = (self.record_at, self._crc)
         self._summary_at, self._crc = self._at, 0
 
     def _footer(self, head: bytes, content: bytes) -> None:
@@ -273,6 +306,8 @@ class _Walk:
         if self._header is None:
             raise RecordingError("no header record")
         integrity = "verified" if self._data_crc else NOT_PROVABLE
+        if self._cut is not None:
+            integrity = f"whole up to byte {self._cut.at} of {self.size}"
         return Verified(
             source=Source(path.name, self._sha.hexdigest(), self.size, integrity),
             header=self._header,
@@ -289,6 +324,7 @@ class _Walk:
             misindexed=self._misindexed,
             unknown_records=self._unknown,
             spans=tuple(self._spans),
+            cut=self._cut,
         )
 
 

@@ -33,6 +33,19 @@ class Span:
 
 
 @dataclass(frozen=True)
+class Cut:
+    """Where a file stops short: its data are whole up to byte `data`, with the CRC-32 `crc`.
+
+    `ended` says whether the end of the data was written, so that only the summary is cut.
+    """
+
+    at: int
+    data: int
+    crc: int
+    ended: bool
+
+
+@dataclass(frozen=True)
 class Verified:
     """What the check found in a file; times are int64 ns, in file order, by channel id."""
 
@@ -51,6 +64,7 @@ class Verified:
     misindexed: int  # chunks that the file's own index misses, or places where none is
     unknown_records: int  # kinds outside the specification, skipped
     spans: tuple[Span, ...]
+    cut: Cut | None = None  # None: the file is whole
 
 
 @contextmanager
