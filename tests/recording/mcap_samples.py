@@ -59,6 +59,10 @@ def _plain(r: Recording) -> Any:
             k: [_bits(c.t), [_bits(o) for o in c.outlines], c.sd, _bits(c.pose), c.frame]
             for k, c in r.contours.items()
         },
+        {
+            k: [_bits(f.t), [i.tolist() for i in f.images], f.m_per_px, _bits(f.pose), f.frame]
+            for k, f in r.frames.items()
+        },
         {k: dict(v) for k, v in r.metadata.items()},
     ]
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from validate.errors import RecordingError
+from validate.recording.mcap.peek import messages_in
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import Inspection, inspect_recording
 
@@ -81,3 +82,29 @@ def test_a_dds_recording_is_listed(shared_data: Path) -> None:
         "configuration_topic": 10,
     }
     assert {t.schema_encoding for t in got.topics} == {"omgidl"}
+
+
+def test_what_ros2_recordings_say_is_read(shared_data: Path, capfd: pytest.CaptureFixture) -> None:
+    folder = shared_data / "mcap" / "ros2"
+
+    def said(name: str, topic: str) -> list[dict]:
+        return [m["message"] for m in messages_in(folder / f"{name}.mcap", topic, 2000)]
+
+    assert said("talker", "/topic") == [{"data": f"Hello, world! {i}"} for i in range(10)]
+    assert said("multiple_files_0", "/chatter") == [{"data": "test"}] * 1324
+    first = said("cdr_test_0", "/array_topic")[0]
+    assert first["bool_values"] == [True, False, True]
+    assert len(said("topics_and_services", "/parameter_events")) == 7
+    for name, topic in (
+        ("wrong_rmw_test_0", "/test_topic"),
+        ("topics_and_services", "/add_two_ints/_service_event"),
+        ("../dds/configuration_type", "configuration_topic"),
+    ):
+        with pytest.raises(RecordingError, match=r"no decoder for|cannot be parsed"):
+            said(name, topic)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_no_recording_of_others_is_left_out(shared_data: Path) -> None:
+    names = {p.stem for p in (shared_data / "mcap").rglob("*.mcap") if "conformance" not in p.parts}
+    assert names == {*ROS2, "configuration_type"}

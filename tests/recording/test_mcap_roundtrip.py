@@ -199,6 +199,7 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path, parts: dict, message:
 
 _NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 _TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=6)
+_SIDES = st.floats(1e-300, 1e300)
 _SPREADS = st.floats(0, 1e300)
 
 
@@ -221,7 +222,10 @@ def _recordings(draw: st.DrawFn) -> Recording:
     x = draw(hnp.arrays(np.float64, shape, elements=maybe))
     pose = draw(hnp.arrays(np.float64, (4, 4), elements=_NUMBERS))
     unit, frame, name = draw(_TEXTS.filter(bool)), draw(_TEXTS), draw(_TEXTS)
-    start = min(t[0], tm[0], tc[0])
+    tf = draw(_times())
+    pixels = draw(hnp.arrays(np.uint8, (len(tf), draw(st.integers(1, 4)), 3)))
+    sides = draw(st.tuples(_SIDES, _SIDES))
+    start = min(t[0], tm[0], tc[0], tf[0])
     return Recording(
         name=name,
         source=ABSENT,
@@ -229,6 +233,7 @@ def _recordings(draw: st.DrawFn) -> Recording:
         markers={"m": Markers(_from(tm, start), tuple(names), x, draw(_SPREADS), frame)},
         signals={"s": Signal(_from(t, start), y, unit, draw(_SPREADS), frame)},
         contours={"c": Contours(_from(tc, start), tuple(outlines), draw(_SPREADS), pose, frame)},
+        frames={"f": Frames(_from(tf, start), tuple(pixels), sides, pose, frame)},
         metadata=draw(
             st.dictionaries(_TEXTS, st.dictionaries(_TEXTS, _TEXTS, max_size=2), max_size=2)
         ),

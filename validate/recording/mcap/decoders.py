@@ -7,7 +7,7 @@ import base64
 import io
 import json
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from typing import Any
 
 from mcap.records import Schema as TheirSchema
@@ -26,7 +26,8 @@ def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
     encodings = (schema.encoding if schema else "", channel.encoding)
     try:
         if encodings == ("ros2msg", "cdr") and schema is not None:
-            with redirect_stdout(io.StringIO()):  # its library prints what it cannot parse
+            # Its library prints what it cannot parse.
+            with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
                 return _ros2(schema)
         if encodings == ("protobuf", "protobuf") and schema is not None:
             return _protobuf(schema)
