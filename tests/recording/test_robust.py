@@ -188,3 +188,13 @@ def test_a_time_that_is_blank_names_the_file(tmp_path: Path) -> None:
     (tmp_path / "x").write_bytes((tmp_path / "x").read_bytes().replace(b"\n3,0", b"\nnan,0"))
     with pytest.raises(RecordingError, match=r"^x: markers t"):
         named("vicon").read(tmp_path / "x", {})
+
+
+@pytest.mark.parametrize("reader", [named("trc"), named("qualisys")], ids=lambda r: r.name)
+def test_a_count_in_raised_digits_is_no_bug(reader: Reader, tmp_path: Path) -> None:
+    """They are digits, but no number to `int`."""
+    path, options = sample(reader, tmp_path)
+    whole = path.read_bytes()
+    for stated in (b"MARKERS\t2", b"\t2\tmm"):
+        path.write_bytes(whole.replace(stated, stated.replace(b"2", "²".encode())))
+        attacked(reader, path, options, "sample")

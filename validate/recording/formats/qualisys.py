@@ -65,7 +65,7 @@ def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRo
         )
     named = next(([c for c in r.cells[1:] if c] for r in keys if r.cell(0) == _NAMES), [])
     stated = header.get("NO_OF_MARKERS", "")
-    if not named or (stated.isdigit() and int(stated) != len(named)):
+    if not named or (stated.isdecimal() and int(stated) != len(named)):
         raise RecordingError(
             f"{held.name}: {len(named)} names of points, the header states {stated or 'none'}; "
             "damaged"

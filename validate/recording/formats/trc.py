@@ -63,7 +63,7 @@ def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
     cells = held.rows[3].cells[_BEFORE:]
     named = [c for c in cells if c]
     stated = header.get("NumMarkers", "")
-    if stated.isdigit() and int(stated) != len(named):
+    if stated.isdecimal() and int(stated) != len(named):
         raise RecordingError(
             f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
         )
