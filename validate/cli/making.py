@@ -10,8 +10,8 @@ from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.places import try_file, write_whole
 from validate.recording.digest import digest, to_text
-from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.readers import read_recording
 from validate.replay.find import find
 from validate.replay.remade import stamped
 

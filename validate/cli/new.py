@@ -17,7 +17,7 @@ from validate.cli.recordings import ask_back
 from validate.errors import UsageError
 from validate.identify.modulus import require_compression
 from validate.places import try_folder, write_whole
-from validate.recording.mcap.read import read_recording
+from validate.recording.readers import read_recording
 from validate.recording.types import Recording, Signal
 from validate.replay.compression import stated_sizes
 

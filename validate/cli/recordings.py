@@ -10,11 +10,10 @@ from validate.errors import UsageError
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
-from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.recover import recover
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
-from validate.recording.readers import named, recognised
+from validate.recording.readers import named, read_recording, recognised
 from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 

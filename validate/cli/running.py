@@ -45,7 +45,7 @@ def run(
     methods: str,
     anyway: bool,
     as_json: bool,
-    vtu: bool,
+    vtu: bool = False,
 ) -> int:
     """Runs experiments and writes their reports; 0 when all checks hold and all figures stand."""
     gl.ask()

@@ -8,8 +8,7 @@ from validate.exports import lazily, names
 _HOMES = {
     "types": ("Clock", "Contours", "Frames", "Markers", "Recording", "Signal", "Source"),
     "reader": ("Reader",),
-    "readers": ("READERS",),
-    "mcap.read": ("read_recording",),
+    "readers": ("READERS", "read_recording"),
     "mcap.write": ("write_recording",),
     "preflight": ("Inspection", "inspect_recording"),
     "alignment": ("Offset", "offset_by_correlation", "shift"),

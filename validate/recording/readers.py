@@ -18,8 +18,10 @@ from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.formats.trc import TRC
 from validate.recording.formats.vicon import VICON
 from validate.recording.images.png_stack import PNG_STACK
+from validate.recording.mcap import read as mcap
 from validate.recording.mcap.read import MCAP
 from validate.recording.reader import Reader
+from validate.recording.types import Recording
 
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
@@ -36,6 +38,15 @@ def told_apart(path: Path) -> str:
         return ""
     takes = "new NAME --from {}" if reader is MCAP else "import {} -o " + f"{path.stem}.mcap"
     return f"{path.name} is {reader.doc}: validate {takes.format(path.name)}"
+
+
+def read_recording(path: Path) -> Recording:
+    """The recording in an MCAP file (`mcap.read.read_recording`); a file of another format is
+    called by its name in the error, with the command that takes it."""
+    try:
+        return mcap.read_recording(path)
+    except RecordingError as error:
+        raise no_mcap(path, error) from None
 
 
 def no_mcap(path: Path, error: RecordingError) -> RecordingError:

@@ -8,7 +8,7 @@ from typing import Any
 
 from validate.errors import UsageError
 from validate.parameters import quantity
-from validate.recording.mcap.read import read_recording
+from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.replay.experiment import Change, MeshLadder
 from validate.scene.laws import Coefficients

@@ -23,7 +23,7 @@ from validate.papers.ekf_nfem.liver import watched
 from validate.papers.ekf_nfem.liver_body import LiverBody
 from validate.papers.needle_pocket.hand import moved, tremor
 from validate.parameters import quantity
-from validate.recording.mcap.read import read_recording
+from validate.recording.readers import read_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, validating

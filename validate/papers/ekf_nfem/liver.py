@@ -16,7 +16,7 @@ from validate.errors import RecordingError
 from validate.papers.ekf_nfem.cube import LargeStrain, Ramp
 from validate.papers.ekf_nfem.liver_body import LiverBody
 from validate.parameters import quantity
-from validate.recording.mcap.read import read_recording
+from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.register.fitting import MarkerFit
 from validate.register.follow import follow_signal

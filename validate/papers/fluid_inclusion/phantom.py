@@ -20,7 +20,7 @@ from validate.papers.fluid_inclusion.swept import (
 from validate.papers.fluid_inclusion.twin import PhantomTwin, record_phantom
 from validate.parameters import quantity
 from validate.recording.images.outline import outlines_of
-from validate.recording.mcap.read import read_recording
+from validate.recording.readers import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.fitting import MarkerFit
 from validate.register.markers import Sampling, Together

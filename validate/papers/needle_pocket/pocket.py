@@ -15,7 +15,7 @@ import numpy as np
 from validate.papers.fluid_block.block import Cavities, PlaneBlock, block_mesh
 from validate.papers.needle_pocket.recorded import walkable
 from validate.parameters import Ranges, quantity
-from validate.recording.mcap.read import read_recording
+from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered

@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
 
 from validate.errors import RecordingError
 from validate.recording.alignment import moved
@@ -36,22 +35,13 @@ def read_recording(path: Path) -> Recording:
     no topic of ours, or whose samples are out of order or change their unit, frame or names.
     """
     with opened(path) as stream:
-        verified = _verified(stream, path)
+        verified = verify(stream, path)
         try:
             collected = _topics(verified)
             fill(collected, messages_of(stream, verified, collected.keys()))
             return _recording(path, verified, list(collected.values()))
         except RecordingError as error:
             raise RecordingError(f"{path.name}: {error}") from None
-
-
-def _verified(stream: BinaryIO, path: Path) -> Verified:
-    try:
-        return verify(stream, path)
-    except RecordingError as error:
-        from validate.recording.readers import no_mcap  # which knows this reader
-
-        raise no_mcap(path, error) from None
 
 
 def _topics(verified: Verified) -> dict[int, Collected]:
