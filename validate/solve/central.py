@@ -218,7 +218,7 @@ class CentralStepper:
             self.body.share(self.team.threads)
         if not finite:
             ratio = self.rule.dt / past.limit
-            words = f"step {k}: displacements not finite; dt is {ratio:.3g} of the critical step"
+            words = f"no finite displacements after it; dt is {ratio:.3g} of the critical step"
             return replace(state, failure=("diverged", words))
         new = _worked(replace(past, struck=struck), motion, inputs, work, taken)
         numbers, failure = dict(state.numbers), None
