@@ -90,6 +90,7 @@ def test_a_folder_that_is_named_is_looked_at(
     assert "of type Experiment" in refused(*command, "fine", *named, cwd=elsewhere)
 
 
+@pytest.mark.slow
 def test_of_all_each_ends_for_itself(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compared: list[str] = []
 

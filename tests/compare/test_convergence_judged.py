@@ -92,6 +92,7 @@ def test_fewer_than_three_meshes_are_refused(h: tuple[float, ...]) -> None:
 @pytest.mark.parametrize("h", [(2.0, 1.4, 1.0), (1.27, 1.0, 0.79), (2.0, 1.0, 0.5), H])
 @pytest.mark.parametrize("p", [1.0, 2.0])
 @pytest.mark.parametrize("scatter", [0.0, 0.03])
+@pytest.mark.slow
 def test_twice_u_covers_the_true_error_in_95_of_100(
     h: tuple[float, ...], p: float, scatter: float
 ) -> None:

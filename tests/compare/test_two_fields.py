@@ -103,6 +103,7 @@ def test_metrics_are_told_apart_and_defined(metrics: Sequence[Metric[Any]]) -> N
 
 
 @pytest.mark.parametrize("shift", 10.0 ** np.arange(-12.0, 0.0))
+@pytest.mark.slow
 def test_a_rigid_shift_is_what_it_is(mesh: Mesh, shift: float) -> None:
     """A box 1 m long shifted by s along x: mean distance s, symmetric difference 2 s of 1."""
     rest = Field(mesh, np.zeros(mesh.nodes.shape), "reference")

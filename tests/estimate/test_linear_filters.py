@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cubes import BELOW, CORNER, DT, PAPER, SD, SMALL, TOP, Case, case, cube
 from filterpy.kalman import KalmanFilter
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_discrete_are
 
 from validate.errors import ComparisonError, SceneError
 from validate.estimate.batch import shared_gain_run
@@ -21,7 +21,7 @@ from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.modal_kernel import advance, mirrored
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.observable import Spaces, observed
-from validate.estimate.reduced_kf import ReducedKf, dense_covariance, steady
+from validate.estimate.reduced_kf import ReducedKf, _doubled, dense_covariance, steady
 from validate.estimate.reduced_linear import LoadDoubt, reduced_model
 from validate.estimate.small_state import CoreStepper
 from validate.fem.system import build
@@ -516,3 +516,13 @@ def test_the_papers_cube_with_a_wrong_modulus() -> None:
     assert errors(KfFem(structure="load")) == pytest.approx([0.0113] * 3, abs=1.5e-3)
     assert max(errors(LoadScale())) < 0.006
     assert max(errors(ReducedKf())) < 0.012
+
+
+def test_riccati_by_doubling_is_that_by_schurs_form() -> None:
+    rng = np.random.default_rng(3)
+    A = 0.3 * rng.standard_normal((6, 6)) + 0.7 * np.eye(6)
+    B, Q = rng.standard_normal((6, 2)), np.diag(rng.random(6) + 0.1)
+    X = _doubled(A, B @ B.T, Q)
+    assert np.abs(X - solve_discrete_are(A, B, Q, np.eye(2))).max() < 1e-9 * np.abs(X).max()
+    with pytest.raises(ValueError, match="does not settle"):
+        _doubled(1.5 * np.eye(2), np.zeros((2, 2)), np.eye(2))

@@ -87,6 +87,7 @@ def test_the_recursion_is_of_order_two(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
+@pytest.mark.slow
 def test_closed_cycles_take_energy(name: str) -> None:
     """The work over one period, after the first ones: never negative at any rate."""
     for period in (1e-3, 0.3, 3.0, 300.0):

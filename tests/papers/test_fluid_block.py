@@ -112,6 +112,7 @@ SETUPS = (
 
 
 @pytest.mark.parametrize("values", SETUPS, ids=lambda v: "+".join(f"{k}={x}" for k, x in v.items()))
+@pytest.mark.slow
 def test_every_set_up_is_reached_from_the_parameters(values: dict[str, str]) -> None:
     """The twin is made anew on another mesh; the model predicts its pressures within the limits."""
     experiment = experiment_named("fluid_block")

@@ -63,6 +63,7 @@ def test_correlation_finds_the_truth_to_a_tenth_of_a_sample(
 
 
 @pytest.mark.parametrize("rates", RATES)
+@pytest.mark.slow
 def test_the_uncertainty_of_a_correlation_is_calibrated(rates: tuple[float, float]) -> None:
     truths = np.random.default_rng(3).uniform(-0.8, 0.8, 3 * SEEDS)
     found = [

@@ -107,6 +107,7 @@ def test_what_is_no_file_is_one_line(reader: Reader, what: str, tmp_path: Path) 
 
 
 @EACH
+@pytest.mark.slow
 def test_a_wrong_extension_and_an_odd_name_change_nothing(reader: Reader, tmp_path: Path) -> None:
     path, options = sample(reader, tmp_path)
     plain = reader.read(path, options)

@@ -56,7 +56,7 @@ def test_all_claims_stand(experiment: Experiment) -> None:
     result = compare(experiment)
     assert result.passed
     assert [(p.name, p.fault) for p in result.published if p.fault] == []
-    assert len(result.published) == 7
+    assert len(result.published) == 23
     tables = {t.name: t for e in result.exhibits for t in e.tables}
     crossings = {r[0]: r[3] for r in tables["crossing"].rows}
     assert crossings[3] == pytest.approx(4.261, abs=1e-3)

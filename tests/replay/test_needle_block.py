@@ -75,7 +75,7 @@ def test_all_claims_stand(experiment: Experiment) -> None:
     result = compare(experiment)
     assert result.passed
     assert [(p.name, p.fault) for p in result.published if p.fault] == []
-    assert len(result.published) == 13
+    assert len(result.published) == 43
     tables = {t.name: t for e in result.exhibits for t in e.tables}
     rows = {(r[0], r[1]): r[2:] for r in tables["solver_errors"].rows}
     assert rows["explicit, lumped M, C = αM", "E_n / 1"] == pytest.approx(

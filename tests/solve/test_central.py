@@ -33,6 +33,7 @@ def limit(system: System) -> float:
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.slow
 def test_it_converges_to_implicit_dynamics_with_order_two(law: str) -> None:
     system, T = pulled(law), 0.02
     exact = ran(NewtonDynamics(T / 200), system, rise(200, 15.0), T / 200).u[0]

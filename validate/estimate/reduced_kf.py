@@ -34,6 +34,7 @@ from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.types import Stepper
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
+_DOUBLINGS, _DOUBLED = 60, 1e-13  # turns, and the relative change that ends them
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def steady(covariance: Dense, when: Mapping[int, Seen]) -> Steady:
     size, sd = _sizes(F, Q, covariance.P0), np.sqrt(covariance.R)
     A, H = size[:, None] * F.T / size, size[:, None] * covariance.H.T / sd
     try:
-        P = solve_discrete_are(A, H, Q / np.outer(size, size), np.eye(len(sd)))
+        P = _riccati(A, H, Q / np.outer(size, size))
     except (LinAlgError, ValueError) as none:
         raise ComparisonError(
             f"no steady gain of {len(F)} states measured every {every} steps ({none}); give "
@@ -98,6 +99,31 @@ def steady(covariance: Dense, when: Mapping[int, Seen]) -> Steady:
         ) from none
     P = np.outer(size, size) * (P + P.T) / 2
     return Steady(covariance, claimed(P, P @ covariance.H.T))
+
+
+def _riccati(A: Floats, B: Floats, Q: Floats) -> Floats:
+    """X = A^T X (I + B B^T X)^-1 A + Q: by Schur's form, and by doubling where rounding keeps that
+    from being ordered. Raises `ValueError` or `LinAlgError` where neither finds it."""
+    try:
+        return np.asarray(solve_discrete_are(A, B, Q, np.eye(B.shape[1])))
+    except (LinAlgError, ValueError):
+        return _doubled(A, B @ B.T, Q)
+
+
+def _doubled(A: Floats, G: Floats, X: Floats) -> Floats:
+    """Each turn looks twice as far ahead (structure-preserving doubling)."""
+    eye = np.eye(len(A))
+    for _ in range(_DOUBLINGS):
+        with np.errstate(all="ignore"):  # what runs away is refused below
+            W = np.linalg.solve(eye + G @ X, np.hstack([A, G]))
+            AW, GW = np.split(W, 2, axis=1)
+            more = A.T @ X @ AW
+            X, G, A = X + (more + more.T) / 2, G + A @ GW @ A.T, A @ AW
+        if not np.isfinite(X).all():
+            break
+        if np.abs(more).max() <= _DOUBLED * np.abs(X).max():
+            return X
+    raise ValueError(f"doubling does not settle within {_DOUBLINGS} turns")
 
 
 def _sizes(F: Floats, Q: Floats, P: Floats) -> Floats:

@@ -81,6 +81,8 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         return recording_of(path, data, table, said, label)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from error
 
 
 def recording_of(

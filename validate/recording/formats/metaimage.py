@@ -85,9 +85,10 @@ def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
         with held.open("rb") as stream:
             stream.seek(after if local else 0)
             return stream.read(2 * size + 4096)
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        why = getattr(error, "strerror", error)
         raise RecordingError(
-            f"{path.name}: its pixels in '{name[:60]}' cannot be read ({error.strerror})"
+            f"{path.name}: its pixels in '{name[:60]}' cannot be read ({why})"
         ) from error
 
 

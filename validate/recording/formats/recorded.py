@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from validate.errors import RecordingError
 from validate.recording.clocks import clock_of
 from validate.recording.types import Record, Recording, Source, Stream, by_kind
+
+_LONGEST = 9e9  # s
 
 
 def recorded(
@@ -19,8 +22,12 @@ def recorded(
 ) -> Recording:
     """The recording of streams whose times count from its first sample; `told` is its provenance.
 
-    Such formats have one time a sample: it is stamp, publish and log time alike.
+    Such formats have one time a sample: it is stamp, publish and log time alike. Raises
+    `RecordingError` for times that no nanoseconds of int64 hold: no clock counts so far.
     """
+    for topic, s in streams.items():
+        if float(s.t[-1]) > _LONGEST:
+            raise RecordingError(f"{topic}: a time of {s.t[-1]:.3g} s; damaged")
     ns = {topic: np.rint(1e9 * s.t).astype(np.int64) for topic, s in streams.items()}
     return Recording(
         name=name,
