@@ -34,6 +34,7 @@ from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.types import Stepper
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
+_DIES = 1 - 1e-6  # of an error, from one look to the next: what never dies has no steady gain
 _DOUBLINGS, _DOUBLED = 60, 1e-13  # turns, and the relative change that ends them
 
 
@@ -107,7 +108,12 @@ def _riccati(A: Floats, B: Floats, Q: Floats) -> Floats:
     try:
         return np.asarray(solve_discrete_are(A, B, Q, np.eye(B.shape[1])))
     except (LinAlgError, ValueError):
-        return _doubled(A, B @ B.T, Q)
+        X = _doubled(A, B @ B.T, Q)
+    left = A - B @ np.linalg.solve(np.eye(B.shape[1]) + B.T @ X @ B, B.T @ X @ A)
+    radius = float(np.abs(np.linalg.eigvals(left)).max())
+    if not radius < _DIES:
+        raise ValueError(f"an error would stay: {radius:.7f} of it from one look to the next")
+    return X
 
 
 def _doubled(A: Floats, G: Floats, X: Floats) -> Floats:
