@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
+from validate.recording.formats.options import above_zero
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.reader import Options, Reader, require_known
 from validate.recording.scales import odd_pixel
@@ -32,7 +33,7 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         raise UsageError("png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10")
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder of PNG images")
-    side, rate = _pixel(options["m_per_px"]), _above_zero(options, "rate")
+    side, rate = _pixel(options["m_per_px"]), above_zero(options, "rate")
     images = _images(folder)
     _require_meant(options["m_per_px"], side, images[0])
     t = np.arange(len(images)) / rate
@@ -64,16 +65,6 @@ def _require_meant(text: str, side: float, image: Pixels) -> None:
     bare = (split(text) or (0.0, ""))[1] == ""
     if bare and (odd := odd_pixel((side, side), (height, width))):
         raise UsageError(f"m_per_px={text}: {odd} With its unit it is taken")
-
-
-def _above_zero(options: Options, key: str) -> float:
-    try:
-        value = float(options[key])
-    except ValueError:
-        value = 0.0
-    if not 0 < value < np.inf:
-        raise UsageError(f"{key}={options[key]}: expected a number above 0")
-    return value
 
 
 def _images(folder: Path) -> tuple[Pixels, ...]:
