@@ -42,8 +42,9 @@ PRINTED = {
 
 
 def rows(result: Result) -> list[list[str]]:
-    """One row a method; the last column is a timing, all others are the same on every machine."""
-    return [_row(method) for method in result.methods]
+    """One row a method that was run; the last column is a timing, all others are the same on every
+    machine."""
+    return [_row(method) for method in result.methods if method.run.finished]
 
 
 def _row(method: MethodResult) -> list[str]:

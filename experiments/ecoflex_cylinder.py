@@ -21,9 +21,13 @@ from validate.replay.compression import stated_sizes
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.solve.fluid import NoFluid
+from validate.solve.guests.guest import Guest
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 
+FELUPE = "python benchmarks/guests/felupe_guest.py"
+CALCULIX = "python benchmarks/guests/calculix_guest.py"
+COARSE = Model(radial=4, axial=4)
 TABLE = Tabulated(StaticNewton("none"), 0.0015)
 METHODS: Mapping[str, Method] = {
     "slip": Method("linear, slipping plates", NoFluid(), Model()),
@@ -50,6 +54,12 @@ METHODS: Mapping[str, Method] = {
         Model("bonded", "neo_bonded", "neo_hooke", 5, 6, 1),
     ),
     "svk_bonded": Method("SVK, bonded plates", TABLE, Model("bonded", "bonded", "svk", 5, 6, 1)),
+    "felupe": Method(
+        "FElupe, neo-Hooke, slipping plates",
+        Guest(FELUPE, levels=10),
+        Model("slip", "neo_slip", "neo_hooke", 2, 2),
+    ),
+    "calculix": Method("CalculiX, linear, slipping plates", Guest(CALCULIX, levels=5), COARSE),
 }
 
 

@@ -22,10 +22,12 @@ from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified, Twin
 from validate.replay.method import Method
 from validate.solve.fluid import ExactPressure, NoFluid
+from validate.solve.guests.guest import Guest
 from validate.solve.pressure_loop import PressureLoop
 
 PARAMETERS = Phantom()
 MEAN_DILATATION = Model(dilatation="nodal_mean")
+FELUPE = "python benchmarks/guests/felupe_guest.py"
 METHODS: Mapping[str, Method] = {
     "p1_fluid": Method("P1 with fluid", ExactPressure(), Model()),
     "p1_loop": Method("P1 with fluid, the paper's loop", PressureLoop(), Model()),
@@ -33,6 +35,7 @@ METHODS: Mapping[str, Method] = {
     "p1_bonded": Method("P1 with fluid, bonded plates", ExactPressure(), Model(plates="bonded")),
     "md_fluid": Method("P1 mean dilatation with fluid", ExactPressure(), MEAN_DILATATION),
     "p2_fluid": Method("P2 with fluid", ExactPressure(), Model(order=2)),
+    "felupe": Method("FElupe, P2", Guest(FELUPE), Model(order=2)),  # a job carries no cavity
 }
 
 

@@ -25,10 +25,14 @@ from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.cards import moved
 from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
 from validate.replay.method import Method
+from validate.solve.guests.guest import Guest
+from validate.solve.guests.let_go import GuestLetGo
 from validate.solve.let_go import LetGo
 from validate.solve.newton import StaticNewton
 from validate.solve.viscous_modes import ViscousModes
 
+FELUPE = "python benchmarks/guests/felupe_guest.py"
+CALCULIX = "python benchmarks/guests/calculix_guest.py"
 STATIC = StaticNewton("none")
 BETA = 0.0023  # s: 2 x .055 over 2 pi 7.7 Hz, of the linear models
 LINEAR = Model("linear", damping=BETA)
@@ -64,6 +68,16 @@ METHODS = {
         LINEAR,
         markers=("Tip - 1",),
         chosen="R, as for the filter of the load",
+    ),
+    "felupe": Method(
+        "FElupe, rest alone, linear hexahedra of three fields",
+        Guest(FELUPE),
+        Model(order=1, along=12, across=3),
+    ),
+    "calculix": Method(
+        "CalculiX, linear hexahedra of incompatible modes",
+        GuestLetGo(CALCULIX),
+        Model(order=1, mixed=False, along=8, across=2, damping=BETA),
     ),
 }
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.errors import SceneError, UsageError
+from validate.errors import SceneError
 from validate.fem.system import build
 from validate.parameters import with_values
 from validate.replay.method import Method
@@ -267,18 +267,26 @@ def test_the_job_is_the_scene(tmp_path: Path) -> None:
 def test_what_a_job_does_not_carry_is_refused(tmp_path: Path) -> None:
     stiff = Region("stiff", np.array([0]), Material(2e4, 0.0))
     scene = Scene(SCENE.mesh, SCENE.material, SCENE.supports, drives=SCENE.drives, regions=(stiff,))
-    with pytest.raises(SceneError, match="carries no regions"):
-        solved(Guest(sys.executable), scene)
-    with pytest.raises(SceneError, match="rising"):
-        Guest(sys.executable).solve(SCENE, T[::-1], INPUTS)
+    refused = solved(Guest(sys.executable), scene)
+    assert refused.outcome.state == "refused"
+    assert refused.outcome.why.startswith("cannot run: a guest's job carries no regions")
+    assert "rising" in Guest(sys.executable).solve(SCENE, T[::-1], INPUTS).outcome.why
     flat = grid((0.02, 0.02), (2, 2))
     with pytest.raises(SceneError, match="not quad4"):
         write_job(tmp_path, Scene(flat, SCENE.material), T, INPUTS, False, 1e-6)
     with pytest.raises(SceneError, match="carries tet4"):
         write_vtu(flat, tmp_path / "flat.vtu")
+
+
+def test_a_program_that_is_not_there_is_a_row() -> None:
     for command, why in (("", "no command"), ("no-such-program x", "no program"), ("'", "closing")):
-        with pytest.raises(UsageError, match=why):
-            solved(Guest(command))
+        outcome = solved(Guest(command)).outcome
+        assert outcome.state == "refused"
+        assert why in outcome.why
+    assert (
+        "not installed: no program 'no-such-program'"
+        in solved(Guest("no-such-program x")).outcome.why
+    )
 
 
 @pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8"])

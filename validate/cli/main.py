@@ -66,6 +66,12 @@ def _bug() -> int:
     return BUG
 
 
+GUESTS = click.option(
+    "--guest", "guests", multiple=True, metavar="COMMAND",
+    help="A program of others as one more method (docs/guests.md).",
+)  # fmt: skip
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="validate")
 def cli() -> None:
@@ -97,6 +103,7 @@ def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
 )
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
+@GUESTS
 @click.option("--anyway", is_flag=True, help="Predict with what is not identifiable, too.")
 @click.option("--json", "as_json", is_flag=True, help="results.json of all on one list.")
 @click.option("--vtu", is_flag=True, help="Series for ParaView beside the report, in paraview/.")

@@ -24,6 +24,7 @@ from validate.compare.verdict import Check
 from validate.fem.locking import locking_notes
 from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment
+from validate.replay.guests import with_guests
 from validate.replay.named_run import run_folder
 from validate.replay.options import Options, Report
 from validate.replay.reused import rests_on
@@ -43,6 +44,7 @@ def run(
     out: Path | None,
     values: tuple[str, ...],
     methods: str,
+    guests: tuple[str, ...] = (),
     anyway: bool,
     as_json: bool,
     vtu: bool = False,
@@ -50,12 +52,12 @@ def run(
     """Runs experiments and writes their reports; 0 when all checks hold and all figures stand."""
     gl.ask()
     wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
-    options = Options(pairs(values, "--set"), wanted, quick, anyway)
+    options = Options(pairs(values, "--set"), wanted, quick, anyway, guests)
     found: list[str] = []  # results.json of each, or why there is none
 
     def one(experiment: Experiment) -> bool:
         start = perf_counter()
-        result, page = _reported(experiment, options, out, vtu=vtu)
+        result, page = _reported(with_guests(experiment, guests), options, out, vtu=vtu)
         if as_json:
             found.append((page.parent / "results.json").read_text(encoding="utf-8").strip())
         else:

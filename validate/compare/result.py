@@ -20,12 +20,13 @@ from validate.register.registered import Registered
 from validate.scene.meshless import AnyScene
 from validate.solve.types import Run
 
-Kind = Literal["measured", "twin", "same model"]
+Kind = Literal["measured", "twin", "same model", "reference"]
 KINDS: Mapping[Kind, str] = MappingProxyType(
     {
         "measured": "measured",
         "twin": "twin, made by another model than the one judged",
         "same model": "same model, the recording and the judged model are one",
+        "reference": "reference, computed by a code of others",
     }
 )
 
@@ -72,9 +73,9 @@ class MethodResult:
 class Result:
     """An experiment compared: all that a report needs.
 
-    `kind` is what the recording is: measured, a twin, or the judged model's own. `warnings` doubt
-    what was given. `changed` parameters are not as the experiment declares them. `specimens` are
-    those of the recordings, one name each.
+    `kind` is what the recording is: measured, a twin, the judged model's own, or computed.
+    `warnings` doubt what was given. `changed` parameters are not as the experiment declares them.
+    `specimens` are those of the recordings, one name each.
     """
 
     name: str

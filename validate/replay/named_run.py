@@ -49,7 +49,8 @@ def differences(experiment: Experiment, options: Options) -> tuple[list[str], li
     if methods == sorted(experiment.methods):
         methods = []
     words = ["quick"] * options.quick + ["methods"] * bool(methods) + [p for p, _ in differing]
-    return words, [options.quick, methods, differing]
+    guests = sorted(options.guests)
+    return words + ["guest"] * bool(guests), [options.quick, methods, differing, *guests]
 
 
 def _settable(experiment: Experiment, options: Options) -> tuple[Parameter, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, nearest_names, with_values
 from validate.replay.experiment import Experiment
+from validate.replay.guests import guests_of
 from validate.replay.method import Method
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
@@ -18,12 +19,14 @@ _MESHES = ".npz"
 @dataclass(frozen=True)
 class Options:
     """What the user changed: values by path, methods to run (none: all), quick; `anyway`: predict
-    with parameters that were not identifiable, too."""
+    with parameters that were not identifiable, too. `guests` are command lines of programs of
+    others that the experiment has as methods (`with_guests`): they are run whatever is chosen."""
 
     values: Mapping[str, str]
     methods: tuple[str, ...] = ()
     quick: bool = False
     anyway: bool = False
+    guests: tuple[str, ...] = ()
 
 
 def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Method]]:
@@ -35,7 +38,8 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
     mine, _ = _split(options.values)
     methods = all_methods(experiment, options)
-    chosen = options.methods or tuple(methods)
+    added = (n for n, m in guests_of(methods).items() if m.settings.command in options.guests)
+    chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     return with_values(parameters, mine), {name: methods[name] for name in chosen}
 
 

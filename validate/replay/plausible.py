@@ -42,7 +42,7 @@ def _of_value(p: Parameter, stated: Mapping[str, float]) -> Iterator[str]:
     value = p.default
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
-    if p.unit == "m" and abs(value) >= LENGTH:
+    if p.unit == "m" and p.origin != "default" and abs(value) >= LENGTH:
         yield f"{p.path} = {value:g} m is 1000 times {value:g} mm: were millimetres meant?"
     if p.unit == "Pa" and p.path.split(".")[-1].startswith("E"):
         yield from _outside(f"{p.path} ({p.origin})", value, MODULUS, "modulus")

@@ -24,8 +24,16 @@ def stamped(recording: Recording, parameters: Any) -> Recording:
 
 def synthetic(recording: Recording) -> bool:
     """Whether a recording says of itself that a model made it."""
-    told = recording.metadata
-    return made_here(recording) or dict(told.get("provenance", {})).get("kind") == "twin"
+    return made_here(recording) or _told(recording) == "twin"
+
+
+def computed(recording: Recording) -> bool:
+    """Whether a recording says of itself that a code of others computed it."""
+    return _told(recording) == "reference"
+
+
+def _told(recording: Recording) -> str:
+    return dict(recording.metadata.get("provenance", {})).get("kind", "")
 
 
 def made_here(recording: Recording) -> bool:

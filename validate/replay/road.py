@@ -34,6 +34,7 @@ from validate.replay.consistency import consistency_scores
 from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
 from validate.replay.gated import gate_warnings
+from validate.replay.guest_exhibit import guest_exhibits
 from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, configure
 from validate.replay.origins import Opened, marked, opened
@@ -48,6 +49,7 @@ _AGAINST: Mapping[Kind, str] = {
     "measured": "measured recording",
     "twin": "recording of a twin",
     "same model": "recording of the same model",
+    "reference": "computation of others",
 }
 
 
@@ -170,7 +172,11 @@ def _compared(
         joint=joint_inputs(road) if any(m.accepted for m in results) else (),
         exhibits=tuple(
             captioned(exhibit, experiment.captions)
-            for exhibit in (*standard_exhibits(experiment, main, others), *told.exhibits)
+            for exhibit in (
+                *guest_exhibits(road, main),
+                *standard_exhibits(experiment, main, others),
+                *told.exhibits,
+            )
         ),
         changed=out.differing,
         specimens=_specimens(experiment, road.recordings),

@@ -12,6 +12,7 @@ _ALL_AGREE: dict[Kind, str] = {
     "measured": "predicts what was measured within the error of the comparison",
     "twin": "follows the twin, a recording of another model, within the error of the comparison",
     "same model": "agrees with a recording of its own model",
+    "reference": "agrees with what others computed, within the error of the comparison",
 }
 _COUNTED: tuple[tuple[Verdict, str], ...] = (
     ("agrees", "agree"),

@@ -1,6 +1,8 @@
 """One method with one set of parameters on the recordings of a case: scene, runs, residuals."""
 
+import resource
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -47,7 +49,13 @@ def solve(
         _refused(refused) if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True)
     )
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
+    done = tuple(replace(run, memory=run.memory or _own_peak()) for run in done)
     return Followed(name, _label(method, scene), case, scene, seen, done, stacked(found))
+
+
+def _own_peak() -> int:
+    """Bytes that this process had at most until now."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _refused(why: str) -> Run:

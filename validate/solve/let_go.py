@@ -56,11 +56,12 @@ class LetGo:
             return moving
         static = StaticNewton("none", tolerance=self.tolerance).prepare(build(relaxed(scene)))
         still = march("", static, t[-1:], inputs[-1:], np.array([0]), 0.0)
-        return _joined(moving, still, t)
+        return joined(moving, still, t)
 
 
-def _joined(moving: Run, still: Run, t: Floats) -> Run:
-    """One run; where no rest was found it ends with the swing."""
+def joined(moving: Run, still: Run, t: Floats) -> Run:
+    """One run of a swing and, at the last of t (nt,) s, its rest; without a rest it ends with the
+    swing."""
     if not still.finished:
         outcome = replace(still.outcome, step=len(t) - 1)
         return replace(moving, outcome=outcome)

@@ -7,6 +7,7 @@ from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.guests.guest import Guest
+from validate.solve.guests.let_go import GuestLetGo
 from validate.solve.handles import Handles
 from validate.solve.haptic_loop import HapticLoop
 from validate.solve.harmonic import Harmonic
@@ -60,6 +61,7 @@ SOLVERS: tuple[type[SceneSolver], ...] = (
     LetGo,
     Harmonic,
     Guest,
+    GuestLetGo,
 )
 
 

@@ -174,6 +174,7 @@ class Run:
 
     `u` keeps the output frames only, and so does a filter's `sd`; `traces` every step, and
     `seconds` (nt,) what each took, where it was timed. `said`: what a `Noticing` stepper noticed.
+    `memory` bytes is the peak of the process that it ran in, until its end; 0: not measured.
     """
 
     method: str
@@ -187,6 +188,7 @@ class Run:
     sd: Floats | None = None
     seconds: Floats | None = None
     said: tuple[str, ...] = ()
+    memory: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", checked(self.t, "run t [s]", (None,)))

@@ -81,9 +81,9 @@ def build(recording: Recording, parameters: ReleasedBeam, model: BeamModel) -> S
 
 
 def _material(p: ReleasedBeam, model: BeamModel) -> Material:
-    """The linear law has Rayleigh's damping in place of the series, the others may not."""
+    """Where a model has Rayleigh's damping, that is in place of the series."""
     card = p.material
-    relaxes = model.law not in ("linear", "svk")
+    relaxes = model.law not in ("linear", "svk") and not model.damping
     return Material(
         known(card.E, "material.E"),
         card.nu,

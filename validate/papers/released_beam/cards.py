@@ -153,4 +153,4 @@ class BeamModel:
     mixed: bool = quantity(True, "1", "with a pressure of their own, so that they do not lock")
     along: int | None = quantity(None, "1", "cells along the beam; none: the mesh's")
     across: int | None = quantity(None, "1", "cells across it; none: the mesh's")
-    damping: float = quantity(0.0, "s", "Rayleigh's beta, of filters' linear law")
+    damping: float = quantity(0.0, "s", "Rayleigh's beta, in place of what relaxes")

@@ -7,6 +7,7 @@ read without pickles: they hold arrays and nothing else.
 import hashlib
 import re
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def read_points(path: Path, unit: str | None = None) -> Recording:
     )  # fmt: skip
     return Recording(
         path.stem,
-        Source(path.name, hashlib.sha256(data).hexdigest(), len(data), "verified (CRC-32)"),
+        _source(path, data),
         0,
         markers={"points": markers},
         metadata={"provenance": {"file": path.name, "unit": unit or f"{_said(path)}, of the name"}},
@@ -60,6 +61,19 @@ def read_stage(path: Path) -> StageTest:
     x = _array(path, arrays, "points", (None, None, 2))
     stage = 1e-3 * _array(path, arrays, "stage_mm", (len(x),), nan=False)
     return StageTest(path.stem, x, stage)
+
+
+def read_arrays(
+    path: Path, shapes: Mapping[str, tuple[int | None, ...]]
+) -> tuple[Source, dict[str, Floats]]:
+    """Arrays of these names and shapes, and where they came from; raises as `read_points` does."""
+    data, arrays = _archive(path)
+    found = {name: _array(path, arrays, name, shape, nan=False) for name, shape in shapes.items()}
+    return _source(path, data), found
+
+
+def _source(path: Path, data: bytes) -> Source:
+    return Source(path.name, hashlib.sha256(data).hexdigest(), len(data), "verified (CRC-32)")
 
 
 def _archive(path: Path) -> tuple[bytes, dict[str, np.ndarray]]:

@@ -8,10 +8,12 @@ from typing import ClassVar, cast
 import numpy as np
 
 from validate.arrays import Floats
+from validate.errors import SceneError, UsageError
 from validate.fem.locate import probe_rows
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.guests.answer import GuestAnswer, NoAnswerError, read_answer
+from validate.solve.guests.asked import Asked, at_levels, at_rest, changes, plain_questions
 from validate.solve.guests.job import GuestJob, write_job
 from validate.solve.guests.ran import Ended, Limits, run_guest, size_of, words
 from validate.solve.handles import LARGE, Handles, require_handled
@@ -25,7 +27,10 @@ _FOLDER = "validate-guest-"
 class Guest:
     """Settings of a program of others, called as `command FOLDER` (docs/guests.md).
 
-    What it cannot do, and a crash, a hang or a wrong answer, is the outcome of its run.
+    What it cannot do, a program that is not there, and a crash, a hang or a wrong answer, are the
+    outcome of its run. In statics a Prony series stands for its relaxed limit, and times whose
+    inputs are those of the time before are not asked again: the answer is the same. It is asked at
+    each of a few `levels` instead where there are many times.
     """
 
     handles: ClassVar[Handles] = Handles(
@@ -33,26 +38,45 @@ class Guest:
     )
     command: str = quantity("", "1", "command line of the guest; the job's folder is put behind it")
     inertia: bool = quantity(False, "1", "masses count; else every time is an equilibrium")
+    levels: int = quantity(
+        0, "1", "of the one input of statics that are asked, between them splines; 0: every time"
+    )
     tolerance: float = quantity(1e-6, "1", "relative tolerance that is asked of its equations")
     seconds: float = quantity(600.0, "s", "wall time until it is ended")
     memory: float = quantity(8192.0, "1", "MB of memory that each of its processes may have")
     output: float = quantity(1024.0, "1", "MB that it may write into its folder")
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
-        """Under inputs (nt, k) at t (nt,) s, from rest at 0 s.
+        """Under inputs (nt, k) at t (nt,) s, from rest at 0 s; refused where a job does not carry
+        the scene, or there is no such program."""
+        try:
+            return self._asked(scene if self.inertia else at_rest(scene), t, inputs)
+        except (SceneError, UsageError) as error:
+            return _unasked(f"cannot run: {error}")
 
-        Raises `SceneError` for what a job does not carry and `UsageError` for a command that is no
-        program's.
-        """
+    def _asked(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
         require_handled(scene, self)
         command = words(self.command)
         with tempfile.TemporaryDirectory(prefix=_FOLDER, ignore_cleanup_errors=True) as place:
             folder = Path(place).resolve()
-            job = write_job(folder, scene, t, inputs, self.inertia, self.tolerance)
+            asked = plain_questions(t, inputs) if self.inertia else self._statics(t, inputs)
+            job = write_job(folder, scene, asked.t, asked.inputs, self.inertia, self.tolerance)
             most = size_of(folder) + int(self.output * 2**20)
             limits = Limits(self.seconds, int(self.memory * 2**20), most)
             ended = run_guest(command, folder, limits)
-            return run_of(folder, job, ended)
+            return asked.answered(run_of(folder, job, ended))
+
+    def _statics(self, t: Floats, inputs: Floats) -> Asked:
+        if self.levels and inputs.shape[1] == 1:
+            return at_levels(t, inputs, self.levels)
+        return changes(t, inputs)
+
+
+def _unasked(why: str) -> Run:
+    traces = {"updates": Trace(np.zeros(0), "1")}
+    none = np.zeros(0)
+    return Run("", none, none.astype(np.int64), np.zeros((0, 0, 3)), traces,
+               Outcome("refused", 0, why), 0.0, None)  # fmt: skip
 
 
 def run_of(folder: Path, job: GuestJob, ended: Ended) -> Run:
@@ -73,7 +97,7 @@ def _none(job: GuestJob, state: Ending, why: str, ended: Ended, said: tuple[str,
     traces = {"updates": Trace(np.zeros(0), "1")}
     at = np.zeros(0, dtype=np.int64)
     return Run("", job.times[:0], at, np.zeros((0, *shape)), traces, Outcome(state, 0, why),
-               ended.seconds, None, said=said)  # fmt: skip
+               ended.seconds, None, said=said, memory=ended.memory)  # fmt: skip
 
 
 def _answered(job: GuestJob, answer: GuestAnswer, ended: Ended) -> Run:
@@ -82,7 +106,7 @@ def _answered(job: GuestJob, answer: GuestAnswer, ended: Ended) -> Run:
     return Run(
         "", job.times[:steps], np.arange(steps), u, _traces(job, answer),
         Outcome(cast(Ending, answer.state), steps, answer.why), answer.setup_s,
-        step_times(answer.step_s), seconds=answer.step_s, said=said,
+        step_times(answer.step_s), seconds=answer.step_s, said=said, memory=ended.memory,
     )  # fmt: skip
 
 

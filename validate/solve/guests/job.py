@@ -11,6 +11,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.loads import hung_masses
 from validate.fem.system import System, build
 from validate.scene.laws import law_kind
 from validate.scene.material import Material
@@ -74,6 +75,8 @@ def asked_material(scene: Scene, inertia: bool) -> dict[str, Any]:
         found["rho"] = _density(m)
     if inertia:
         found |= {"mass_damping": m.mass_damping, "stiffness_damping": m.stiffness_damping}
+    if scene.masses:
+        found["hung"] = sum(part.mass for part in scene.masses)
     names = (*kind.coefficients, *(("volumetric",) if kind.volumetric else ()))
     return found | {name: _plain(getattr(m.coefficients, name)) for name in names}
 
@@ -114,7 +117,14 @@ def _parts(system: System, inputs: Floats, before: int) -> dict[str, Any]:
         forces = system.loads[:, j].reshape(-1, 3)
         nodes = np.flatnonzero(forces.any(axis=1))
         loads.append(named | {"nodes": nodes.tolist(), "forces": forces[nodes].tolist()})
-    return {"held": _unknowns(still), "drives": drives, "loads": loads, "weights": weights}
+    return {"held": _unknowns(still), "drives": drives, "loads": loads, "weights": weights,
+            "masses": _hung(scene)}  # fmt: skip
+
+
+def _hung(scene: Scene) -> dict[str, list[Any]]:
+    kg = hung_masses(scene)[::3]
+    nodes = np.flatnonzero(kg)
+    return {"nodes": nodes.tolist(), "kg": kg[nodes].tolist()}
 
 
 def _unknowns(rows: Any) -> dict[str, list[int]]:
@@ -125,7 +135,7 @@ def _require_carried(scene: Scene, t: Floats) -> None:
     mesh = scene.mesh
     if mesh.kind not in CELL_TYPES:
         raise SceneError(f"a guest is given {', '.join(CELL_TYPES)}, not {mesh.kind}")
-    parts = ("regions", "foundations", "membranes", "masses", "contacts", "tracked", "tools")
+    parts = ("regions", "foundations", "membranes", "contacts", "tracked", "tools")
     odd = [name for name in parts if getattr(scene, name)]
     if odd:
         raise SceneError(f"a guest's job carries no {' nor '.join(odd)}; drop them from the scene")

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from validate.catalogue import shipped
 from validate.errors import UsageError
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -18,7 +19,7 @@ _CACHES = (
     "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "MPLCONFIGDIR",
     "NUMBA_CACHE_DIR", "PYTHONPYCACHEPREFIX", "WARP_CACHE_PATH", "CUDA_CACHE_PATH",
 )  # fmt: skip
-_SAID = "said.txt"
+_SAID, _PEAK = "said.txt", "peak.txt"
 _LAST_WORDS = 2000  # bytes of what it printed that are read
 
 
@@ -34,15 +35,18 @@ class Limits:
 
 @dataclass(frozen=True)
 class Ended:
-    """After `seconds` s of wall time; `why` is empty where it ended well, `said` its last line."""
+    """After `seconds` s of wall time; `why` is empty where it ended well, `said` its last line,
+    `memory` bytes the peak of the largest of its processes (0: it was ended before)."""
 
     seconds: float
     why: str
     said: str
+    memory: int = 0
 
 
 def words(command: str) -> tuple[str, ...]:
-    """A command line as words, files of the current folder by their whole path.
+    """A command line as words: `python` is the one that runs this, and files of the current folder
+    stand by their whole path, else those that came with the package.
 
     Raises `UsageError` for a program that is not there.
     """
@@ -52,11 +56,17 @@ def words(command: str) -> tuple[str, ...]:
         raise UsageError(f"command {command!r}: {error}") from None
     if not given:
         raise UsageError("no command of a guest; give methods.NAME.command='python my_guest.py'")
-    program = shutil.which(given[0])
+    program = sys.executable if given[0] == "python" else shutil.which(given[0])
     if program is None:
-        raise UsageError(f"command {command!r}: no program '{given[0]}'; give its path")
-    rest = (str(Path(w).absolute()) if Path(w).is_file() else w for w in given[1:])
-    return str(Path(program).absolute()), *rest
+        raise UsageError(f"command {command!r}: not installed: no program '{given[0]}'")
+    return str(Path(program).absolute()), *(_whole(word) for word in given[1:])
+
+
+def _whole(word: str) -> str:
+    for path in (Path(word), shipped().parent / word):
+        if path.is_file():
+            return str(path.absolute())
+    return word
 
 
 def run_guest(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
@@ -69,7 +79,7 @@ def run_guest(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
     start = time.monotonic()
     with (folder / _SAID).open("wb") as said:
         process = subprocess.Popen(
-            [*apart, str(limits.memory), str(limits.output), *command, str(folder)],
+            [*apart, str(limits.memory), str(limits.output), _PEAK, *command, str(folder)],
             cwd=folder,
             env=_surroundings(folder),
             stdin=subprocess.DEVNULL,
@@ -83,7 +93,8 @@ def run_guest(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
     seconds = time.monotonic() - start
-    return Ended(seconds, why or _ending(process.returncode), _last_line(folder / _SAID))
+    why = why or _ending(process.returncode)
+    return Ended(seconds, why, _last_line(folder / _SAID), _peak(folder / _PEAK))
 
 
 def _watched(pid: int, folder: Path, limits: Limits, start: float) -> str:
@@ -138,6 +149,12 @@ def _last_line(path: Path) -> str:
         file.seek(max(0, path.stat().st_size - _LAST_WORDS))
         lines = file.read(_LAST_WORDS).decode("utf-8", "replace").splitlines()
     return next((plain(line) for line in reversed(lines) if line.strip()), "")
+
+
+def _peak(path: Path) -> int:
+    """Bytes; a file that the guest itself wrote there is no more believed than its other words."""
+    text = _last_line(path)
+    return int(text) if text.isdecimal() and len(text) < 16 else 0
 
 
 def plain(text: str, most: int = 200) -> str:

@@ -14,6 +14,7 @@ from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, DriveShape, Scene, Support, Weight
 from validate.solve.guests.guest import Guest
+from validate.solve.guests.ran import words
 from validate.solve.types import Run
 
 _E, _NU, _RHO, _G = 10e3, 0.3, 1000.0, 9.81
@@ -62,6 +63,7 @@ def check_guest(guest: Guest) -> Iterator[tuple[OffBy, ...]]:
 
     Raises `UsageError` for a command that is no program's.
     """
+    words(guest.command)
     for small in small_scenes():
         run = replace(guest, inertia=small.inertia).solve(small.scene, small.t, small.inputs)
         yield _measured(small, run)

@@ -1,0 +1,121 @@
+"""Programs of others as methods of any experiment."""
+
+import shlex
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.compare.result import Result
+from validate.errors import UsageError
+from validate.replay import load
+from validate.replay.guests import guests_of, with_guests
+from validate.replay.named_run import run_name
+from validate.replay.options import Options, configure
+from validate.replay.road import compare
+from validate.solve.guests.guest import Guest
+from validate.solve.guests.let_go import GuestLetGo
+
+FAKE = """
+import json, sys
+from pathlib import Path
+import numpy as np
+folder = Path(sys.argv[-1])
+job = json.loads((folder / "job.json").read_text())
+ballast = bytearray(60_000_000)
+u = np.zeros((len(job["times"]), job["mesh"]["nodes"], 3))
+u[..., 2] = -0.05
+np.savez(folder / "fields.npz", t=job["times"], u=u)
+answer = {"schema": "validate-guest-answer/1", "name": "fake", "version": "7",
+          "state": "finished", "used": job["material"], "mesh_sha256": job["mesh"]["sha256"],
+          "setup_s": 1e-6, "step_s": [1e-3] * len(u)}
+(folder / "answer.json").write_text(json.dumps(answer))
+"""
+
+
+@pytest.fixture
+def fake(tmp_path: Path) -> str:
+    script = tmp_path / "fake_guest.py"
+    script.write_text(FAKE, "utf-8")
+    return shlex.join([sys.executable, str(script)])
+
+
+def test_a_command_becomes_a_method_like_the_first_declared_guest(fake: str) -> None:
+    beam = with_guests(load("silicone_beam"), (fake, fake))
+    one, two = beam.methods["fake"], beam.methods["fake_2"]
+    declared = next(iter(guests_of(beam.methods).values()))
+    assert one.settings.command == two.settings.command == fake
+    assert one.scene == declared.scene
+    assert isinstance(load("silicone_beam").methods["calculix"].settings, GuestLetGo)
+
+
+def test_where_none_is_declared_it_is_run_as_what_is_accepted(fake: str) -> None:
+    gel, cube = (with_guests(load(n), (fake,)) for n in ("gel_indentation", "kf_cube_inertia"))
+    mine = gel.methods["fake"]
+    assert isinstance(mine.settings, Guest)
+    assert (mine.scene, mine.settings.inertia) == (gel.methods["linear"].scene, False)
+    assert cube.methods["fake"].settings.inertia
+    assert cube.methods["fake"].markers == ()
+    with pytest.raises(UsageError, match="not installed"):
+        with_guests(gel, ("no-such-program",))
+
+
+def test_it_is_run_whatever_is_chosen_in_a_folder_of_its_own(fake: str) -> None:
+    beam = with_guests(load("silicone_beam"), (fake,))
+    options = Options({}, ("mixed",), guests=(fake,))
+    assert list(configure(beam, options)[1]) == ["mixed", "fake"]
+    assert run_name(beam, Options({})) == "silicone_beam"
+    assert run_name(beam, Options({}, guests=(fake,))).startswith("silicone_beam+guest-")
+
+
+@pytest.fixture
+def judged(fake: str, shared_data: Path) -> Result:
+    options = Options({"mesh.across": "2"}, ("tetrahedra",), quick=True, guests=(fake,))
+    return compare(with_guests(load("hanging_bar"), (fake,)), options)
+
+
+def test_the_table_has_program_error_rate_and_memory(judged: Result) -> None:
+    assert judged.kind == "reference"
+    (exhibit,) = (e for e in judged.exhibits if e.anchor == "guests")
+    (row,) = (r for r in exhibit.tables[0].rows if r[1] == "fake 7")
+    assert (row[2], row[6], row[8]) == ("-", pytest.approx(1000.0), "finished")
+    assert isinstance(row[7], float)
+    assert row[7] > 60
+    said = " ".join(str(r[1]) for r in exhibit.tables[1].rows)
+    assert "no reaction forces" in said
+    assert "what is held or driven is up to 50 mm from where it should be" in said
+    mine = next(m for m in judged.methods if m.name == "fake")
+    assert mine.residuals["drop@all"].values == pytest.approx(
+        np.array([[0.05 - 44.102e-3]]), abs=1e-5
+    )
+
+
+def test_a_guest_has_no_cavity_and_says_so(phantom_result: Result) -> None:
+    (mine,) = (m for m in phantom_result.methods if m.name == "felupe")
+    assert mine.run.outcome.state == "refused"
+    assert mine.run.outcome.why.startswith("cannot run: Guest knows no fluid in cavities")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("felupe") is None, reason="felupe absent: the extra 'peers' has it")
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx absent: apt-get calculix-ccx")
+def test_the_hanging_bar_is_what_it_was_printed_to_be(shared_data: Path) -> None:
+    """dolfinx's four meshes within .01 %, the converged drop between meshes graded in two ways."""
+    result = compare(load("hanging_bar"), Options({}))
+    assert result.passed
+    figures = {p.name: p.verdict for p in result.published}
+    assert [v for n, v in figures.items() if n.startswith("dolfinx")] == ["reproduced"] * 4
+    (check,) = result.checks
+    assert check.verdict == "agrees"
+    rows = {str(r[0]): r for e in result.exhibits if e.anchor == "guests" for r in e.tables[0].rows}
+    felupe = rows["FElupe, linear tetrahedra, dolfinx's mesh"]
+    ours = rows["linear tetrahedra, dolfinx's mesh"]
+    assert felupe[3].value == pytest.approx(ours[3].value, rel=1e-6)
+    assert felupe[5] == ours[5] == "differs"
+    said = [str(r[1]) for e in result.exhibits if e.anchor == "guests" for r in e.tables[1].rows]
+    assert any("used volumetric = K/2 (J - 1)^2 instead of coupled" in line for line in said)
+    words = next(e.words[0] for e in result.exhibits if e.anchor == "converged")
+    assert words.startswith("The drop converges to 44.085")

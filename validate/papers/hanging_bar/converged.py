@@ -1,0 +1,94 @@
+"""What the hanging bar's drop converges to on our own meshes, and what others printed beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from validate.compare.convergence import Richardson, richardson
+from validate.compare.exhibit import Exhibit, NumberTable
+from validate.compare.published import Claim, Figure
+from validate.fem.system import build as build_system
+from validate.papers.hanging_bar.bar import (
+    SOURCE,
+    BarModel,
+    HangingBar,
+    build,
+    hexahedra,
+    hung,
+    sunk,
+)
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import MAIN, Cases
+from validate.scene.scene import Scene
+from validate.solve.march import march
+from validate.solve.newton import StaticNewton
+
+QUARTER = BarModel()
+_MESHES, _GRADINGS = (6, 4, 3), (3.0, 2.0)
+_HEXAHEDRA = (6, 12)  # of dolfinx's meshes, beside those that are methods
+_ORDER = 3.0  # of quadratic cells
+_MM = 1e3
+
+
+def tell(parameters: HangingBar, cases: Cases, progress: Progress) -> Told:
+    """The converged drop with its interval on meshes graded in two ways, dolfinx's own meshes."""
+    p, main = parameters, cases[MAIN]
+    progress("what it converges to")
+    found = {g: _converged(replace(p, mesh=replace(p.mesh, grading=g))) for g in _GRADINGS}
+    limits = [float(at.extrapolated[0, 0]) for _, at in found.values()]
+    value = sum(limits) / len(limits)
+    half = max(at.index for _, at in found.values())
+    numbers = {"drop.converged": value, "drop.converged.half_interval": half}
+    numbers |= {f"drop.hexahedra.{n}": _drop(p, hung(p, hexahedra(p, n))) for n in _HEXAHEDRA}
+    own = (("tetrahedra", "drop.tetrahedra"), ("hexahedra", "drop.hexahedra.9"))
+    numbers |= {name: sunk(main[m].run) for m, name in own if main[m].run.finished}
+    rows = [(g, str(n), _MM * d) for g, (drops, _) in found.items() for n, d in drops.items()]
+    rows += [(g, "infinitely many", _MM * x) for g, x in zip(found, limits, strict=True)]
+    words = (
+        f"The drop converges to {_MM * value:.4f} mm, within {_MM * half:.4f} mm: the mean of what "
+        "meshes graded in two ways tend to (Richardson), and the larger of their grid convergence "
+        "indices."
+    )
+    head = ("grading / 1", "cells across a quarter", "drop / mm")
+    table = NumberTable("converged", "Quadratic hexahedra, finer and finer", head, tuple(rows))
+    return Told((Exhibit("converged", "The converged drop", (words,), tables=(table,)),), numbers)
+
+
+def _converged(p: HangingBar) -> tuple[dict[int, float], Richardson]:
+    """Drops m by cells across, and where they tend to."""
+    drops = {n: _drop(p, _quarter(p, n)) for n in _MESHES}
+    answers = [np.array([[d]]) for d in drops.values()]
+    return drops, richardson([1 / n for n in drops], answers, _ORDER)
+
+
+def _quarter(p: HangingBar, across: int) -> Scene:
+    return build(None, replace(p, mesh=replace(p.mesh, across=across)), QUARTER)
+
+
+def _drop(p: HangingBar, scene: Scene) -> float:
+    stepper = StaticNewton("none").prepare(build_system(scene))
+    pull = np.array([[p.gravity]])
+    return sunk(march("bar", stepper, np.ones(1), pull, np.array([0]), 0.0))
+
+
+def _ours(name: str, of: str, theirs: float, expected: float) -> Figure:
+    near = 1e-4 * theirs
+    return Figure(name, f"told:{of}", theirs, near, "m", "reproduced", "within .01 %", SOURCE,
+                  expected, 1e-8)  # fmt: skip
+
+
+def _other(name: str, theirs: float, reason: str, claim: Claim = "not reproduced") -> Figure:
+    return Figure(name, "told:drop.converged", theirs, 1e-3 * theirs, "m", claim, reason, SOURCE)
+
+
+_ENGINE = "NVIDIA Newton's own solver: no mesh of the same law comes near"
+PUBLISHED = (
+    _ours("dolfinx, linear tetrahedra", "drop.tetrahedra", 43.2013e-3, 43.20130e-3),
+    _ours("dolfinx, 6 x 6 x 16 hexahedra", "drop.hexahedra.6", 43.3963e-3, 43.39635e-3),
+    _ours("dolfinx, 9 x 9 x 24 hexahedra", "drop.hexahedra.9", 43.676e-3, 43.67569e-3),
+    _ours("dolfinx, 12 x 12 x 32 hexahedra", "drop.hexahedra.12", 43.82e-3, 43.82059e-3),
+    _other("one-dimensional theory", 44.303e-3, "its held top is free to contract"),
+    _other("NVIDIA Newton, XPBD", 158.856e-3, _ENGINE),
+    _other("NVIDIA Newton, VBD", 139.529e-3, _ENGINE),
+    _other("NVIDIA Newton, semi-implicit", 84.988e-3, _ENGINE),
+)
