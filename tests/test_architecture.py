@@ -3,6 +3,7 @@
 import ast
 import os
 from collections.abc import Iterator, Mapping
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -18,9 +19,15 @@ def modules(root: Path) -> list[Path]:
     return sorted((root / "validate").rglob("*.py")) + sorted((root / "experiments").glob("*.py"))
 
 
-def classes(path: Path) -> Iterator[ast.ClassDef]:
+def defined(path: Path) -> Iterator[ast.ClassDef]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     return (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+
+
+@cache
+def classes(path: Path) -> tuple[tuple[str, dict[str, object] | None], ...]:
+    """Name and dataclass settings of each class of a file, which is parsed once for two tests."""
+    return tuple((node.name, dataclass_settings(node)) for node in defined(path))
 
 
 def dataclass_settings(node: ast.ClassDef) -> dict[str, object] | None:
@@ -42,17 +49,17 @@ def test_names_of_test_modules_are_unique(project_root: Path) -> None:
 def test_class_names_stand_once(project_root: Path) -> None:
     """Two classes of one name are two meanings of one word."""
     names = [
-        node.name for path in (project_root / "validate").rglob("*.py") for node in classes(path)
+        name for path in (project_root / "validate").rglob("*.py") for name, _ in classes(path)
     ]
     assert not {name for name in names if names.count(name) > 1}
 
 
 def test_every_dataclass_is_frozen(project_root: Path) -> None:
     found = {
-        f"{path.name}:{node.name}": settings
+        f"{path.name}:{name}": settings
         for path in modules(project_root)
-        for node in classes(path)
-        if (settings := dataclass_settings(node)) is not None
+        for name, settings in classes(path)
+        if settings is not None
     }
     assert len(found) > 40
     assert {name for name, s in found.items() if s.get("frozen") is not True} == ACCUMULATORS
@@ -65,7 +72,7 @@ def test_every_scheme_is_in_the_tuple(project_root: Path) -> None:
     written = {
         node.name
         for path in (project_root / "validate" / "solve").glob("*.py")
-        for node in classes(path)
+        for node in defined(path)
         if any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
         and "Protocol" not in [ast.unparse(b) for b in node.bases]
     }
@@ -79,7 +86,7 @@ def test_every_filter_is_in_the_tuple(project_root: Path) -> None:
     written = {
         node.name
         for path in (project_root / "validate" / "estimate").glob("*.py")
-        for node in classes(path)
+        for node in defined(path)
         if any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
         and "Protocol" not in [ast.unparse(b) for b in node.bases]
     }

@@ -105,6 +105,7 @@ def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> Non
             assert f"--set specimen.{name}=VALUE" in message
 
 
+@pytest.mark.slow
 def test_a_part_of_the_sizes_is_enough_where_the_recording_says_the_rest(tmp_path: Path) -> None:
     write_recording(log(height_m=repr(HEIGHT)), tmp_path / "gel.mcap")
     in_folder(tmp_path, "new", "half", "--from", "gel.mcap")
@@ -143,6 +144,7 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
     assert "identified" in page.split("Origin: recorded")[1]
 
 
+@pytest.mark.slow
 def test_each_rival_is_fitted_as_what_it_is(tmp_path: Path) -> None:
     """Bonded plates stiffen the body, so the modulus that has the measured slope is lower; given a
     modulus by the user, both take it."""

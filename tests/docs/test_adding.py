@@ -18,6 +18,7 @@ def test_the_page_adds_each_of_the_six(project_root: Path) -> None:
         assert "assert " in section, thing
 
 
+@pytest.mark.slow
 def test_every_example_runs(
     project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -331,6 +331,7 @@ def test_a_wrong_modulus_is_found_and_every_node_gains(settings: MemberModel) ->
     assert nis_consistency(run.traces["nis"].y, run.traces["nis.dof"].y).holds
 
 
+@pytest.mark.slow
 def test_the_claim_on_a_parameter_holds_over_many_truths() -> None:
     """Truths drawn from the start's law: errors over the claimed sd are chi-square (20 truths), and
     NIS too."""

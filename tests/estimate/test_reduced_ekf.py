@@ -134,6 +134,7 @@ def test_what_a_second_adds_is_as_declared_whatever_the_step(small: System) -> N
             assert not claim.Q[12:24, :].any()
 
 
+@pytest.mark.slow
 def test_on_truths_of_its_own_model_it_is_consistent(small: System) -> None:
     """NIS over 30 seeds x 30 measurements within the 99.9 % band of chi-square, and NEES."""
     settings = ReducedEKF(H, shapes=12, load_walk=1e-5, load_sd=1e-6, process=1e-8)

@@ -88,6 +88,7 @@ def end(scheme: Scheme, system: System, steps: int, dt: float) -> Floats:
     return np.asarray(run.u[0])
 
 
+@pytest.mark.slow
 def test_explicit_steps_converge_to_implicit_ones() -> None:
     """Both are of order two, so half the step leaves a quarter of what is between them."""
     system = swinging()

@@ -39,6 +39,7 @@ def pushed(n: int, nu: float) -> Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nu", "printed"), [(0.47, 0.930), (0.495, 0.759), (0.4999, 0.134)])
 def test_bilinear_quadrilaterals_lock(nu: float, printed: float) -> None:
     """n = 20: numbers of an independent reconstruction of paper 002, three digits.

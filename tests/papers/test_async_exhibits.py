@@ -34,6 +34,7 @@ def test_a_path_across_is_walked_and_one_along_x_is_a_depth() -> None:
     assert np.array_equal(pushed(scene, NEAR, path).force, pushed(scene, NEAR, depth).force)
 
 
+@pytest.mark.slow
 def test_a_contact_that_slides_changes_without_a_jump_of_the_force() -> None:
     shown = sliding_exhibit(
         block(5e3, 6, 2), {"whole": WHOLE, "near": NEAR, "few": TouchedKrylov()}, "whole"

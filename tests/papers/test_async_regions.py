@@ -75,6 +75,7 @@ def test_the_recording_is_not_the_models_own_and_drives_and_validates() -> None:
     assert np.array_equal(again, recording.signal("force", "N").y)
 
 
+@pytest.mark.slow
 def test_no_energy_is_made_by_borders_nor_by_their_moves() -> None:
     """No more than in the whole solve the spring, whose force is that of the tick's begin. Borders
     that were put back at a change made thousands of joules here."""
@@ -168,6 +169,7 @@ def test_the_rows_of_table_1_that_are_printed() -> None:
         assert peak(found.force, t, 20.0, 1.0) == pytest.approx(theirs, abs=0.02)
 
 
+@pytest.mark.slow
 def test_sentences_of_the_paper_as_numbers() -> None:
     """A linear model's relative error knows no size; eq 4 is 2/w_max of the bar, nearly."""
     p = TouchedLine(probe=HapticProbe(seconds=3.0))

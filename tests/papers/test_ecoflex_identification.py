@@ -87,6 +87,7 @@ def test_two_elements_find_the_modulus_of_a_round_cylinder(found: Mapping[str, f
     assert found["modulus.E_slip"] == pytest.approx(found["modulus.E"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_what_the_mesh_does_not_resolve_stands_in_the_interval(
     found: Mapping[str, float], methods: Mapping[str, Method]
 ) -> None:

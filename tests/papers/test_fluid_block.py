@@ -131,6 +131,7 @@ def test_every_set_up_is_reached_from_the_parameters(values: dict[str, str]) -> 
         assert np.abs(residual.values).max() < share * scale + 40.0, name
 
 
+@pytest.mark.slow
 def test_the_printed_claim_by_tool() -> None:
     """At most one update to 1 % under a needle, two under a plate at 15 % (findings: 2 to 4)."""
     shown, numbers = updates_exhibit(SMALL, silent)
@@ -146,6 +147,7 @@ def test_the_printed_claim_by_tool() -> None:
     assert rows["newton", "1e-12"][1] < rows["proportional", "1e-12"][1]
 
 
+@pytest.mark.slow
 def test_scalar_gains_weaken_as_the_septum_thins() -> None:
     shown, radii = several_exhibit(replace(SMALL, mesh=PlaneGrid(40)), silent)
     own = [radii[f"2.{share}.own"] for share in ("2", "1", "0.5", "0.25")]

@@ -143,6 +143,7 @@ def test_a_path_of_ones_own_sets_the_tick_and_says_what_was_left_out(small: dict
 # --- what is told ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_is_told_of_a_coarse_liver(
     small: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -174,6 +175,7 @@ def test_nothing_is_felt_without_the_reference() -> None:
 # --- live -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_live_in_a_thread_of_its_own_replays_to_the_same_numbers(
     small: dict[str, str], tmp_path: Path
 ) -> None:

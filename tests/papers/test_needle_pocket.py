@@ -159,6 +159,7 @@ def test_over_a_closed_path_the_exact_law_is_passive_and_the_papers_is_not() -> 
 # --- the recording ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("space", ["plane", "solid"])
 def test_the_twin_is_felt_and_its_seed_repeats_it(space: str) -> None:
     body = replace(COARSE.body, space=space)  # type: ignore[arg-type]

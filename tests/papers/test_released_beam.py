@@ -97,6 +97,7 @@ def errors(beam: Experiment, path: Path, *values: str) -> dict[str, float]:
     return {k: float(1e3 * r.values.mean()) for k, r in residuals.items() if r.unit == "m"}  # mm
 
 
+@pytest.mark.slow
 def test_where_the_beam_comes_to_rest_is_predicted(beam: Experiment, shared_data: Path) -> None:
     """Nothing is fitted. Linear hexahedra of 12 x 3 x 3 sag some .2 mm less than converged."""
     own = errors(beam, shared_data / BEAM.format("gravity_V2_b"))

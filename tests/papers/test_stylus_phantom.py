@@ -97,6 +97,7 @@ def test_the_eight_landmarks_of_the_data_set(shared_data: Path) -> None:
     assert off.origin < 0.3e-3
 
 
+@pytest.mark.slow
 def test_the_road_fits_the_pose_and_judges_what_was_left_out(shared_data: Path) -> None:
     result = road(experiment("stylus_phantom"), Options({}))
     (check,) = result.checks

@@ -53,6 +53,7 @@ def test_other_disks_are_measured_by_their_own_pixels(
     assert wrong.checks[0].verdict == "differs"
 
 
+@pytest.mark.slow
 def test_an_image_without_a_disk_is_named_and_most_without_one_are_an_error(tmp_path: Path) -> None:
     path = tmp_path / "some.mat"
     images = imaged(8.0, 0.1, frames=3)

@@ -56,6 +56,7 @@ def test_what_stands_open_is_identified_and_what_calibrated_is_fitted() -> None:
     assert {i.name: i.source for i in result.inputs}["identified E"].startswith("identified on")
 
 
+@pytest.mark.slow
 def test_a_residual_that_calibrated_is_no_evidence() -> None:
     whole = replace(OPEN, accept=(Accept("force", 1e-3, "ours"),))
     verdicts = {c.name: c.verdict for c in compare(whole, Options({})).checks}
@@ -152,6 +153,7 @@ def test_what_repeats_the_model_is_not_said_to_have_served_to_fit() -> None:
     assert "predicted: nothing, for 3 of 3 checks only repeat the model itself. " in sentence
 
 
+@pytest.mark.slow
 def test_a_sensor_is_identified_beside_the_material() -> None:
     """A cell that reads .2 N of nothing: the force's slope over the holds is the modulus'."""
     bias = Free("cell.bias", -1.0, 1.0, "assumed")
@@ -188,6 +190,7 @@ def test_a_recording_that_only_calibrates_is_named_among_the_files() -> None:
     assert "calibrates" not in [f.role for f in rests_on(taken, Options({})).files]
 
 
+@pytest.mark.slow
 def test_several_recordings_calibrate_at_once() -> None:
     """Two looks at one force with independent noise halve the variance of one."""
     once = Calibrates(("force@0.1mm",))
@@ -201,6 +204,7 @@ def test_several_recordings_calibrate_at_once() -> None:
     assert "force@0.1mm of moved and force@0.1mm of a repeat" in two.sentence
 
 
+@pytest.mark.slow
 def test_a_declared_range_of_what_was_identified_gives_way_to_its_covariance() -> None:
     """A range that moves anything besides stays, and so does one of what was not identified."""
     ranges = (

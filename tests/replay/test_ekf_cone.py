@@ -119,6 +119,7 @@ def test_inertia_of_the_explicit_run_is_below_the_declared_limit(result: Result)
     assert f"at most {share:.2f} % of strain energy: within the declared 1 %" in told
 
 
+@pytest.mark.slow
 def test_a_faster_ramp_is_told_to_be_beyond_the_limit(two: Experiment) -> None:
     """300 times instead of 30, so ten times the speed: a hundred times the kinetic energy."""
     found = compare(two, {**COARSE, "clock.scale": "300"})

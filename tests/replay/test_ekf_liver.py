@@ -76,6 +76,7 @@ def test_a_recording_of_the_other_body_is_refused(liver: Experiment, project_roo
         read(liver, p)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("data_body")
 def test_the_data_folders_liver_is_recorded_in_memory_and_has_its_own_figures(
     liver: Experiment,

@@ -186,6 +186,7 @@ def test_the_first_line_doubts_what_the_warnings_doubt(
     assert capsys.readouterr().out.startswith(f"tiny: {word} evidence: 1 of 1 checks")
 
 
+@pytest.mark.slow
 def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -305,6 +305,7 @@ def test_it_listens_on_loopback_alone_and_only_when_asked(monkeypatch: pytest.Mo
 # --- what it did, replayed --------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["path", "udp"])
 def test_what_it_did_replays_to_the_same_numbers(source: str, tmp_path: Path) -> None:
     if source == "path":
@@ -329,6 +330,7 @@ def test_what_it_did_replays_to_the_same_numbers(source: str, tmp_path: Path) ->
     assert result.passed
 
 
+@pytest.mark.slow
 def test_the_command_runs_against_the_real_clock(tmp_path: Path) -> None:
     file = tmp_path / "live.mcap"
     given = ["live", "needle_pocket", "--set", "mesh.plane=10", "--method", "p1_exact",

@@ -274,6 +274,7 @@ def test_a_filters_own_covariance_is_part_of_u_val() -> None:
     assert filtered.u_val == pytest.approx(np.hypot(filtered.u_D, filtered.u_input))
 
 
+@pytest.mark.slow
 def test_mesh_and_inputs_enter_u_val_by_the_surrogate() -> None:
     """By hand: residuals of three runs, their differences times the declared scales."""
     declared = Uncertainty(

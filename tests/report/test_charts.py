@@ -59,6 +59,7 @@ def test_a_chart_keeps_the_contract(result: Result, number: int) -> None:
     assert faults(drawn(result, shown()[0].charts[number])) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "log"), [(2, ""), (TOGETHER, "y"), (TOGETHER + 1, ""), (8, "y"), (9, "y")]
 )

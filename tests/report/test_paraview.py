@@ -63,6 +63,7 @@ def test_markers_are_where_they_were_measured_with_what_the_run_is_off_by(folder
     assert np.abs(points.point_data["error [m]"] - off).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_report_has_them_where_they_are_asked_for(tmp_path: Path) -> None:
     created = "2026-01-01T00:00:00+00:00"
     write_report(tracking_result(), tmp_path / "r", created=created, vtu=True)

@@ -128,6 +128,7 @@ def test_an_open_surface_is_refused_with_its_open_edges(tmp_path: Path) -> None:
         filled(tmp_path / "open.stl", "mm")
 
 
+@pytest.mark.slow
 def test_the_beam_of_others_is_filled(shared_data: Path) -> None:
     """30 x 30 x 100 mm, as its makers say."""
     body = filled(shared_data / "markers/silicone-beam/beam.stl", "mm", 8e-3)

@@ -89,6 +89,7 @@ def test_a_measured_number_of_threads_is_told(monkeypatch: pytest.MonkeyPatch) -
     assert re.match(r"threads: [12] of 2, pilot 1: \S+ us, 2: \S+ us", run.said[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["svk", "neo_hooke"])
 def test_single_precision_stays_near_over_many_steps(law: str) -> None:
     """Increments add up in doubles: after 800 steps the motion still has six digits."""

@@ -48,6 +48,7 @@ def modal(scene: Scene, g: float, t: np.ndarray = T) -> Run:
     return run_scheme("r", ViscousModes(24), scene, t, inputs(g, t), np.array([len(t) - 1]))
 
 
+@pytest.mark.slow
 def test_small_vibrations_are_those_of_the_large_strain_march() -> None:
     """What is left is the march's own error of order two."""
     errors = []

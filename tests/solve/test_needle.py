@@ -346,6 +346,7 @@ def test_settings_without_sense_are_refused(made, words: str) -> None:  # type: 
 # --- where a path enters --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.floats(0.05, 0.95), st.floats(0.05, 0.95), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 def test_a_path_enters_a_box_where_geometry_says(u: float, v: float, a: float, b: float) -> None:

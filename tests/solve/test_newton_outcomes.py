@@ -72,6 +72,7 @@ def test_end_of_the_law_is_invalid_with_the_last_good_load() -> None:
     assert failed.inner.inputs[0] < 0.042265
 
 
+@pytest.mark.slow
 def test_no_static_solution_beyond_a_load() -> None:
     """Bonded plates: Newton stops near stretch .69 to .75."""
     stepper = prepared(cube("svk", 0.4, "bonded", n=6, dilatation="nodal_mean"))

@@ -163,6 +163,7 @@ def test_the_error_of_borders_is_of_first_order_in_the_slow_period() -> None:
     assert np.log2(np.divide(off[1:], off[:-1])) == pytest.approx([1.0, 1.0], abs=0.35)
 
 
+@pytest.mark.slow
 def test_overlap_cuts_the_error() -> None:
     pushed = swing(2.0)
     whole = force(WHOLE, pushed)
@@ -239,6 +240,7 @@ def test_a_primary_region_that_follows_the_deformation_keeps_the_static_limit(
     assert states[-1].numbers["probe.force.x"] == pytest.approx(LIMIT, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_change_of_regions_at_rest_under_load_moves_nothing() -> None:
     settings = replace(NEAR, layers=(3,), adapt="linear", most=9)
     states = walked(settings, np.minimum(np.arange(1, 6001) / 500, 1.0) * 0.01)

@@ -156,7 +156,11 @@ def test_a_linear_scheme_refuses_a_law_at_large_strain(scheme: type[Scheme], lar
 
 @pytest.mark.parametrize(
     ("scheme", "law"),
-    [(s, law) for s in LARGE_INERTIAL for law in s.handles.law],
+    [
+        pytest.param(s, law, marks=[] if law == "neo_hooke" else pytest.mark.slow)
+        for s in LARGE_INERTIAL
+        for law in s.handles.law
+    ],
     ids=lambda v: v if isinstance(v, str) else v.__name__,
 )
 def test_dynamics_at_large_strain_step_drives_and_loads(

@@ -80,7 +80,10 @@ def test_statics_are_the_limit_that_the_series_says() -> None:
     assert forces["instantaneous"] / forces["relaxed"] == pytest.approx(2.2, rel=0.1)
 
 
-@pytest.mark.parametrize("scheme", [NewtonDynamics(1e-3), CentralDifference(1e-3)])
+@pytest.mark.parametrize(
+    "scheme",
+    [NewtonDynamics(1e-3), pytest.param(CentralDifference(1e-3), marks=pytest.mark.slow)],
+)
 def test_a_step_is_the_same_whoever_stepped_before(scheme: Scheme) -> None:
     """What branches remember is in the state, not in the scheme."""
     stepper = scheme.prepare(relaxing(pressed("neo_hooke")))
@@ -132,6 +135,7 @@ def ring_down(scheme: Scheme, dt: float, n: int) -> tuple[complex, complex]:
     return exact, complex(np.log(roots[np.argmax(roots.imag)]) / (k * dt))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [NewtonDynamics(1e-3), CentralDifference(1e-3)])
 def test_a_swing_dies_away_as_the_loss_factor_says(scheme: Scheme) -> None:
     exact, seen = ring_down(scheme, 1e-3, 400)
@@ -165,6 +169,7 @@ def test_explicit_forces_are_those_of_the_numpy_body(law: str) -> None:
     assert np.abs(found - body.force(u)).max() > 0.1 * np.abs(exact).max()
 
 
+@pytest.mark.slow
 def test_explicit_steps_converge_to_implicit_ones_with_order_two() -> None:
     system, T = relaxing(pulled("neo_hooke", 2), Prony((0.8,), (0.01,))), 0.02
     exact = ran(NewtonDynamics(T / 160), system, rise(160, 15.0), T / 160).u[0]

@@ -78,6 +78,7 @@ def one(found: Coverage) -> Quantity:
     return found.quantities[0]
 
 
+@pytest.mark.slow
 def test_one_number_with_normal_noise_differs_in_two_sided_two_sd() -> None:
     """600 draws: their share has a standard deviation of .85 %."""
     found = studied()

@@ -134,6 +134,7 @@ def test_timed_cells_run_one_at_a_time_on_one_worker(cluster: Cluster, tmp_path:
     assert len({row.pid for row in rows[4:]}) == 1
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_no_cell_and_none_is_done_twice(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

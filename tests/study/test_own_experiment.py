@@ -54,6 +54,7 @@ def told(folder: Path, study: str) -> dict[str, object]:
     return dict(json.loads(path.read_text("utf-8"))["study"])
 
 
+@pytest.mark.slow
 def test_it_runs(here: Path) -> None:
     assert run(["run", "my_gel", "--methods", "slip"]) == 0
 
