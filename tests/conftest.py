@@ -14,6 +14,10 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[1]
+if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is found by what they test
+    os.environ.setdefault("VALIDATE_SHARED_DATA", str(_data))
+
 import pytest
 
 from validate.compare.result import Result
@@ -22,7 +26,6 @@ from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.replay.road import compare
 
-ROOT = Path(__file__).resolve().parents[1]
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 
@@ -46,8 +49,7 @@ def project_root() -> Path:
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of real recordings made by others; skips where it is absent."""
-    named = os.environ.get("VALIDATE_SHARED_DATA")
-    folder = Path(named) if named else ROOT.parent / "shared" / "data"
+    folder = Path(os.environ.get("VALIDATE_SHARED_DATA") or ROOT.parent / "shared" / "data")
     if not folder.is_dir():
         pytest.skip(f"real data absent: {folder} (set VALIDATE_SHARED_DATA)")
     return folder

@@ -71,6 +71,7 @@ def test_every_metric_scales_as_its_unit_says(mesh: Mesh) -> None:
         assert large[name] == pytest.approx(3.0**power * plain[name], rel=1e-9, abs=0), name
 
 
+@pytest.mark.slow
 def test_symmetric_metrics_do_not_change_with_the_reference(mesh: Mesh) -> None:
     run, reference, scene = on(mesh)
     between = pair(run, reference, scene)

@@ -125,6 +125,7 @@ def test_a_filter_that_no_measurement_reaches_is_invalid(settings: Filter, pulle
         assert run.traces["nis.dof"].y.max() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", SETTINGS, ids=repr)
 def test_a_gated_outlier_changes_as_much_as_a_missing_look(settings: Filter, pulled: Case) -> None:
     """A marker that jumps by 1 m for one look, beside another that does not; without a gate the

@@ -90,6 +90,7 @@ def test_the_printed_filter_is_filterpys(pulled: Case, recursion: str) -> None:
     assert run.sd[-1].ravel()[free] == pytest.approx(np.sqrt(np.diag(guest.P)), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_drives_are_inputs_of_the_filter_too() -> None:
     """A top driven in z: without measurements Newmark with its forces; with them, one filter."""
     scene = cube().scene

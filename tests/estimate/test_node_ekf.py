@@ -108,6 +108,7 @@ def _by_filterpy(
     return np.array(us), np.array(Ps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", ["component", "node", "companion"])
 def test_forces_of_single_precision_leave_six_digits(system: System, block: Any) -> None:
     """Covariances are doubles whatever the forces are."""

@@ -57,6 +57,7 @@ def test_energy_volume_and_tangent_are_those_of_the_reference(name: str) -> None
     assert not fast.tangent_product(u, 0 * v).any()
 
 
+@pytest.mark.slow
 def test_threads_share_the_cells_and_inverted_ones_are_counted() -> None:
     scene = Scene(grid((1.0, 1.0, 1.0), (4, 4, 3)), sample("neo_hooke"), dilatation="mixed")
     u = bent(scene.mesh)

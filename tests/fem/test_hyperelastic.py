@@ -99,6 +99,7 @@ def test_volume_hessian_is_the_derivative_of_the_load(order: int) -> None:
 # Exact truths
 
 
+@pytest.mark.slow
 @every
 def test_rigid_turn_by_a_right_angle_costs_nothing(
     order: int, dilatation: Dilatation, name: str

@@ -255,6 +255,7 @@ def real(folder: Path, name: str) -> Recording:
     return read_instron(folder / "force" / "ecoflex-compression" / f"{name}.csv")
 
 
+@pytest.mark.slow
 def test_ecoflex_00_30_five_repeats(shared_data: Path) -> None:
     """Data README: E over 0.5-5 % 107.7 kPa, sd 1.1 kPa; noise 0.017-0.021 N, offset 0.04 N."""
     summary = identify_modulus([real(shared_data, f"EF30_0T_A{i}") for i in range(1, 6)])

@@ -165,6 +165,7 @@ def test_extraction_turns_with_the_image(bench: ModuleType) -> None:
     assert mirrored.centre[0] == pytest.approx(199e-4 - found.centre[0], abs=0.05e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_pure_speckle_is_refused(seed: int) -> None:
     with pytest.raises(RecordingError, match=r"no closed dark region"):

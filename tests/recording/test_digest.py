@@ -67,6 +67,7 @@ def test_its_text_is_json_that_holds_it() -> None:
     assert json.loads(to_text(found)) == found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", sorted(RECORDINGS.glob("*.mcap")), ids=lambda file: file.stem)
 def test_a_shipped_recording_reads_as_the_file_beside_it_says(file: Path) -> None:
     text = file.with_suffix(".json").read_text("utf-8")

@@ -71,6 +71,7 @@ def test_10_000_bit_flips_change_no_value(whole: bytes, tmp_path: Path) -> None:
     assert _check_flips(whole, 10_000, tmp_path / "a.mcap") == 10_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [{"enable_crcs": False}, {"use_chunking": False, "enable_crcs": False}],

@@ -300,6 +300,7 @@ def noisy(k: int, first: float, sd: float, rng: np.random.Generator) -> Floats:
     return radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("k", "first", "freedom"), [(36, 0.0, 36), (36, 5.0, 24), (72, 2.5, 36), (24, 3.0, 20)]
 )

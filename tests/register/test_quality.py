@@ -118,6 +118,7 @@ def test_tre_is_fitzpatricks_formula_in_any_frame(seed):
     assert found == pytest.approx(expected, rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "scaled"), [(3, False), (3, True), (2, False), (2, True)])
 def test_fre_and_tre_match_their_prediction_over_many_draws(d, scaled):
     """42 planar markers, 0.577 mm per axis; in 3-D the inclusion lies 22.5 mm below the plane."""
@@ -327,6 +328,7 @@ def test_three_permuted_markers_are_named():
     assert "markers m01, m04 and m09 look permuted" in message(x, y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(8))
 def test_any_permutation_of_a_jittered_grid_is_found(seed):
     y = grid(0.003, seed)

@@ -64,6 +64,7 @@ def test_a_residual_that_calibrated_is_no_evidence() -> None:
     assert "fitted" not in verdicts.values()
 
 
+@pytest.mark.slow
 def test_the_covariance_of_what_was_identified_is_uncertain_input() -> None:
     """Force is proportional to E, so its relative uncertainty is that of E, at every load."""
     result = compare(OPEN, Options({}))
@@ -147,6 +148,7 @@ def test_a_marker_that_is_never_seen_calibrates_nothing() -> None:
         compare(replace(blind, accept=OPEN.accept[1:]), Options({}))
 
 
+@pytest.mark.slow
 def test_what_repeats_the_model_is_not_said_to_have_served_to_fit() -> None:
     repeats = replace(OPEN, accept=OPEN.accept[:1])
     sentence = compare(repeats, Options({})).sentence

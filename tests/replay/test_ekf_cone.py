@@ -23,6 +23,8 @@ from validate.replay import compare, load
 from validate.replay.experiment import Experiment
 from validate.replay.remade import stamped
 
+pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
+
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
 COARSE = {"twin.radial": "3", "twin.axial": "3", "mesh.radial": "3", "mesh.axial": "3"}
 
@@ -77,7 +79,6 @@ def words(result: Result, anchor: str) -> tuple[str, ...]:
     return next(e.words for e in result.exhibits if e.anchor == anchor)
 
 
-@pytest.mark.slow
 def test_0_15_N_is_below_the_noise_and_15_N_above(result: Result) -> None:
     recorded, small = words(result, "signal")
     assert recorded.startswith("recorded: the plate moves by 1.1")
@@ -119,7 +120,6 @@ def test_inertia_of_the_explicit_run_is_below_the_declared_limit(result: Result)
     assert f"at most {share:.2f} % of strain energy: within the declared 1 %" in told
 
 
-@pytest.mark.slow
 def test_a_faster_ramp_is_told_to_be_beyond_the_limit(two: Experiment) -> None:
     """300 times instead of 30, so ten times the speed: a hundred times the kinetic energy."""
     found = compare(two, {**COARSE, "clock.scale": "300"})
@@ -167,7 +167,6 @@ def test_a_path_and_a_ramp_are_fitted_through_the_recorded_samples(cone: Experim
     assert ramp.inputs[:, 0] == pytest.approx(30 * ramp.t, rel=2e-3)
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_the_recordings_are_what_the_twin_records(cone: Experiment) -> None:
     assert cone.twin is not None
@@ -184,7 +183,6 @@ def test_the_recordings_are_what_the_twin_records(cone: Experiment) -> None:
             )
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     """Locking at nu .4995 is ours; an earlier study has .855 and .460 at .49 and .499 on its mesh

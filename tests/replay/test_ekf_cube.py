@@ -20,6 +20,8 @@ from validate.replay import compare, load
 from validate.replay.experiment import Experiment
 from validate.scene.scene import Scene
 
+pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
+
 STEP = (
     0.29447e-3  # s, critical on the shipped mesh (ours); an earlier study's is 0.24 ms on its own
 )
@@ -159,7 +161,6 @@ def test_readings_of_the_force_are_totals_or_per_node(cube: Experiment, scene: S
     assert rows["consistent"][-1] == "finished"
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     result = whole("ekf_cube")

@@ -35,6 +35,7 @@ def pair(folder: Path, count: int = 3000) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_another_pair_is_linked_in_the_scale_that_is_said(tmp_path: Path) -> None:
     folder = pair(tmp_path / "other")
     p = GelIndentation(data=str(folder))

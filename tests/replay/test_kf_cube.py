@@ -20,6 +20,8 @@ from validate.replay.experiment import Experiment
 from validate.replay.options import Options
 from validate.replay.road import compare as compare_with
 
+pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
+
 SOME = ("fem", "kf_printed", "kf_load", "load_scale")
 # Of methods that are left out.
 TIMED = ("FEM step over filter step", "step of FEM", "step of KF-FEM", "rate of KF-FEM")
@@ -118,7 +120,6 @@ def test_noise_along_the_load_and_two_states_correct_every_node(some: Result) ->
     assert nrmse(some, "load_scale", "@stiff_model") == pytest.approx([0.0028 / 1.2] * 3, abs=1e-3)
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     result = whole("kf_cube")

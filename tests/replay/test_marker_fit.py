@@ -10,6 +10,7 @@ from validate.replay.find import find
 from validate.replay.options import Options, configure, folder_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["kf_cube", "ekf_cube", "ekf_liver", "ekf_cone", "needle_block", "fluid_phantom"]
 )

@@ -118,6 +118,7 @@ def test_every_law_walks_the_road(law: str) -> None:
     assert (check.count, check.verdict) == (len(STRETCH), "agrees")
 
 
+@pytest.mark.slow
 def test_a_stretch_that_is_held_relaxes_on_the_road() -> None:
     """P = mu (l - 1/l^2) (1 + g exp(-t/tau)) after a jump; without the series it differs."""
     t, series = np.linspace(0.0, 3.0, 61), Prony((0.6,), (0.7,))

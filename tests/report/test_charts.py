@@ -229,6 +229,7 @@ def test_a_log_axis_leaves_out_what_is_not_positive(result: Result) -> None:
     assert [t.get_text() for t in ax.texts] == ["one"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("top", [1.1, 2.0, 4.0, 30.0, 1e3, 1e7])
 @pytest.mark.parametrize("low", [3e-7, 0.08, 40.0])
 def test_ticks_of_any_range_can_be_read(result: Result, low: float, top: float) -> None:
@@ -239,6 +240,7 @@ def test_ticks_of_any_range_can_be_read(result: Result, low: float, top: float) 
     assert len([t for t in figure.axes[0].get_yticks() if low <= t <= low * top]) >= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [1e-3, 0.05, 20.0])
 def test_axes_of_both_signs_have_readable_ticks(result: Result, noise: float) -> None:
     lines = [Series(f"s{i}", X, (i - 3) * 7 * noise * X) for i in range(8)]

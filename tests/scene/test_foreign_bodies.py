@@ -106,6 +106,7 @@ def _inp(path: Path, mesh: Mesh) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_sphere_is_filled_to_its_volume(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The volume of the triangulated sphere, within the envelope of a thousandth; nothing is left
     in the current folder, where the library would write."""

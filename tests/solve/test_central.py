@@ -55,6 +55,7 @@ def test_substeps_are_steps_with_inputs_linear_between() -> None:
     assert four.traces["updates"].y.tolist() == [4.0] * 20
 
 
+@pytest.mark.slow
 def test_threads_change_no_more_than_rounding() -> None:
     """Also where a run begins with two and goes on with one."""
     system, dt = pressed(), 3e-4

@@ -60,6 +60,7 @@ def step_of(scheme: Scheme) -> float:
     return float(scheme.dt)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 @EVERY
 def test_a_struck_bar_answers_as_a_wave_does(
     scheme: Scheme, law: LawName, off: float, own: float

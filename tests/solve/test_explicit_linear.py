@@ -37,6 +37,7 @@ def end(scheme: Scheme, system: System, inputs: np.ndarray, dt: float) -> np.nda
     return got.u[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "terms", "update"), EVERYTHING)
 def test_every_variant_converges_to_the_implicit_motion_of_its_matrices(
     mass: MassName, terms: DampingTerms, update: str

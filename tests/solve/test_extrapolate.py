@@ -42,6 +42,7 @@ def test_ticks_between_answers_are_exact_once_enough_answers_are_there(
         assert np.abs(got[:begun] - y[:begun]).max() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "order"), [("hold", 1), ("linear", 2), ("quadratic", 3)])
 def test_the_error_on_a_sine_falls_by_its_order_and_is_the_known_one(name: str, order: int) -> None:
     """Peak error of order p at a distance a behind readings T apart: w^p a (a + T) .. / p!."""

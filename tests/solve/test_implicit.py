@@ -7,6 +7,7 @@ from explicit_scenes import pulled, ran, rise
 from validate.solve.implicit import NewtonDynamics, RateRule
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rule", "order"), [("average", 2), ("backward_euler", 1)])
 def test_the_rules_converge_with_their_order(rule: RateRule, order: int) -> None:
     system, T = pulled(cells=2), 0.04

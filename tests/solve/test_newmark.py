@@ -110,6 +110,7 @@ def test_average_acceleration_conserves_energy() -> None:
     assert energies[10] > 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [1e-5, 2e-3, 10.0])
 @pytest.mark.parametrize("rule", RULES)
 def test_nothing_diverges_without_damping(rule: RuleName, dt: float) -> None:

@@ -119,6 +119,7 @@ def test_force_peaks_at_the_end_of_the_law() -> None:
     assert slopes[-1] < 0.05 * slopes[0]
 
 
+@pytest.mark.slow
 def test_work_of_the_plate_is_the_stored_energy() -> None:
     """The fluid keeps its volume, so it takes none; Simpson's rule along the load path."""
     stepper = StaticNewton().prepare(phantom_system())

@@ -69,6 +69,7 @@ CASES: list[tuple[str, Dilatation]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nu", [0.499, 0.4999])
 @pytest.mark.parametrize(("kind", "dilatation"), CASES)
 def test_every_element_takes_the_whole_load_in_one_step(

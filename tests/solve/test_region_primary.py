@@ -65,6 +65,7 @@ def test_at_small_strain_it_is_the_linear_run(law: Any, solver: Any) -> None:
     assert np.abs(change).max() > 1e-3 * np.abs(1e5 * expected).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_at_rest_the_whole_body_is_in_the_laws_own_equilibrium(dimension: int) -> None:
     """The forces of the whole hyperelastic body are the spring's, and nothing else."""
@@ -160,6 +161,7 @@ def test_both_laws_relax_alike_at_small_strain() -> None:
     assert large == pytest.approx(linear, abs=1e-5 * linear.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["explicit", "euler"])
 def test_explicit_steps_relax_to_the_same_limit(solver: Any) -> None:
     scene = damped(strained(CELLS))

@@ -186,6 +186,7 @@ def _radius(settings: AsyncRegions) -> float:
     return spectral_radius(regions.coupled, pull)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "stable"),
     [
@@ -225,6 +226,7 @@ def test_an_explicit_region_beyond_its_critical_step_is_refused_with_both_number
 # --- regions that change --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("adapt", "border"), [("linear", "delayed"), ("saturating", "hold"), ("threshold", "delayed")]
 )

@@ -132,6 +132,7 @@ def test_a_wrong_modulus_is_noticed_the_more_the_wronger() -> None:
     assert weak == sorted(weak)
 
 
+@pytest.mark.slow
 def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
     own = written("drawn", uncertain=0.05)
     first = coverage(own, draws=20, out=tmp_path, where=HERE)
@@ -315,6 +316,7 @@ def test_the_command_writes_a_page_with_tables_and_curves(
     assert list((folder / "figures").glob("chart_power_fem_*.png"))
 
 
+@pytest.mark.slow
 def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Path) -> None:
     text = OWN.format(name="steep", quantity="force", limit=5e-3, range=0.7, uncertainty=INPUTS)
     path = tmp_path / "steep.py"

@@ -121,6 +121,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     found.stop()
 
 
+@pytest.mark.slow
 def test_timed_cells_run_one_at_a_time_on_one_worker(cluster: Cluster, tmp_path: Path) -> None:
     beside = tuple(Waiting(f"b{i}", 0.05) for i in range(4))
     timed = tuple(Waiting(f"t{i}", 0.05, timed=True) for i in range(4))

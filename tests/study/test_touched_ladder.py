@@ -49,6 +49,7 @@ def test_a_touched_body_is_climbed_by_its_own_methods(trial: Trial) -> None:
     assert "shared by the nodes within" in trial.notes[1]
 
 
+@pytest.mark.slow
 def test_a_bar_is_refined_as_one_body(project_root: Path) -> None:
     trial = trial_of(load_file(project_root / "experiments" / "async_line.py"), quick=True)
     element, finest = trial.reference
