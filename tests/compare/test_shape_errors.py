@@ -130,6 +130,7 @@ def test_an_inside_out_mesh_is_refused() -> None:
         still(mesh)
 
 
+@pytest.mark.slow
 def test_a_run_turned_inside_out_is_no_perfect_match(mesh: Mesh) -> None:
     """x -> -x: the booleans would call it empty and the error 0."""
     found = compared(pair(along_x(mesh, -2 * mesh.nodes[:, 0]), still(mesh)))

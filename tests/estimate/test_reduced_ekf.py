@@ -201,6 +201,7 @@ FORMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_one_measured_node_corrects_the_whole_field_of_a_wrong_model(
     wrong_model: tuple[System, Floats, Measurements, Floats], form: str

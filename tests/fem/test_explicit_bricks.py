@@ -100,6 +100,7 @@ def test_explicit_steps_converge_to_implicit_ones() -> None:
     assert apart(ours, limit) < 2e-3
 
 
+@pytest.mark.slow
 def test_a_step_beyond_the_limit_is_refused_with_the_limit() -> None:
     run = march(
         "fast", CentralDifference(1e-3).prepare(swinging()), np.array([1e-3]), np.ones((1, 1)),

@@ -65,6 +65,7 @@ def test_tangent_at_rest_is_the_linear_stiffness(
     assert abs(T - K).max() <= 1e-10 * abs(K).max()
 
 
+@pytest.mark.slow
 @every
 def test_force_and_tangent_are_derivatives(order: int, dilatation: Dilatation, name: str) -> None:
     b = body(order, dilatation, name)

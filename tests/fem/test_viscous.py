@@ -102,6 +102,7 @@ def test_closed_cycles_take_energy(name: str) -> None:
             assert work > 1e-3 * np.abs(P).max()
 
 
+@pytest.mark.slow
 def test_small_oscillations_have_the_loss_factor_of_the_series() -> None:
     """G' = G (1 + sum g w^2 tau^2/(1 + w^2 tau^2)), G'' = G sum g w tau/(1 + w^2 tau^2)."""
     w, n, cycles = 7.0, 60, 12

@@ -234,7 +234,9 @@ def test_an_unknown_option_is_one_line_with_its_name(reader: Reader, tmp_path: P
 
 
 @EACH
-@pytest.mark.parametrize("damage", ["empty", "cut", "garbage"])
+@pytest.mark.parametrize(
+    "damage", ["empty", *(pytest.param(d, marks=pytest.mark.slow) for d in ("cut", "garbage"))]
+)
 def test_damage_is_one_line_with_the_name_of_the_file(
     reader: Reader, damage: str, tmp_path: Path
 ) -> None:

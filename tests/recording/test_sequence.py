@@ -111,6 +111,7 @@ def test_a_stylus_without_an_image_is_read(shared_data: Path) -> None:
     assert got.signal("ReferenceToTracker/translation", "m").y.shape == (1000, 3)
 
 
+@pytest.mark.slow
 def test_two_formats_of_one_sequence_are_equal(shared_data: Path) -> None:
     one, other = (
         read(shared_data / FREEHAND.format(ending), {"m_per_px": "0.1mm"})

@@ -270,6 +270,7 @@ def test_landmarks_touched_exactly_lie_where_all_others_say() -> None:
     assert found.values == pytest.approx(np.zeros((6, 3)), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_noise_of_a_landmark_is_its_own_and_that_of_the_poses_it_makes() -> None:
     seen = touched(np.zeros((6, 3)))
     run = predicting(seen)

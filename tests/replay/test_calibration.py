@@ -45,6 +45,7 @@ def test_a_calibration_names_parameters_and_residuals_each_once() -> None:
 # --- on the road ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_stands_open_is_identified_and_what_calibrated_is_fitted() -> None:
     result = compare(OPEN, Options({}))
     (modulus,) = result.identified

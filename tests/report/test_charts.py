@@ -101,6 +101,7 @@ def test_lines_of_several_recordings_are_told_apart(result: Result) -> None:
     assert names == [f"log {i}" for i in range(5)]
 
 
+@pytest.mark.slow
 def test_zigzags_of_several_recordings_keep_their_dashes(result: Result) -> None:
     x, rng = np.linspace(0, 1, 1000), np.random.default_rng(0)
     lines = [

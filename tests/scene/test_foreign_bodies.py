@@ -140,11 +140,16 @@ def test_the_beam_of_others_is_filled(shared_data: Path) -> None:
     ("name", "text", "why"),
     [
         ("x.msh", "$MeshFormat\n1 0 8\n$EndMeshFormat\n", "x.msh: "),
-        ("x.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "x.vtk: "),
-        ("x.vtu", "<VTKFile>", "x.vtu: "),
-        ("x.obj", "v 0 0 0\n", "x.obj: "),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)  # each starts a process
+            for case in (
+                ("x.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "x.vtk: "),
+                ("x.vtu", "<VTKFile>", "x.vtu: "),
+                ("x.obj", "v 0 0 0\n", "x.obj: "),
+                ("x.stl", "solid x\nendsolid x\n", "x.stl: "),
+            )
+        ),
         ("x.ply", "ply\nformat ascii 1.0\n", "x.ply: "),
-        ("x.stl", "solid x\nendsolid x\n", "x.stl: "),
     ],
 )
 def test_a_reader_that_ends_the_interpreter_costs_a_line(

@@ -84,6 +84,7 @@ def test_no_threads_run_where_no_core_is_idle(monkeypatch: pytest.MonkeyPatch) -
     assert alone.said == ()
 
 
+@pytest.mark.slow
 def test_a_measured_number_of_threads_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("validate.solve.central.idle_cores", lambda: 2)
     run = ran(CentralDifference(3e-4, threads=2), pressed(), rise(20, 0.02), 3e-4)

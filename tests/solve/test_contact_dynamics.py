@@ -82,6 +82,7 @@ def test_a_struck_bar_answers_as_a_wave_does(
     assert traced(states, "plate.penetration").max() < 1e-12
 
 
+@pytest.mark.slow
 @EVERY
 def test_a_strike_gives_the_bar_no_more_than_the_plates_work(
     scheme: Scheme, law: LawName, off: float, own: float

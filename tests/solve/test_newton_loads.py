@@ -144,6 +144,7 @@ def test_a_loose_body_is_refused() -> None:
         StaticNewton().prepare(build(replace(pulled().scene, supports=())))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [0.002, 0.01])
 def test_a_swing_near_nu_one_half_takes_steps_of_ten_milliseconds(dt: float) -> None:
     """The first half swing of 62 ms goes twice as deep as the beam hangs at rest."""
