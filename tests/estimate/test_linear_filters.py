@@ -401,14 +401,14 @@ def test_a_step_of_the_load_scale_by_hand() -> None:
     settings = LoadScale(dt=0.5, scale_sd=0.5, walk=0.2, Q=3.0)
     core = ScaleCore(settings, np.array([1.0, 2.0]), np.array([2.0]), np.array([4.0]), 0.25, 0.1)
     prior, _ = core.step(core.start(), 1, np.array([10.0]), None)
-    assert prior.x == pytest.approx([0.75, 1.0], rel=1e-14)
+    assert prior.x.x == pytest.approx([0.75, 1.0], rel=1e-14)
     known = np.array([[3 + 0.75**2 / 4, 0.75 / 4], [0.75 / 4, 0.25 + 0.2**2 / 2]])
-    assert pytest.approx(known, rel=1e-14) == prior.P
+    assert pytest.approx(known, rel=1e-14) == prior.x.P
     assert core.free(prior) == pytest.approx([0.75, 1.5])
     assert core.variances(prior) == pytest.approx(known[0, 0] * np.array([1.0, 4.0]))
     after, seen = core.step(core.start(), 1, np.array([10.0]), np.array([2.5]))
     gain = 2 * known[0] / (4 * known[0, 0] + 4)
-    assert after.x == pytest.approx([0.75, 1.0] + gain * 1.0, rel=1e-14)
+    assert after.x.x == pytest.approx([0.75, 1.0] + gain * 1.0, rel=1e-14)
     assert seen.y == pytest.approx([1.0])
 
 

@@ -15,8 +15,10 @@ from validate.errors import UsageError
 from validate.estimate.consistency import nees_consistency
 from validate.estimate.covariance import Dense
 from validate.estimate.explicit_filter import ExplicitFilterStepper
+from validate.estimate.filterpy_guest import FilterpyGuest
 from validate.estimate.filters import FILTERS, Filter
 from validate.estimate.kf_fem import KfFem
+from validate.estimate.load_scale import LoadScale, ScaleCore
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.reduced_ekf import ReducedEKF, ShapesCore
 from validate.estimate.reduced_kf import ReducedKf, dense_covariance
@@ -31,6 +33,9 @@ LINEAR: tuple[Any, ...] = (
     ModalKf(gains="shared", recursion="posterior"),
     ReducedKf(),
     ReducedKf(load_start=0.0, load_jitter=0.02),
+    LoadScale(),
+    LoadScale(walk=0.3, Q=1e-12),
+    FilterpyGuest(),
 )
 
 
@@ -165,12 +170,14 @@ def smooths(filter_: Any) -> bool:
     return "smooth" in filter_.__dataclass_fields__
 
 
-def test_every_linear_and_reduced_filter_of_ours_smooths() -> None:
+def test_every_linear_and_reduced_filter_smooths() -> None:
     assert {f.__name__ for f in FILTERS if smooths(f)} == {
         "KfFem",
         "ModalKf",
         "ReducedKf",
         "ReducedEKF",
+        "LoadScale",
+        "FilterpyGuest",
     }
 
 
@@ -303,3 +310,53 @@ def test_a_large_strain_run_is_nearer_to_the_truth() -> None:
 def test_a_steady_gain_is_refused(pulled: Case) -> None:
     with pytest.raises(UsageError, match="smooth needs the exact gains"):
         ReducedKf(gains="steady", smooth=True).prepare(pulled.system, pulled.measured(1))
+
+
+def test_a_guest_is_smoothed_as_our_own_filter_and_another_is_refused(pulled: Case) -> None:
+    seen = pulled.measured(1, every=3)
+    ours, guest = (
+        pulled.march(s.prepare(pulled.system, seen), at=FRAMES)
+        for s in (
+            ReducedKf(modes=5, load_start=0.1, load_walk=0.1, settled=0.0, smooth=True),
+            FilterpyGuest(smooth=True),
+        )
+    )
+    assert guest.u == pytest.approx(ours.u, rel=1e-6, abs=1e-11)
+    assert guest.sd == pytest.approx(ours.sd, rel=1e-4, abs=1e-12)
+    for name in ("EnsembleKalmanFilter", "UnscentedKalmanFilter"):
+        with pytest.raises(UsageError, match=f"gains, which _?{name[:8]}.* has not: take make="):
+            FilterpyGuest(name, smooth=True).prepare(pulled.system, seen)
+
+
+def test_a_load_scale_is_the_posterior_of_all_looks_through_a_load_that_changes() -> None:
+    """Its transition is of each step's load: against the least squares of the whole path."""
+    loads, rng = np.array([0.0, 3.0, 5.0, -2.0, 4.0, 1.0]), np.random.default_rng(4)
+    settings = LoadScale(dt=0.1, scale_sd=0.5, walk=0.2, Q=1e-2)
+    core = ScaleCore(settings, np.ones(2), np.array([1.0, 0.5]), np.full(2, 0.04), 0.6, 0.2)
+    z, state, states = rng.normal(size=(6, 2)), core.start(), []
+    z[2] = np.nan
+    for k, load in enumerate(loads):
+        look = None if np.isnan(z[k]).any() else z[k]
+        state, _ = core.step(state, k + 1, np.array([load]), look)
+        states.append(state)
+    found = smoothed(core.transition(), [core.note(s, True) for s in states])
+    late = [core.corrected(s, found.after(k + 1), found.roots[k + 1]) for k, s in enumerate(states)]
+    # Rows: the start, how each step follows from the one before, what was seen; over their sds.
+    rows, right = [np.eye(1, 14, 1)[0] / 0.5], [1.0 / 0.5]
+    sd = np.sqrt(np.diag(core.Q))
+    for k, s in enumerate(states):
+        for i in range(2):
+            row = np.zeros(14)
+            row[2 * k : 2 * k + 2], row[2 * k + 2 + i] = -s.A[i] / sd[i], 1 / sd[i]
+            rows.append(row)
+            right.append(0.0)
+            if not np.isnan(z[k]).any():
+                rows.append(np.eye(1, 14, 2 * k + 2)[0] * core.seen[i] / 0.2)
+                right.append(z[k, i] / 0.2)
+    A = np.array(rows)[:, 1:]  # the amplitude starts at zero, surely
+    P = np.linalg.inv(A.T @ A)
+    path = (P @ A.T @ np.array(right))[1:].reshape(6, 2)
+    for k, one in enumerate(late):
+        assert one.x.x == pytest.approx(path[k], rel=1e-9, abs=1e-11)
+        at = slice(1 + 2 * k, 3 + 2 * k)
+        assert pytest.approx(P[at, at], rel=1e-8, abs=1e-11) == one.x.P

@@ -307,6 +307,7 @@ def test_a_probe_takes_hold_within_its_reach_only_and_may_let_go() -> None:
 
 def test_rates_that_do_not_divide_the_primary_one_are_rounded_in_words() -> None:
     assert ratios((500.0, 50.0), 1e-3) == ((2, 20), ())
+    assert ratios((1e-3,), 1e-3)[1] == ("0.001 Hz is solved every 1000 s, never in a shorter run",)
     assert ratios((300.0,), 1e-3) == (
         (3,),
         ("300 Hz does not divide 1000 Hz: solved every 3 ticks, at 333.3 Hz",),

@@ -34,6 +34,7 @@ from validate.estimate.kalman import (
     Gated,
     Gaussian,
     Innovation,
+    Update,
     innovation,
     kf_update,
     nothing,
@@ -128,14 +129,14 @@ class Care:
 
     def linear_update(
         self, prior: Gaussian, z: Floats, H: Floats, R: Floats, moved: Floats
-    ) -> tuple[Gaussian, Innovation]:
-        """`kf_update` with care; the prior where nothing passed."""
+    ) -> tuple[Update | None, Innovation]:
+        """`kf_update` with care; None where nothing passed."""
         R, shown = R + self.together(moved), H @ prior.x
         z, gated = self.passed(z, shown, H @ prior.P @ H.T + R)
         if not np.isfinite(z).any():
-            return prior, replace(nothing(len(z)), gated=gated)
+            return None, replace(nothing(len(z)), gated=gated)
         update = kf_update(prior, z, H, R)
-        return update.posterior, replace(update.innovation, gated=gated)
+        return update, replace(update.innovation, gated=gated)
 
 
 def _squared(y: Floats, S: Floats) -> float:

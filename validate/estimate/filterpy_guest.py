@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.estimate.care import Care, care_of, clock_setting, gate_setting
 from validate.estimate.filterpy_names import (
     EnsembleKalmanFilter,
@@ -24,8 +24,10 @@ from validate.estimate.filterpy_names import (
 from validate.estimate.kalman import Innovation, best_gain, innovation, nothing
 from validate.estimate.linear_model import LinearModel, require_symmetric
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.reduced_kf import dense_covariance
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
 from validate.estimate.small_state import CoreStepper
+from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
@@ -135,10 +137,11 @@ class FilterpyGuest:
     seed: int = quantity(0, "1", "of filters that draw")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
+    smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
-        shapes are not the model's."""
+        shapes are not the model's, `UsageError` for smoothing one whose covariances are its own."""
         require_handled(system.scene, self)
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
@@ -146,10 +149,12 @@ class FilterpyGuest:
         with seeded(self.seed):
             first = _made(self.make)(reduced.model)
         require_shapes(first, reduced.model)
+        if self.smooth:
+            require_exact_covariances(first)
         care = care_of(measurements, self.gate, self.clock, self.dt)
         core = GuestCore(reduced, first, self.seed, care)
         table = timetable(measurements, self.dt)
-        return CoreStepper(system, core, measurements.names, table, care)
+        return CoreStepper(system, core, measurements.names, table, care, self.smooth)
 
 
 def _made(make: Make | str) -> Make:
@@ -185,11 +190,25 @@ def require_shapes(guest: Any, model: LinearModel) -> None:
             raise ComparisonError(f"guest {type(guest).__name__} has no `{name}`: not a filter")
 
 
+def require_exact_covariances(guest: Any) -> None:
+    """Raises `UsageError` unless the guest's P and gain are those of the linear model. filterpy's
+    unscented filter takes its gain from points that were moved without the step's noise."""
+    if not isinstance(guest, KalmanFilter) or guest.alpha != 1.0:
+        raise UsageError(
+            f"smooth needs the model's own covariances and gains, which {type(guest).__name__} has "
+            "not: take make='KalmanFilter' (alpha = 1), or smooth=false"
+        )
+
+
 @dataclass(frozen=True)
 class Visit:
-    """A guest after a step."""
+    """A guest after a step, and the look that it took; smoothed, what is added to its mean (n,)
+    and at output frames taken off its covariance (n, n)."""
 
     guest: Any
+    look: Look | None = None
+    more: Floats | float = 0.0
+    less: Floats | float = 0.0
 
 
 @dataclass(frozen=True)
@@ -216,11 +235,11 @@ class GuestCore:
             guest.predict(u=loads)
             if z is None or not np.isfinite(z).all():
                 return Visit(guest), nothing(len(model.H))
-            found = self._update(guest, z, model.H @ (guest.x - inner.guest.x))
+            look, found = self._update(guest, z, model.H @ (guest.x - inner.guest.x))
         require_shapes(guest, model)
-        return Visit(guest), found
+        return Visit(guest, look), found
 
-    def _update(self, guest: Any, z: Floats, moved: Floats) -> Innovation:
+    def _update(self, guest: Any, z: Floats, moved: Floats) -> tuple[Look | None, Innovation]:
         """Changes the guest, unless a gate rejects part of z (m,) m."""
         H, R, gated = self.reduced.model.H, self.reduced.model.R, None
         PHt, shown = guest.P @ H.T, H @ guest.x
@@ -228,17 +247,30 @@ class GuestCore:
             R = R + self.care.together(moved)
             z, gated = self.care.passed(z, shown, H @ PHt + R)
         if not np.isfinite(z).all():
-            return replace(nothing(len(H)), gated=gated)
+            return None, replace(nothing(len(H)), gated=gated)
         gain = best_gain(PHt, H @ PHt + R)
         guest.update(z, R=R) if self.care else guest.update(z)
-        return replace(innovation(z, shown, gain), gated=gated)
+        found = replace(innovation(z, shown, gain), gated=gated)
+        return look_of(gain, found), found
 
     def free(self, inner: Visit) -> Floats:
-        return np.asarray(self.reduced.lift @ inner.guest.x)
+        return np.asarray(self.reduced.lift @ (inner.guest.x + inner.more))
 
     def variances(self, inner: Visit) -> Floats:
         lift = self.reduced.lift
-        return np.asarray(np.einsum("ij,ij->i", lift @ inner.guest.P, lift))
+        return np.asarray(np.einsum("ij,ij->i", lift @ (inner.guest.P - inner.less), lift))
+
+    def note(self, inner: Visit, framed: bool) -> Note:
+        return Note(inner.look, framed)
+
+    def transition(self) -> Transition:
+        return dense_covariance(self.reduced.model)
+
+    def corrected(self, inner: Visit, e: Floats, W: Floats | None) -> Visit:
+        if W is None:
+            return replace(inner, more=e)
+        PW = inner.guest.P @ W
+        return replace(inner, more=e, less=PW @ PW.T)
 
     def numbers(self, inner: Visit) -> Mapping[str, float]:
         return {}

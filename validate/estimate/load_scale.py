@@ -15,10 +15,19 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.covariance import Dense
 from validate.estimate.displacement_filter import load_shapes
-from validate.estimate.kalman import Gaussian, Innovation, kf_predict, kf_update, nothing
+from validate.estimate.kalman import (
+    Gaussian,
+    Innovation,
+    Update,
+    kf_predict,
+    kf_update,
+    nothing,
+)
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.small_state import CoreStepper
+from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
@@ -41,6 +50,7 @@ class LoadScale:
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
+    smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> Stepper:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
@@ -52,7 +62,7 @@ class LoadScale:
         care = care_of(measurements, self.gate, self.clock, self.dt)
         core = _core(self, system, shape, H @ shape, measurements.variances(self.R), care)
         table = timetable(measurements, self.dt)
-        return CoreStepper(system, core, measurements.names, table, care)
+        return CoreStepper(system, core, measurements.names, table, care, self.smooth)
 
 
 def _core(
@@ -71,6 +81,15 @@ def _core(
 
 
 @dataclass(frozen=True)
+class Scaled:
+    """Amplitude and scale after a step, A (2, 2) of that step and the look that it took."""
+
+    x: Gaussian
+    A: Floats
+    look: Look | None = None
+
+
+@dataclass(frozen=True)
 class ScaleCore:
     """`keep` of the amplitude stays over a step; `per_newton` m/N is its static value."""
 
@@ -86,30 +105,57 @@ class ScaleCore:
     def units(self) -> Mapping[str, str]:
         return {"load.scale": "1"}
 
-    def start(self) -> Gaussian:
-        return Gaussian(np.array([0.0, 1.0]), np.diag([0.0, self.settings.scale_sd**2]))
+    @property
+    def H(self) -> Floats:
+        return np.outer(self.seen, [1.0, 0.0])
+
+    @property
+    def Q(self) -> Floats:
+        s = self.settings
+        return np.diag([s.Q, s.walk**2 * s.dt])
+
+    def start(self) -> Scaled:
+        doubt = np.diag([0.0, self.settings.scale_sd**2])
+        return Scaled(Gaussian(np.array([0.0, 1.0]), doubt), np.eye(2))
 
     def step(
-        self, inner: Gaussian, k: int, loads: Floats, z: Floats | None
-    ) -> tuple[Gaussian, Innovation]:
+        self, inner: Scaled, k: int, loads: Floats, z: Floats | None
+    ) -> tuple[Scaled, Innovation]:
         static = (1 - self.keep) * self.per_newton * loads[0]
         A = np.array([[self.keep, static], [0.0, 1.0]])
-        s = self.settings
-        prior = kf_predict(inner, A, np.diag([s.Q, s.walk**2 * s.dt]))
+        prior = kf_predict(inner.x, A, self.Q)
         if z is None:
-            return prior, nothing(len(self.seen))
-        H, R = np.outer(self.seen, [1.0, 0.0]), np.diag(self.R)
+            return Scaled(prior, A), nothing(len(self.seen))
+        update, seen = self._updated(prior, z, inner.x.x[0])
+        if update is None:
+            return Scaled(prior, A), seen
+        return Scaled(update.posterior, A, look_of(update.gain, seen)), seen
+
+    def _updated(self, prior: Gaussian, z: Floats, was: float) -> tuple[Update | None, Innovation]:
+        R = np.diag(self.R)
         if self.care is not None:
-            moved = self.seen * (prior.x[0] - inner.x[0])
-            return self.care.linear_update(prior, z, H, R, moved)
-        update = kf_update(prior, z, H, R)
-        return update.posterior, update.innovation
+            return self.care.linear_update(prior, z, self.H, R, self.seen * (prior.x[0] - was))
+        update = kf_update(prior, z, self.H, R)
+        return update, update.innovation
 
-    def free(self, inner: Gaussian) -> Floats:
-        return np.asarray(self.shape * inner.x[0])
+    def free(self, inner: Scaled) -> Floats:
+        return np.asarray(self.shape * inner.x.x[0])
 
-    def variances(self, inner: Gaussian) -> Floats:
-        return np.asarray(self.shape**2 * inner.P[0, 0])
+    def variances(self, inner: Scaled) -> Floats:
+        return np.asarray(self.shape**2 * inner.x.P[0, 0])
 
-    def numbers(self, inner: Gaussian) -> Mapping[str, float]:
-        return {"load.scale": float(inner.x[1])}
+    def numbers(self, inner: Scaled) -> Mapping[str, float]:
+        return {"load.scale": float(inner.x.x[1])}
+
+    def _across(self, A: Floats) -> Dense:
+        return Dense(A, self.Q, self.H, self.R, self.start().x.P)
+
+    def note(self, inner: Scaled, framed: bool) -> Note:
+        return Note(inner.look, framed, self._across(inner.A))
+
+    def transition(self) -> Transition:
+        return self._across(np.eye(2))
+
+    def corrected(self, inner: Scaled, e: Floats, W: Floats | None) -> Scaled:
+        PW = inner.x.P @ W if W is not None else np.zeros((2, 0))
+        return replace(inner, x=Gaussian(inner.x.x + e, inner.x.P - PW @ PW.T))

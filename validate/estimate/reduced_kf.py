@@ -23,6 +23,7 @@ from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_mo
 from validate.estimate.small_state import CoreStepper
 from validate.estimate.smoother import (
     Look,
+    Note,
     Transition,
     look_of,
     require_exact,
@@ -211,8 +212,8 @@ class GainCore:
         biases = inner.x[len(inner.x) - self.reduced.loads :]
         return dict(zip(self.units, biases.tolist(), strict=True))
 
-    def look(self, inner: Amplitudes) -> Look | None:
-        return inner.look
+    def note(self, inner: Amplitudes, framed: bool) -> Note:
+        return Note(inner.look, framed)
 
     def transition(self) -> Transition:
         assert isinstance(self.recursion, Dense)

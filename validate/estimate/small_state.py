@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.kalman import Innovation, innovation_units
 from validate.estimate.measurements import Timetable
-from validate.estimate.smoother import Look, Note, Transition, smoothed
+from validate.estimate.smoother import Note, Transition, smoothed
 from validate.fem.system import System
 from validate.scene.scene import Scene
 from validate.solve.dynamic import spread
@@ -46,8 +46,8 @@ class Core(Protocol):
 class SmoothCore(Core, Protocol):
     """A core whose states can be smoothed."""
 
-    def look(self, inner: Any) -> Look | None:
-        """What it took at the last step, if anything."""
+    def note(self, inner: Any, framed: bool) -> Note:
+        """Of the last step."""
         ...
 
     def transition(self) -> Transition: ...
@@ -96,7 +96,7 @@ class CoreStepper:
 
     def note(self, state: State, framed: bool) -> Note:
         assert isinstance(self.core, SmoothCore)
-        return Note(self.core.look(state.inner), framed)
+        return self.core.note(state.inner, framed)
 
     def smoother(self, notes: Sequence[Note]) -> Callable[[State], State]:
         """With what else the core estimates."""

@@ -71,10 +71,12 @@ def look_of(gain: Gain, found: Innovation) -> Look:
 
 @dataclass(frozen=True)
 class Note:
-    """What smoothing needs of a step: its look, if any, and whether it is an output frame."""
+    """What smoothing needs of a step: its look, if any, whether it is an output frame, and how
+    errors went over to it where that is not as at every step."""
 
     look: Look | None
     framed: bool = False
+    across: Transition | None = None
 
 
 @dataclass(frozen=True)
@@ -99,8 +101,8 @@ def smoothed(model: Transition, notes: Sequence[Note]) -> Smoothed:
         look = notes[i].look
         if look is not None:
             away, W = _informed(model.H[np.array(look.gain.seen)], look, away, W)
-        kept[i] = away
-        away, W = model.back(away), model.back(W if W.shape[1] <= _wide(n) else _narrow(W))
+        kept[i], across = away, notes[i].across or model
+        away, W = across.back(away), across.back(W if W.shape[1] <= _wide(n) else _narrow(W))
     return Smoothed(_forward(model, notes, away, kept), roots)
 
 
@@ -130,7 +132,8 @@ def _forward(model: Transition, notes: Sequence[Note], away: Floats, kept: Float
     """Corrections (steps, n), in the place of `kept`."""
     e = -model.P0 @ away
     for i, note in enumerate(notes):
-        e = model.ahead(e) - model.Q @ kept[i]
+        across = note.across or model
+        e = across.ahead(e) - across.Q @ kept[i]
         if note.look is not None:
             e = e - note.look.gain.G @ note.look.y
         kept[i] = e

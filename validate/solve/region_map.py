@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 
+_SELDOM = 1.0  # s between two solves from which it is said
 _WHOLE = 1e-9  # of a ratio of rates, beyond which it is rounded with a notice
 
 
@@ -105,6 +106,8 @@ def ratios(rates: tuple[float, ...], dt: float) -> tuple[tuple[int, ...], tuple[
                 f"{rate:g} Hz does not divide {1 / dt:g} Hz: solved every {ticks} ticks, at "
                 f"{1 / (ticks * dt):.4g} Hz"
             )
+        if ticks * dt > _SELDOM:
+            words.append(f"{rate:g} Hz is solved every {ticks * dt:.4g} s, never in a shorter run")
         found.append(ticks)
     return tuple(found), tuple(words)
 
