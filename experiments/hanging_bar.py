@@ -9,8 +9,10 @@ from validate.compare.verdict import Accept
 from validate.papers.hanging_bar.bar import BarModel as Model
 from validate.papers.hanging_bar.bar import HangingBar, build, load, place
 from validate.papers.hanging_bar.converged import PUBLISHED, tell
+from validate.papers.hanging_bar.ladder import trial
 from validate.replay.cards import changed
 from validate.replay.experiment import Experiment, MeshLadder, Uncertainty
+from validate.replay.ladder import Ladder
 from validate.replay.method import Method
 from validate.solve.guests.guest import Guest
 from validate.solve.newton import StaticNewton
@@ -49,5 +51,6 @@ EXPERIMENT = Experiment(
     ),
     exhibits=tell,
     published=PUBLISHED,
+    ladder=Ladder(trial=trial),
     locates=("data",),
 )

@@ -244,12 +244,13 @@ def stability_(name: str, **options: Any) -> int:
 
 
 @study.command()
+@GUESTS
 @_studied
-def tradeoff(name: str, **options: Any) -> int:
+def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
     """Error against time per step: every solver, mesh, element and step; the Pareto front."""
     from validate.cli import studying
 
-    return studying.tradeoff(name, _common(options))
+    return studying.tradeoff(name, _common(options), guests)
 
 
 @study.command()

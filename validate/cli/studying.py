@@ -124,13 +124,16 @@ def _still(experiment: Experiment, still: GainMap | None, place: str, common: St
     return FAILED if told.passed is False else OK
 
 
-def tradeoff(name: str, common: StudyOptions) -> int:
+def tradeoff(name: str, common: StudyOptions, guests: tuple[str, ...] = ()) -> int:
     """Measures error against time; 0."""
-    experiment, place = find(name, Path.cwd(), common.named), f"tradeoff{_quick(common)}"
+    experiment = find(name, Path.cwd(), common.named)
+    words = ["quick"] * common.quick + ["guest"] * bool(guests)
+    place = f"tradeoff{tag(words, [common.quick, guests] if guests else common.quick)}"
     with running(experiment, place, "pilot runs", common) as report:
         found = trade(
-            experiment, quick=common.quick, out=common.out, where=common.where, report=report
-        )
+            experiment, quick=common.quick, guests=guests, out=common.out, where=common.where,
+            report=report,
+        )  # fmt: skip
     page = written(experiment, trade_page.told(found), place, common)
     if not common.as_json:
         _show_trade(found)

@@ -16,7 +16,7 @@ from validate.recording.types import Recording
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene
-from validate.solve.types import Scheme
+from validate.solve.types import SceneSolver, Scheme
 
 LARGEST = 1000  # unknowns of a body whose stability is mapped: all its modes are taken many times
 # Worst altitude ratios of its cells.
@@ -24,12 +24,13 @@ QUALITY = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 
 Rung = Literal[
     "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
-    "large strain",
+    "large strain", "guests",
 ]  # fmt: skip
-RUNGS: tuple[Rung, ...] = (
+RUNGS: tuple[Rung, ...] = (  # that are climbed to choose a method of ours
     "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
     "large strain",
 )  # fmt: skip
+SHOWN: tuple[Rung, ...] = (*RUNGS, "guests")
 
 # --- error against time ---------------------------------------------------------------------------
 
@@ -47,7 +48,7 @@ class Rival:
 
     name: str
     rung: Rung
-    make: Callable[[float], Scheme]
+    make: Callable[[float], Scheme | SceneSolver]
     stepped: bool = True
     law: LawName = "linear"
     elements: tuple[str, ...] = ()

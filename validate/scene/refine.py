@@ -62,7 +62,8 @@ def of_element(scene: Scene, element: str) -> Scene:
     """The scene in elements "P1", "MD" (P1, nodal mean dilatation), "P2", "H8" or "Q4"."""
     mesh = linear(scene.mesh)
     if element in ("H8", "Q4"):
-        return scene
+        shaped = any(drive.shape is not None for drive in scene.drives)  # node by node
+        return scene if shaped else replace(scene, mesh=mesh)
     return replace(
         scene,
         mesh=quadratic(mesh) if element == "P2" else mesh,

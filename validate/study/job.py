@@ -44,13 +44,14 @@ class Where:
 @dataclass(frozen=True)
 class Job:
     """What all cells of a study share: the experiment's file, its hash and those of its recordings,
-    values set, quick."""
+    values set, quick, command lines of guests."""
 
     path: str
     sha256: str
     recordings: tuple[str, ...] = ()
     values: tuple[tuple[str, str], ...] = ()
     quick: bool = False
+    guests: tuple[str, ...] = ()
 
     def experiment(self) -> Experiment:
         """Raises `UsageError` when the file is not the one that the study began with."""

@@ -5,7 +5,7 @@ rest is the solver's; what the declared law costs is a pair of runs at large str
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.arrays import Floats, rms
@@ -32,6 +32,7 @@ from validate.study.trade_cell import (
     open_trial,
     run_cell,
 )
+from validate.study.trade_guests import with_guests_beside
 
 KIND = "tradeoff"
 ERROR = (
@@ -200,14 +201,17 @@ def trade(
     experiment: str | Experiment,
     *,
     quick: bool = False,
+    guests: tuple[str, ...] = (),
     out: Path | None = None,
     where: Where | None = None,
     report: Report | None = None,
 ) -> Trade:
     """Runs what is not finished yet in `out`/<name>/study-tradeoff/cells. A cell that fails is a
-    row with the reason. Raises `ComparisonError` without a reference."""
+    row with the reason; `guests` are command lines of programs of others. Raises `ComparisonError`
+    without a reference."""
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
-    trial, job = trial_of(found, quick), job_of(found, quick=quick)
+    trial = with_guests_beside(trial_of(found, quick), guests)
+    job = replace(job_of(found, quick=quick), guests=guests)
     cells = trade_cells(trial, job)
     done = finish(plan_of(job, cells), study_folder(found, KIND, out) / CELLS, where, report)
     return traded(found, trial, cells, done, quick)

@@ -20,10 +20,11 @@ from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_default import trial_of
 from validate.scene.material import LawName
 from validate.solve.march import march
-from validate.solve.types import Run, Scheme, Stepper, StepTimes
+from validate.solve.types import Run, SceneSolver, Scheme, Stepper, StepTimes
 from validate.study.held import held_bytes
 from validate.study.job import Job
 from validate.study.store import key_of
+from validate.study.trade_guests import GUEST, with_guests_beside
 
 _FIRST, _PROBED = 4, 60  # steps that tell how long all would take, the second where it is short
 _PROBE_S = 1.0
@@ -83,13 +84,14 @@ class Measured:
 
 
 def keyed(job: Job, cell: TradeCell) -> TradeCell:
-    """Times are this machine's, answers are everyone's."""
+    """Times are this machine's, answers are everyone's, whatever guests stand beside."""
     machine = platform.node() if cell.timed else ""
+    job = job if cell.solver.startswith(GUEST) else replace(job, guests=())
     return replace(cell, key=key_of(job, cell, machine))
 
 
 def open_trial(job: Job) -> Trial:
-    return trial_of(job.experiment(), job.quick)
+    return with_guests_beside(trial_of(job.experiment(), job.quick), job.guests)
 
 
 def run_cell(trial: Trial, cell: TradeCell) -> Measured:
@@ -154,9 +156,28 @@ def _refused(dt: float, error: ValidateError) -> Stride:
     return Stride(dt, failed=" ".join(f"refused: {error}".split()))
 
 
+def _whole(trial: Trial, solver: SceneSolver, system: System, dt: float) -> Stride:
+    """Of a solver that is given all times at once: its own seconds and memory."""
+    t, start = trial.times(dt), perf_counter()
+    run = solver.solve(system.scene, t, trial.inputs(t))
+    unknowns, setup = len(system.free), run.setup_s or perf_counter() - start
+    stride = Stride(dt, None, unknowns, setup, run.step_s, 0.0, run.memory, "its own")
+    if not run.finished:
+        return replace(stride, step=None, failed=f"{run.outcome.state}: {run.outcome.why}")
+    at = np.round(trial.frames / dt).astype(np.int64) - 1
+    return replace(stride, u=_read(trial, system, replace(run, at=at, u=run.u[at])))
+
+
 def _stride(
-    trial: Trial, scheme: Scheme, system: System, dt: float, start: float, budget: float
+    trial: Trial,
+    scheme: Scheme | SceneSolver,
+    system: System,
+    dt: float,
+    start: float,
+    budget: float,
 ) -> Stride:
+    if isinstance(scheme, SceneSolver):
+        return _whole(trial, scheme, system, dt)
     stepper = scheme.prepare(system)
     warmed = _warm(trial, stepper)
     setup = perf_counter() - start

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.replay.ladder import RUNGS
+from validate.replay.ladder import SHOWN
 from validate.study.held import DEFINITION
 from validate.study.ranking import SAME_TIME
 from validate.study.trade import ERROR, ParetoFront, Refinement, Trade, TradeRow
@@ -112,7 +112,7 @@ def _front_row(row: TradeRow, by: str, trade: Trade) -> tuple[Entry, ...]:
 def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
     rows = [*front.rows, *(r for r, _ in front.beaten)]
     series = []
-    for rung in RUNGS:
+    for rung in SHOWN:
         mine = [r for r in rows if r.solver.rung == rung]
         if mine:
             series.append(Series(rung, *_points(mine, front.by), "points"))

@@ -51,6 +51,11 @@ class BarMaterial:
         coupled = Coefficients(volumetric="coupled")
         return Material(E, nu, "neo_hooke", self.rho, coefficients=coupled)
 
+    @property
+    def linear(self) -> Material:
+        """The same moduli at small strain."""
+        return replace(self.law, law="linear", coefficients=Coefficients())
+
 
 @dataclass(frozen=True)
 class BarGrid:
