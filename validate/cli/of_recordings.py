@@ -60,6 +60,29 @@ def import_(
 
 
 @click.command()
+@click.argument("file", type=FILE)
+@click.option("--topic", default="", help="Its images (default: the only ones).")
+@click.option("--centre", metavar="X,Y", help="Roughly: 12mm,20mm or 120px,80px.")
+@click.option("--radius", metavar="LENGTH", help="Roughly, within a third: 8mm or 80px.")
+@click.option("--shape", type=click.Choice(["free", "ellipse", "circle"]), default="free",
+              show_default=True, help="What runs along the wall.")  # fmt: skip
+@click.option("--bright", is_flag=True, help="A bright region on dark ground.")
+@click.option("--from", "drawn", type=click.Path(path_type=Path),
+              help="Of others: masks (.png, folder, .npy, .npz), .csv, .json.")  # fmt: skip
+@click.option("--sd", metavar="LENGTH", help="How far theirs may be off, as 0.3mm or 2px.")
+@click.option("--unit", metavar="UNIT", help="Of their points (default: px).")
+@click.option("--name", default="outline", show_default=True, help="The stream to write.")
+@click.option("-o", "out", type=FILE, help="The recording to write (default: FILE itself).")
+def outline(
+    file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, **given: Any
+) -> None:
+    """Find the outline of a dark region in a recording's images, or bring those of others."""
+    from validate.cli import outlining
+
+    outlining.outline(file, out, topic, name, drawn, given)
+
+
+@click.command()
 @click.argument("files", nargs=-1, required=True, type=FILE)
 @click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
 @click.option(

@@ -11,7 +11,7 @@ that is closed or lies outside the image.
 Limits: the region must be star-shaped about its centroid; regions under about 20 speckles are lost.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -77,15 +77,60 @@ def extract_outline(
     with the numbers where there is no such region: none found, contrast too low, open, cut by the
     border.
     """
+    grey = _darkened(image, m_per_px, bright)
+    return _placed(grey, *_first(_walls(grey, centre, radius), bright), shape, bright)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another closed region of an image: centre (2,) m, radius m, and how well it parts from its
+    surroundings as a share of how well the outline does."""
+
+    centre: Floats
+    radius: float
+    share: float
+
+    @property
+    def words(self) -> str:
+        x, y = 1e3 * self.centre
+        return f"({x:.1f}, {y:.1f}) mm, radius {1e3 * self.radius:.1f} mm"
+
+
+def rivals_of(
+    image: NDArray[np.uint8],
+    m_per_px: tuple[float, float],
+    outline: Outline,
+    *,
+    radius: float | None = None,
+    bright: bool = False,
+) -> tuple[Rival, ...]:
+    """Other regions that would pass where no centre is given, the strongest first; arguments as of
+    `extract_outline`."""
+    grey = _darkened(image, m_per_px, bright)
+    walls = [w for w in _walls(grey, None, radius) if not _refusal(*w)]
+    others = [w for w in walls if not _beside(w[0], outline)]
+    own = [_strength(*w) for w in walls if _beside(w[0], outline)]
+    base = max(own or [_strength(*w) for w in others], default=1.0)
+    found: list[Rival] = []
+    for wall, judged in sorted(others, key=lambda w: -_strength(*w)):
+        if all(np.linalg.norm(wall.centre - r.centre) > r.radius for r in found):
+            found.append(Rival(wall.centre, rms(wall.radius), _strength(wall, judged) / base))
+    return tuple(found)
+
+
+def _beside(wall: Wall, outline: Outline) -> bool:
+    return bool(np.linalg.norm(wall.centre - outline.centre) < outline.radius)
+
+
+def _darkened(image: NDArray[np.uint8], m_per_px: tuple[float, float], bright: bool) -> Grey:
     if image.ndim != 2 or image.dtype != np.uint8 or min(image.shape) < 16:
         raise RecordingError(f"image {image.shape} {image.dtype}: expected 16 x 16 uint8 or larger")
     plain = image.astype(np.float64)
     dark = 255.0 - plain if bright else plain
-    grey = Grey(dark, m_per_px, speckle_area(dark, m_per_px))
-    wall, judged = _best(grey, _starts(grey, centre, radius))
-    refusal = _refusal(wall, judged)
-    if refusal:
-        raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusal}")
+    return Grey(dark, m_per_px, speckle_area(dark, m_per_px))
+
+
+def _placed(grey: Grey, wall: Wall, judged: Quality, shape: Shape, bright: bool) -> Outline:
     found = placed(grey, wall, bright)
     free = _outline(found.points, wall_sd(grey, wall), judged, found.moved)
     return free if shape == "free" else _fitted(free, shape, grey)
@@ -149,17 +194,31 @@ def _size(grey: Grey) -> str:
     return f"{1e3 * width * grey.m_per_px[0]:.1f} x {1e3 * height * grey.m_per_px[1]:.1f} mm"
 
 
-def _best(grey: Grey, starts: list[tuple[Floats, float]]) -> tuple[Wall, Quality]:
-    """The start whose wall is closed, apart in grey level and large."""
+def _walls(
+    grey: Grey, centre: Sequence[float] | Floats | None, radius: float | None
+) -> Iterator[tuple[Wall, Quality]]:
+    """Walls traced from every start, the most promising first."""
+    starts = _starts(grey, centre, radius)
     if not starts:
         raise RecordingError("no closed dark region: no disc is darker than its surroundings")
-    tried: list[tuple[Wall, Quality]] = []
-    for centre, radius in _ranked(grey, starts):
-        wall = trace(grey, centre, radius)
-        tried.append((wall, quality(grey, wall)))
-        if not _refusal(*tried[-1]):
-            return tried[-1]
-    return tried[0]
+    for start in _ranked(grey, starts):
+        wall = trace(grey, *start)
+        yield wall, quality(grey, wall)
+
+
+def _first(walls: Iterator[tuple[Wall, Quality]], bright: bool) -> tuple[Wall, Quality]:
+    """The first whose wall is closed, apart in grey level and large."""
+    refusals = []
+    for wall, judged in walls:
+        refusal = _refusal(wall, judged)
+        if not refusal:
+            return wall, judged
+        refusals.append(refusal)
+    raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusals[0]}")
+
+
+def _strength(wall: Wall, judged: Quality) -> float:
+    return float(judged.gcnr * judged.closed * np.sqrt(max(wall.evidence, 0.0)))
 
 
 def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats, float]]:
@@ -170,7 +229,7 @@ def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats
     def rank(start: tuple[Floats, float]) -> tuple[bool, float]:
         wall = trace(grey, *start, rounds=2)
         q = quality(grey, wall)
-        return not _refusal(wall, q), q.gcnr * q.closed * np.sqrt(max(wall.evidence, 0.0))
+        return not _refusal(wall, q), _strength(wall, q)
 
     return sorted(starts, key=rank, reverse=True)
 

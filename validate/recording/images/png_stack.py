@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import above_zero
@@ -26,7 +27,7 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     Options are `m_per_px` (m, or with its unit), `rate` (Hz) and `topic` (default images). Frames
     are in the image's own metres, x right, y down. Raises `UsageError` without size or rate, for a
     pixel beyond reason and for what is no folder, `RecordingError`: no files, equal numbers,
-    damaged images, sizes that differ, over `MAX_STACK`.
+    damaged images, over `MAX_STACK`. Images of several sizes are streams of their own.
     """
     require_known(options, _OPTIONS)
     if not {"m_per_px", "rate"} <= options.keys():
@@ -39,15 +40,27 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
     topic, name = options.get("topic", "images"), folder.resolve().name
+    streams = _by_size(topic, images)
     made = {"kind": "folder of PNG images", "images": str(len(images)), "rate_hz": repr(rate)}
     return Recording(
         name=name,
         source=Source(name, "", 0, "folder of images: integrity not provable"),
         t0_ns=0,
-        frames={topic: Frames(t, images, (side, side), np.eye(4), "image")},
-        clock={topic: clock_of(topic, None, ns, ns)},
+        frames={
+            name: Frames(t[at], tuple(images[i] for i in at), (side, side), np.eye(4), "image")
+            for name, at in streams.items()
+        },
+        clock={name: clock_of(name, None, ns[at], ns[at]) for name, at in streams.items()},
         metadata={"provenance": made},
     )
+
+
+def _by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
+    """Numbers of the images by stream: those of several sizes are streams of their own."""
+    sizes = [f"{image.shape[1]}x{image.shape[0]}" for image in images]
+    if len(set(sizes)) == 1:
+        return {topic: np.arange(len(images))}
+    return {f"{topic}_{s}": np.flatnonzero(np.array(sizes) == s) for s in dict.fromkeys(sizes)}
 
 
 def _pixel(text: str) -> float:

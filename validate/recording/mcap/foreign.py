@@ -5,7 +5,7 @@ Of a type that is not known a field becomes a signal by `--map /topic.field.sub=
 put in the order of their stamps; how many were not is told. What is no stream is listed with why.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,13 +27,16 @@ from validate.recording.types import Clock, Frames, Markers, Signal, Stream
 SCALE = "m_per_px"
 
 
+Sample = tuple[MessagePart, int, int]  # and when it was published and logged, ns
+
+
 @dataclass
 class Gathered:
     """The parts of one channel while they are read; `error` is the first that was wrong."""
 
     channel: Channel
     parts: Callable[[bytes], Iterable[MessagePart]]
-    samples: dict[str, list[tuple[MessagePart, int, int]]] = field(default_factory=dict)
+    samples: dict[str, list[Sample]] = field(default_factory=dict)
     error: str = ""
 
     def add(self, message: Message) -> int:
@@ -170,7 +173,7 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
         if one.error:
             never[one.channel.topic] = one.error
             continue
-        for name, samples in one.samples.items():
+        for name, samples in _by_size(one.samples):
             topic = f"{one.channel.topic}{name}"
             why = _why_none([part for part, _, _ in samples], side)
             if why or topic in make:
@@ -191,13 +194,28 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
     return ForeignStreams(make, ns, clocks, told, never)
 
 
+def _by_size(
+    samples: Mapping[str, list[Sample]],
+) -> Iterator[tuple[str, list[Sample]]]:
+    """Samples by name; images of several sizes are streams of their own, as `/640x480`."""
+    for name, whole in samples.items():
+        sizes = dict.fromkeys(_size(sample) for sample in whole)
+        if len(sizes) < 2:
+            yield name, whole
+            continue
+        for size in sizes:
+            yield f"{name}/{size}", [sample for sample in whole if _size(sample) == size]
+
+
+def _size(sample: Sample) -> str:
+    image = sample[0].image
+    return "" if image is None else f"{image.shape[1]}x{image.shape[0]}"
+
+
 def _why_none(parts: list[MessagePart], side: float | None) -> str:
     """Why samples are no one stream; empty where they are."""
     first = parts[0]
     if first.image is not None:
-        sizes = {p.image.shape for p in parts if p.image is not None}
-        if len(sizes) > 1:
-            return f"images of {len(sizes)} sizes"
         return "" if side else "images without a scale; say --map m_per_px=0.1mm"
     if len({p.frame for p in parts}) > 1:
         return f"frames change: {sorted({p.frame for p in parts})[:4]}"

@@ -1,0 +1,194 @@
+"""`validate outline`: found, followed, doubted and brought outlines, as a user commands them."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import here, refused
+from scipy.ndimage import gaussian_filter
+
+from validate.arrays import Floats
+from validate.recording.images.followed import EXPERTS
+from validate.recording.images.image import encode_png
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Frames, Recording, Source
+
+SIDE = 0.2e-3  # m of a pixel
+SHAPE = (110, 150)
+CENTRE, RADIUS = np.array([58.0, 55.0]), 26.0  # px
+
+
+def speckled(rng: np.random.Generator, *discs: tuple[float, float, float]) -> np.ndarray:
+    """Log-compressed speckle (h, w) uint8 with dark discs (x, y, radius) px."""
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    real, imaginary = (gaussian_filter(rng.normal(size=SHAPE), 1.1) for _ in range(2))
+    envelope = np.hypot(real, imaginary)
+    for a, b, r in discs:
+        envelope = np.where(np.hypot(x - a, y - b) < r, 0.03 * envelope, envelope)
+    return np.clip(200 + 100 * np.log10(envelope / envelope.mean() + 1e-3), 0, 255).astype(np.uint8)
+
+
+def recorded(path: Path, *images: np.ndarray) -> Path:
+    frames = Frames(np.arange(len(images)) / 10, images, (SIDE, SIDE), np.eye(4), "image")
+    write_recording(Recording("x", Source("x", "", 0, ""), 0, frames={"images": frames}), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A disc that moves by 3 px an image."""
+    rng = np.random.default_rng(0)
+    images = [speckled(rng, (CENTRE[0] + 3 * i, CENTRE[1], RADIUS)) for i in range(3)]
+    return recorded(tmp_path_factory.mktemp("moving") / "a.mcap", *images)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A disc, and one as dark that is a little smaller."""
+    image = speckled(np.random.default_rng(1), (45, 55, 24), (110, 55, 21))
+    return recorded(tmp_path_factory.mktemp("two") / "b.mcap", image)
+
+
+def radii(outline: Floats, centre: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(outline / SIDE - centre, axis=1))
+
+
+def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
+    code, out, err = here("outline", str(moving))
+    assert (code, err.count("confidence")) == (0, 0)
+    assert "outline (3 outlines)" in out
+    found = read_recording(moving)
+    contours = found.contour("outline")
+    assert contours.images == "images"
+    assert set(found.streams) == {"images", "outline"}
+    for i, outline in enumerate(contours.outlines):
+        away = radii(outline, CENTRE + [3 * i, 0]) - RADIUS
+        assert abs(away.mean()) < 0.8
+        assert np.sqrt((away**2).mean()) * SIDE < contours.sd
+    assert found.record("found/outline")["rivals"] == "none"
+    assert moving.with_name("a-outline.png").stat().st_size > 20_000
+    assert here("outline", str(moving))[0] == 0  # again: its own stream is made anew
+
+
+def test_the_sd_is_that_of_distances_to_experts_lines(moving: Path, tmp_path: Path) -> None:
+    code, out, _ = here("outline", str(moving), "-o", str(tmp_path / "c.mcap"), "--name", "other")
+    assert code == 0
+    assert f"{EXPERTS:.2f} times that of the wall on twins" in out
+    assert pytest.approx(5 / 3) == EXPERTS
+
+
+def test_a_rival_is_named_and_lowers_the_confidence(two: Path, tmp_path: Path) -> None:
+    code, out, err = here("outline", str(two), "-o", str(tmp_path / "c.mcap"))
+    assert code == 0
+    assert "1 other regions are as dark: (22." in err
+    assert "is another one meant, say --centre X,Y" in err
+    assert "confidence falls to 0.5" in err
+    assert "confidence: 0.5" in out
+
+
+def test_what_is_meant_is_said(two: Path, tmp_path: Path) -> None:
+    where = ("--centre", "110px,11mm", "--radius", "20px")
+    code, _, err = here("outline", str(two), "-o", str(tmp_path / "c.mcap"), *where)
+    assert (code, err) == (0, "")
+    (outline,) = read_recording(tmp_path / "c.mcap").contour("outline").outlines
+    assert radii(outline, np.array([110, 55])).mean() == pytest.approx(21, abs=0.5)
+
+
+def test_an_image_without_an_outline_is_left_out_and_said(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    disc = (*CENTRE, RADIUS)
+    path = recorded(tmp_path / "a.mcap", *(speckled(rng, *d) for d in ((disc,), (), (disc,))))
+    code, out, err = here("outline", str(path))
+    assert code == 0
+    assert "1 images have no outline and are left out, first 1: no closed dark region" in err
+    assert "left out: 1" in out
+    assert read_recording(path).contour("outline").t == pytest.approx([0.0, 0.2])
+    empty = recorded(tmp_path / "b.mcap", speckled(rng), speckled(rng))
+    assert "2 of 2 images without an outline, first image 0" in refused("outline", str(empty))
+
+
+def mask() -> np.ndarray:
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    return np.where(np.hypot(x - CENTRE[0], y - CENTRE[1]) <= RADIUS, 255, 0).astype(np.uint8)
+
+
+ANGLES = np.deg2rad(np.arange(0, 360, 5))
+CIRCLE = CENTRE + RADIUS * np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+
+
+def drawn(folder: Path, kind: str) -> Path:
+    path = folder / f"drawn.{kind.removeprefix('coco.')}"
+    match kind:
+        case "png":
+            path.write_bytes(encode_png(mask()))
+        case "npy":
+            np.save(path, mask()[None] > 0)
+        case "npz":
+            np.savez(path, masks=mask())
+        case "csv":
+            with path.open("w", newline="") as file:
+                rows = csv.writer(file)
+                rows.writerow(["Frame", "X", "Y"])
+                rows.writerows([0, *p] for p in CIRCLE.tolist())
+        case "json":
+            shape = {"label": "gel", "shape_type": "polygon", "points": CIRCLE.tolist()}
+            path.write_text(json.dumps({"shapes": [shape]}))
+        case "coco.json":
+            note = {"image_id": 7, "segmentation": [CIRCLE.ravel().tolist()]}
+            path.write_text(json.dumps({"images": [{"id": 7}], "annotations": [note]}))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["png", "npy", "npz", "csv", "json", "coco.json"])
+def test_outlines_of_others_come_in(kind: str, moving: Path, tmp_path: Path) -> None:
+    """A mask's edge runs half a pixel outside its outermost pixels, at the circle that cut it."""
+    out, file = tmp_path / "c.mcap", drawn(tmp_path, kind)
+    arguments = ("outline", str(moving), "--from", str(file), "--name", "theirs", "-o", str(out))
+    assert "may be off along their normal is not in it: --sd 0.3mm or 2px" in refused(*arguments)
+    assert here(*arguments, "--sd", "2px")[0] == 0
+    contours = read_recording(out).contour("theirs")
+    assert contours.sd == pytest.approx(2 * SIDE)
+    away = radii(contours.outlines[0], CENTRE) - RADIUS
+    assert abs(away.mean()) < 0.15
+    assert np.abs(away).max() < 0.6
+
+
+def test_what_is_no_outline_is_one_line(moving: Path, tmp_path: Path) -> None:
+    both = mask()
+    both[:, 57:60] = 0
+    (tmp_path / "two.png").write_bytes(encode_png(both))
+    (tmp_path / "small.png").write_bytes(encode_png(mask()[:50]))
+    (tmp_path / "late.csv").write_text("frame,x,y\n9,1,1\n9,2,1\n9,2,2\n")
+    (tmp_path / "bad.csv").write_text("frame,x,y\n0,1,one\n")
+    (tmp_path / "bad.json").write_text("{")
+    for name, why in (
+        ("two.png", "2 closed lines, expected one region"),
+        ("small.png", "mask 0 is (50, 150), its image (110, 150)"),
+        ("late.csv", "outlines of 1 images, image 9 among them; 'images' has the images 0 to 2"),
+        ("bad.csv", "are no numbers"),
+        ("bad.json", "neither LabelMe nor COCO polygons"),
+        ("none.png", "cannot be read"),
+        ("x.doc", "outlines come as .png"),
+    ):
+        told = refused("outline", str(moving), "--from", str(tmp_path / name), "--sd", "1px")
+        assert why in told, name
+    assert "expected a length with its unit" in refused("outline", str(moving), "--centre", "3,4")
+    assert "has a stream 'images' already" in refused("outline", str(moving), "--name", "images")
+
+
+def test_images_of_several_sizes_are_streams_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "s").mkdir()
+    for i, image in enumerate([np.zeros((20, 30), np.uint8), np.zeros((24, 32), np.uint8)] * 2):
+        (tmp_path / "s" / f"{i}.png").write_bytes(encode_png(image))
+    out = tmp_path / "a.mcap"
+    assert here("import", str(tmp_path / "s"), "--m-per-px", "0.1mm", "--rate", "10",
+                "-o", str(out))[0] == 0  # fmt: skip
+    found = read_recording(out)
+    assert {k: list(f.t) for k, f in found.frames.items()} == {
+        "images_30x20": [0.0, 0.2],
+        "images_32x24": [0.1, 0.3],
+    }
+    assert "say which: --topic NAME" in refused("outline", str(out))

@@ -1,0 +1,167 @@
+"""`validate outline`: outlines found in a recording's images, or drawn by others, as a stream."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.cli.arguments import complain
+from validate.cli.display import say
+from validate.cli.progress import progress
+from validate.errors import RecordingError, UsageError
+from validate.places import try_file
+from validate.recording.images.followed import EXPERTS, Followed, Hint, followed
+from validate.recording.images.foreign_outline import foreign_outlines
+from validate.recording.mcap.write import write_recording
+from validate.recording.readers import read_recording
+from validate.recording.types import Contours, Frames, Recording
+from validate.report.encode import png
+from validate.report.observed import Held
+from validate.report.outline_images import outlines_over
+from validate.units import in_si, split
+
+_SHOWN = 6  # images of the picture
+_SURE = 0.75  # confidence below which it is said
+
+
+def outline(
+    file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, given: dict[str, Any]
+) -> None:
+    """Adds the outlines of the images `topic` to the recording in `file` as the stream `name`."""
+    recording = read_recording(file)
+    out = out or _same(file, recording)
+    try_file(out)
+    images = topic or _only(recording)
+    frames = recording.frame(images)
+    _require_free(recording, name)
+    if drawn is None:
+        contours, told = _found(frames, images, given)
+    else:
+        contours, told = _drawn(drawn, frames, images, given)
+    records = {**recording.metadata, f"found/{name}": {"images": images, **told}}
+    streams = {**recording.contours, name: contours}
+    write_recording(replace(recording, contours=streams, metadata=records), out)
+    for key, text in told.items():
+        say(f"{key}: {text}", indent="  ")
+    _pictured(frames, contours, out.with_name(f"{out.stem}-{name}.png"))
+    say(
+        f"{out}: {name} ({len(contours.t)} outlines); {out.stat().st_size / 1e3:.0f} kB",
+        indent="  ",
+    )
+
+
+def _same(file: Path, recording: Recording) -> Path:
+    """The recording itself, unless that would lose what is no stream here."""
+    if recording.unread:
+        raise UsageError(
+            f"{file.name} holds {len(recording.unread)} topics that are not read here and would be "
+            "lost: name another file, -o OUT.mcap"
+        )
+    return file
+
+
+def _only(recording: Recording) -> str:
+    if len(recording.frames) != 1:
+        raise UsageError(
+            f"{recording.name}: images {sorted(recording.frames)}; say which: --topic NAME"
+            if recording.frames
+            else f"{recording.name}: no images; it has {sorted(recording.streams)}"
+        )
+    return next(iter(recording.frames))
+
+
+def _require_free(recording: Recording, name: str) -> None:
+    """Outlines that this command made may be made again."""
+    if name in recording.streams and f"found/{name}" not in recording.metadata:
+        raise UsageError(f"{recording.name} has a stream '{name}' already: choose --name OTHER")
+
+
+def _found(frames: Frames, images: str, given: dict[str, Any]) -> tuple[Contours, dict[str, str]]:
+    for option in ("sd", "unit"):
+        if given[option]:
+            raise UsageError(f"--{option} is for outlines of others: with --from FILE")
+    hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
+                given["shape"], given["bright"])  # fmt: skip
+    with progress("outlines") as told:
+        found = followed(frames, hint, images, told)
+    _warned(found)
+    return found.contours, _told(found, hint)
+
+
+def _warned(found: Followed) -> None:
+    if found.rivals:
+        named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
+        complain(
+            f"{len(found.rivals)} other regions are as dark: {named}; is another one meant, say "
+            "--centre X,Y"
+        )
+    if found.confidence.min() < _SURE:
+        complain(f"confidence falls to {found.confidence.min():.2f}: look at the picture")
+    if found.without:
+        i, why = next(iter(found.without.items()))
+        complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
+
+
+def _told(found: Followed, hint: Hint) -> dict[str, str]:
+    sd, c = found.contours.sd, found.confidence
+    told = {
+        "confidence": f"{c.min():.2f} to {c.max():.2f}",
+        "sd": f"{1e3 * sd:.3g} mm, {EXPERTS:.2f} times that of the wall on twins, as far as "
+        "experts' lines were off elsewhere; not measured on these images",
+        "searched": f"{'bright' if hint.bright else 'dark'} region, {hint.shape}, from "
+        + ("the centre that was said" if hint.centre is not None else "the darkest disc"),
+        "rivals": "; ".join(f"{r.words}: {r.share:.2f}" for r in found.rivals) or "none",
+    }
+    if found.without:
+        told["left out"] = ", ".join(map(str, found.without))
+    return told
+
+
+def _drawn(
+    path: Path, frames: Frames, images: str, given: dict[str, Any]
+) -> tuple[Contours, dict[str, str]]:
+    useless = [k for k in ("centre", "radius", "bright") if given[k]]
+    if useless:
+        raise UsageError(f"--{useless[0]} is for outlines that are searched: not with --from")
+    if given["sd"] is None:
+        raise UsageError(
+            f"how far the outlines of {path.name} may be off along their normal is not in it: --sd "
+            "0.3mm or 2px"
+        )
+    sd = _length("--sd", given["sd"], frames)
+    contours = foreign_outlines(path, frames, images, sd or 0.0, given["unit"] or "px")
+    return contours, {"drawn by others": path.name, "sd": f"{given['sd']}, as said"}
+
+
+def _place(text: str | None, frames: Frames) -> Any:
+    """X,Y in pixels or with units, from the first pixel's centre, m."""
+    if text is None:
+        return None
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise UsageError(f"--centre {text}: expected X,Y as 120px,80px or 12mm,20mm")
+    return np.array([_length("--centre", p, frames, axis=i) for i, p in enumerate(parts)])
+
+
+def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> float | None:
+    if text is None:
+        return None
+    number, unit = split(text.strip()) or (np.nan, "")
+    metres = number * frames.m_per_px[axis] if unit == "px" else None
+    value = in_si(number, unit, "m") if unit not in ("px", "") else metres
+    if value is None or not np.isfinite(value) or (value <= 0 and option != "--centre"):
+        raise UsageError(f"{option} {text}: expected a length with its unit, as 8mm or 80px")
+    return float(value)
+
+
+def _pictured(frames: Frames, contours: Contours, file: Path) -> None:
+    """Up to six images, evenly, with their outlines."""
+    at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
+    holds = tuple(Held(f"image {i}", 0.0, "m", float(contours.t[i])) for i in at)
+    try:
+        picture = outlines_over(frames, contours, holds, "evenly over time", "")
+        file.write_bytes(png(picture))
+    except OSError as error:
+        raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error
+    say(f"{file}: {len(at)} of the images with their outlines: look at it", indent="  ")
