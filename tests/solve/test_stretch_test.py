@@ -64,16 +64,21 @@ def test_the_linear_law_has_no_large_stretch() -> None:
 
 
 def test_every_solver_of_whole_scenes_is_in_the_tuple(project_root: Path) -> None:
-    """A class with `solve` and `handles`: linear solvers handle no scenes."""
-    found = {}
+    """A class with `solve` and `handles`, its own or of the class that it goes on from: linear
+    solvers handle no scenes."""
+    found: dict[str, set[str]] = {}
+    bases: dict[str, list[str]] = {}
     for path in (project_root / "validate" / "solve").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef) and "Protocol" not in map(ast.unparse, node.bases):
                 given = [f.target for f in node.body if isinstance(f, ast.AnnAssign)]
                 names = {ast.unparse(target) for target in given}
                 names |= {f.name for f in node.body if isinstance(f, ast.FunctionDef)}
-                found[node.name] = names
-    written = {name for name, has in found.items() if {"solve", "handles"} <= has}
+                found[node.name], bases[node.name] = names, [ast.unparse(b) for b in node.bases]
+    whole = {
+        name: has.union(*(found.get(b, ()) for b in bases[name])) for name, has in found.items()
+    }
+    written = {name for name, has in whole.items() if {"solve", "handles"} <= has}
     assert written == {solver.__name__ for solver in SOLVERS}
 
 

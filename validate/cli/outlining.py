@@ -11,7 +11,7 @@ from validate.cli.display import say
 from validate.cli.progress import progress
 from validate.errors import RecordingError, UsageError
 from validate.places import try_file
-from validate.recording.images.followed import EXPERTS, Followed, Hint, followed
+from validate.recording.images.followed import EXPERTS, FollowedOutline, Hint, followed
 from validate.recording.images.foreign_outline import foreign_outlines
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
@@ -89,7 +89,7 @@ def _found(frames: Frames, images: str, given: dict[str, Any]) -> tuple[Contours
     return found.contours, _told(found, hint)
 
 
-def _warned(found: Followed) -> None:
+def _warned(found: FollowedOutline) -> None:
     if found.rivals:
         named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
         complain(
@@ -103,7 +103,7 @@ def _warned(found: Followed) -> None:
         complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
 
 
-def _told(found: Followed, hint: Hint) -> dict[str, str]:
+def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
     sd, c = found.contours.sd, found.confidence
     told = {
         "confidence": f"{c.min():.2f} to {c.max():.2f}",

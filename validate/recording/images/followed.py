@@ -15,7 +15,7 @@ from validate.arrays import Floats, rms
 from validate.errors import RecordingError
 from validate.recording.images.outline import (
     Outline,
-    Rival,
+    RivalRegion,
     Shape,
     extract_outline,
     rivals_of,
@@ -51,17 +51,19 @@ class Hint:
 
 
 @dataclass(frozen=True)
-class Followed:
+class FollowedOutline:
     """Outlines with their confidences (nt,) 0..1, the first image's rivals, and by the number of
     the image why it has none."""
 
     contours: Contours
     confidence: Floats
-    rivals: tuple[Rival, ...]
+    rivals: tuple[RivalRegion, ...]
     without: dict[int, str]
 
 
-def followed(frames: Frames, hint: Hint, images: str, told: Told = lambda *_: None) -> Followed:
+def followed(
+    frames: Frames, hint: Hint, images: str, told: Told = lambda *_: None
+) -> FollowedOutline:
     """The outline in the `frames` of topic `images`; sd m is that of distances to experts' lines.
 
     A rival counts only where no centre was said. Raises `RecordingError` where the first search
@@ -82,7 +84,7 @@ def followed(frames: Frames, hint: Hint, images: str, told: Told = lambda *_: No
     )  # fmt: skip
     doubt = 1 - max((r.share for r in rivals), default=0.0) / 2
     confidence = doubt * np.array([o.closed * o.contrast for o in found.values()])
-    return Followed(contours, confidence, rivals, without)
+    return FollowedOutline(contours, confidence, rivals, without)
 
 
 def _searched(frames: Frames, hint: Hint, told: Told) -> tuple[dict[int, Outline], dict[int, str]]:
@@ -115,7 +117,7 @@ def _next(
     return outline
 
 
-def _rivals(frames: Frames, i: int, outline: Outline, hint: Hint) -> tuple[Rival, ...]:
+def _rivals(frames: Frames, i: int, outline: Outline, hint: Hint) -> tuple[RivalRegion, ...]:
     image, scale = frames.images[i], frames.m_per_px
     found = rivals_of(image, scale, outline, radius=hint.radius, bright=hint.bright)
     return tuple(replace(r, share=min(r.share, 1.0)) for r in found if r.share >= SIMILAR)

@@ -82,7 +82,7 @@ def extract_outline(
 
 
 @dataclass(frozen=True)
-class Rival:
+class RivalRegion:
     """Another closed region of an image: centre (2,) m, radius m, and how well it parts from its
     surroundings as a share of how well the outline does."""
 
@@ -103,7 +103,7 @@ def rivals_of(
     *,
     radius: float | None = None,
     bright: bool = False,
-) -> tuple[Rival, ...]:
+) -> tuple[RivalRegion, ...]:
     """Other regions that would pass where no centre is given, the strongest first; arguments as of
     `extract_outline`."""
     grey = _darkened(image, m_per_px, bright)
@@ -111,10 +111,10 @@ def rivals_of(
     others = [w for w in walls if not _beside(w[0], outline)]
     own = [_strength(*w) for w in walls if _beside(w[0], outline)]
     base = max(own or [_strength(*w) for w in others], default=1.0)
-    found: list[Rival] = []
+    found: list[RivalRegion] = []
     for wall, judged in sorted(others, key=lambda w: -_strength(*w)):
         if all(np.linalg.norm(wall.centre - r.centre) > r.radius for r in found):
-            found.append(Rival(wall.centre, rms(wall.radius), _strength(wall, judged) / base))
+            found.append(RivalRegion(wall.centre, rms(wall.radius), _strength(wall, judged) / base))
     return tuple(found)
 
 
