@@ -9,7 +9,7 @@ import click
 
 from validate import __version__
 from validate.cli.arguments import BAD_INPUT, BUG, EXPERIMENTS, FILE, FOLDER, INTERRUPTED, complain
-from validate.cli.of_recordings import body, data_, import_, inspect, merge, new, outline, record
+from validate.cli.of_recordings import COMMANDS
 from validate.errors import UsageError, ValidateError
 from validate.places import of_the_place, why_not
 
@@ -346,5 +346,5 @@ def guest_check(command: tuple[str, ...], **options: Any) -> int:
     return guesting.check(text, **options)
 
 
-for _command in (inspect, import_, outline, merge, body, new, record, data_):
+for _command in COMMANDS:
     cli.add_command(_command)

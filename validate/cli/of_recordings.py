@@ -100,6 +100,21 @@ def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
 
 
 @click.command()
+@click.argument("files", nargs=2, type=FILE)
+@click.option("--by", required=True, metavar="CHANNEL=CHANNEL",
+              help="What moves alike in both, as force=-markers.tip.z.")  # fmt: skip
+@click.option("--event", type=click.Choice(["onset", "step"]), help="Not by correlation.")
+@click.option("--within", type=float, metavar="SECONDS", help="The largest offset searched.")
+@click.option("--drift", "straighten", is_flag=True, help="Stretch the second file's clock.")
+@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+def align(files: tuple[Path, Path], out: Path, by: str, **options: Any) -> None:
+    """Put two files of one test on the clock of the first, and say how sure that is."""
+    from validate.cli import aligning
+
+    aligning.align(files, out, by, **options)
+
+
+@click.command()
 @click.argument("name")
 @click.option("--from", "source", required=True, type=FILE, help="The MCAP recording.")
 @click.option("-o", "out", type=FILE, help="The file (default: experiments/NAME.py).")
@@ -153,3 +168,6 @@ def get_(name: str) -> None:
     from validate.cli import data
 
     data.get(name)
+
+
+COMMANDS = (inspect, import_, outline, align, merge, body, new, record, data_)

@@ -50,10 +50,19 @@ def offset_by_correlation(
         raise RecordingError(f"offset within {within} s: expected a range above 0")
     step = min(step_of(reference.t), step_of(stream.t))
     coarse = coarse_lag(reference, stream, step, within, min_coverage)
+    seconds, sd = offset_near(reference, stream, coarse)
+    return matched(reference, stream, Offset(seconds, sd, "correlation", 0, 0), min_coverage)
+
+
+def offset_near(reference: Signal, stream: Signal, start: float) -> tuple[float, float]:
+    """Offset and its sd (s) of a stream that is known to follow the reference at about `start`.
+
+    Raises `RecordingError` where it does not, or where too few samples meet.
+    """
     fine = step_of(reference.t) <= step_of(stream.t)
     known, seen, sign = (reference, stream, 1.0) if fine else (stream, reference, -1.0)
-    seconds, sd = refined_lag(known, seen, sign * coarse)
-    return matched(reference, stream, Offset(sign * seconds, sd, "correlation", 0, 0), min_coverage)
+    seconds, sd = refined_lag(known, seen, sign * start)
+    return sign * seconds, sd
 
 
 def declared_offset(recording: Recording, topic: str, seconds: float, sd: float) -> Offset:

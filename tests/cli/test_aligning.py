@@ -1,0 +1,134 @@
+"""`validate align`: two files of one test on one clock, against known offsets and drifts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import here, refused
+from scipy.ndimage import gaussian_filter1d
+
+from validate.arrays import Floats
+from validate.errors import UsageError
+from validate.recording.channels import channel
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Frames, Markers, Recording, Signal, Source
+
+OFFSET = 0.7318  # s by which the markers' clock is behind
+_GRID = np.arange(-5.0, 65.0, 0.01)
+_WALK = gaussian_filter1d(np.random.default_rng(0).normal(size=len(_GRID)), 40)
+_WALK = _WALK / _WALK.std()
+
+
+def motion(t: Floats) -> Floats:
+    """A slow motion that never repeats itself."""
+    return np.asarray(np.interp(t, _GRID, _WALK))
+
+
+def recording(name: str, **streams: object) -> Recording:
+    return Recording(name, Source(name, "", 0, ""), 0, **streams)  # type: ignore[arg-type]
+
+
+def files(folder: Path, drift: float = 0.0, noise: float = 0.01) -> tuple[str, str]:
+    """A log of 50 Hz and markers of 25 Hz of one motion, the second clock late and fast."""
+    rng, t = np.random.default_rng(1), np.arange(0, 60, 0.02)
+    force = Signal(t, (3 * motion(t) + noise * rng.normal(size=len(t)))[:, None], "N", 0.1, "cell")
+    own = np.arange(0, 55, 0.04)
+    real = own + OFFSET + drift * (own - own.mean())
+    x = np.full((len(own), 2, 3), 0.5)
+    x[:, 1, 2] = -0.01 * motion(real) + 1e-2 * noise * rng.normal(size=len(own))
+    x[100, 1] = np.nan
+    markers = Markers(own, ("base", "tip"), x, 1e-4, "lab")
+    write_recording(recording("log", signals={"force": force}), folder / "log.mcap")
+    write_recording(recording("seen", markers={"markers": markers}), folder / "seen.mcap")
+    return str(folder / "log.mcap"), str(folder / "seen.mcap")
+
+
+BY = ("--by", "force=-markers.tip.z")
+
+
+def test_an_offset_is_found_below_a_sample_and_kept(tmp_path: Path) -> None:
+    out = tmp_path / "both.mcap"
+    code, said, err = here("align", *files(tmp_path), *BY, "-o", str(out))
+    assert (code, err) == (0, "")
+    told = " ".join(said.split())
+    assert "by correlation; 1374 samples meet the first file, 100 % of them" in told
+    found = read_recording(out)
+    record = found.record("clock_offset/markers")
+    sd = float(record["sd"])
+    assert sd < 2e-3
+    assert abs(float(record["seconds"]) - OFFSET) < 4 * sd
+    late = found.markers["markers"].t[0] - found.signals["force"].t[0]
+    assert late == pytest.approx(float(record["seconds"]), abs=1e-6)
+    assert (tmp_path / "both-aligned.png").stat().st_size > 10_000
+
+
+def test_a_drift_is_said_enters_the_sd_and_is_taken_out_on_demand(tmp_path: Path) -> None:
+    drift, out = 4e-4, tmp_path / "both.mcap"
+    given = files(tmp_path, drift)
+    code, said, err = here("align", *given, *BY, "-o", str(out))
+    assert code == 0
+    assert "drift: +4" in said or "drift: +3.9" in said
+    assert "the clocks run apart by 2" in err
+    assert "--drift takes it out" in err
+    blunt = float(read_recording(out).record("clock_offset/markers")["sd"])
+    assert blunt > drift * 55 / np.sqrt(12) * 0.9
+    assert here("align", *given, *BY, "--drift", "-o", str(out))[0] == 0
+    found = read_recording(out)
+    assert float(found.record("clock_drift/seen")["rate"]) == pytest.approx(drift, rel=0.03)
+    t = found.markers["markers"].t - found.signals["force"].t[0]
+    own = np.arange(0, 55, 0.04)
+    assert t == pytest.approx(own + OFFSET + drift * (own - own.mean()), abs=3e-3)
+    assert float(found.record("clock_offset/markers")["sd"]) < blunt / 3
+
+
+def test_a_flash_marks_images(tmp_path: Path) -> None:
+    t = np.arange(100) / 20
+    images = tuple(np.full((16, 16), 200 if x >= 2 else 20, np.uint8) for x in t)
+    frames = Frames(t, images, (1e-4, 1e-4), np.eye(4), "image")
+    write_recording(recording("us", frames={"images": frames}), tmp_path / "us.mcap")
+    t = np.arange(0, 6, 0.01)
+    lamp = Signal(t, np.where(t >= 3, 5.0, 0.0)[:, None], "V", 0.01, "lamp")
+    write_recording(recording("lamp", signals={"lamp": lamp}), tmp_path / "lamp.mcap")
+    out = tmp_path / "both.mcap"
+    by = ("--by", "lamp=images.brightness", "--event", "step")
+    pair = (str(tmp_path / "lamp.mcap"), str(tmp_path / "us.mcap"))
+    code, _, _ = here("align", *pair, *by, "-o", str(out))
+    assert code == 0
+    record = read_recording(out).record("clock_offset/images")
+    assert float(record["seconds"]) == pytest.approx(1.0, abs=0.03)
+    assert float(record["sd"]) == pytest.approx(0.05 / np.sqrt(12), rel=0.2)
+
+
+def test_what_does_not_tell_an_offset_is_one_line(tmp_path: Path) -> None:
+    log, seen = files(tmp_path)
+    out = str(tmp_path / "x.mcap")
+    assert "no channel 'forse'; there are force" in refused(
+        "align", log, seen, "--by", "forse=markers.tip.z", "-o", out
+    )
+    assert "both have ['force']" in refused("align", log, log, *BY, "-o", out)
+    assert "correlate by" in refused("align", log, seen, "--by", "force=markers.tip.z", "-o", out)
+    assert "flat" in refused("align", log, seen, "--by", "force=markers.base.z", "-o", out)
+    t = np.arange(0, 30, 0.02)
+    for name, topic in (("a", "one"), ("b", "two")):
+        wave = Signal(t, np.sin(2 * np.pi * t)[:, None], "N", 0.1, "cell")
+        write_recording(recording(name, signals={topic: wave}), tmp_path / f"{name}.mcap")
+    pair = (str(tmp_path / "a.mcap"), str(tmp_path / "b.mcap"))
+    assert "ambiguous" in refused("align", *pair, "--by", "one=two", "-o", out)
+    assert not Path(out).exists()
+
+
+def test_channels_are_named(tmp_path: Path) -> None:
+    t = np.arange(3.0)
+    pressure = Signal(t, np.array([[1.0, 2], [3, 4], [5, 7]]), "Pa", 0.0, "cell")
+    images = tuple(np.full((4, 4), v, np.uint8) for v in (1, 3, 0))
+    frames = Frames(t, images, (1e-4, 1e-4), np.eye(4), "image")
+    held = recording("r", signals={"p": pressure}, frames={"im": frames})
+    assert channel(held, "p.1").y[:, 0] == pytest.approx([2, 4, 7])
+    assert channel(held, "-p.0").y[:, 0] == pytest.approx([-1, -3, -5])
+    assert channel(held, "im.brightness").y[:, 0] == pytest.approx([1, 3, 0])
+    assert channel(held, "im.change").y[:, 0] == pytest.approx([2, 3])
+    assert channel(held, "im.change").t == pytest.approx([0.5, 1.5])
+    for wrong in ("p", "p.2", "im.colour", "q"):
+        with pytest.raises(UsageError, match=rf"no channel '{wrong}'; there are p.0, p.1, im.bri"):
+            channel(held, wrong)

@@ -1,0 +1,111 @@
+"""Two files of one test with clocks of their own become one recording on the clock of the first.
+
+The second file's streams share one clock, so one offset moves all of them. Whether that clock also
+runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1), over
+the distance of the halves' middles.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from validate.errors import RecordingError
+from validate.recording.alignment import Offset, offset_near, shift
+from validate.recording.merge import merge
+from validate.recording.types import Recording, Signal, by_kind
+
+_TURNS = 12
+_SETTLED = 0.05  # standard deviations of the drift
+DOUBTFUL = 3.0  # standard deviations beyond which a drift is taken for one
+
+
+@dataclass(frozen=True)
+class ClockDrift:
+    """By how much the second clock must be stretched: `rate` and `sd` in s/s, about `middle` s of
+    its own; `span` s is how long it ran."""
+
+    rate: float
+    sd: float
+    middle: float
+    span: float
+
+    @property
+    def seen(self) -> bool:
+        return abs(self.rate) > DOUBTFUL * self.sd
+
+    @property
+    def apart(self) -> float:
+        """Seconds by which the clocks run apart over the recording."""
+        return abs(self.rate) * self.span
+
+
+def drift_of(reference: Signal, stream: Signal, offset: Offset) -> ClockDrift:
+    """Turned to and fro until a stretched stream has none left, as a half's offset counts most
+    where its signal is steep. Raises `RecordingError` where a half does not follow the reference
+    alone, and where the turns do not settle."""
+    middle, span = float(stream.t[0] + stream.t[-1]) / 2, float(np.ptp(stream.t))
+    found = ClockDrift(0.0, 0.0, middle, span)
+    for _ in range(_TURNS):
+        more, sd = _left(reference, stretched_signal(stream, found), offset.seconds, middle)
+        found = ClockDrift(found.rate + more, sd, middle, span)
+        if abs(more) < _SETTLED * sd:
+            return found
+    raise RecordingError(f"the drift does not settle within {_TURNS} turns")
+
+
+def _left(reference: Signal, stream: Signal, start: float, middle: float) -> tuple[float, float]:
+    """Rate and sd (s/s) by which the halves' offsets still run apart."""
+    halves = [stream.t < middle, stream.t >= middle]
+    parts = [replace(stream, t=stream.t[half], y=stream.y[half]) for half in halves]
+    found = [offset_near(reference, part, start) for part in parts]
+    between = float(parts[1].t.mean() - parts[0].t.mean())
+    return (found[1][0] - found[0][0]) / between, float(
+        np.hypot(found[0][1], found[1][1])
+    ) / between
+
+
+def with_drift(offset: Offset, drift: ClockDrift | None) -> Offset:
+    """The offset with what an uncorrected drift makes of it: a ramp of that height, root 12."""
+    if drift is None or not drift.seen:
+        return offset
+    return replace(offset, sd=float(np.hypot(offset.sd, drift.apart / np.sqrt(12))))
+
+
+def stretched_signal(signal: Signal, drift: ClockDrift) -> Signal:
+    return replace(signal, t=signal.t + drift.rate * (signal.t - drift.middle))
+
+
+def stretched(recording: Recording, drift: ClockDrift) -> Recording:
+    """The recording with its times t + rate (t - middle)."""
+    streams = {
+        topic: replace(s, t=s.t + drift.rate * (s.t - drift.middle))
+        for topic, s in recording.streams.items()
+    }
+    return replace(recording, **by_kind(streams))
+
+
+def together(
+    reference: Recording, other: Recording, offset: Offset, drift: ClockDrift | None, name: str
+) -> Recording:
+    """One recording; `offset` counts from both files' own zeros, `drift` is taken out where given.
+
+    Every stream of `other` keeps the offset as a record. Raises `RecordingError` for topics that
+    both have, and for a stream that was moved before.
+    """
+    straight = other if drift is None else stretched(other, drift)
+    found = merge([reference, replace(straight, t0_ns=reference.t0_ns)], name)
+    for topic in other.streams:
+        found = shift(found, topic, offset)
+    if drift is None:
+        return found
+    record = {"rate": repr(drift.rate), "sd": repr(drift.sd), "about_s": repr(drift.middle)}
+    return replace(found, metadata={**found.metadata, f"clock_drift/{other.name}": record})
+
+
+def require_other_topics(reference: Recording, other: Recording) -> None:
+    """Raises `RecordingError` for topics that both recordings have."""
+    both = sorted(reference.streams.keys() & other.streams.keys())
+    if both:
+        raise RecordingError(
+            f"both have {both}: import one of them again under another topic (--topic)"
+        )
