@@ -115,6 +115,22 @@ def align(files: tuple[Path, Path], out: Path, by: str, **options: Any) -> None:
 
 
 @click.command()
+@click.argument("file", type=FILE)
+@click.option("--points", required=True, type=FILE, help="CSV: image, u, v (px), target.")
+@click.option("--targets", required=True, type=FILE,
+              help="CSV: target, x, y, z; a wire has x2, y2, z2, too.")  # fmt: skip
+@click.option("--unit", required=True, metavar="UNIT", help="Of the targets, as mm.")
+@click.option("--probe", required=True, metavar="TOOL", help="Its poses, as ProbeToReference.")
+@click.option("--topic", default="images", show_default=True, help="The images.")
+@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+def calibrate(file: Path, out: Path, **given: Any) -> None:
+    """Find where the image plane lies on a tracked probe, by landmarks or wires (N-wire)."""
+    from validate.cli import calibrating
+
+    calibrating.calibrate(file, out, **given)
+
+
+@click.command()
 @click.argument("name")
 @click.option("--from", "source", required=True, type=FILE, help="The MCAP recording.")
 @click.option("-o", "out", type=FILE, help="The file (default: experiments/NAME.py).")
@@ -170,4 +186,4 @@ def get_(name: str) -> None:
     data.get(name)
 
 
-COMMANDS = (inspect, import_, outline, align, merge, body, new, record, data_)
+COMMANDS = (inspect, import_, outline, align, calibrate, merge, body, new, record, data_)

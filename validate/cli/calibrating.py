@@ -1,0 +1,157 @@
+"""`validate calibrate`: the image plane of a tracked probe, from targets marked in its images."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.cli.display import say, table
+from validate.cli.recordings import written
+from validate.errors import RecordingError, UsageError
+from validate.places import try_file
+from validate.recording.formats.poses import ROTATION, TRANSLATION
+from validate.recording.mcap.write import write_recording
+from validate.recording.readers import read_recording
+from validate.recording.types import Frames, Recording
+from validate.register.image_plane import (
+    ImagePlane,
+    KnownTarget,
+    SeenPoints,
+    by_target,
+    image_plane,
+)
+from validate.units import in_si
+
+_APART = 0.5  # of the images' period: a pose later than that is not that of the image
+
+
+def calibrate(
+    file: Path, out: Path, points: Path, targets: Path, unit: str, probe: str, topic: str
+) -> None:
+    """Finds where the images `topic` lie on the tracked `probe`, and writes them with that."""
+    try_file(out)
+    recording = read_recording(file)
+    frames = recording.frame(topic)
+    known = {t.name: t for t in _targets(targets, unit)}
+    seen = _seen(recording, frames, probe, known, _rows(points, ("image", "u", "v", "target")))
+    found = image_plane(seen)
+    _told(seen, found, frames)
+    frame = probe.partition("To")[0] or probe
+    placed = replace(frames, m_per_px=found.m_per_px, pose=found.pose.matrix, frame=frame)
+    metadata = {**recording.metadata, f"image_plane/{topic}": _record(seen, found, frames)}
+    streams = {**recording.frames, topic: placed}
+    done = replace(recording, frames=streams, metadata=metadata)
+    write_recording(done, out)
+    written(done, out)
+
+
+def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
+    table(
+        f"{len(seen.px)} points in {len(np.unique(seen.image))} images",
+        ["target", "points", "rms off, mm"],
+        [[name, str(n), f"{1e3 * off:.3g}"] for name, n, off in by_target(seen, found.off)],
+    )
+    for key, text in _record(seen, found, frames).items():
+        say(f"{key}: {text}", indent="  ")
+
+
+def _record(seen: SeenPoints, found: ImagePlane, frames: Frames) -> dict[str, str]:
+    height, width = frames.images[0].shape
+    places = {"middle": (width / 2, height / 2), "lower right": (width - 1, height - 1)}
+    sds = (f"{1e3 * found.sd(np.array(px)):.3g} mm at the {w}" for w, px in places.items())
+    images = len(np.unique(seen.image))
+    predicted = f"{1e3 * found.predicted:.3g} mm" if np.isfinite(found.predicted) else "not known"
+    return {
+        "fitted": f"rms {1e3 * found.rms:.3g} mm of {len(seen.px)} points in {images} images",
+        "predicted": f"rms {predicted}, each image by the others",
+        "pixel": " x ".join(f"{1e3 * s:.6g} mm" for s in found.m_per_px),
+        "sd": ", ".join(sds),
+    }
+
+
+def _rows(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
+    try:
+        with file.open(encoding="utf-8-sig", errors="replace", newline="") as opened:
+            rows = csv.DictReader(opened)
+            names = [str(n).strip().lower() for n in rows.fieldnames or ()]
+            if not set(wanted) <= set(names):
+                raise UsageError(f"{file.name}: columns {names}, expected {', '.join(wanted)}")
+            rows.fieldnames = names
+            return list(rows)
+    except OSError as error:
+        raise RecordingError(f"{file}: cannot be read ({error.strerror})") from error
+
+
+def _number(file: Path, row: dict[str, str], name: str) -> float:
+    try:
+        value = float(row[name])
+    except (TypeError, ValueError):
+        value = np.nan
+    if not np.isfinite(value):
+        raise RecordingError(f"{file.name}: {name} = {row[name]!r} is no number")
+    return value
+
+
+def _targets(file: Path, unit: str) -> list[KnownTarget]:
+    """Places (x, y, z), or wires by a second place (x2, y2, z2)."""
+    factor = in_si(1.0, unit, "m")
+    if factor is None:
+        raise UsageError(f"--unit {unit}: expected a length, as mm")
+    found = []
+    for row in _rows(file, ("target", "x", "y", "z")):
+        place = factor * np.array([_number(file, row, c) for c in "xyz"])
+        along = None
+        if (row.get("x2") or "").strip():
+            way = factor * np.array([_number(file, row, c) for c in ("x2", "y2", "z2")]) - place
+            if not np.linalg.norm(way):
+                raise RecordingError(f"{file.name}: wire {row['target']} has one place twice")
+            along = way / np.linalg.norm(way)
+        found.append(KnownTarget(row["target"].strip(), place, along))
+    return found
+
+
+def _seen(
+    recording: Recording, frames: Frames, probe: str, known: dict[str, KnownTarget], rows: list[Any]
+) -> SeenPoints:
+    if not rows:
+        raise UsageError("no points are marked")
+    turns, shifts = _poses(recording, frames, probe)
+    px, image, targets = [], [], []
+    for row in rows:
+        name = (row["target"] or "").strip()
+        if name not in known:
+            raise UsageError(f"no target '{name}'; there are {', '.join(known)}")
+        at = int(_number(Path("points"), row, "image"))
+        if not (0 <= at < len(frames.t) and np.isfinite(shifts[at]).all()):
+            raise UsageError(
+                f"image {at}: there are 0 to {len(frames.t) - 1}, and "
+                f"{int(np.isfinite(shifts[:, 0]).sum())} of them have a pose of '{probe}'"
+            )
+        px.append([_number(Path("points"), row, c) for c in "uv"])
+        image.append(at)
+        targets.append(known[name])
+    i = np.array(image)
+    return SeenPoints(np.array(px), i, tuple(targets), turns[i], shifts[i])
+
+
+def _poses(recording: Recording, frames: Frames, probe: str) -> tuple[Floats, Floats]:
+    """The probe's rotations (n, 3, 3) and places (n, 3) m at the images, NaN where it was not
+    seen."""
+    turns = [t for t in recording.signals if t.endswith(f"/{ROTATION}")]
+    tools = sorted(t.removesuffix(f"/{ROTATION}") for t in turns)
+    if probe not in tools:
+        raise UsageError(f"no poses of '{probe}'; there are {', '.join(tools) or 'none'}")
+    turned = recording.signal(f"{probe}/{ROTATION}", "1")
+    moved = recording.signal(f"{probe}/{TRANSLATION}", "m")
+    near = np.abs(turned.t[None] - frames.t[:, None])
+    at, period = (
+        near.argmin(axis=1),
+        float(np.median(np.diff(frames.t))) if len(frames.t) > 1 else 0,
+    )
+    late = near[np.arange(len(at)), at] > max(_APART * period, 1e-9)
+    R, t = turned.y[at].reshape(-1, 3, 3).copy(), moved.y[at].copy()
+    R[late], t[late] = np.nan, np.nan
+    return R, t
