@@ -1,6 +1,7 @@
 """The image plane of a tracked probe against one that is known."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from validate.errors import RegistrationError
 from validate.recording.formats.poses import pose_signals
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Frames, Recording, Source
+from validate.recording.types import Contours, Frames, Recording, Source
 from validate.register.image_plane import KnownTarget, SeenPoints, image_plane
 from validate.register.transform import Similarity
 
@@ -167,3 +168,24 @@ def test_the_command_writes_images_that_know_where_they_lie(tmp_path: Path) -> N
     assert "image 99: there are 0 to 7" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u\n")
     assert "expected image, u, v, target" in refused(*given, "--probe", "ProbeToReference")
+
+
+def test_a_mistaken_unit_and_outlines_of_before_are_refused(tmp_path: Path) -> None:
+    """One image that stands still: places in mm that are said to be metres."""
+    seen = landmarks(np.random.default_rng(5), 1, 5)
+    still = SeenPoints(seen.px, seen.image, seen.targets, np.tile(np.eye(3), (5, 1, 1)),
+                       np.zeros((5, 3)))  # fmt: skip
+    files(tmp_path, still)
+    rows = [f"p{i},{','.join(map(repr, (1e3 * x).tolist()))}" for i, x in enumerate(seen.places)]
+    (tmp_path / "wires.csv").write_text("\n".join(["target,x,y,z", *rows]))
+    given = ["--points", str(tmp_path / "points.csv"), "--targets", str(tmp_path / "wires.csv"),
+             "--probe", "ProbeToReference", "-o", str(tmp_path / "y.mcap")]  # fmt: skip
+    x = tmp_path / "x.mcap"
+    assert here("calibrate", str(x), *given, "--unit", "mm")[0] == 0
+    (tmp_path / "y.mcap").unlink()
+    assert "a pixel would be 110 mm wide" in refused("calibrate", str(x), *given, "--unit", "m")
+    ring = np.array([[0, 0], [0.01, 0], [0, 0.01]])
+    drawn = Contours(np.zeros(1), (ring,), 1e-4, np.eye(4), "image", "images")
+    write_recording(replace(read_recording(x), contours={"outline": drawn}), x)
+    assert "['outline'] would keep" in refused("calibrate", str(x), *given, "--unit", "mm")
+    assert not (tmp_path / "y.mcap").exists()

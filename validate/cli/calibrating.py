@@ -25,6 +25,7 @@ from validate.register.image_plane import (
 )
 from validate.units import in_si
 
+_LARGEST = 5e-3  # m: no scanner's or camera's pixel on tissue is wider
 _APART = 0.5  # of the images' period: a pose later than that is not that of the image
 
 
@@ -35,9 +36,11 @@ def calibrate(
     try_file(out)
     recording = read_recording(file)
     frames = recording.frame(topic)
+    _require_no_outlines(recording, topic)
     known = {t.name: t for t in _targets(targets, unit)}
     seen = _seen(recording, frames, probe, known, _rows(points, ("image", "u", "v", "target")))
     found = image_plane(seen)
+    _require_plausible(found, unit)
     _told(seen, found, frames)
     frame = probe.partition("To")[0] or probe
     placed = replace(frames, m_per_px=found.m_per_px, pose=found.pose.matrix, frame=frame)
@@ -46,6 +49,25 @@ def calibrate(
     done = replace(recording, frames=streams, metadata=metadata)
     write_recording(done, out)
     written(done, out)
+
+
+def _require_no_outlines(recording: Recording, topic: str) -> None:
+    """Outlines carry a pose and metres of their own, which would be those of before."""
+    old = [name for name, c in recording.contours.items() if c.images in ("", topic)]
+    if old:
+        raise UsageError(
+            f"outlines {old} would keep the place that '{topic}' had: calibrate first, then "
+            "`validate outline`"
+        )
+
+
+def _require_plausible(found: ImagePlane, unit: str) -> None:
+    size = max(found.m_per_px)
+    if size > _LARGEST:
+        raise UsageError(
+            f"--unit {unit}: a pixel would be {1e3 * size:.4g} mm wide, above "
+            f"{1e3 * _LARGEST:g} mm: check the unit of the targets"
+        )
 
 
 def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
