@@ -40,11 +40,12 @@ def judged() -> tuple[Judged, ...]:
     loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
     under = {"recording": str(loaded), "load.mass": "52g"}
     beams = ("mixed", "still", "felupe", "calculix")
+    cylinders = ("slip", "neo_slip", "felupe", "calculix")
     rest, rings = "tip.vertical.rms@settled", "ringing.frequency@swing"
     return (
         Judged("silicone_beam", beams, (rest,)),
         Judged("silicone_beam", beams, (rest, rings), "with 52 g", under),
-        Judged("ecoflex_cylinder", ("slip", "neo_slip", "felupe", "calculix"), ("force.rms@10pct",)),
+        Judged("ecoflex_cylinder", cylinders, ("force.rms@10pct",)),
         Judged("fluid_phantom", ("p2_fluid", "felupe"), ("contour.rms@9mm",)),
         Judged(
             "hanging_bar",
@@ -70,15 +71,20 @@ def rows_of(one: Judged, result: Result) -> list[list[str]]:
 
 
 def _cells(row: tuple[Entry | TableCell, ...]) -> list[str]:
-    label, program, check, error, doubt, verdict, rate, memory, end = map(plain, row)
+    label, program, check, error, _, verdict, rate, memory, end = map(plain, row)
     who = str(label) if program in (_OURS, "-") else f"{label} ({program})"
     figures = [with_unit(c.value, c.unit) if isinstance(c, TableCell) else "-" for c in row[3:5]]
     if isinstance(error, float) and error == 0:
         figures[0] = "within noise"
     if check == "-":
-        return ["-", who, "-", "-", str(end).partition(": ")[2], "-", "-"]
+        return ["-", who, "-", "-", _short(str(end)), "-", "-"]
     costs = [significant(x, 2) if isinstance(x, float) else "-" for x in (rate, memory)]
     return [str(check), who, *figures, str(verdict), *costs]
+
+
+def _short(end: str) -> str:
+    """`cannot run` and the first part of the reason."""
+    return end.partition(": ")[2].partition(";")[0]
 
 
 def markdown(table: list[list[str]]) -> str:

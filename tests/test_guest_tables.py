@@ -1,0 +1,87 @@
+"""The README's tables of guests: what they are made by, and that they are today's."""
+
+import importlib.util
+import re
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from validate.compare.result import Result
+from validate.report.numbers import significant
+
+
+def script(root: Path, name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, root / "benchmarks" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def rates(project_root: Path) -> ModuleType:
+    return script(project_root, "guests_rates")
+
+
+@pytest.fixture(scope="module")
+def table(project_root: Path) -> ModuleType:
+    return script(project_root, "guests_table")
+
+
+def cells(root: Path, module: ModuleType) -> list[list[str]]:
+    text = (root / "README.md").read_text("utf-8").split(module.BEGIN)[1].split(module.END)[0]
+    return [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
+
+
+def test_at_an_error_stands_the_least_time_on_a_line_of_one_kind(rates: ModuleType) -> None:
+    points = [
+        rates.Point("ours", "a 1", 10, 1e-1, 1.0),
+        rates.Point("ours", "a 2", 20, 1e-3, 100.0),
+        rates.Point("ours", "b 1", 15, 5e-3, 15.0),
+        rates.Point("other", "a 1", 10, 1e-4, 3.0),
+        rates.Point("other", "a 2", 20, 2e-2, 9.0),
+    ]
+    assert rates.at_error(points, "ours", 1e-2) == (pytest.approx(10.0), "a")
+    assert rates.at_error(points, "ours", 5e-3) == (15.0, "b")
+    assert rates.at_error(points, "ours", 1e-4) is None
+    assert rates.at_error(points, "other", 1e-3) is None  # near by accident: a finer one is not
+    assert rates.at_error(points, "other", 5e-2) == (3.0, "a")
+    (row,) = rates.rows("bar", points, (5e-2,))
+    assert row == ["bar", "5 %", f"{significant(2000.0)} (a)", "-", "-", "ours"]
+
+
+def test_who_is_first_is_who_takes_least(project_root: Path, rates: ModuleType) -> None:
+    head, _, *rows = cells(project_root, rates)
+    assert tuple(head) == rates.HEAD
+    scenes = {row[0] for row in rows}
+    assert scenes == {"beam at rest", "hanging bar", "beam let go"}
+    for row in rows:
+        times = {
+            who: float(re.sub(r"\s|\(.*", "", cell))
+            for who, cell in zip(("ours", *rates.GUESTS), row[2:5], strict=True)
+            if cell != "-"
+        }
+        assert row[5] == (min(times, key=lambda who: times[who]) if times else "-")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.skipif(find_spec("felupe") is None, reason="felupe absent: the extra 'peers' has it")
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx absent: apt-get calculix-ccx")
+def test_errors_and_verdicts_are_todays(
+    project_root: Path, shared_data: Path, table: ModuleType
+) -> None:
+    """Of all but the beam under its mass: all but the last two columns, which are timings."""
+    head, _, *printed = cells(project_root, table)
+    assert tuple(head) == table.HEAD
+    shown = [one for one in table.judged() if not one.values and one.name != "silicone_beam"]
+    for one in shown:
+        result: Result = table.run(one)
+        today = [row[:-2] for row in table.rows_of(one, result)]
+        assert [row[:-2] for row in printed if row[0] == f"`{one.name}`"] == today
