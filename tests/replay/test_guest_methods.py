@@ -67,6 +67,9 @@ def test_it_is_run_whatever_is_chosen_in_a_folder_of_its_own(fake: str) -> None:
     beam = with_guests(load("silicone_beam"), (fake,))
     options = Options({}, ("mixed",), guests=(fake,))
     assert list(configure(beam, options)[1]) == ["mixed", "fake"]
+    shipped = beam.methods["felupe"].settings.command
+    again = Options({}, ("mixed",), guests=(shipped,))
+    assert list(configure(with_guests(beam, (shipped,)), again)[1]) == ["mixed", "felupe_2"]
     assert run_name(beam, Options({})) == "silicone_beam"
     assert run_name(beam, Options({}, guests=(fake,))).startswith("silicone_beam+guest-")
 

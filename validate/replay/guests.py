@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +17,16 @@ _LEVELS = 20  # of statics with one input, where the experiment does not say
 def guests_of(methods: dict[str, Method]) -> dict[str, Method]:
     """Those that are programs of others."""
     return {name: m for name, m in methods.items() if isinstance(m.settings, Guest)}
+
+
+def added_guests(methods: Mapping[str, Method], commands: Sequence[str]) -> tuple[str, ...]:
+    """Names of those that `with_guests` made of these commands; declared ones are none of them."""
+    labels = [_label(command) for command in commands]
+    return tuple(name for name, m in methods.items() if m.label in labels)
+
+
+def _label(command: str) -> str:
+    return f"guest: {command}"
 
 
 def with_guests(experiment: Experiment, commands: Sequence[str]) -> Experiment:
@@ -35,7 +45,7 @@ def with_guests(experiment: Experiment, commands: Sequence[str]) -> Experiment:
 
 def _as(methods: dict[str, Method], accepted: str, command: str) -> Method:
     declared = next(iter(guests_of(methods).values()), None)
-    label = f"guest: {command}"
+    label = _label(command)
     if declared is not None:
         return replace(declared, label=label, settings=replace(declared.settings, command=command))
     like = methods[accepted]

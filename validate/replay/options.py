@@ -9,7 +9,7 @@ from typing import Any
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, nearest_names, with_values
 from validate.replay.experiment import Experiment
-from validate.replay.guests import guests_of
+from validate.replay.guests import added_guests
 from validate.replay.method import Method
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
@@ -38,7 +38,7 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
     mine, _ = _split(options.values)
     methods = all_methods(experiment, options)
-    added = (n for n, m in guests_of(methods).items() if m.settings.command in options.guests)
+    added = added_guests(methods, options.guests)
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     return with_values(parameters, mine), {name: methods[name] for name in chosen}
 
