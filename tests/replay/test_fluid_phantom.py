@@ -38,7 +38,7 @@ def test_the_accepted_model_agrees_within_the_error_of_the_measurement(
 
 def test_rivals_are_told_apart_by_pressure_and_outline(phantom_result: Result) -> None:
     pressure = {m.name: abs(scores(phantom_result, m.name)["pressure@9mm"])
-                for m in phantom_result.methods}  # fmt: skip
+                for m in phantom_result.methods if m.run.finished}  # fmt: skip
     assert pressure["p2_fluid"] < 30 < 90 < pressure["md_fluid"] < 500 < pressure["p1_fluid"]
     assert pressure["p1_bonded"] > 2000
     assert scores(phantom_result, "p1_dry")["pressure.simulated@9mm"] == 0.0
@@ -66,7 +66,7 @@ def test_the_error_budget_of_the_9_mm_contour(phantom_result: Result) -> None:
 
 
 def test_rates_updates_and_volume_are_reported(phantom_result: Result) -> None:
-    for method in phantom_result.methods:
+    for method in (m for m in phantom_result.methods if m.run.finished):
         found = scores(phantom_result, method.name)
         assert {"setup", "step.p50", "step.p99", "updates.max"} <= set(found)
         assert method.run.step_s is not None
