@@ -163,9 +163,15 @@ def test_the_command_writes_images_that_know_where_they_lie(tmp_path: Path) -> N
         *given, "--probe", "Stylus"
     )
     (tmp_path / "points.csv").write_text("image,u,v,target\n0,1,1,q\n")
-    assert "no target 'q'; there are a0, b0" in refused(*given, "--probe", "ProbeToReference")
+    assert "points.csv: no target 'q'; there are a0, b0" in refused(
+        *given, "--probe", "ProbeToReference"
+    )
     (tmp_path / "points.csv").write_text("image,u,v,target\n99,1,1,a0\n")
     assert "image 99: there are 0 to 7" in refused(*given, "--probe", "ProbeToReference")
+    (tmp_path / "points.csv").write_text("image,u,v,target\n1.7,1,1,a0\n")
+    assert "image 1.7: there are 0 to 7" in refused(*given, "--probe", "ProbeToReference")
+    (tmp_path / "points.csv").write_text("image,u,v,target\n1,one,1,a0\n")
+    assert "points.csv: u = 'one' is no number" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u\n")
     assert "expected image, u, v, target" in refused(*given, "--probe", "ProbeToReference")
 
@@ -189,3 +195,20 @@ def test_a_mistaken_unit_and_outlines_of_before_are_refused(tmp_path: Path) -> N
     write_recording(replace(read_recording(x), contours={"outline": drawn}), x)
     assert "['outline'] would keep" in refused("calibrate", str(x), *given, "--unit", "mm")
     assert not (tmp_path / "y.mcap").exists()
+
+
+def test_swapped_targets_are_doubted_and_named_twice_refused(tmp_path: Path) -> None:
+    files(tmp_path, wired(np.random.default_rng(3), 8, 0.5))
+    wires = tmp_path / "wires.csv"
+    given = ["calibrate", str(tmp_path / "x.mcap"), "--points", str(tmp_path / "points.csv"),
+             "--targets", str(wires), "--unit", "mm", "--probe", "ProbeToReference",
+             "-o", str(tmp_path / "y.mcap")]  # fmt: skip
+    lines = wires.read_text().splitlines()
+    wires.write_text("\n".join([*lines, lines[1]]))
+    assert "target a0 stands there twice" in refused(*given)
+    other = {"a0": "c2", "c2": "a0"}
+    swapped = [f"{other.get(line[:2], line[:2])}{line[2:]}" for line in lines]
+    wires.write_text("\n".join(swapped))
+    code, _, err = here(*given)
+    assert code == 0
+    assert "most: are targets swapped" in err

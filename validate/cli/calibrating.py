@@ -3,11 +3,11 @@
 import csv
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats
+from validate.cli.arguments import complain
 from validate.cli.display import say, table
 from validate.cli.recordings import written
 from validate.errors import RecordingError, UsageError
@@ -25,6 +25,8 @@ from validate.register.image_plane import (
 )
 from validate.units import in_si
 
+_MAX_TABLE = 16 * 2**20  # bytes
+_GROSS = 0.05  # of the image's diagonal: what marking by hand never misses by
 _LARGEST = 5e-3  # m: no scanner's or camera's pixel on tissue is wider
 _APART = 0.5  # of the images' period: a pose later than that is not that of the image
 
@@ -38,7 +40,7 @@ def calibrate(
     frames = recording.frame(topic)
     _require_no_outlines(recording, topic)
     known = {t.name: t for t in _targets(targets, unit)}
-    seen = _seen(recording, frames, probe, known, _rows(points, ("image", "u", "v", "target")))
+    seen = _seen(recording, frames, probe, known, points)
     found = image_plane(seen)
     _require_plausible(found, unit)
     _told(seen, found, frames)
@@ -78,6 +80,13 @@ def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
     )
     for key, text in _record(seen, found, frames).items():
         say(f"{key}: {text}", indent="  ")
+    far = max(by_target(seen, found.off), key=lambda row: row[2])
+    wide = float(np.hypot(*(np.array(frames.images[0].shape[::-1]) * found.m_per_px)))
+    if found.rms > _GROSS * wide:
+        complain(
+            f"the points miss by {1e3 * found.rms:.3g} mm in an image of {1e3 * wide:.3g} mm, "
+            f"'{far[0]}' most: are targets swapped, or their frame another than the poses lead to?"
+        )
 
 
 def _record(seen: SeenPoints, found: ImagePlane, frames: Frames) -> dict[str, str]:
@@ -96,6 +105,8 @@ def _record(seen: SeenPoints, found: ImagePlane, frames: Frames) -> dict[str, st
 
 def _rows(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
     try:
+        if file.stat().st_size > _MAX_TABLE:
+            raise RecordingError(f"{file.name}: {file.stat().st_size} bytes, limit {_MAX_TABLE}")
         with file.open(encoding="utf-8-sig", errors="replace", newline="") as opened:
             rows = csv.DictReader(opened)
             names = [str(n).strip().lower() for n in rows.fieldnames or ()]
@@ -122,8 +133,10 @@ def _targets(file: Path, unit: str) -> list[KnownTarget]:
     factor = in_si(1.0, unit, "m")
     if factor is None:
         raise UsageError(f"--unit {unit}: expected a length, as mm")
-    found = []
+    found: list[KnownTarget] = []
     for row in _rows(file, ("target", "x", "y", "z")):
+        if row["target"].strip() in [target.name for target in found]:
+            raise RecordingError(f"{file.name}: target {row['target']} stands there twice")
         place = factor * np.array([_number(file, row, c) for c in "xyz"])
         along = None
         if (row.get("x2") or "").strip():
@@ -136,23 +149,25 @@ def _targets(file: Path, unit: str) -> list[KnownTarget]:
 
 
 def _seen(
-    recording: Recording, frames: Frames, probe: str, known: dict[str, KnownTarget], rows: list[Any]
+    recording: Recording, frames: Frames, probe: str, known: dict[str, KnownTarget], file: Path
 ) -> SeenPoints:
+    rows = _rows(file, ("image", "u", "v", "target"))
     if not rows:
-        raise UsageError("no points are marked")
+        raise UsageError(f"{file.name}: no points are marked")
     turns, shifts = _poses(recording, frames, probe)
     px, image, targets = [], [], []
     for row in rows:
         name = (row["target"] or "").strip()
         if name not in known:
-            raise UsageError(f"no target '{name}'; there are {', '.join(known)}")
-        at = int(_number(Path("points"), row, "image"))
-        if not (0 <= at < len(frames.t) and np.isfinite(shifts[at]).all()):
+            raise UsageError(f"{file.name}: no target '{name}'; there are {', '.join(known)}")
+        said = _number(file, row, "image")
+        at = int(said)
+        if said != at or not (0 <= at < len(frames.t) and np.isfinite(shifts[at]).all()):
             raise UsageError(
-                f"image {at}: there are 0 to {len(frames.t) - 1}, and "
+                f"{file.name}: image {said:g}: there are 0 to {len(frames.t) - 1}, and "
                 f"{int(np.isfinite(shifts[:, 0]).sum())} of them have a pose of '{probe}'"
             )
-        px.append([_number(Path("points"), row, c) for c in "uv"])
+        px.append([_number(file, row, c) for c in "uv"])
         image.append(at)
         targets.append(known[name])
     i = np.array(image)
