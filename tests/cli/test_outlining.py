@@ -142,7 +142,11 @@ def drawn(folder: Path, kind: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", ["png", "npy", "npz", "csv", "json", "coco.json"])
+@pytest.mark.parametrize(
+    "kind",
+    ["png", "csv", "json"]
+    + [pytest.param(k, marks=pytest.mark.slow) for k in ("npy", "npz", "coco.json")],
+)
 def test_outlines_of_others_come_in(kind: str, moving: Path, tmp_path: Path) -> None:
     """A mask's edge runs half a pixel outside its outermost pixels, at the circle that cut it."""
     out, file = tmp_path / "c.mcap", drawn(tmp_path, kind)

@@ -86,6 +86,7 @@ def test_the_best_line_decides_and_names_what_decides(
     assert run([*words[1:-1], "plain"]) == 1  # no check of its own: nothing is decided
 
 
+@pytest.mark.slow
 def test_a_finished_study_is_not_run_again(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -152,6 +152,7 @@ def test_an_inverted_cell_is_named(mesh: Mesh) -> None:
     assert np.isin(wrong, around).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [box, grid])
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_strip_wound_over_itself_crosses_without_inverted_cells(d: int, make) -> None:  # type: ignore[no-untyped-def]

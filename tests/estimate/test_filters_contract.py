@@ -155,6 +155,7 @@ def test_a_gated_outlier_changes_as_much_as_a_missing_look(settings: Filter, pul
     assert np.abs(free.u[0] - missing.u[1]).max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", SETTINGS, ids=repr)
 def test_a_sure_clock_changes_nothing_and_a_doubtful_one_the_claims(
     settings: Filter, pulled: Case
@@ -173,6 +174,7 @@ def test_a_sure_clock_changes_nothing_and_a_doubtful_one_the_claims(
     assert wide.traces[name].y[5] > 1.05 * plain.traces[name].y[5]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", SETTINGS, ids=repr)
 def test_an_open_gate_leaves_the_estimate(settings: Filter, pulled: Case) -> None:
     """Gains as they go are those beforehand, to what `settled` leaves."""

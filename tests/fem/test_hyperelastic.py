@@ -56,6 +56,7 @@ def turn(axis: int, angle: float) -> Floats:
 # Derivatives
 
 
+@pytest.mark.slow
 @every
 def test_tangent_at_rest_is_the_linear_stiffness(
     order: int, dilatation: Dilatation, name: str

@@ -78,6 +78,7 @@ def test_mixed_cells_in_plane_strain_are_consistent() -> None:
     assert slope == pytest.approx(b.tangent(u) @ v, rel=1e-5, abs=1e-7 * np.abs(slope).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("mode", ["uniaxial", "pure_shear"])
 def test_a_stretched_sheet_is_the_material_point(

@@ -72,6 +72,7 @@ def test_fast_is_instantaneous_and_slow_is_relaxed() -> None:
         assert found == pytest.approx(exact, abs=off * exact.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["neo_hooke", "ogden"])
 def test_the_recursion_is_of_order_two(name: str) -> None:
     material = viscous(name, series=Prony((1.0,), (0.2,)))

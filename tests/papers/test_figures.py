@@ -83,6 +83,7 @@ def test_a_figure_names_a_method_or_what_the_experiment_tells(name: str) -> None
     assert owners <= {*experiment.methods, "told", "identified"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DECLARED)
 def test_a_run_that_computes_nothing_says_what_each_figure_lacks(name: str) -> None:
     """Only figures that rest on no run stand then: a reading, or a model of the paper alone."""

@@ -32,6 +32,7 @@ def test_a_cine_loop_is_its_region_with_its_scale_and_its_times() -> None:
     assert told["images px"] == "84..596 x 31..415 of 640 x 480"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", ["OBXXXX1A_rle_2frame.dcm", "OBXXXX1A_expb_2frame.dcm"])
 def test_the_same_images_in_other_encodings_are_the_same_bit_for_bit(other: str) -> None:
     plain = read_dicom(DATA / "OBXXXX1A_2frame.dcm", {"rate": "20"}).frame("images")

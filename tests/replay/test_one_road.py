@@ -219,6 +219,7 @@ def test_own_exhibits_printed_figures_and_captions(road: Experiment) -> None:
     assert [(p.ours, p.fault) for p in result.published] == [(1.0, "")]
 
 
+@pytest.mark.slow
 @ROADS
 def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -> None:
     """The slow one is never built there; u_num is the stand-in's, and the check says so."""

@@ -91,6 +91,7 @@ def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
     assert small_result().sentence in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 400])
 def test_why_a_check_ends_as_it_does_is_seen_without_scrolling(
     browser: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int

@@ -79,6 +79,7 @@ def test_lines_of_one_axes_differ_in_colour_and_without_it_in_dash(many: Result)
     assert len({d.look.colour for d in found}) == len({str(d.look.dash) for d in found}) == 4
 
 
+@pytest.mark.slow
 def test_many_lines_have_axes_of_their_own(many: Result) -> None:
     """Their levels are named in the legend, and letters can be read on 400 pixels."""
     figure = drawn(many, of_methods(many, levels=(("one", 1.0), ("two", 2.0))))

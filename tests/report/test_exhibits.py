@@ -81,6 +81,7 @@ def test_results_without_exhibits_have_none(monkeypatch: pytest.MonkeyPatch) -> 
     assert list(sections(small_result()))[:2] == ["checks", "curves"]
 
 
+@pytest.mark.slow
 def test_a_failed_result_still_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
     failed = failed_result()

@@ -61,6 +61,7 @@ def test_the_liver(shared_data: Path) -> None:
     assert {"Disp", "FixT&P"} <= set(got.facets)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -154,6 +154,7 @@ def test_no_answer_is_read_through_a_link_or_a_pipe(tmp_path: Path) -> None:
         (tmp_path / "answer.json").unlink()
 
 
+@pytest.mark.slow
 def test_one_that_hangs_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
     """The limit is seen on a clock of its own; its child is gone with it."""
     note = tmp_path / "child"

@@ -87,6 +87,7 @@ def test_every_element_takes_the_whole_load_in_one_step(
     assert Body(system.scene).inverted(far.inner.u) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_law_hangs_alike_where_strains_are_small(name: str) -> None:
     """The split forms in mixed cells, the coupled ones in quadratic tetrahedra."""

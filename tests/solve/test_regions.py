@@ -121,6 +121,7 @@ def test_equal_rates_without_delay_are_the_one_solve() -> None:
     assert np.abs(late - by_hand(pushed)).max() > 1e-3  # a tick late is not the whole solve
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("border", ["delayed", "hold", "joint"])
 @pytest.mark.parametrize("far", ["semi_implicit", "static"])
 def test_the_static_limit_is_exact(border: Any, far: Any) -> None:

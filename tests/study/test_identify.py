@@ -113,6 +113,7 @@ def test_a_parameter_that_is_not_declared_needs_bounds(block: Path, tmp_path: Pa
     assert "--parameters nu: no bounds; declared: E, C01" in line
 
 
+@pytest.mark.slow
 def test_finished_cells_are_not_run_again(block: Path, tmp_path: Path) -> None:
     def found(starts: int) -> IdentifyStudy:
         return identification(load_file(block), starts=starts, out=tmp_path, where=Where(0))
