@@ -73,7 +73,9 @@ def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
     assert here("outline", str(moving))[0] == 0  # again: its own stream is made anew
 
 
-def test_the_sd_is_that_of_distances_to_experts_lines(moving: Path, tmp_path: Path) -> None:
+def test_the_sd_says_that_it_is_widened_to_distances_from_experts_lines(
+    moving: Path, tmp_path: Path
+) -> None:
     code, out, _ = here("outline", str(moving), "-o", str(tmp_path / "c.mcap"), "--name", "other")
     assert code == 0
     assert f"{EXPERTS:.2f} times that of the wall on twins" in out
@@ -83,7 +85,7 @@ def test_the_sd_is_that_of_distances_to_experts_lines(moving: Path, tmp_path: Pa
 def test_a_rival_is_named_and_lowers_the_confidence(two: Path, tmp_path: Path) -> None:
     code, out, err = here("outline", str(two), "-o", str(tmp_path / "c.mcap"))
     assert code == 0
-    assert "1 other regions are as dark: (22." in err
+    assert "as distinct as the outline (others: 1): (22." in err
     assert "is another one meant, say --centre X,Y" in err
     assert "confidence falls to 0.5" in err
     assert "confidence: 0.5" in out
@@ -138,7 +140,8 @@ def drawn(folder: Path, kind: str) -> Path:
             path.write_text(json.dumps({"shapes": [shape]}))
         case "coco.json":
             note = {"image_id": 7, "segmentation": [CIRCLE.ravel().tolist()]}
-            path.write_text(json.dumps({"images": [{"id": 7}], "annotations": [note]}))
+            image = {"id": 7, "file_name": "0.png"}
+            path.write_text(json.dumps({"images": [image], "annotations": [note]}))
     return path
 
 
@@ -147,10 +150,10 @@ def drawn(folder: Path, kind: str) -> Path:
     ["png", "csv", "json"]
     + [pytest.param(k, marks=pytest.mark.slow) for k in ("npy", "npz", "coco.json")],
 )
-def test_outlines_of_others_come_in(kind: str, moving: Path, tmp_path: Path) -> None:
+def test_outlines_of_others_come_in(kind: str, two: Path, tmp_path: Path) -> None:
     """A mask's edge runs half a pixel outside its outermost pixels, at the circle that cut it."""
     out, file = tmp_path / "c.mcap", drawn(tmp_path, kind)
-    arguments = ("outline", str(moving), "--from", str(file), "--name", "theirs", "-o", str(out))
+    arguments = ("outline", str(two), "--from", str(file), "--name", "theirs", "-o", str(out))
     assert "may be off along their normal is not in it: --sd 0.3mm or 2px" in refused(*arguments)
     assert here(*arguments, "--sd", "2px")[0] == 0
     contours = read_recording(out).contour("theirs")
@@ -160,7 +163,41 @@ def test_outlines_of_others_come_in(kind: str, moving: Path, tmp_path: Path) -> 
     assert np.abs(away).max() < 0.6
 
 
-def test_what_is_no_outline_is_one_line(moving: Path, tmp_path: Path) -> None:
+def test_coco_images_are_in_the_order_of_their_files(moving: Path, tmp_path: Path) -> None:
+    """Not in that of the list; a second polygon in an image is refused, a file too few as well."""
+    images = [{"id": i, "file_name": f"{i:03}.png"} for i in (2, 0, 1)]
+    notes = [{"image_id": i, "segmentation": [(CIRCLE + [3 * i, 0]).ravel().tolist()]}
+             for i in range(3)]  # fmt: skip
+    file, out = tmp_path / "drawn.json", tmp_path / "c.mcap"
+    given = ("outline", str(moving), "--from", str(file), "--sd", "1px", "--name", "theirs",
+             "-o", str(out))  # fmt: skip
+    file.write_text(json.dumps({"images": images, "annotations": notes}))
+    assert here(*given)[0] == 0
+    for i, outline in enumerate(read_recording(out).contour("theirs").outlines):
+        assert radii(outline, CENTRE + [3 * i, 0]) == pytest.approx(RADIUS)
+    notes[0]["segmentation"] *= 2
+    file.write_text(json.dumps({"images": images, "annotations": notes}))
+    assert "several polygons in one image" in refused(*given)
+    file.write_text(json.dumps({"images": images[:2], "annotations": notes[1:2]}))
+    assert "2 images for 3 images leave open whose they are" in refused(*given)
+
+
+def test_masks_of_a_folder_are_one_an_image(moving: Path, tmp_path: Path) -> None:
+    folder, out = tmp_path / "masks", tmp_path / "c.mcap"
+    folder.mkdir()
+    for i in (2, 10, 1):  # in the order of numbers, not of letters
+        (folder / f"{i}.png").write_bytes(encode_png(np.roll(mask() * (i != 2), i, axis=1)))
+    given = ("outline", str(moving), "--from", str(folder), "--sd", "1px", "--name", "theirs",
+             "-o", str(out))  # fmt: skip
+    assert here(*given)[0] == 0
+    found = read_recording(out).contour("theirs")
+    assert found.t == pytest.approx([0.0, 0.2])
+    assert (found.outlines[1] / SIDE).mean(axis=0) == pytest.approx(CENTRE + [10, 0], abs=0.2)
+    (folder / "2.png").unlink()
+    assert "2 masks for 3 images leave open whose they are" in refused(*given)
+
+
+def test_what_is_no_outline_is_one_line(two: Path, moving: Path, tmp_path: Path) -> None:
     both = mask()
     both[:, 57:60] = 0
     (tmp_path / "two.png").write_bytes(encode_png(both))
@@ -171,13 +208,13 @@ def test_what_is_no_outline_is_one_line(moving: Path, tmp_path: Path) -> None:
     for name, why in (
         ("two.png", "2 closed lines, expected one region"),
         ("small.png", "mask 0 is (50, 150), its image (110, 150)"),
-        ("late.csv", "outlines of 1 images, image 9 among them; 'images' has the images 0 to 2"),
+        ("late.csv", "outlines of 1 images, image 9 among them; 'images' has the images 0 to 0"),
         ("bad.csv", "are no numbers"),
         ("bad.json", "neither LabelMe nor COCO polygons"),
         ("none.png", "cannot be read"),
         ("x.doc", "outlines come as .png"),
     ):
-        told = refused("outline", str(moving), "--from", str(tmp_path / name), "--sd", "1px")
+        told = refused("outline", str(two), "--from", str(tmp_path / name), "--sd", "1px")
         assert why in told, name
     assert "expected a length with its unit" in refused("outline", str(moving), "--centre", "3,4")
     assert "has a stream 'images' already" in refused("outline", str(moving), "--name", "images")

@@ -93,8 +93,8 @@ def _warned(found: FollowedOutline) -> None:
     if found.rivals:
         named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
         complain(
-            f"{len(found.rivals)} other regions are as dark: {named}; is another one meant, say "
-            "--centre X,Y"
+            f"as distinct as the outline (others: {len(found.rivals)}): {named}; is another one "
+            "meant, say --centre X,Y"
         )
     if found.confidence.min() < _SURE:
         complain(f"confidence falls to {found.confidence.min():.2f}: look at the picture")
@@ -110,7 +110,7 @@ def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
         "sd": f"{1e3 * sd:.3g} mm, {EXPERTS:.2f} times that of the wall on twins, as far as "
         "experts' lines were off elsewhere; not measured on these images",
         "searched": f"{'bright' if hint.bright else 'dark'} region, {hint.shape}, from "
-        + ("the centre that was said" if hint.centre is not None else "the darkest disc"),
+        + ("the centre that was said" if hint.centre is not None else "the most distinct disc"),
         "rivals": "; ".join(f"{r.words}: {r.share:.2f}" for r in found.rivals) or "none",
     }
     if found.without:
@@ -158,7 +158,7 @@ def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> flo
 def _pictured(frames: Frames, contours: Contours, file: Path) -> None:
     """Up to six images, evenly, with their outlines."""
     at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
-    holds = tuple(Held(f"image {i}", 0.0, "m", float(contours.t[i])) for i in at)
+    holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
     try:
         picture = outlines_over(frames, contours, holds, "evenly over time", "")
         file.write_bytes(png(picture))

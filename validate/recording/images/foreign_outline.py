@@ -1,9 +1,12 @@
 """Outlines that others drew in the images of a recording: masks, tables of points, polygons.
 
-Masks are PNG files (one, or a folder, numbered) or an array (n, h, w) in .npy or .npz: what is not
-zero is inside, and the outline runs half a pixel outside the outermost pixels' centres. Tables are
-CSV with the columns frame, x, y; polygons JSON as LabelMe (`shapes`) or COCO (`annotations`) has
-them. Points of tables and polygons are pixels, centres whole numbers, unless a unit is said.
+Masks are PNG files (a folder, numbered; one for a single image) or an array (n, h, w) in .npy or
+.npz: what is not zero is inside, and the outline runs half a pixel outside the outermost pixels'
+centres; an image without an outline has an empty mask. Tables are CSV with the columns frame, x, y;
+polygons JSON as LabelMe (`shapes`, a file an image) or COCO (`annotations`) has them. There are as
+many masks or files as images, in the order of the numbers in their names: fewer would leave open
+whose they are. Points of tables and polygons are pixels, centres whole numbers, unless a unit is
+said.
 """
 
 import csv
@@ -19,6 +22,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.images.image import decode_png
+from validate.recording.images.png_stack import number_key, numbered
 from validate.recording.types import Contours, Frames
 from validate.units import in_si
 
@@ -59,15 +63,18 @@ def _scale(path: Path, frames: Frames, unit: str) -> Floats:
 
 
 def _read(path: Path, frames: Frames) -> Outlines:
-    kind = ".png" if path.is_dir() else path.suffix.lower()
-    if kind not in KINDS:
-        raise UsageError(f"{path.name}: outlines come as {', '.join(KINDS)} or a folder of PNG")
     try:
-        if not path.is_dir() and path.stat().st_size > MAX_FILE:
-            raise RecordingError(f"{path.name}: {path.stat().st_size} bytes, limit {MAX_FILE}")
+        files = numbered(path, (".png", ".json")) if path.is_dir() else [path]
+        kind = files[0].suffix.lower()
+        if kind not in KINDS:
+            raise UsageError(f"{path.name}: outlines come as {', '.join(KINDS)} or a folder")
+        if (size := sum(file.stat().st_size for file in files)) > MAX_FILE:
+            raise RecordingError(f"{path.name}: {size} bytes, limit {MAX_FILE}")
         if kind == ".csv":
             return _table(path)
-        return _polygons(path) if kind == ".json" else _masks(path, frames)
+        if kind == ".json":
+            return _polygons(path, files, len(frames.images))
+        return _masks(path, _pictures(files) if kind == ".png" else _array(path), frames)
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be read ({error.strerror})") from error
 
@@ -75,8 +82,8 @@ def _read(path: Path, frames: Frames) -> Outlines:
 # --- masks ----------------------------------------------------------------------------------------
 
 
-def _masks(path: Path, frames: Frames) -> Outlines:
-    masks = _pictures(path) if path.is_dir() or path.suffix.lower() == ".png" else _array(path)
+def _masks(path: Path, masks: Any, frames: Frames) -> Outlines:
+    _require_each(path, len(masks), "masks", len(frames.images))
     shape, found = frames.images[0].shape, {}
     for i, mask in enumerate(masks):
         if mask.shape != shape:
@@ -86,8 +93,15 @@ def _masks(path: Path, frames: Frames) -> Outlines:
     return found
 
 
-def _pictures(path: Path) -> list[Any]:
-    files = sorted(path.glob("*.png")) if path.is_dir() else [path]
+def _require_each(path: Path, count: int, what: str, images: int) -> None:
+    if count != images:
+        raise RecordingError(
+            f"{path.name}: {count} {what} for {images} images leave open whose they are; give one "
+            "an image (an empty mask where there is no outline), or a CSV of frame, x, y"
+        )
+
+
+def _pictures(files: list[Path]) -> list[Any]:
     return [decode_png(file.read_bytes()) for file in files]
 
 
@@ -129,33 +143,35 @@ def _table(path: Path) -> Outlines:
         return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
 
 
-def _polygons(path: Path) -> Outlines:
+def _polygons(path: Path, files: list[Path], images: int) -> Outlines:
     try:
-        told = json.loads(path.read_text(encoding="utf-8-sig", errors="replace"))
-        if "annotations" in told:
-            return _coco(path, told)
-        shapes = [
-            s["points"] for s in told["shapes"] if s.get("shape_type", "polygon") == "polygon"
-        ]
+        told = [json.loads(f.read_text(encoding="utf-8-sig", errors="replace")) for f in files]
+        if "annotations" in told[0] and len(told) == 1:
+            return _coco(path, told[0], images)
+        _require_each(path, len(files), "files of polygons", images)
+        return _grouped(path, ((i, p) for i, one in enumerate(told) for p in _shape(path, one)))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise RecordingError(f"{path.name}: neither LabelMe nor COCO polygons ({error})") from None
-    if len(shapes) != 1:
-        raise RecordingError(f"{path.name}: {len(shapes)} polygons, expected one")
-    return _grouped(path, ((0, p) for p in shapes[0]))
 
 
-def _coco(path: Path, told: Any) -> Outlines:
-    """One polygon an image, images in the order in which the file lists them."""
-    order = {image["id"]: i for i, image in enumerate(told["images"])}
-    points = (
-        (order[note["image_id"]], pair)
-        for note in told["annotations"]
-        for pair in np.reshape(note["segmentation"][0], (-1, 2)).tolist()
-    )
-    ids = [note["image_id"] for note in told["annotations"]]
-    if len(ids) > len(set(ids)):
-        raise RecordingError(f"{path.name}: two polygons in one image, expected one")
-    return _grouped(path, points)
+def _shape(path: Path, told: Any) -> Any:
+    """The points of the polygon of a LabelMe file; none where it has no shape."""
+    closed = [s for s in told["shapes"] if s.get("shape_type", "polygon") == "polygon"]
+    if len(closed) > 1:
+        raise RecordingError(f"{path.name}: {len(closed)} polygons in one image, expected one")
+    return closed[0]["points"] if closed else []
+
+
+def _coco(path: Path, told: Any, images: int) -> Outlines:
+    """One polygon an image, images in the order of the numbers in their files' names."""
+    _require_each(path, len(told["images"]), "images", images)
+    listed = sorted(told["images"], key=lambda image: number_key(str(image["file_name"])))
+    order = {image["id"]: i for i, image in enumerate(listed)}
+    polygons = [(order[n["image_id"]], p) for n in told["annotations"] for p in n["segmentation"]]
+    if len(polygons) > len({i for i, _ in polygons}):
+        raise RecordingError(f"{path.name}: several polygons in one image, expected one")
+    pairs = ((i, pair) for i, p in polygons for pair in np.reshape(p, (-1, 2)).tolist())
+    return _grouped(path, pairs)
 
 
 def _grouped(path: Path, points: Iterable[tuple[Any, Any]]) -> Outlines:

@@ -82,25 +82,34 @@ def _require_meant(text: str, side: float, image: Pixels) -> None:
 
 def _images(folder: Path) -> tuple[Pixels, ...]:
     images: list[Pixels] = []
-    for file in _numbered(folder):
+    for file in numbered(folder):
         images.append(_read(file))
         if sum(image.size for image in images) > MAX_STACK:
             raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
     return tuple(images)
 
 
-def _pictures(folder: Path) -> list[Path]:
-    return [f for f in folder.iterdir() if f.suffix.lower() == ".png"]
+def _pictures(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
+    return [f for f in folder.iterdir() if f.suffix.lower() in kinds]
 
 
-def _numbered(folder: Path) -> list[Path]:
+def number_key(stem: str) -> tuple[int, ...]:
+    """Numbers in a name, by which files are in order."""
+    return tuple(int(n) for n in re.findall(r"\d+", stem)[:8])
+
+
+def numbered(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
+    """Its files of these kinds in the order of the numbers in their names.
+
+    Raises `RecordingError` for a folder without any, and for numbers that are alike.
+    """
     try:
-        files = _pictures(folder)
+        files = _pictures(folder, kinds)
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be read ({error.strerror})") from error
     if not files:
-        raise RecordingError(f"{folder}: no *.png files")
-    keys = {f: tuple(int(n) for n in re.findall(r"\d+", f.stem)[:8]) for f in files}
+        raise RecordingError(f"{folder}: no {' or '.join(f'*{kind}' for kind in kinds)} files")
+    keys = {f: number_key(f.stem) for f in files}
     files.sort(key=lambda f: (keys[f], f.name))
     for a, b in pairwise(files):
         if keys[a] == keys[b]:
