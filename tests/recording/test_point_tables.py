@@ -36,6 +36,26 @@ def test_a_vicon_export_is_the_c3d_of_the_same_motion(shared_data: Path) -> None
     assert np.abs(text.t - binary.t).max() == 0
 
 
+def test_devices_of_a_vicon_export_have_their_own_rate(tmp_path: Path) -> None:
+    """Five rows a frame: the sub-frame counts, a blank channel is told, and clocks agree."""
+    rows = [f"{f},{s},{10 * f + s},{0.5 * s},{'' if s else 1}" for f in (1, 2, 3) for s in range(5)]
+    points = [f"{f},0,{f},0,0" for f in (1, 2, 3)]
+    (tmp_path / "both.csv").write_text(
+        "Devices\n500\n,,Plate - Force,,Plate - Moment\nFrame,Sub Frame,Fx,Fy,Mz\n,,N,N,N.mm\n"
+        + "\n".join(rows)
+        + "\n\nTrajectories\n100\n,,s:tip,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n"
+        + "\n".join(points)
+        + "\n"
+    )
+    got = read_vicon(tmp_path / "both.csv", {})
+    force = got.signal("analog/Plate - Force.Fx", "N")
+    assert force.y[:, 0].tolist() == [11 - 1 + s + 10 * f for f in range(3) for s in range(5)]
+    assert np.diff(force.t) == pytest.approx(1 / 500)
+    assert force.t[::5] == pytest.approx(got.marker("markers").t)
+    assert sorted(got.signals) == ["analog/Plate - Force.Fx", "analog/Plate - Force.Fy"]
+    assert "Mz: 12 blank cells" in str(dict(got.metadata))
+
+
 def test_a_comma_separated_trc_is_read_and_says_that_it_is_a_part(shared_data: Path) -> None:
     path = shared_data / MOCAP / "pyomeca_markers.trc"
     got = read_trc(path, {})
