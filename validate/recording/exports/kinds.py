@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from validate.errors import UsageError
-from validate.recording.exports.vocabulary import COMPRESSION, TENSION, kind_word
+from validate.recording.exports.vocabulary import BESIDE_THE_TEST, COMPRESSION, TENSION, kind_word
 
 KindName = Literal["compression", "tension"]
 KINDS: dict[str, KindName] = {"compression": "compression", "tension": "tension"}
@@ -24,18 +24,27 @@ class Kind:
 def kind_of_test(said: str | None, header: Mapping[str, str], labels: Iterable[str]) -> Kind | None:
     """What is stated; None where nothing is, or header and columns contradict each other.
 
-    A line that names both (`Load cell: tension/compression`) tells nothing. Raises `UsageError`
-    for a kind that is neither.
+    A line that names both (`Load cell: tension/compression`) tells nothing, nor does one on the
+    material, the machine's parts, who tested, a remark or a path: a compression moulded sheet is
+    pulled as well. Raises `UsageError` for a kind that is neither.
     """
     if said is not None:
         if said not in KINDS:
             raise UsageError(f"--map test={said}: a test is one of tension, compression")
         return Kind(KINDS[said], "said by the user", said=True)
     lines = [
-        value if key.startswith("line ") else f"{key}: {value}" for key, value in header.items()
+        value if key.startswith("line ") else f"{key}: {value}"
+        for key, value in header.items()
+        if _of_the_test(key, value)
     ]
     found = {**_stated(labels, "column"), **_stated(lines, "header")}
     return next(iter(found.values())) if len(found) == 1 else None
+
+
+def _of_the_test(key: str, value: str) -> bool:
+    """Whether a header's line can say what was done, by its key, and by a value that is no path."""
+    beside = any(word in key.casefold() for word in BESIDE_THE_TEST)
+    return not beside and "\\" not in value and value.count("/") < 2
 
 
 def _stated(texts: Iterable[str], where: str) -> dict[KindName, Kind]:
