@@ -5,7 +5,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from validate.errors import UsageError
-from validate.recording.exports.vocabulary import BESIDE_THE_TEST, COMPRESSION, TENSION, kind_word
+from validate.recording.exports.vocabulary import (
+    BESIDE_THE_TEST,
+    COMPRESSION,
+    TENSION,
+    kind_word,
+    plain,
+    terms,
+)
 
 KindName = Literal["compression", "tension"]
 KINDS: dict[str, KindName] = {"compression": "compression", "tension": "tension"}
@@ -43,7 +50,7 @@ def kind_of_test(said: str | None, header: Mapping[str, str], labels: Iterable[s
 
 def _of_the_test(key: str, value: str) -> bool:
     """Whether a header's line can say what was done, by its key, and by a value that is no path."""
-    beside = any(word in key.casefold() for word in BESIDE_THE_TEST)
+    beside = any(word in plain(key) for word in terms(BESIDE_THE_TEST))
     return not beside and "\\" not in value and value.count("/") < 2
 
 

@@ -74,72 +74,11 @@ _NO_KIND = re.compile(
     r"|compressor\w*|aria compressa|data compression"
 )
 # Keys of what is beside the test: material, machine, its parts, people, remarks, files.
-BESIDE_THE_TEST = tuple(
-    [
-        "material",
-        "matéria",
-        "werkstoff",
-        "cell",
-        "messdose",
-        "kraftaufnehmer",
-        "aufnehmer",
-        "capteur",
-        "sensor",
-        "cella",
-        "célula",
-        "transducer",
-        "fixture",
-        "grip",
-        "clamp",
-        "platen",
-        "plate",
-        "jaw",
-        "einspann",
-        "mors",
-        "garra",
-        "mordaza",
-        "company",
-        "firma",
-        "firm",
-        "société",
-        "empresa",
-        "azienda",
-        "customer",
-        "client",
-        "kunde",
-        "lab",
-        "operator",
-        "user",
-        "bediener",
-        "prüfer",
-        "opérateur",
-        "comment",
-        "note",
-        "remark",
-        "bemerk",
-        "komment",
-        "observ",
-        "file",
-        "path",
-        "datei",
-        "fichier",
-        "archiv",
-        "machine",
-        "maschine",
-        "macchina",
-        "máquina",
-        "serial",
-        "instrument",
-        "frame",
-        "prepar",
-        "材料",
-        "传感器",
-        "夹具",
-        "公司",
-        "备注",
-        "操作",
-    ]
-)
+BESIDE_THE_TEST = """material materia werkstoff cell messdose aufnehmer capteur sensor cella celula
+    transducer fixture grip clamp platen plate jaw einspann mors garra mordaza company firm societe
+    empresa azienda customer client kunde lab operator user bediener prufer operateur comment note
+    remark bemerk komment observ file path datei fichier archiv machine maschine macchina maquina
+    serial instrument frame prepar 材料 传感器 夹具 公司 备注 操作"""
 STOPPED = """aborted cancelled canceled interrupted abgebrochen interrompu interrotto interrotta
     interrumpido interrumpida abortado abortada interrompido прерван прервано przerwano przerwane
     preruseno megszakitva 中止 中断"""
