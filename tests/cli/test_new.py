@@ -17,7 +17,7 @@ from validate.errors import RecordingError, UsageError
 from validate.identify.modulus import fit_modulus
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Frames, Recording, Signal, Source
 from validate.replay import compare
 from validate.replay.find import load_file
 from validate.scene.box import box
@@ -173,6 +173,16 @@ def test_it_names_channels_rates_units_and_what_is_not_recorded(tmp_path: Path) 
     assert len(text.splitlines()) <= 60
     assert "$" not in text
     assert "TODO" not in text
+
+
+def test_streams_that_are_not_used_are_named(tmp_path: Path) -> None:
+    images = tuple(np.zeros((8, 8), np.uint8) for _ in range(2))
+    frames = Frames(np.arange(2.0), images, (1e-4, 1e-4), np.eye(4), "image")
+    write_recording(replace(log(**SIZES), frames={"camera": frames}), tmp_path / "gel.mcap")
+    write_recording(log(**SIZES), tmp_path / "alone.mcap")
+    _, said = in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")
+    assert "'camera' is not used by the experiment that was written" in " ".join(said.split())
+    assert "not used" not in in_folder(tmp_path, "new", "other", "--from", "alone.mcap")[1]
 
 
 def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from string import Template
 
 import numpy as np
 
+from validate.cli.arguments import complain
 from validate.cli.display import say
 from validate.cli.recordings import ask_back
 from validate.errors import UsageError
@@ -42,6 +43,8 @@ def new(name: str, source: Path, out: Path | None) -> None:
     text = written(name, recording, _beside(source, path))
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, text)
+    for topic in _unused(recording):
+        complain(f"'{topic}' is not used by the experiment that was written")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
 
 
@@ -76,6 +79,17 @@ def _kind(recording: Recording) -> str:
         "an experiment is written from signals 'displacement' (m) and 'force' (N), or from "
         "outlines, a stage (m) and markers with records 'inclusion' and 'marker_layout'"
     )
+
+
+def _unused(recording: Recording) -> list[str]:
+    """Topics that the written experiment looks at in nothing; images give outlines."""
+    if _kind(recording) == "force":
+        used = {"displacement", "force"}
+    else:
+        outline, contours = next(iter(recording.contours.items()))
+        used = {outline, contours.images, next(iter(recording.markers)), _stage(recording)[0]}
+        used |= set(_scalars(recording))
+    return [topic for topic in _topics(recording) if topic not in used]
 
 
 def _topics(recording: Recording) -> list[str]:
