@@ -66,7 +66,7 @@ class GridConvergence:
     @property
     def words(self) -> str:
         if self.conduct == "at rounding":
-            return f"{self.sizes} sizes differ by rounding"
+            return f"{self.sizes} sizes differ by nothing that counts ({self.u:.1g})"
         if self.order is None:
             return f"{self.conduct} over {self.sizes} sizes, not asymptotic"
         return (

@@ -18,7 +18,6 @@ from validate.scene.shape_functions import (
     simplex_values,
 )
 
-_ON = 1e-6  # m: a point this near is on the surface
 _CANDIDATES = 24  # nearest cell centres tried per point
 _INVERSIONS = 12  # Newton steps to a brick's local coordinates; a parallelepiped takes one
 _STRAY = 4.0  # how far outside its unit cell such a step may go: a brick's map folds further out
@@ -50,17 +49,17 @@ def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
 
 
 def standing_rows(mesh: Mesh, points: Floats) -> Rows:
-    """Rows of points off the surface, as markers on stalks: each moves and turns with the cell
-    below it, by the affine field (least squares) of the cell's nodes, so that in a stretch-free
-    cell its offset is turned exactly. Points within the mesh are read as `barycentric_rows` does.
+    """Rows of points off the surface, as markers on stalks: each moves with its foot on the cell
+    below it, and turns with that cell, by the slope of the affine field (least squares) of its
+    nodes. Points within the mesh are read as `barycentric_rows` does.
     """
     rows = barycentric_rows(mesh, points)
-    weights = rows.weights.copy()
-    for i in np.flatnonzero(rows.outside > _ON):
+    weights, feet = rows.weights.copy(), rows.apply(mesh.nodes)
+    for i in np.flatnonzero(rows.outside > 0):
         own = slice(weights.indptr[i], weights.indptr[i + 1])  # all nodes of the cell
         x = mesh.nodes[weights.indices[own]]
         affine = np.linalg.pinv(np.column_stack([np.ones(len(x)), x - x.mean(axis=0)]))
-        weights.data[own] = np.append(1.0, points[i] - x.mean(axis=0)) @ affine
+        weights.data[own] += (points[i] - feet[i]) @ affine[1:]
     return Rows(weights, rows.outside)
 
 

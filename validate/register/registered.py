@@ -70,14 +70,12 @@ class Registered:
         return tuple(o for o in self.compared if isinstance(o, kind))
 
     def frames(self, t: Floats, most: int) -> Ints:
-        """Which of a run's steps at t (nt,) s keep their fields: rest and single instants, else
-        `most` evenly."""
-        compared = [s for s in (self.rest, *self.selections) if s is not None]
-        single = [s for s in compared if s.t is not None and len(s.t) == 1]
-        if single:
-            return np.unique(np.concatenate([s.steps(t) for s in single]))
-        steps = len(t)
-        return np.unique(np.linspace(0, steps - 1, min(most, steps)).round().astype(np.int64))
+        """Which of a run's steps at t (nt,) s keep their fields: rest and single instants, where
+        there are none of these rest and `most` evenly."""
+        single = [s.steps(t) for s in self.selections if s.t is not None and len(s.t) == 1]
+        rest = [self.rest.steps(t)] if self.rest is not None else []
+        even = np.linspace(0, len(t) - 1, min(most, len(t))).round().astype(np.int64)
+        return np.unique(np.concatenate([*rest, *(single or [even])]))
 
     def stage(self, t: float) -> float:
         """The first input at the step nearest to t s, in its own unit."""

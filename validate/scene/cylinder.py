@@ -1,4 +1,6 @@
-"""A quarter of an upright cylinder, for compression between plates."""
+"""An upright cylinder, or a quarter of it, for compression between plates."""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -77,3 +79,21 @@ def _outside(radial: int) -> float:
 
 def _ratio(part: Floats, whole: Floats) -> Floats:
     return np.asarray(np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0))
+
+
+def whole_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:
+    """Linear tetrahedra of the whole cylinder: four mirrored quarters, sets "lower_plate",
+    "upper_plate" and "rim"."""
+    mesh = quarter_cylinder(diameter, height, radial, axial)
+    sets = {name: mesh.facets[name] for name in ("lower_plate", "upper_plate", "rim")}
+    return _doubled(_doubled(replace(mesh, facets=sets), 0), 1)
+
+
+def _doubled(mesh: Mesh, axis: int) -> Mesh:
+    """The mesh and its mirror image across the plane through the origin, joined there."""
+    n, flat = len(mesh.nodes), np.abs(mesh.nodes[:, axis]) < 1e-12
+    image = np.where(flat, np.arange(n), n + np.cumsum(~flat) - 1)
+    sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+    nodes = np.vstack([mesh.nodes, sign * mesh.nodes[~flat]])
+    facets = {k: np.vstack([f, image[f[:, [0, 2, 1]]]]) for k, f in mesh.facets.items()}
+    return Mesh(nodes, np.vstack([mesh.cells, image[mesh.cells[:, [0, 2, 1, 3]]]]), "tet4", facets)

@@ -1,0 +1,224 @@
+"""A measured body against exact solutions: uniaxial force, own weight, markers that move a face,
+outlines of a section; and what is refused."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from validate.compare.result import Result
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError, RegistrationError, SceneError, UsageError
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Contours, Markers, Recording, Signal, Source
+from validate.replay import compare
+from validate.replay.experiment import Experiment
+from validate.replay.measured_body import measured_body, solid
+from validate.replay.measured_cards import BodyRanges, Held, Measured, Moved, Seen, Solid, Tissue
+from validate.scene.box import box
+from validate.scene.mesh_file import write_mesh
+from validate.scene.named_place import axis_of, place_of, point_of
+
+SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
+T = np.linspace(0.0, 4.0, 161)
+ROLLERS = Held(x=("xmin",), y=("ymin",), z=("zmin",))
+PLACES = {"A": (0.04, 0.03, 0.05), "B": (0.0, 0.03, 0.04), "C": (0.04, 0.0, 0.02),
+          "D": (0.04, 0.03, 0.03)}  # fmt: skip
+SD = 5e-6
+
+
+def recording(**streams: Any) -> Recording:
+    return Recording("body", Source("x", "", 0, "x"), 0, **streams)
+
+
+def tracked(u: Any, frame: str = "body") -> Markers:
+    """Markers displaced by u(x) times the share of the load, with noise."""
+    x = np.array(list(PLACES.values()))
+    share = np.clip((T - 0.5) / 3.0, 0, 1)[:, None, None]
+    seen = x + share * u(x) + np.random.default_rng(3).normal(0, SD, (len(T), *x.shape))
+    return Markers(T, tuple(PLACES), seen, SD, frame)
+
+
+def stretched(x: Any) -> Any:
+    """1 mm of compression, uniform."""
+    return np.array([-NU, -NU, 1.0]) * -0.001 / SIZE[2] * x
+
+
+def log() -> dict[str, Signal]:
+    d = 1e-3 * np.clip((T - 0.5) / 3.0, 0, 1)
+    force = E * SIZE[0] * SIZE[1] * d / SIZE[2] + np.random.default_rng(1).normal(0, 2e-3, len(T))
+    return {"displacement": Signal(T, d[:, None], "m", 0.0, "machine"),
+            "force": Signal(T, force[:, None], "N", 2e-3, "machine")}  # fmt: skip
+
+
+BASE = Measured(
+    "body.mcap", Solid(block=SIZE, cells=4), Tissue(E, NU, RHO), ROLLERS,
+    Moved("displacement", "zmax", "-z", sideways=False), Seen(force="force", states=8, still=0.4),
+)  # fmt: skip
+
+
+def experiment(
+    folder: Path, parameters: Measured, seen: Recording, *names: str, order: int = 1
+) -> Experiment:
+    write_recording(seen, folder / "body.mcap")
+    limits = {"force": 0.05, "marker": 5e-5, "contour": 2e-4}
+    made = measured_body(
+        "body", "body", "x", parameters, {"linear": solid("linear", "linear", order)}, ("linear",),
+        tuple(Accept(n, limits[n], "of a test") for n in names), folder,
+    )  # fmt: skip
+    return replace(made, path=folder / "body.py")
+
+
+def verdicts(result: Result) -> dict[str, str]:
+    return {c.name: c.verdict for c in result.checks}
+
+
+def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
+    result = compare(experiment(tmp_path, BASE, recording(signals=log()), "force"))
+    assert verdicts(result) == {"force.rms@low": "agrees", "force.rms@high": "agrees"}
+    rms = {s.name: s.value for s in result.methods[0].scores}
+    assert rms["force.rms@high"] < 4e-3  # noise alone
+
+
+def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> None:
+    open_ = replace(BASE, material=replace(BASE.material, E=None))
+    result = compare(experiment(tmp_path, open_, recording(signals=log()), "force"))
+    found = {p.path: p.default for p in result.parameters}
+    assert found["material.E"] == pytest.approx(E, rel=0.01)
+    assert verdicts(result) == {"force.rms@low": "fitted", "force.rms@high": "agrees"}
+
+
+def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
+    """A turned tracker's frame, the layout recorded: displacements are those of the body."""
+    c, s = np.cos(0.4), np.sin(0.4)
+    R, shift = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), np.array([1.0, -2.0, 0.5])
+    seen = tracked(stretched, "tracker")
+    layout = {name: " ".join(map(repr, at)) for name, at in PLACES.items()}
+    both = recording(
+        signals=log(), markers={"markers": replace(seen, x=seen.x @ R.T + shift)},
+        metadata={"marker_layout": layout},
+    )  # fmt: skip
+    p = replace(BASE, seen=replace(BASE.seen, markers="markers", layout="recorded"))
+    result = compare(experiment(tmp_path, p, both, "force", "marker"))
+    assert set(verdicts(result).values()) == {"agrees"}
+    rms = {s.name: s.value for s in result.methods[0].scores}
+    assert rms["marker.rms@high"] < 1.5 * np.sqrt(3) * SD  # of a length
+
+
+def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
+    """u_z = -rho g (h z - z^2/2) / E on rollers, without contraction."""
+
+    def sunk(x: Any) -> Any:
+        u = np.zeros_like(x)
+        u[:, 2] = -RHO * G * (SIZE[2] * x[:, 2] - x[:, 2] ** 2 / 2) / E
+        return u
+
+    p = replace(BASE, moved=Moved("gravity", None, "-z"), seen=Seen(markers="m", still=0.4),
+                material=replace(BASE.material, nu=0.0), ranges=BodyRanges(E=0.02))  # fmt: skip
+    seen = recording(markers={"m": tracked(sunk)})
+    result = compare(experiment(tmp_path, p, seen, "marker", order=2))
+    assert verdicts(result) == {"marker.rms@loaded": "agrees"}
+    assert {s.name: s.value for s in result.methods[0].scores}["marker.rms@loaded"] < 2e-5
+
+
+def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
+    """Three of them drive the top as a rigid body; the fourth is predicted."""
+    names = ("A", "T1", "T2", "D")
+    x = np.array([(0.04, 0.03, 0.05), (0.0, 0.03, 0.05), (0.04, 0.0, 0.05), (0.02, 0.0, 0.025)])
+    share = np.clip((T - 0.5) / 3.0, 0, 1)[:, None, None]
+    u = np.zeros_like(x)
+    u[:, 2] = -1e-3 * x[:, 2] / SIZE[2]
+    noise = np.random.default_rng(3).normal(0, SD, (len(T), *x.shape))
+    seen = recording(markers={"m": Markers(T, names, x + share * u + noise, SD, "body")})
+    p = replace(
+        BASE, material=replace(BASE.material, nu=0.0), held=Held(all=("zmin",)),
+        moved=Moved("markers", "zmax", markers=names[:3]),
+        seen=Seen(markers="m", states=8, still=0.4),
+    )  # fmt: skip
+    result = compare(experiment(tmp_path, p, seen, "marker"))
+    assert verdicts(result) == {"marker.rms@low": "agrees", "marker.rms@high": "agrees"}
+    short = replace(p, moved=Moved("markers", "zmax", markers=names[:2]))
+    with pytest.raises(UsageError, match="three or more are needed"):
+        compare(experiment(tmp_path, short, seen, "marker"))
+
+
+def test_outlines_of_a_section(tmp_path: Path) -> None:
+    """The side of a pressed block: its width grows, its height falls."""
+
+    def outline(share: float) -> Any:
+        w, h = SIZE[0] * (1 + NU * 0.02 * share), SIZE[2] * (1 - 0.02 * share)
+        s = np.linspace(0, 1, 30, endpoint=False)[:, None]
+        corners = np.array([[0, 0], [w, 0], [w, h], [0, h]])
+        return np.vstack([a + s * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0),
+                                                          strict=True)])  # fmt: skip
+
+    t = T[::16]
+    shapes = tuple(outline(float(v)) for v in np.clip((t - 0.5) / 3.0, 0, 1))
+    contours = Contours(t, shapes, 2e-5, np.eye(4), "image")
+    p = replace(BASE, seen=Seen(outline="o", origin=(0.0, 0.015, 0.0), image_x="+x", image_y="+z"))
+    seen = recording(signals=log(), contours={"o": contours})
+    result = compare(experiment(tmp_path, p, seen, "contour"))
+    assert verdicts(result) == {"contour.rms@low": "agrees", "contour.rms@high": "agrees"}
+    with pytest.raises(UsageError, match="two directions at right angles"):
+        compare(experiment(tmp_path, replace(p, seen=replace(p.seen, image_y="+x")), seen))
+
+
+def test_a_mesh_file_is_found_beside_the_experiment(tmp_path: Path) -> None:
+    write_mesh(box(SIZE, (2, 2, 2)), tmp_path / "body.npz")
+    p = replace(BASE, body=Solid("body.npz"))
+    result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    assert set(verdicts(result).values()) == {"agrees"}
+
+
+@cache
+def _block() -> Any:
+    return box(SIZE, (2, 2, 2))
+
+
+def test_places_in_words() -> None:
+    mesh = _block()
+    top = place_of("z1", mesh)
+    assert top == "z1"
+    for words in ("zmax", "z=50mm", "z=0.0499~0.2mm", "box 0,0,49mm to 40mm,30mm,51mm"):
+        assert len(place_of(words, mesh).entities(mesh)) == 8  # type: ignore[union-attr]
+    assert len(place_of("near 0,0,50mm", mesh).entities(mesh)) == 1  # type: ignore[union-attr]
+    assert len(place_of("zmin+zmax", mesh).entities(mesh)) == 16  # type: ignore[union-attr]
+    assert axis_of("-z") == (0.0, 0.0, -1.0)
+    assert axis_of("0,3,4") == (0.0, 0.6, 0.8)
+    assert point_of("10mm,0,0.02m") == (0.01, 0.0, 0.02)
+    for words, why in (("top", "none of a facet set"), ("z=1", "none of .* faces is chosen"),
+                       ("z=5 apples", "no length"), ("near 1,2", "three lengths")):  # fmt: skip
+        with pytest.raises(SceneError, match=why):
+            place_of(words, mesh)
+    with pytest.raises(SceneError, match="each with its unit"):
+        point_of("10mm,20,0")
+    with pytest.raises(SceneError, match="or three numbers"):
+        axis_of("up")
+
+
+@pytest.mark.parametrize(("change", "error", "why"), [
+    ({"seen": Seen()}, ComparisonError, "nothing of the recording is compared"),
+    ({"moved": Moved("stage", "zmax")}, UsageError, "stage: no signal of that name"),
+    ({"moved": Moved("displacement")}, UsageError, "moved.place is not set"),
+    ({"moved": Moved("displacement", "lid")}, SceneError, "place 'lid': none of"),
+    ({"moved": Moved("gravity")}, ComparisonError, "here the body weighs"),
+    ({"body": Solid()}, UsageError, "body: none is given"),
+    ({"material": Tissue(None), "moved": Moved("gravity"), "seen": Seen(markers="m")}, UsageError,
+     "material.E is not set"),
+])  # fmt: skip
+def test_what_cannot_be_is_refused(
+    tmp_path: Path, change: dict[str, Any], error: type[Exception], why: str
+) -> None:
+    seen = recording(signals=log(), markers={"m": tracked(stretched)})
+    with pytest.raises(error, match=why):
+        compare(experiment(tmp_path, replace(BASE, **change), seen, "force", "marker"))
+
+
+def test_force_and_motion_of_different_signs_are_refused(tmp_path: Path) -> None:
+    turned = log()
+    turned["force"] = replace(turned["force"], y=-turned["force"].y)
+    with pytest.raises(RegistrationError, match="must have one sign"):
+        compare(experiment(tmp_path, BASE, recording(signals=turned), "force"))

@@ -1,0 +1,120 @@
+"""What a user decides of a measured body: its shape, material, supports, what moves it, what was
+seen of it. Places and directions are words (`scene.named_place`)."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from validate.errors import UsageError
+from validate.parameters import Ranges, part, quantity
+from validate.register.fitting import MarkerFit
+from validate.scene.laws import Coefficients
+from validate.scene.material import LawName
+
+Layout = Literal["recorded", "as seen"]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """One of a mesh file, a block [0, size] or a cylinder about z from the origin."""
+
+    file: str | None = quantity(None, "1", "mesh file, from the experiment's folder")
+    unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
+    block: tuple[float, ...] = quantity((), "m", "sizes along x, y, z of a block from the origin")
+    cylinder: tuple[float, ...] = quantity((), "m", "diameter and height of a cylinder along z")
+    cells: int = quantity(8, "1", "cells along the longest edge of a block or cylinder")
+    finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
+    halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
+
+    def __post_init__(self) -> None:
+        given = [bool(self.file), bool(self.block), bool(self.cylinder)]
+        if sum(given) > 1 or len(self.block) not in (0, 3) or len(self.cylinder) not in (0, 2):
+            raise UsageError(
+                "body: one of file, block (three sizes) and cylinder (diameter, height); "
+                f"{sum(given)} are given, block {self.block}, cylinder {self.cylinder}"
+            )
+
+
+@dataclass(frozen=True)
+class Tissue:
+    E: float | None = quantity(None, "Pa", "Young's modulus; none: identified")
+    nu: float = quantity(0.45, "1", "Poisson ratio")
+    rho: float = quantity(1000.0, "kg/m3", "density; moves the body under gravity only")
+    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
+
+
+@dataclass(frozen=True)
+class Held:
+    """Places by which displacements cannot happen there."""
+
+    all: tuple[str, ...] = quantity((), "1", "places held in every direction")
+    x: tuple[str, ...] = quantity((), "1", "places held along x alone")
+    y: tuple[str, ...] = quantity((), "1", "places held along y alone")
+    z: tuple[str, ...] = quantity((), "1", "places held along z alone")
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What loads the body: a signal in m (moves a place) or N (pulls at it), "markers" that sit on
+    a place, which follows them as a rigid body, or "gravity"."""
+
+    by: str = quantity("gravity", "1", "a signal's topic, or: markers, gravity")
+    place: str | None = quantity(None, "1", "where; gravity needs none")
+    along: str = quantity("-z", "1", "direction: +x, -z, or three numbers")
+    sideways: bool = quantity(True, "1", "whether a moved place is held across its direction")
+    markers: tuple[str, ...] = quantity((), "1", "markers on the moved place, three or more")
+    amount: float = quantity(9.80665, "m/s^2", "gravity")
+    scale: float = quantity(1.0, "1", "true load over the recorded one")
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What of the recording is compared; what is none is not."""
+
+    force: str | None = quantity(None, "1", "signal in N: the force on the moved place")
+    markers: str | None = quantity(None, "1", "markers' topic")
+    layout: Layout = quantity("as seen", "1", "markers' places: of the recording, or as first seen")
+    stands: float = quantity(2e-3, "m", "how far off the body a marker may stand, as on a stalk")
+    outline: str | None = quantity(None, "1", "outlines' topic")
+    surface: str = quantity("surface", "1", "facet set the outlines show; surface: the whole one")
+    origin: tuple[float, ...] = quantity((), "m", "the image's origin; none: the recording's pose")
+    image_x: str = quantity("+x", "1", "direction of the image's x (columns), with an origin")
+    image_y: str = quantity("-z", "1", "direction of the image's y (rows), with an origin")
+    states: int = quantity(30, "1", "instants that are solved and compared, evenly spaced")
+    still: float = quantity(0.0, "s", "from the first instant, in which the body is unloaded")
+    fit_to: float = quantity(0.5, "1", "share of the load below which an open E is identified")
+    registration: MarkerFit = MarkerFit()
+
+    def __post_init__(self) -> None:
+        if not (2 <= self.states <= 500 and 0 < self.fit_to < 1 and self.still >= 0):
+            raise UsageError(
+                f"seen: {self.states} states (2 to 500), fit_to {self.fit_to:g} (between 0 and 1), "
+                f"still {self.still:g} s (0 or above)"
+            )
+
+
+@dataclass(frozen=True)
+class BodyRanges(Ranges):
+    E: float = quantity(0.05, "1", "relative, of a modulus that is given")
+    nu: float = quantity(0.01, "1", "of the Poisson ratio")
+    load: float = quantity(0.01, "1", "relative, of what moves or pulls the body")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Everything that is decided; `recording` lies beside the experiment's file."""
+
+    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
+    body: Solid = Solid()
+    material: Tissue = Tissue()
+    held: Held = Held()
+    moved: Moved = Moved()
+    seen: Seen = Seen()
+    ranges: BodyRanges = BodyRanges()
+
+
+@dataclass(frozen=True)
+class SolidModel:
+    """What a method's scene is built with."""
+
+    law: LawName = quantity("neo_hooke", "1", "linear, or the law at large strain")
+    order: Literal[1, 2] = quantity(1, "1", "element order; 1 means nodal mean dilatation")

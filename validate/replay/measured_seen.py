@@ -1,0 +1,309 @@
+"""A measured body's recording, registered: what moves it, what is compared, at which instants."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError, RegistrationError, UsageError
+from validate.identify.modulus import MIN_SAMPLES, load_noise
+from validate.recording.types import Markers, Recording, Signal
+from validate.register.clock import clock_sd, interpolated
+from validate.register.from_rest import noise, rested, since_rest
+from validate.register.markers import MarkerObservation, Together, observe_markers, vector
+from validate.register.observation import Observation, Selection
+from validate.register.outlines import observe_outlines
+from validate.register.plane import cavity_sampler
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
+from validate.replay.measured_cards import Measured
+from validate.scene.mesh import Mesh
+from validate.scene.named_place import axis_of
+from validate.scene.scene import Scene
+from validate.scene.select import Place
+from validate.scene.tracked import Prescribed
+
+LOW, HIGH = "low", "high"
+Kind = Literal["weighs", "pulls", "moves", "follows"]
+_TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
+_FEWEST = 3  # markers on a place that follows them
+
+
+def drive_kind(recording: Recording, p: Measured) -> Kind:
+    """What the load is; raises `UsageError` for a topic that is no signal in m or N."""
+    if p.moved.by == "gravity":
+        return "weighs"
+    if p.moved.by == "markers":
+        return "follows"
+    found = recording.signals.get(p.moved.by)
+    unit = found.unit if found is not None else ""
+    if unit not in ("m", "N"):
+        known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in ("m", "N")]
+        raise UsageError(
+            f"moved.by = {p.moved.by}: {'in ' + unit if unit else 'no signal of that name'}; one "
+            f"of {', '.join([*known, 'markers', 'gravity'])}"
+        )
+    return "moves" if unit == "m" else "pulls"
+
+
+def place(recording: Recording, p: Measured, scene: Scene) -> Registered:
+    """Drive, force, markers and outlines at `seen.states` instants.
+
+    Raises `ComparisonError` where nothing is left to be compared, `RegistrationError` and
+    `RecordingError` as the parts do.
+    """
+    t, rest = _instants(recording, p)
+    kind = drive_kind(recording, p)
+    drive = _drive(recording, p, kind, t, rest, scene.mesh)
+    compared: list[Observation] = []
+    findings: tuple[str, ...] = ()
+    if p.seen.force:
+        compared.append(_force(recording, p, kind, drive, rest))
+    if p.seen.markers:
+        markers, findings = _markers(recording, p, scene, kind)
+        compared.append(markers)
+    if p.seen.outline:
+        compared.append(_outline(recording, p, scene, rest))
+    if not compared:
+        raise ComparisonError(
+            "nothing of the recording is compared: set one of seen.force, seen.markers and "
+            f"seen.outline to a topic of {sorted(recording.streams)}"
+        )
+    return Registered(
+        (drive, *compared), _selections(p, drive, kind), Selection("rest", t[:1]),
+        findings=findings,
+    )  # fmt: skip
+
+
+def _instants(recording: Recording, p: Measured) -> tuple[Floats, float]:
+    """Rest and evenly spaced times (nt,) s that all streams in use cover; images' own, where
+    outlines are compared."""
+    used = {p.seen.force, p.seen.markers, p.seen.outline, p.moved.by} - {None, "gravity"}
+    used = {p.seen.markers if topic == "markers" else topic for topic in used} - {None}
+    streams = recording.streams
+    missing = sorted(str(topic) for topic in used if topic not in streams)
+    if missing:
+        raise UsageError(f"no stream {missing} in {recording.name}; it has {sorted(streams)}")
+    times = [streams[str(topic)].t for topic in used]
+    if not times:
+        raise ComparisonError("nothing of the recording is used: set seen.* or moved.by")
+    start, end = max(t[0] for t in times), min(t[-1] for t in times)
+    if not end > start:
+        raise ComparisonError(
+            f"{recording.name}: the streams {sorted(map(str, used))} share no time "
+            f"(latest start {start:.3f} s, earliest end {end:.3f} s); `validate align` them"
+        )
+    if p.seen.outline:
+        own = recording.contour(p.seen.outline).t
+        own = own[(own >= start) & (own <= end)]
+        picked = np.unique(np.linspace(0, len(own) - 1, p.seen.states + 1).round().astype(int))
+        return np.unique(own[picked]), float(own[0])
+    count = 1 if p.moved.by == "gravity" else p.seen.states
+    return np.append(start, np.linspace(start, end, count + 1)[1:]), float(start)
+
+
+# --- what moves it --------------------------------------------------------------------------------
+
+
+def _drive(
+    recording: Recording, p: Measured, kind: Kind, t: Floats, rest: float, mesh: Mesh
+) -> SignalObservation:
+    if kind == "weighs":
+        y = np.full((len(t), 1), p.moved.amount * p.moved.scale)
+        y[0] = 0.0
+        return SignalObservation("gravity", "drives", t, y, "m/s^2", 0.0)
+    if kind == "follows":
+        return _followed(recording, p, t, mesh)
+    topic, unit = p.moved.by, "m" if kind == "moves" else "N"
+    signal = _zeroed(recording, topic, unit, rest + p.seen.still)
+    y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
+    y[0] = 0.0
+    return SignalObservation(
+        topic, "drives", t, y, unit, signal.sd, sd_t=clock_sd(recording, topic)
+    )
+
+
+def _zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
+    """The signal from its mean at rest; its noise as declared, or more as its samples scatter."""
+    s = recording.signal(topic, unit)
+    early = s.y[s.t <= max(until, float(s.t[0]))]
+    scatter = load_noise(s.y[:, 0]) if len(s.t) >= MIN_SAMPLES else 0.0
+    sd = max(s.sd, scatter) * float(np.sqrt(1 + 1 / len(early)))
+    return replace(s, y=s.y - early.mean(axis=0), sd=sd)
+
+
+def prescribed(recording: Recording, p: Measured, where: Place, mesh: Mesh) -> Prescribed:
+    """The place that follows its markers as a rigid body; raises `UsageError` for fewer than three
+    markers, or names that are none."""
+    markers = recording.marker(_topic(recording, p))
+    absent = [n for n in p.moved.markers if n not in markers.names]
+    if absent or len(p.moved.markers) < _FEWEST:
+        raise UsageError(
+            f"moved.markers = {','.join(p.moved.markers) or 'none'}: "
+            f"{f'{absent} are not recorded' if absent else 'three or more are needed'}; the "
+            f"recording has {', '.join(markers.names)}"
+        )
+    observed = _registered(recording, p, mesh)
+    places = dict(zip(observed.names, observed.x[0], strict=True))
+    unseen = [n for n in p.moved.markers if n not in places]
+    if unseen:
+        raise RegistrationError(f"markers {unseen} on the moved place are not seen at rest")
+    points = tuple((n, tuple(places[n].tolist())) for n in p.moved.markers)
+    return Prescribed("moved", where, points)
+
+
+def _followed(recording: Recording, p: Measured, t: Floats, mesh: Mesh) -> SignalObservation:
+    """What the markers on the moved place did, one column an axis of each."""
+    seen = _registered(recording, p, mesh)
+    at = [seen.names.index(n) for n in p.moved.markers]
+    moved = (seen.x[:, at] - seen.x[0, at]).reshape(len(seen.t), -1)
+    y, _ = interpolated(seen.t, moved, t)
+    if not np.isfinite(y).all():
+        first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
+        raise RegistrationError(
+            f"the markers on the moved place are not all seen at t = {first:.3f} s: fill the gap, "
+            "or leave one out of moved.markers"
+        )
+    y[0] = 0.0
+    sd_t = clock_sd(recording, _topic(recording, p))
+    return SignalObservation("moved", "drives", t, p.moved.scale * y, "m", seen.sd, sd_t=sd_t)
+
+
+# --- what is compared -----------------------------------------------------------------------------
+
+
+def _force(
+    recording: Recording, p: Measured, kind: Kind, drive: SignalObservation, rest: float
+) -> SignalObservation:
+    """Force on the moved place against its motion; raises `ComparisonError` where that is none of
+    the run's, `RegistrationError` for a force that falls as the place moves."""
+    if kind != "moves":
+        raise ComparisonError(
+            f"seen.force = {p.seen.force}: a force is predicted where a displacement moves a "
+            f"place; here the body {kind}. Set seen.force=none"
+        )
+    topic = str(p.seen.force)
+    force = _zeroed(recording, topic, "N", rest + p.seen.still)
+    t = drive.t
+    y = np.interp(t, force.t, force.y[:, 0])
+    far = int(np.abs(drive.y[:, 0]).argmax())
+    if y[far] * drive.y[far, 0] < 0 and abs(y[far]) > 5 * force.sd:
+        raise RegistrationError(
+            f"'{topic}' is {y[far]:.4g} N where '{p.moved.by}' is {1e3 * drive.y[far, 0]:.3g} mm: "
+            "force and motion must have one sign; turn one as it is imported, with "
+            "--map force=COLUMN:UNIT:-"
+        )
+    return SignalObservation(
+        topic, "validates", t[1:], y[1:, None], "N", force.sd, "force", "moved.force",
+        clock_sd(recording, topic),
+    )  # fmt: skip
+
+
+def _markers(
+    recording: Recording, p: Measured, scene: Scene, kind: Kind
+) -> tuple[MarkerObservation, tuple[str, ...]]:
+    """All markers that move nothing themselves, from where they stood at rest."""
+    whole = _registered(recording, p, scene.mesh)
+    source, unseen, samples = rested(recording.marker(_topic(recording, p)), p.seen.still)
+    driving = p.moved.markers if kind == "follows" else ()
+    kept = [i for i, n in enumerate(whole.names) if n not in driving]
+    if not kept:
+        raise ComparisonError("every marker moves the body: none is left to be compared")
+    part = replace(
+        whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
+        rest=whole.rest[kept], tre=whole.tre[kept],
+    )  # fmt: skip
+    found = since_rest(part, scene.mesh, noise(source), samples, p.seen.stands)
+    said = (f"markers not seen at rest are left out: {', '.join(unseen)}",) if unseen else ()
+    return replace(found, together=_TOGETHER), said
+
+
+def _registered(recording: Recording, p: Measured, mesh: Mesh) -> MarkerObservation:
+    """Markers in the body's frame: their layout's, or the one they were recorded in."""
+    topic = _topic(recording, p)
+    markers, _, _ = rested(recording.marker(topic), p.seen.still)
+    layout = _layout(recording, p, markers)
+    kept = [i for i, n in enumerate(markers.names) if n in layout]
+    markers = replace(
+        markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
+        sd=noise(markers),
+    )  # fmt: skip
+    up = np.array([0.0, 0.0, 1.0])
+    same = (up, up) if p.seen.layout == "as seen" else None
+    return observe_markers(
+        markers, layout, mesh, how=p.seen.registration, up=same, name=topic, stands=np.inf,
+        sd_t=clock_sd(recording, topic),
+    )  # fmt: skip
+
+
+def _layout(recording: Recording, p: Measured, markers: Markers) -> dict[str, Floats]:
+    if p.seen.layout == "as seen":
+        return dict(zip(markers.names, markers.x[0], strict=True))
+    record = recording.record("marker_layout")
+    return {name: vector(text, f"marker_layout '{name}'") for name, text in record.items()}
+
+
+def _topic(recording: Recording, p: Measured) -> str:
+    """The markers' topic, where it is not said the only one."""
+    if p.seen.markers:
+        return p.seen.markers
+    if len(recording.markers) != 1:
+        raise UsageError(f"seen.markers is not set; one of {sorted(recording.markers)}")
+    return next(iter(recording.markers))
+
+
+def _outline(recording: Recording, p: Measured, scene: Scene, rest: float) -> Observation:
+    """Outlines against the section of the deformed surface with the images' plane."""
+    topic = str(p.seen.outline)
+    contours = recording.contour(topic)
+    if scene.mesh.bricks:
+        raise RegistrationError(
+            f"outlines need triangular facets, the body has {scene.mesh.kind}: give a body of "
+            "tetrahedra"
+        )
+    scene.mesh.facet_nodes(p.seen.surface)
+    if p.seen.origin:
+        contours = replace(contours, pose=_pose(p))
+    wall = cavity_sampler(scene.mesh, p.seen.surface, None, 4)
+    return observe_outlines(contours, wall, rest, name=topic, sd_t=clock_sd(recording, topic))
+
+
+def _pose(p: Measured) -> Floats:
+    """T_body_from_image of what is declared; raises `UsageError` for axes that are not square."""
+    x, y = np.array(axis_of(p.seen.image_x)), np.array(axis_of(p.seen.image_y))
+    if len(p.seen.origin) != 3 or abs(float(x @ y)) > 1e-6:
+        raise UsageError(
+            f"seen.origin {p.seen.origin}, image_x {p.seen.image_x}, image_y {p.seen.image_y}: "
+            "three lengths, and two directions at right angles"
+        )
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), p.seen.origin
+    return pose
+
+
+# --- windows --------------------------------------------------------------------------------------
+
+
+def _selections(p: Measured, drive: SignalObservation, kind: Kind) -> tuple[Selection, ...]:
+    """The one state under gravity; else the instants up to `fit_to` of the largest load, on which
+    an open modulus is identified, and those beyond."""
+    after = drive.t[1:]
+    if kind == "weighs":
+        return (Selection("loaded", after, "the last instant"),)
+    size = np.linalg.norm(drive.y[1:], axis=1)
+    low = size <= p.seen.fit_to * size.max()
+    share = f"{100 * p.seen.fit_to:g} % of the largest load"
+    return (
+        _window(LOW, after[low], f"instants up to {share}"),
+        _window(HIGH, after[~low], f"instants beyond {share}"),
+    )
+
+
+def _window(label: str, t: Floats, words: str) -> Selection:
+    if len(t) < _FEWEST:
+        raise ComparisonError(
+            f"window '{label}': {len(t)} {words}, {_FEWEST} are needed; set seen.fit_to or "
+            "seen.states"
+        )
+    return Selection(label, t, words)

@@ -1,0 +1,106 @@
+"""Where a part of a scene sits, in a user's words: a label, a side, a plane, a box or a point.
+
+    top                            the facet set of that name
+    zmax                           the facets on the body's highest plane across z
+    z=20mm                         those on a plane; "z=20mm~0.5mm" within half a millimetre of it
+    box 0,0,18mm to 5mm,5mm,20mm   those inside a box
+    near 10mm,0,20mm               the one nearest to a point
+
+Lengths without a unit are metres. Several places are joined by "+".
+"""
+
+from functools import reduce
+from operator import or_
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.parameters import nearest_names
+from validate.scene.mesh import Mesh
+from validate.scene.select import InBox, Labelled, Nearest, OnPlane, Place, Site
+from validate.units import in_si, split
+
+GRAMMAR = "a facet set, zmin, zmax, z=20mm, z=20mm~0.5mm, box A to B, near P (points as 1mm,2mm,0)"
+_AXES = "xyz"
+_FLAT = 2e-3  # of the body's diagonal: how far the facets of a filled surface lie off its sides
+
+
+def place_of(text: str, mesh: Mesh) -> Place:
+    """The facets that the words choose of a mesh; raises `SceneError` for words that say nothing,
+    or choose nothing."""
+    sites = [_site(part.strip(), mesh) for part in text.split("+")]
+    chosen = reduce(or_, sites).faces
+    if len(sites) == 1 and text.strip() in mesh.facets:
+        return text.strip()
+    chosen.entities(mesh)
+    return chosen
+
+
+def axis_of(text: str) -> tuple[float, ...]:
+    """The unit vector of "+x", "-z", or of three numbers; raises `SceneError` for anything else."""
+    word = text.strip().lower()
+    if word.lstrip("+-") in tuple(_AXES) and len(word) <= 2:
+        sign = -1.0 if word.startswith("-") else 1.0
+        return tuple((sign * np.eye(3)[_AXES.index(word[-1])]).tolist())
+    try:
+        v = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        v = np.zeros(0)
+    if v.shape != (3,) or not np.isfinite(v).all() or not v.any():
+        raise SceneError(f"direction '{text[:40]}': one of +x -x +y -y +z -z, or three numbers")
+    return tuple((v / np.linalg.norm(v)).tolist())
+
+
+def point_of(text: str) -> tuple[float, ...]:
+    """Three lengths as metres; raises `SceneError` for anything else, and where some of them have
+    a unit and others that are not 0 have none."""
+    found = [split(part) for part in text.split(",")]
+    units = {bool(f[1]) for f in found if f and f[0] != 0}
+    if len(found) != 3 or len(units) > 1:
+        raise SceneError(f"point '{text[:40]}': three lengths, each with its unit, as 10mm,0,20mm")
+    return tuple(_metres(part) for part in text.split(","))
+
+
+def _site(text: str, mesh: Mesh) -> Site:
+    if text in mesh.facets:
+        return Labelled(text)
+    if text.startswith("near "):
+        return Nearest(point_of(text[5:]))
+    if text.startswith("box ") and " to " in text:
+        low, high = text[4:].split(" to ", 1)
+        return InBox(point_of(low), point_of(high))
+    if text[:1] in tuple(_AXES) and text[1:] in ("min", "max"):
+        return _side(mesh, _AXES.index(text[0]), text[1:])
+    if text[:2] in ("x=", "y=", "z="):
+        return _plane(_AXES.index(text[0]), text[2:])
+    known = set(mesh.facets)
+    named = f"; {nearest_names(text, known)}" if known else "; the body has no facet sets"
+    raise SceneError(f"place '{text[:40]}': none of {GRAMMAR}{named}")
+
+
+def _side(mesh: Mesh, axis: int, end: str) -> Site:
+    x = mesh.nodes[:, axis]
+    at = np.zeros(3)
+    at[axis] = x.min() if end == "min" else x.max()
+    slack = _FLAT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    return OnPlane(_tuple(at), _tuple(np.eye(3)[axis]), slack)
+
+
+def _plane(axis: int, text: str) -> Site:
+    where, _, within = text.partition("~")
+    at = np.zeros(3)
+    at[axis] = _metres(where)
+    return OnPlane(_tuple(at), _tuple(np.eye(3)[axis]), _metres(within) if within else 0.0)
+
+
+def _metres(text: str) -> float:
+    found = split(text)
+    value = in_si(found[0], found[1] or "m", "m") if found else None
+    if value is None:
+        raise SceneError(f"'{text[:40]}': no length; as 20mm or 0.02")
+    return value
+
+
+def _tuple(x: Floats) -> tuple[float, ...]:
+    return tuple(x.tolist())
