@@ -17,14 +17,22 @@ from validate.recording.types import Contours, Markers, Recording, Signal, Sourc
 from validate.replay import compare
 from validate.replay.experiment import Experiment
 from validate.replay.measured_body import measured_body, solid
-from validate.replay.measured_cards import BodyRanges, Held, Measured, Moved, Seen, Solid, Tissue
+from validate.replay.measured_cards import (
+    BodyRanges,
+    HeldAt,
+    MeasuredBody,
+    MovedBy,
+    SeenOf,
+    Solid,
+    Tissue,
+)
 from validate.scene.box import box
 from validate.scene.mesh_file import write_mesh
 from validate.scene.named_place import axis_of, place_of, point_of
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)
-ROLLERS = Held(x=("xmin",), y=("ymin",), z=("zmin",))
+ROLLERS = HeldAt(x=("xmin",), y=("ymin",), z=("zmin",))
 PLACES = {"A": (0.04, 0.03, 0.05), "B": (0.0, 0.03, 0.04), "C": (0.04, 0.0, 0.02),
           "D": (0.04, 0.03, 0.03)}  # fmt: skip
 SD = 5e-6
@@ -54,14 +62,14 @@ def log() -> dict[str, Signal]:
             "force": Signal(T, force[:, None], "N", 2e-3, "machine")}  # fmt: skip
 
 
-BASE = Measured(
+BASE = MeasuredBody(
     "body.mcap", Solid(block=SIZE, cells=4), Tissue(E, NU, RHO), ROLLERS,
-    Moved("displacement", "zmax", "-z", sideways=False), Seen(force="force", states=8, still=0.4),
+    MovedBy("displacement", "zmax", "-z", sideways=False), SeenOf(force="force", states=8, still=0.4),
 )  # fmt: skip
 
 
 def experiment(
-    folder: Path, parameters: Measured, seen: Recording, *names: str, order: int = 1
+    folder: Path, parameters: MeasuredBody, seen: Recording, *names: str, order: int = 1
 ) -> Experiment:
     write_recording(seen, folder / "body.mcap")
     limits = {"force": 0.05, "marker": 5e-5, "contour": 2e-4}
@@ -116,7 +124,7 @@ def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
         u[:, 2] = -RHO * G * (SIZE[2] * x[:, 2] - x[:, 2] ** 2 / 2) / E
         return u
 
-    p = replace(BASE, moved=Moved("gravity", None, "-z"), seen=Seen(markers="m", still=0.4),
+    p = replace(BASE, moved=MovedBy("gravity", None, "-z"), seen=SeenOf(markers="m", still=0.4),
                 material=replace(BASE.material, nu=0.0), ranges=BodyRanges(E=0.02))  # fmt: skip
     seen = recording(markers={"m": tracked(sunk)})
     result = compare(experiment(tmp_path, p, seen, "marker", order=2))
@@ -134,13 +142,13 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
     noise = np.random.default_rng(3).normal(0, SD, (len(T), *x.shape))
     seen = recording(markers={"m": Markers(T, names, x + share * u + noise, SD, "body")})
     p = replace(
-        BASE, material=replace(BASE.material, nu=0.0), held=Held(all=("zmin",)),
-        moved=Moved("markers", "zmax", markers=names[:3]),
-        seen=Seen(markers="m", states=8, still=0.4),
+        BASE, material=replace(BASE.material, nu=0.0), held=HeldAt(all=("zmin",)),
+        moved=MovedBy("markers", "zmax", markers=names[:3]),
+        seen=SeenOf(markers="m", states=8, still=0.4),
     )  # fmt: skip
     result = compare(experiment(tmp_path, p, seen, "marker"))
     assert verdicts(result) == {"marker.rms@low": "agrees", "marker.rms@high": "agrees"}
-    short = replace(p, moved=Moved("markers", "zmax", markers=names[:2]))
+    short = replace(p, moved=MovedBy("markers", "zmax", markers=names[:2]))
     with pytest.raises(UsageError, match="three or more are needed"):
         compare(experiment(tmp_path, short, seen, "marker"))
 
@@ -158,7 +166,9 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
     t = T[::16]
     shapes = tuple(outline(float(v)) for v in np.clip((t - 0.5) / 3.0, 0, 1))
     contours = Contours(t, shapes, 2e-5, np.eye(4), "image")
-    p = replace(BASE, seen=Seen(outline="o", origin=(0.0, 0.015, 0.0), image_x="+x", image_y="+z"))
+    p = replace(
+        BASE, seen=SeenOf(outline="o", origin=(0.0, 0.015, 0.0), image_x="+x", image_y="+z")
+    )
     seen = recording(signals=log(), contours={"o": contours})
     result = compare(experiment(tmp_path, p, seen, "contour"))
     assert verdicts(result) == {"contour.rms@low": "agrees", "contour.rms@high": "agrees"}
@@ -200,13 +210,13 @@ def test_places_in_words() -> None:
 
 
 @pytest.mark.parametrize(("change", "error", "why"), [
-    ({"seen": Seen()}, ComparisonError, "nothing of the recording is compared"),
-    ({"moved": Moved("stage", "zmax")}, UsageError, "stage: no signal of that name"),
-    ({"moved": Moved("displacement")}, UsageError, "moved.place is not set"),
-    ({"moved": Moved("displacement", "lid")}, SceneError, "place 'lid': none of"),
-    ({"moved": Moved("gravity")}, ComparisonError, "here the body weighs"),
+    ({"seen": SeenOf()}, ComparisonError, "nothing of the recording is compared"),
+    ({"moved": MovedBy("stage", "zmax")}, UsageError, "stage: no signal of that name"),
+    ({"moved": MovedBy("displacement")}, UsageError, "moved.place is not set"),
+    ({"moved": MovedBy("displacement", "lid")}, SceneError, "place 'lid': none of"),
+    ({"moved": MovedBy("gravity")}, ComparisonError, "here the body weighs"),
     ({"body": Solid()}, UsageError, "body: none is given"),
-    ({"material": Tissue(None), "moved": Moved("gravity"), "seen": Seen(markers="m")}, UsageError,
+    ({"material": Tissue(None), "moved": MovedBy("gravity"), "seen": SeenOf(markers="m")}, UsageError,
      "material.E is not set"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(

@@ -22,7 +22,7 @@ from validate.recording.types import Recording
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.cards import beside, moved
 from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
-from validate.replay.measured_cards import Measured, Solid, SolidModel
+from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_seen import LOW, drive_kind, place, prescribed
 from validate.replay.method import Method
 from validate.scene.box import box
@@ -50,7 +50,7 @@ def measured_body(
     name: str,
     title: str,
     source: str,
-    parameters: Measured,
+    parameters: MeasuredBody,
     methods: Mapping[str, Method],
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
@@ -78,7 +78,7 @@ def measured_body(
 
 
 def _calibrations(
-    p: Measured, methods: Mapping[str, Method], accept: tuple[Accept, ...]
+    p: MeasuredBody, methods: Mapping[str, Method], accept: tuple[Accept, ...]
 ) -> tuple[Calibration, ...]:
     """An open modulus is found on the force, or where a force moves the body on its markers; each
     method finds its own."""
@@ -93,7 +93,7 @@ def _calibrations(
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def _build(recording: Recording, p: Measured, model: SolidModel, *, body: Any) -> Scene:
+def _build(recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any) -> Scene:
     mesh = body(p.body)
     scene = Scene(
         mesh,
@@ -107,7 +107,7 @@ def _build(recording: Recording, p: Measured, model: SolidModel, *, body: Any) -
     return of_element(scene, "P2" if model.order == 2 else "MD")
 
 
-def _supports(p: Measured, mesh: Mesh, recording: Recording) -> tuple[Support, ...]:
+def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Support, ...]:
     held = [
         Support(place_of(text, mesh), axes)
         for name, axes in _AXES.items()
@@ -120,7 +120,7 @@ def _supports(p: Measured, mesh: Mesh, recording: Recording) -> tuple[Support, .
     return tuple(held)
 
 
-def _load(p: Measured, mesh: Mesh, recording: Recording) -> dict[str, Any]:
+def _load(p: MeasuredBody, mesh: Mesh, recording: Recording) -> dict[str, Any]:
     kind, along = drive_kind(recording, p), axis_of(p.moved.along)
     if kind == "weighs":
         return {"loads": (Weight("gravity", along),)}
@@ -134,7 +134,7 @@ def _load(p: Measured, mesh: Mesh, recording: Recording) -> dict[str, Any]:
     return {"drives": (Drive("moved", where, along),)}
 
 
-def known_place(p: Measured) -> str:
+def known_place(p: MeasuredBody) -> str:
     """Raises `UsageError` where the place that is moved is not said."""
     if not p.moved.place:
         raise UsageError("moved.place is not set; say where the load acts: --set moved.place=zmax")
@@ -179,7 +179,7 @@ def _level(share: float | None, halvings: int | None) -> Change:
     """A grid with `share` of its cells along every edge (none: its own `finer`), or a mesh file
     with its edges halved so many times more."""
 
-    def change(p: Measured) -> Measured:
+    def change(p: MeasuredBody) -> MeasuredBody:
         body = p.body
         if body.file is not None:
             return replace(p, body=replace(body, halvings=body.halvings + (halvings or 0)))
@@ -189,16 +189,16 @@ def _level(share: float | None, halvings: int | None) -> Change:
     return change
 
 
-def _cell(p: Measured, *, body: Any) -> float:
+def _cell(p: MeasuredBody, *, body: Any) -> float:
     """The edge m of a cube as large as a mean cell."""
     return float(np.cbrt(cell_volumes(body(p.body)).mean()))
 
 
-def _stiffer(p: Measured, z: float) -> float | None:
+def _stiffer(p: MeasuredBody, z: float) -> float | None:
     return p.material.E and p.material.E * (1 + z * p.ranges.E)
 
 
-def _more(p: Measured, z: float) -> float:
+def _more(p: MeasuredBody, z: float) -> float:
     return p.moved.scale * (1 + z * p.ranges.load)
 
 

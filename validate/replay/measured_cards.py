@@ -43,7 +43,7 @@ class Tissue:
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldAt:
     """Places by which displacements cannot happen there."""
 
     all: tuple[str, ...] = quantity((), "1", "places held in every direction")
@@ -53,7 +53,7 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedBy:
     """What loads the body: a signal in m (moves a place) or N (pulls at it), "markers" that sit on
     a place, which follows them as a rigid body, or "gravity"."""
 
@@ -67,7 +67,7 @@ class Moved:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenOf:
     """What of the recording is compared; what is none is not."""
 
     force: str | None = quantity(None, "1", "signal in N: the force on the moved place")
@@ -100,15 +100,15 @@ class BodyRanges(Ranges):
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredBody:
     """Everything that is decided; `recording` lies beside the experiment's file."""
 
     recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
     body: Solid = Solid()
     material: Tissue = Tissue()
-    held: Held = Held()
-    moved: Moved = Moved()
-    seen: Seen = Seen()
+    held: HeldAt = HeldAt()
+    moved: MovedBy = MovedBy()
+    seen: SeenOf = SeenOf()
     ranges: BodyRanges = BodyRanges()
 
 

@@ -17,7 +17,7 @@ from validate.register.outlines import observe_outlines
 from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.measured_cards import Measured
+from validate.replay.measured_cards import MeasuredBody
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
@@ -30,7 +30,7 @@ _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since re
 _FEWEST = 3  # markers on a place that follows them
 
 
-def drive_kind(recording: Recording, p: Measured) -> Kind:
+def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
     """What the load is; raises `UsageError` for a topic that is no signal in m or N."""
     if p.moved.by == "gravity":
         return "weighs"
@@ -47,7 +47,7 @@ def drive_kind(recording: Recording, p: Measured) -> Kind:
     return "moves" if unit == "m" else "pulls"
 
 
-def place(recording: Recording, p: Measured, scene: Scene) -> Registered:
+def place(recording: Recording, p: MeasuredBody, scene: Scene) -> Registered:
     """Drive, force, markers and outlines at `seen.states` instants.
 
     Raises `ComparisonError` where nothing is left to be compared, `RegistrationError` and
@@ -76,7 +76,7 @@ def place(recording: Recording, p: Measured, scene: Scene) -> Registered:
     )  # fmt: skip
 
 
-def _instants(recording: Recording, p: Measured) -> tuple[Floats, float]:
+def _instants(recording: Recording, p: MeasuredBody) -> tuple[Floats, float]:
     """Rest and evenly spaced times (nt,) s that all streams in use cover; images' own, where
     outlines are compared."""
     used = {p.seen.force, p.seen.markers, p.seen.outline, p.moved.by} - {None, "gravity"}
@@ -107,7 +107,7 @@ def _instants(recording: Recording, p: Measured) -> tuple[Floats, float]:
 
 
 def _drive(
-    recording: Recording, p: Measured, kind: Kind, t: Floats, rest: float, mesh: Mesh
+    recording: Recording, p: MeasuredBody, kind: Kind, t: Floats, rest: float, mesh: Mesh
 ) -> SignalObservation:
     if kind == "weighs":
         y = np.full((len(t), 1), p.moved.amount * p.moved.scale)
@@ -133,7 +133,7 @@ def _zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal
     return replace(s, y=s.y - early.mean(axis=0), sd=sd)
 
 
-def prescribed(recording: Recording, p: Measured, where: Place, mesh: Mesh) -> Prescribed:
+def prescribed(recording: Recording, p: MeasuredBody, where: Place, mesh: Mesh) -> Prescribed:
     """The place that follows its markers as a rigid body; raises `UsageError` for fewer than three
     markers, or names that are none."""
     markers = recording.marker(_topic(recording, p))
@@ -153,7 +153,7 @@ def prescribed(recording: Recording, p: Measured, where: Place, mesh: Mesh) -> P
     return Prescribed("moved", where, points)
 
 
-def _followed(recording: Recording, p: Measured, t: Floats, mesh: Mesh) -> SignalObservation:
+def _followed(recording: Recording, p: MeasuredBody, t: Floats, mesh: Mesh) -> SignalObservation:
     """What the markers on the moved place did, one column an axis of each."""
     seen = _registered(recording, p, mesh)
     at = [seen.names.index(n) for n in p.moved.markers]
@@ -174,7 +174,7 @@ def _followed(recording: Recording, p: Measured, t: Floats, mesh: Mesh) -> Signa
 
 
 def _force(
-    recording: Recording, p: Measured, kind: Kind, drive: SignalObservation, rest: float
+    recording: Recording, p: MeasuredBody, kind: Kind, drive: SignalObservation, rest: float
 ) -> SignalObservation:
     """Force on the moved place against its motion; raises `ComparisonError` where that is none of
     the run's, `RegistrationError` for a force that falls as the place moves."""
@@ -201,7 +201,7 @@ def _force(
 
 
 def _markers(
-    recording: Recording, p: Measured, scene: Scene, kind: Kind
+    recording: Recording, p: MeasuredBody, scene: Scene, kind: Kind
 ) -> tuple[MarkerObservation, tuple[str, ...]]:
     """All markers that move nothing themselves, from where they stood at rest."""
     whole = _registered(recording, p, scene.mesh)
@@ -219,7 +219,7 @@ def _markers(
     return replace(found, together=_TOGETHER), said
 
 
-def _registered(recording: Recording, p: Measured, mesh: Mesh) -> MarkerObservation:
+def _registered(recording: Recording, p: MeasuredBody, mesh: Mesh) -> MarkerObservation:
     """Markers in the body's frame: their layout's, or the one they were recorded in."""
     topic = _topic(recording, p)
     markers, _, _ = rested(recording.marker(topic), p.seen.still)
@@ -237,14 +237,14 @@ def _registered(recording: Recording, p: Measured, mesh: Mesh) -> MarkerObservat
     )  # fmt: skip
 
 
-def _layout(recording: Recording, p: Measured, markers: Markers) -> dict[str, Floats]:
+def _layout(recording: Recording, p: MeasuredBody, markers: Markers) -> dict[str, Floats]:
     if p.seen.layout == "as seen":
         return dict(zip(markers.names, markers.x[0], strict=True))
     record = recording.record("marker_layout")
     return {name: vector(text, f"marker_layout '{name}'") for name, text in record.items()}
 
 
-def _topic(recording: Recording, p: Measured) -> str:
+def _topic(recording: Recording, p: MeasuredBody) -> str:
     """The markers' topic, where it is not said the only one."""
     if p.seen.markers:
         return p.seen.markers
@@ -253,7 +253,7 @@ def _topic(recording: Recording, p: Measured) -> str:
     return next(iter(recording.markers))
 
 
-def _outline(recording: Recording, p: Measured, scene: Scene, rest: float) -> Observation:
+def _outline(recording: Recording, p: MeasuredBody, scene: Scene, rest: float) -> Observation:
     """Outlines against the section of the deformed surface with the images' plane."""
     topic = str(p.seen.outline)
     contours = recording.contour(topic)
@@ -269,7 +269,7 @@ def _outline(recording: Recording, p: Measured, scene: Scene, rest: float) -> Ob
     return observe_outlines(contours, wall, rest, name=topic, sd_t=clock_sd(recording, topic))
 
 
-def _pose(p: Measured) -> Floats:
+def _pose(p: MeasuredBody) -> Floats:
     """T_body_from_image of what is declared; raises `UsageError` for axes that are not square."""
     x, y = np.array(axis_of(p.seen.image_x)), np.array(axis_of(p.seen.image_y))
     if len(p.seen.origin) != 3 or abs(float(x @ y)) > 1e-6:
@@ -285,7 +285,7 @@ def _pose(p: Measured) -> Floats:
 # --- windows --------------------------------------------------------------------------------------
 
 
-def _selections(p: Measured, drive: SignalObservation, kind: Kind) -> tuple[Selection, ...]:
+def _selections(p: MeasuredBody, drive: SignalObservation, kind: Kind) -> tuple[Selection, ...]:
     """The one state under gravity; else the instants up to `fit_to` of the largest load, on which
     an open modulus is identified, and those beyond."""
     after = drive.t[1:]
