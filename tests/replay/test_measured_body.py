@@ -64,7 +64,8 @@ def log() -> dict[str, Signal]:
 
 BASE = MeasuredBody(
     "body.mcap", Solid(block=SIZE, cells=4), Tissue(E, NU, RHO), ROLLERS,
-    MovedBy("displacement", "zmax", "-z", sideways=False), SeenOf(force="force", states=8, still=0.4),
+    MovedBy("displacement", "zmax", "-z", sideways=False),
+    SeenOf(force="force", states=8, still=0.4),
 )  # fmt: skip
 
 
@@ -216,8 +217,8 @@ def test_places_in_words() -> None:
     ({"moved": MovedBy("displacement", "lid")}, SceneError, "place 'lid': none of"),
     ({"moved": MovedBy("gravity")}, ComparisonError, "here the body weighs"),
     ({"body": Solid()}, UsageError, "body: none is given"),
-    ({"material": Tissue(None), "moved": MovedBy("gravity"), "seen": SeenOf(markers="m")}, UsageError,
-     "material.E is not set"),
+    ({"material": Tissue(None), "moved": MovedBy("gravity"), "seen": SeenOf(markers="m")},
+     UsageError, "material.E is not set"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(
     tmp_path: Path, change: dict[str, Any], error: type[Exception], why: str
