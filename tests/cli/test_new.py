@@ -11,9 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 from validate.cli.main import cli, run
-from validate.cli.new import _kind, written
+from validate.cli.new import fitting
+from validate.cli.new import written as filled
+from validate.cli.new_inclusion import INCLUSION
 from validate.compare.score import bias
-from validate.errors import RecordingError, UsageError
+from validate.errors import RecordingError
 from validate.identify.modulus import fit_modulus
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -42,6 +44,10 @@ def log(name: str = "gel", **specimen: str) -> Recording:
 
 BLOCK = {"block.x": "0.06", "block.y": "0.045", "block.z": "0.07"}
 SIZES = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT)}
+
+
+def written(name: str, recording: Recording, source: str) -> str:
+    return filled(name, recording, source, Path("experiments"), fitting(recording)[0], {})
 
 
 def in_folder(folder: Path, *arguments: str) -> tuple[int, str]:
@@ -226,9 +232,44 @@ def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> Non
 
 
 def test_a_test_in_tension_is_not_pressed() -> None:
-    for use in (lambda r: written("gel", r, "x.mcap"), fit_modulus):
-        with pytest.raises(RecordingError, match=r"a test in tension; .* --map test=compression"):
-            use(log(test="tension", **SIZES))
+    with pytest.raises(RecordingError, match=r"a test in tension, .* --map test=compression"):
+        fit_modulus(log(test="tension", **SIZES))
+
+
+def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> None:
+    """Imported logs have compression positive; free ends: the modulus is that of the bar."""
+    pulled = log(test="tension", **SIZES)
+    turned = {k: replace(s, y=-s.y) for k, s in pulled.signals.items()}
+    write_recording(replace(pulled, signals=turned), tmp_path / "gel.mcap")
+    assert in_folder(tmp_path, "new", "strip", "--from", "gel.mcap")[0] == 0
+    text = (tmp_path / "experiments" / "strip.py").read_text("utf-8")
+    assert 'test="tension",  # recorded' in text
+    assert 'pressed("linear, gripped ends", "bonded")' in text
+    mine = load_file(tmp_path / "experiments" / "strip.py")
+    result = compare(mine)
+    assert [c.verdict for c in result.checks] == ["fitted", "agrees"]
+    found = {p.path: p.default for p in result.parameters}
+    assert found["material.E"] == pytest.approx(E, rel=0.02)
+    (slip,) = [m for m in result.methods if m.name == "slip"]
+    tops = slip.scene.mesh.facet_nodes("upper_plate")
+    assert slip.runs[0].u[-1][tops, 2].mean() > 0
+    with pytest.raises(RecordingError, match="--set test=tension"):
+        compare(mine, {"test": "compression"})
+
+
+def test_what_presses_is_asked_where_nothing_says_it(tmp_path: Path) -> None:
+    write_recording(log(**SIZES), tmp_path / "gel.mcap")
+    _, said = in_folder(tmp_path, "new", "a", "--from", "gel.mcap")
+    assert "compression is assumed" in " ".join(said.split())
+    (tmp_path / "a.toml").write_text('test = "tension"\naccept.force = "40mN"\n', "utf-8")
+    arguments = ("new", "b", "--from", "gel.mcap", "--answers", "a.toml")
+    code, said = in_folder(tmp_path, *arguments)
+    assert (code, "assumed" in said) == (0, False)
+    text = (tmp_path / "experiments" / "b.py").read_text("utf-8")
+    assert 'test="tension",  # answered' in text
+    assert 'Accept("force", 0.04, "answered (change it)")' in text
+    write_recording(log(test="compression", **SIZES), tmp_path / "gel.mcap")
+    assert "assumed" not in in_folder(tmp_path, "new", "c", "--from", "gel.mcap")[1]
 
 
 def test_the_file_of_an_inclusion_is_short(project_root: Path) -> None:
@@ -285,10 +326,10 @@ def test_two_records_make_an_inclusions_experiment() -> None:
         name="x", signals={"stage": stage}, metadata=records, contours={"o": 1}, markers={"m": 1},
         frames={},
     )  # fmt: skip
-    assert _kind(seen) == "inclusion"  # type: ignore[arg-type]
+    assert INCLUSION.fits(seen)  # type: ignore[arg-type]
     del records["inclusion"]
-    with pytest.raises(UsageError, match="records 'inclusion' and 'marker_layout'"):
-        _kind(seen)  # type: ignore[arg-type]
+    assert not INCLUSION.fits(seen)  # type: ignore[arg-type]
+    assert "records 'inclusion' and 'marker_layout'" in INCLUSION.needs
 
 
 def test_a_prediction_of_a_few_samples_is_no_evidence(tmp_path: Path) -> None:

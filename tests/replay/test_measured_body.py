@@ -32,7 +32,7 @@ from validate.scene.named_place import axis_of, place_of, point_of
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)
-ROLLERS = HeldAt(x=("xmin",), y=("ymin",), z=("zmin",))
+ROLLERS = HeldAt(x="xmin", y="ymin", z="zmin")
 PLACES = {"A": (0.04, 0.03, 0.05), "B": (0.0, 0.03, 0.04), "C": (0.04, 0.0, 0.02),
           "D": (0.04, 0.03, 0.03)}  # fmt: skip
 SD = 5e-6
@@ -143,7 +143,7 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
     noise = np.random.default_rng(3).normal(0, SD, (len(T), *x.shape))
     seen = recording(markers={"m": Markers(T, names, x + share * u + noise, SD, "body")})
     p = replace(
-        BASE, material=replace(BASE.material, nu=0.0), held=HeldAt(all=("zmin",)),
+        BASE, material=replace(BASE.material, nu=0.0), held=HeldAt(all="zmin"),
         moved=MovedBy("markers", "zmax", markers=names[:3]),
         seen=SeenOf(markers="m", states=8, still=0.4),
     )  # fmt: skip

@@ -133,12 +133,19 @@ def calibrate(file: Path, out: Path, **given: Any) -> None:
 @click.command()
 @click.argument("name")
 @click.option("--from", "source", required=True, type=FILE, help="The MCAP recording.")
+@click.option("--answers", type=FILE, help="TOML answers to what the recording does not tell.")
+@click.option("--questions", is_flag=True, help="List the questions as such a file; write nothing.")
 @click.option("-o", "out", type=FILE, help="The file (default: experiments/NAME.py).")
-def new(name: str, source: Path, out: Path | None) -> None:
-    """Write a commented experiment file, filled with what a recording holds."""
+def new(
+    name: str, source: Path, out: Path | None, answers: Path | None, *, questions: bool
+) -> None:
+    """Write a commented experiment file, filled with what a recording holds.
+
+    What the recording does not tell is asked on a terminal, or taken from --answers.
+    """
     from validate.cli import new as writing
 
-    writing.new(name, source, out)
+    writing.new(name, source, out, answers, questions=questions)
 
 
 @click.command()

@@ -15,6 +15,7 @@ E_apparent = E * correction. Whether plates slip is seldom recorded.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.types import Recording, Signal
 from validate.register.clock import SAME, interpolated
 
+TestKind = Literal["compression", "tension"]
 WINDOW = (0.005, 0.05)
 MIN_SAMPLES = 10
 PLATEAU = 5  # samples of unloaded approach from which a contact point is told from noise
@@ -105,17 +107,18 @@ def fit_modulus(
     recording: Recording,
     cylinder: Cylinder | None = None,
     window: tuple[float, float] = WINDOW,
+    test: TestKind = "compression",
 ) -> ModulusFit:
     """E over a strain window of one log with signals `displacement` (m) and `force` (N).
 
-    Compression positive. `cylinder` None: the one in the recording. Raises `UsageError` for an
+    `cylinder` None: the one in the recording. Raises `UsageError` for an
     empty window and `RecordingError` when the log does not cover it with 10 samples.
     """
     low, high = window
     if not (math.isfinite(high) and 0 <= low < high):
         raise UsageError(f"strain window {window}: expected 0 <= low < high, e.g. {WINDOW}")
     cylinder = cylinder or cylinder_of(recording)
-    log = loading(recording)
+    log = loading(recording, test)
     d, force = log.d, log.force
     noise = _first_noise(d, force, cylinder.height * high)
     offset, contact = _zero(d, force, noise, cylinder.height * low)
@@ -143,9 +146,10 @@ def identify_modulus(
     recordings: Sequence[Recording],
     cylinder: Cylinder | None = None,
     window: tuple[float, float] = WINDOW,
+    test: TestKind = "compression",
 ) -> ModulusSummary:
     """`fit_modulus` of each recording, summarised."""
-    return summarise([fit_modulus(recording, cylinder, window) for recording in recordings])
+    return summarise([fit_modulus(recording, cylinder, window, test) for recording in recordings])
 
 
 def gent_correction(diameter: float, height: float) -> float:
@@ -182,16 +186,18 @@ class Log:
     error: float
 
 
-def loading(recording: Recording) -> Log:
-    """Signals `displacement` and `force` at the displacement's times, by their clocks.
+def loading(recording: Recording, test: TestKind = "compression") -> Log:
+    """Signals `displacement` and `force` at the displacement's times, by their clocks; both grow
+    as the specimen is pressed, or in a test in tension as it is pulled.
 
-    Raises `RecordingError` where they have fewer than 10 samples in common, and for a test that
-    pulls.
+    Raises `RecordingError` where they have fewer than 10 samples in common, and for a recording of
+    the other test.
     """
-    require_compression(recording)
+    require_test(recording, test)
     moved, force = (_samples(recording, *s) for s in (("displacement", "m"), ("force", "N")))
+    sign = _pulled(moved.y[:, 0]) if test == "tension" else 1.0
     if len(moved.t) == len(force.t) and np.abs(moved.t - force.t).max(initial=0.0) <= SAME:
-        return Log(moved.t, moved.y[:, 0], force.y[:, 0], 0.0)
+        return Log(moved.t, sign * moved.y[:, 0], sign * force.y[:, 0], 0.0)
     shown, squared = interpolated(force.t, force.y, moved.t)
     both = np.isfinite(shown[:, 0])
     if both.sum() < MIN_SAMPLES:
@@ -200,15 +206,30 @@ def loading(recording: Recording) -> Log:
             f"{both.sum()} of the displacement's samples ({moved.t[0]:.3f} to {moved.t[-1]:.3f} s),"
             f" at least {MIN_SAMPLES} needed; check the clocks with `validate inspect`"
         )
-    return Log(moved.t[both], moved.y[both, 0], shown[both, 0], float(np.sqrt(squared[0])))
+    error = float(np.sqrt(squared[0]))
+    return Log(moved.t[both], sign * moved.y[both, 0], sign * shown[both, 0], error)
 
 
-def require_compression(recording: Recording) -> None:
-    """Raises `RecordingError` for a recording that says of itself that it is a test in tension."""
-    if recording.metadata.get("specimen", {}).get("test") == "tension":
+def _pulled(d: Floats) -> float:
+    """The sign of the largest displacement: imported logs have compression positive."""
+    moved = d - d[0]
+    return float(np.sign(moved[np.abs(moved).argmax()])) or 1.0
+
+
+def stated_test(recording: Recording) -> str:
+    """What the recording says that it is, "compression" or "tension"; "" where it does not."""
+    said = recording.metadata.get("specimen", {}).get("test", "")
+    return said if said in ("compression", "tension") else ""
+
+
+def require_test(recording: Recording, test: TestKind) -> None:
+    """Raises `RecordingError` for a recording that says of itself that it is the other test."""
+    said = stated_test(recording)
+    if said and said != test:
+        presses = "presses" if test == "compression" else "pulls"
         raise RecordingError(
-            f"{recording.name} is a test in tension; between two plates one in compression is "
-            "needed. If it presses, import it again with --map test=compression"
+            f"{recording.name} is a test in {said}, the experiment one in {test}: --set "
+            f"test={said}; or if it {presses}, import it again with --map test={test}"
         )
 
 

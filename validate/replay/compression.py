@@ -1,5 +1,5 @@
-"""Bodies pressed between two plates, from a log of displacement and force: what a file of one's own
-declares, and the experiment that follows.
+"""Bodies pressed between two plates, or pulled between two grips, from a log of displacement and
+force: what a file of one's own declares, and the experiment that follows.
 
 The body is a cylinder or a mesh file. Displacement counts from contact less the toe (where the
 fitted line reaches zero force), force from the cell's own offset; the first window of strain fits
@@ -21,6 +21,7 @@ from validate.fem.system import responses
 from validate.identify.modulus import (
     MIN_SAMPLES,
     Cylinder,
+    TestKind,
     fit_modulus,
     identify_modulus,
 )
@@ -51,6 +52,7 @@ from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 
 STAGE = Drive("stage", "upper_plate", (0.0, 0.0, -1.0))
+PULLED = Drive("stage", "upper_plate", (0.0, 0.0, 1.0))
 SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))  # of a quarter
 _LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
 
@@ -134,6 +136,7 @@ class Compression:
     """Everything a user decides of a compression test; `recording` lies beside the file."""
 
     recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
+    test: TestKind = quantity("compression", "1", "whether the upper plate presses or pulls")
     specimen: Specimen = Specimen()
     material: Gel = Gel()
     mesh: CylinderGrid = CylinderGrid()
@@ -193,11 +196,11 @@ def _identify(
     require_used(p.material.coefficients, {m.scene.law for m in methods.values()})
     if p.material.E is not None:
         return Identified(p, (), ())
-    found = identify_modulus(recordings, p.specimen.size, (p.fit_from, p.fit_to))
-    E = found.mean
+    found = identify_modulus(recordings, p.specimen.size, (p.fit_from, p.fit_to), p.test)
+    E, ends = found.mean, "slipping plates" if p.test == "compression" else "ends free to contract"
     note = (
-        f"E = {E:.5g} ± {2 * found.sd_mean:.3g} Pa (two sd of the fit; uniform compression owes "
-        "the mesh nothing) was identified from the recording in the window 'fit', slipping plates."
+        f"E = {E:.5g} ± {2 * found.sd_mean:.3g} Pa (two sd of the fit; uniform {p.test} owes "
+        f"the mesh nothing) was identified from the recording in the window 'fit', {ends}."
     )
     material, notes = replace(p.material, E=E), [note]
     if p.material.E_bonded is None and any(m.scene.plates == "bonded" for m in methods.values()):
@@ -234,7 +237,7 @@ def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
         ),
         (*between(model.plates), *(() if whole else SYMMETRY)),
         pins=_pins(mesh) if whole and model.plates == "slip" else (),
-        drives=(STAGE,),
+        drives=(STAGE if p.test == "compression" else PULLED,),
         copies=1 if whole else 4,
     )
     for _ in range(p.mesh.halvings if whole else 0):
@@ -269,10 +272,10 @@ def _pins(mesh: Mesh) -> tuple[Pin, ...]:
 
 
 def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
-    fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to))
+    fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to), p.test)
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
-    seen = pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise)
+    seen = pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise, test=p.test)
     for window in seen.selections:
         if window.t is not None and len(window.t) < MIN_SAMPLES:
             raise ComparisonError(

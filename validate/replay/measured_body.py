@@ -64,7 +64,8 @@ def measured_body(
     body = partial(body_of, folder=folder)
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
-        partial(_build, body=body), place, frames=parameters.seen.states + 1,
+        partial(_build, body=body, folder=folder), partial(place, folder=folder),
+        frames=parameters.seen.states + 1,
         calibrations=_calibrations(parameters, methods, accept),
         uncertainty=Uncertainty(
             mesh=MeshLadder((_level(0.5, 1), _level(0.75, 2), _level(None, None)),
@@ -93,14 +94,16 @@ def _calibrations(
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def _build(recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any) -> Scene:
+def _build(
+    recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
+) -> Scene:
     mesh = body(p.body)
     scene = Scene(
         mesh,
         Material(known(p.material.E, "material.E"), p.material.nu, model.law, p.material.rho,
                  coefficients=p.material.coefficients.known_to(model.law)),
         _supports(p, mesh, recording),
-        **_load(p, mesh, recording),
+        **_load(p, recording, (mesh, folder)),
     )  # fmt: skip
     if mesh.bricks:
         return replace(scene, dilatation="mixed")
@@ -108,11 +111,8 @@ def _build(recording: Recording, p: MeasuredBody, model: SolidModel, *, body: An
 
 
 def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Support, ...]:
-    held = [
-        Support(place_of(text, mesh), axes)
-        for name, axes in _AXES.items()
-        for text in getattr(p.held, name)
-    ]
+    said = [(getattr(p.held, name), axes) for name, axes in _AXES.items()]
+    held = [Support(place_of(text, mesh), axes) for text, axes in said if text]
     if drive_kind(recording, p) == "moves" and p.moved.sideways:
         along = int(np.abs(axis_of(p.moved.along)).argmax())
         across = tuple(c for c in range(3) if c != along)
@@ -120,13 +120,13 @@ def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Suppor
     return tuple(held)
 
 
-def _load(p: MeasuredBody, mesh: Mesh, recording: Recording) -> dict[str, Any]:
+def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[str, Any]:
     kind, along = drive_kind(recording, p), axis_of(p.moved.along)
     if kind == "weighs":
         return {"loads": (Weight("gravity", along),)}
-    where = place_of(known_place(p), mesh)
+    where = place_of(known_place(p), at[0])
     if kind == "follows":
-        return {"tracked": (prescribed(recording, p, where, mesh),)}
+        return {"tracked": (prescribed(recording, p, where, at),)}
     if kind == "pulls":
         return {"loads": (Load("load", where, along),)}
     if sorted(np.abs(along)) != [0.0, 0.0, 1.0]:

@@ -10,8 +10,6 @@ from validate.register.fitting import MarkerFit
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName
 
-Layout = Literal["recorded", "as seen"]
-
 
 @dataclass(frozen=True)
 class Solid:
@@ -44,12 +42,12 @@ class Tissue:
 
 @dataclass(frozen=True)
 class HeldAt:
-    """Places by which displacements cannot happen there."""
+    """Places by which displacements cannot happen there; several are joined by "+"."""
 
-    all: tuple[str, ...] = quantity((), "1", "places held in every direction")
-    x: tuple[str, ...] = quantity((), "1", "places held along x alone")
-    y: tuple[str, ...] = quantity((), "1", "places held along y alone")
-    z: tuple[str, ...] = quantity((), "1", "places held along z alone")
+    all: str | None = quantity(None, "1", "held in every direction")
+    x: str | None = quantity(None, "1", "held along x alone")
+    y: str | None = quantity(None, "1", "held along y alone")
+    z: str | None = quantity(None, "1", "held along z alone")
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class SeenOf:
 
     force: str | None = quantity(None, "1", "signal in N: the force on the moved place")
     markers: str | None = quantity(None, "1", "markers' topic")
-    layout: Layout = quantity("as seen", "1", "markers' places: of the recording, or as first seen")
+    layout: str = quantity("as seen", "1", "markers' places: recorded, as seen, or a file")
     stands: float = quantity(2e-3, "m", "how far off the body a marker may stand, as on a stalk")
     outline: str | None = quantity(None, "1", "outlines' topic")
     surface: str = quantity("surface", "1", "facet set the outlines show; surface: the whole one")

@@ -1,14 +1,16 @@
 """A measured body's recording, registered: what moves it, what is compared, at which instants."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import ComparisonError, RegistrationError, UsageError
+from validate.errors import ComparisonError, RecordingError, RegistrationError, UsageError
 from validate.identify.modulus import MIN_SAMPLES, load_noise
-from validate.recording.types import Markers, Recording, Signal
+from validate.recording.readers import recognised
+from validate.recording.types import Recording, Signal
 from validate.register.clock import clock_sd, interpolated
 from validate.register.from_rest import noise, rested, since_rest
 from validate.register.markers import MarkerObservation, Together, observe_markers, vector
@@ -25,8 +27,10 @@ from validate.scene.select import Place
 from validate.scene.tracked import Prescribed
 
 LOW, HIGH = "low", "high"
+AS_SEEN = "as seen"
 Kind = Literal["weighs", "pulls", "moves", "follows"]
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
+_At = tuple[Mesh, Path]  # the body's mesh, and the experiment's folder
 _FEWEST = 3  # markers on a place that follows them
 
 
@@ -47,7 +51,7 @@ def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
     return "moves" if unit == "m" else "pulls"
 
 
-def place(recording: Recording, p: MeasuredBody, scene: Scene) -> Registered:
+def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) -> Registered:
     """Drive, force, markers and outlines at `seen.states` instants.
 
     Raises `ComparisonError` where nothing is left to be compared, `RegistrationError` and
@@ -55,13 +59,13 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene) -> Registered:
     """
     t, rest = _instants(recording, p)
     kind = drive_kind(recording, p)
-    drive = _drive(recording, p, kind, t, rest, scene.mesh)
+    drive = _drive(recording, p, kind, t, rest, (scene.mesh, folder))
     compared: list[Observation] = []
     findings: tuple[str, ...] = ()
     if p.seen.force:
         compared.append(_force(recording, p, kind, drive, rest))
     if p.seen.markers:
-        markers, findings = _markers(recording, p, scene, kind)
+        markers, findings = _markers(recording, p, kind, (scene.mesh, folder))
         compared.append(markers)
     if p.seen.outline:
         compared.append(_outline(recording, p, scene, rest))
@@ -107,14 +111,14 @@ def _instants(recording: Recording, p: MeasuredBody) -> tuple[Floats, float]:
 
 
 def _drive(
-    recording: Recording, p: MeasuredBody, kind: Kind, t: Floats, rest: float, mesh: Mesh
+    recording: Recording, p: MeasuredBody, kind: Kind, t: Floats, rest: float, at: _At
 ) -> SignalObservation:
     if kind == "weighs":
         y = np.full((len(t), 1), p.moved.amount * p.moved.scale)
         y[0] = 0.0
         return SignalObservation("gravity", "drives", t, y, "m/s^2", 0.0)
     if kind == "follows":
-        return _followed(recording, p, t, mesh)
+        return _followed(recording, p, t, at)
     topic, unit = p.moved.by, "m" if kind == "moves" else "N"
     signal = _zeroed(recording, topic, unit, rest + p.seen.still)
     y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
@@ -133,7 +137,7 @@ def _zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal
     return replace(s, y=s.y - early.mean(axis=0), sd=sd)
 
 
-def prescribed(recording: Recording, p: MeasuredBody, where: Place, mesh: Mesh) -> Prescribed:
+def prescribed(recording: Recording, p: MeasuredBody, where: Place, at: _At) -> Prescribed:
     """The place that follows its markers as a rigid body; raises `UsageError` for fewer than three
     markers, or names that are none."""
     markers = recording.marker(_topic(recording, p))
@@ -144,7 +148,7 @@ def prescribed(recording: Recording, p: MeasuredBody, where: Place, mesh: Mesh) 
             f"{f'{absent} are not recorded' if absent else 'three or more are needed'}; the "
             f"recording has {', '.join(markers.names)}"
         )
-    observed = _registered(recording, p, mesh)
+    observed = _registered(recording, p, at)
     places = dict(zip(observed.names, observed.x[0], strict=True))
     unseen = [n for n in p.moved.markers if n not in places]
     if unseen:
@@ -153,11 +157,11 @@ def prescribed(recording: Recording, p: MeasuredBody, where: Place, mesh: Mesh) 
     return Prescribed("moved", where, points)
 
 
-def _followed(recording: Recording, p: MeasuredBody, t: Floats, mesh: Mesh) -> SignalObservation:
+def _followed(recording: Recording, p: MeasuredBody, t: Floats, at: _At) -> SignalObservation:
     """What the markers on the moved place did, one column an axis of each."""
-    seen = _registered(recording, p, mesh)
-    at = [seen.names.index(n) for n in p.moved.markers]
-    moved = (seen.x[:, at] - seen.x[0, at]).reshape(len(seen.t), -1)
+    seen = _registered(recording, p, at)
+    own = [seen.names.index(n) for n in p.moved.markers]
+    moved = (seen.x[:, own] - seen.x[0, own]).reshape(len(seen.t), -1)
     y, _ = interpolated(seen.t, moved, t)
     if not np.isfinite(y).all():
         first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
@@ -201,10 +205,10 @@ def _force(
 
 
 def _markers(
-    recording: Recording, p: MeasuredBody, scene: Scene, kind: Kind
+    recording: Recording, p: MeasuredBody, kind: Kind, at: _At
 ) -> tuple[MarkerObservation, tuple[str, ...]]:
     """All markers that move nothing themselves, from where they stood at rest."""
-    whole = _registered(recording, p, scene.mesh)
+    whole = _registered(recording, p, at)
     source, unseen, samples = rested(recording.marker(_topic(recording, p)), p.seen.still)
     driving = p.moved.markers if kind == "follows" else ()
     kept = [i for i, n in enumerate(whole.names) if n not in driving]
@@ -214,34 +218,44 @@ def _markers(
         whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
         rest=whole.rest[kept], tre=whole.tre[kept],
     )  # fmt: skip
-    found = since_rest(part, scene.mesh, noise(source), samples, p.seen.stands)
+    found = since_rest(part, at[0], noise(source), samples, p.seen.stands)
     said = (f"markers not seen at rest are left out: {', '.join(unseen)}",) if unseen else ()
     return replace(found, together=_TOGETHER), said
 
 
-def _registered(recording: Recording, p: MeasuredBody, mesh: Mesh) -> MarkerObservation:
+def _registered(recording: Recording, p: MeasuredBody, at: _At) -> MarkerObservation:
     """Markers in the body's frame: their layout's, or the one they were recorded in."""
+    mesh, folder = at
     topic = _topic(recording, p)
     markers, _, _ = rested(recording.marker(topic), p.seen.still)
-    layout = _layout(recording, p, markers)
+    layout = dict(zip(markers.names, markers.x[0], strict=True))
+    if p.seen.layout != AS_SEEN:
+        layout = layout_of(recording, p.seen.layout, folder)
     kept = [i for i, n in enumerate(markers.names) if n in layout]
     markers = replace(
         markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
         sd=noise(markers),
     )  # fmt: skip
     up = np.array([0.0, 0.0, 1.0])
-    same = (up, up) if p.seen.layout == "as seen" else None
+    same = (up, up) if p.seen.layout == AS_SEEN else None
     return observe_markers(
         markers, layout, mesh, how=p.seen.registration, up=same, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
     )  # fmt: skip
 
 
-def _layout(recording: Recording, p: MeasuredBody, markers: Markers) -> dict[str, Floats]:
-    if p.seen.layout == "as seen":
-        return dict(zip(markers.names, markers.x[0], strict=True))
-    record = recording.record("marker_layout")
-    return {name: vector(text, f"marker_layout '{name}'") for name, text in record.items()}
+def layout_of(recording: Recording, text: str, folder: Path) -> dict[str, Floats]:
+    """Places (3,) m of markers in the body's frame: of the record "marker_layout", or of the points
+    of a file of landmarks. Raises `RecordingError` for a file without points."""
+    if text == "recorded":
+        record = recording.record("marker_layout")
+        return {name: vector(at, f"marker_layout '{name}'") for name, at in record.items()}
+    path = folder / text
+    points = recognised(path).read(path, {}).markers
+    if not points:
+        raise RecordingError(f"{path.name}: no points; a layout is a file of landmarks, as FCSV")
+    first = next(iter(points.values()))
+    return dict(zip(first.names, first.x[0], strict=True))
 
 
 def _topic(recording: Recording, p: MeasuredBody) -> str:

@@ -1,10 +1,10 @@
-"""A log of a compression test in the scene: displacement from contact, force from its zero."""
+"""A log of a testing machine in the scene: displacement from contact, force from its zero."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from validate.identify.modulus import ModulusFit, loading
+from validate.identify.modulus import ModulusFit, TestKind, loading
 from validate.recording.types import Recording
 from validate.register.clock import clock_sd
 from validate.register.observation import Role
@@ -21,6 +21,7 @@ def pressed_log(
     noise: float,
     role: Role = "validates",
     share: float = 0.0,
+    test: TestKind = "compression",
 ) -> Registered:
     """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
 
@@ -28,7 +29,7 @@ def pressed_log(
     strain; what an uncertain clock of either makes of it is counted. `share` is how far specimens
     differ, relative, one standard uncertainty.
     """
-    log = loading(recording)
+    log = loading(recording, test)
     moved = log.d[:, None] - fit.contact - fit.toe * height
     last = int(np.argmax(moved[:, 0] > limit * height)) or len(moved)
     stage = SignalObservation(

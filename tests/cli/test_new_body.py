@@ -1,0 +1,180 @@
+"""`validate new` by questions: from markers, outlines or forces and any body to a verdict."""
+
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from validate.cli.asking import Question, answered, listed, read_answers
+from validate.cli.main import cli
+from validate.errors import UsageError
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
+from validate.replay import compare
+from validate.replay.find import load_file
+from validate.scene.box import box
+from validate.scene.mesh_file import write_mesh
+
+E, NU, RHO, G, SIZE = 20e3, 0.3, 1100.0, 9.80665, (0.04, 0.03, 0.05)
+T = np.linspace(0.0, 4.0, 81)
+SHARE = np.clip((T - 0.5) / 3.0, 0, 1)
+
+
+def recording(**streams: object) -> Recording:
+    return Recording("body", Source("x", "", 0, "x"), 0, **streams)  # type: ignore[arg-type]
+
+
+def log() -> dict[str, Signal]:
+    d = 1e-3 * SHARE
+    force = E * SIZE[0] * SIZE[1] * d / SIZE[2] + np.random.default_rng(1).normal(0, 2e-3, len(T))
+    return {"displacement": Signal(T, d[:, None], "m", 0.0, "machine"),
+            "force": Signal(T, force[:, None], "N", 2e-3, "machine")}  # fmt: skip
+
+
+def markers() -> dict[str, Markers]:
+    x = np.array([(0.04, 0.03, 0.05), (0.0, 0.03, 0.04), (0.04, 0.0, 0.02), (0.02, 0.0, 0.025)])
+    u = np.array([-NU, -NU, 1.0]) * -0.001 / SIZE[2] * x
+    noise = np.random.default_rng(3).normal(0, 5e-6, (len(T), *x.shape))
+    return {"m": Markers(T, ("A", "B", "C", "D"), x + SHARE[:, None, None] * u + noise, 5e-6, "b")}
+
+
+PRESSED = """
+experiment = "body"
+law = "linear"
+body = {shape = "block", block = "40mm,30mm,50mm"}
+material = {E = "20kPa", nu = 0.3}
+moved = {by = "displacement", along = "-z", place = "zmax", sideways = false}
+held = {x = "xmin", y = "ymin", z = "zmin"}
+seen = {layout = "as seen", still = "0.4s"}
+accept = {force = "50mN", marker = "0.1mm"}
+ranges = {E = "2%", nu = 0.01, load = 0.01}
+"""
+
+
+def called(*arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(cli, list(arguments), standalone_mode=False)
+    if done.exception is not None:
+        return 2, str(done.exception)
+    return int(done.return_value or 0), done.output
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    write_recording(recording(signals=log(), markers=markers()), tmp_path / "all.mcap")
+    (tmp_path / "a.toml").write_text(PRESSED, "utf-8")
+    return tmp_path
+
+
+def test_answers_make_an_experiment_that_runs(here: Path) -> None:
+    code, said = called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
+    assert (code, "not used" in said) == (0, False)
+    text = (here / "experiments" / "mine.py").read_text("utf-8")
+    assert len(text.splitlines()) <= 60
+    assert "material=Tissue(E=20000, nu=0.3),  # E: Pa" in text
+    result = compare(load_file(here / "experiments" / "mine.py"))
+    assert {c.name: c.verdict for c in result.checks} == dict.fromkeys(
+        ("force.rms@low", "force.rms@high", "marker.rms@low", "marker.rms@high"), "agrees"
+    )
+
+
+def test_what_is_open_is_asked_all_at_once(here: Path) -> None:
+    (here / "a.toml").write_text('experiment = "body"\nbody.shape = "block"\n', "utf-8")
+    code, said = called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
+    assert code == 2
+    for key in ("body.block", "material.E", "material.nu", "moved.by",
+                "accept.marker", "ranges.nu", "seen.layout"):  # fmt: skip
+        assert f"{key} (" in said
+    assert "--questions writes out" in said
+    assert not (here / "experiments").exists()
+
+
+@pytest.mark.parametrize(("line", "why"), [
+    ('held.all = "lid"', "held.all = lid: place 'lid': none of"),
+    ('moved.along = "down"', "direction 'down'"),
+    ('material.E = "15mm"', "material.E = 15mm"),
+    ('moved.by = "stage"', "one of displacement, force, markers, gravity"),
+    ('accept.force = "-1"', "a number above 0 in N"),
+    ('hold.all = "zmin"', "answers to no question: hold.all; nearest: held.all"),
+    ('body.file = "x.npz"', "answers to no question: body.file"),
+    ('seen.still = "soon"', "seen.still = soon"),
+])  # fmt: skip
+def test_a_wrong_answer_is_named(here: Path, line: str, why: str) -> None:
+    key, value = line.split(" = ", 1)
+    group, name = key.split(".")
+    text = "\n".join(s for s in PRESSED.splitlines())
+    flat = read_answers(here / "a.toml") | {f"{group}.{name}": value.strip('"')}
+    text = "\n".join(f'{k} = "{v}"' for k, v in flat.items())
+    (here / "a.toml").write_text(text, "utf-8")
+    code, said = called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
+    assert (code, why in said) == (2, True), said
+
+
+def test_questions_are_a_file_of_answers(here: Path) -> None:
+    code, listing = called("new", "mine", "--from", "all.mcap", "--questions", "--answers",
+                           "a.toml")  # fmt: skip
+    assert code == 0
+    (here / "again.toml").write_text(listing, "utf-8")
+    assert called("new", "mine", "--from", "all.mcap", "--answers", "again.toml")[0] == 0
+    bare = called("new", "other", "--from", "all.mcap", "--questions")[1]
+    assert "# one of: plates, body" in bare
+    assert not (here / "experiments" / "other.py").exists()
+
+
+def test_markers_alone_and_a_mesh_of_ones_own(here: Path) -> None:
+    write_mesh(box(SIZE, (2, 2, 2)), here / "body.npz")
+    write_recording(recording(markers=markers()), here / "seen.mcap")
+    (here / "a.toml").write_text(
+        'law = "linear"\nbody = {shape = "file", file = "body.npz"}\n'
+        'material = {E = "20kPa", nu = 0.3}\nheld = {all = "z0"}\n'
+        'moved = {by = "markers", place = "z1", markers = "A,B,C"}\n'
+        'seen = {layout = "as seen", still = 0.4}\naccept.marker = "0.2mm"\n'
+        "ranges = {E = 0.05, nu = 0.01, load = 0.01}\n", "utf-8",
+    )  # fmt: skip
+    code, said = called("new", "mine", "--from", "seen.mcap", "--answers", "a.toml")
+    assert code == 0, said
+    text = (here / "experiments" / "mine.py").read_text("utf-8")
+    assert "body=Solid(file='../body.npz')," in text
+    result = compare(load_file(here / "experiments" / "mine.py"))
+    assert [c.name for c in result.checks] == ["marker.rms@low", "marker.rms@high"]
+
+
+def test_outlines_without_a_pose_are_asked_where_they_lie(here: Path) -> None:
+    ring = np.array([(0.01, 0.01), (0.03, 0.01), (0.03, 0.04), (0.01, 0.04)])
+    contours = Contours(T[::20], tuple(ring for _ in T[::20]), 1e-5, np.eye(4), "image")
+    write_recording(recording(signals=log(), contours={"o": contours}), here / "o.mcap")
+    listing = called("new", "mine", "--from", "o.mcap", "--questions", "--answers", "a.toml")[1]
+    assert 'seen.origin = ""' in listing
+    assert "open: nothing tells it" in listing
+
+
+def test_images_alone_lead_to_their_outlines(here: Path) -> None:
+    frames = Frames(T[:2], (np.zeros((8, 8), np.uint8),) * 2, (1e-4, 1e-4), np.eye(4), "image")
+    write_recording(recording(frames={"us": frames}), here / "us.mcap")
+    code, said = called("new", "mine", "--from", "us.mcap")
+    assert (code, "validate outline us.mcap -o outlined.mcap" in said) == (2, True)
+
+
+def test_a_terminal_is_asked_until_it_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    def check(text: str) -> None:
+        if text != "7":
+            raise UsageError("it is seven")
+
+    asks = [Question("n", "how many", open=True, check=check), Question("m", "more", "1", "rule")]
+    replies = iter(["", "6", "7", "1"])
+    monkeypatch.setattr(click, "prompt", lambda *_, **__: next(replies))
+    assert answered(lambda _: asks, {}, terminal=True) == {"n": "7", "m": "1"}
+    assert answered(lambda _: asks, {"n": "7"}, terminal=False) == {"n": "7", "m": "1"}
+    assert 'm = "1"' in listed(lambda _: asks, {})
+
+
+def test_a_file_of_answers_is_toml(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text("a = {b = [1, 2.5], c = true}", "utf-8")
+    assert read_answers(file) == {"a.b": "1,2.5", "a.c": "true"}
+    file.write_text("a = = 1", "utf-8")
+    for path in (file, tmp_path / "none.toml"):
+        with pytest.raises(UsageError):
+            read_answers(path)

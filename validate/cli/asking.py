@@ -1,0 +1,179 @@
+"""Questions that a file of one's own leaves open: answered on a terminal, by TOML, or listed.
+
+A question is asked where the recording does not tell. One whose default stands is answered by it
+where nobody is there; without a default it is open, and all open ones are named at once.
+"""
+
+import sys
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from validate.cli.display import say
+from validate.errors import UsageError, ValidateError
+from validate.parameters import nearest_names
+
+Answers = Mapping[str, str]
+_MOST = 200  # questions one after another: more would be a circle
+_LARGEST = 100_000  # bytes of a file of answers
+
+
+def _anything(text: str) -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class Question:
+    """`key` is how a file of answers spells it; `check` raises `ValidateError` for a wrong answer.
+
+    `default` answers it where nobody does, `why` says what the default rests on; `open` ones need
+    an answer of the user.
+    """
+
+    key: str
+    text: str
+    default: str = ""
+    why: str = ""
+    open: bool = False
+    choices: tuple[str, ...] = ()
+    check: Callable[[str], Any] = _anything
+
+    def checked(self, answer: str) -> str:
+        """The answer, stripped; raises `UsageError` that names the question for a wrong one."""
+        answer = answer.strip()
+        if self.open and not answer:
+            raise UsageError(f"{self.key}: {self.text}; no answer is given")
+        if self.choices and answer not in self.choices:
+            raise UsageError(f"{self.key} = {answer}: one of {', '.join(self.choices)}")
+        if answer and answer != self.default:
+            try:
+                self.check(answer)
+            except ValidateError as error:
+                raise UsageError(f"{self.key} = {answer}: {error}") from None
+        return answer
+
+
+Asks = Callable[[Answers], Sequence[Question]]  # the questions that follow from the answers so far
+
+
+def read_answers(path: Path) -> dict[str, str]:
+    """Answers by key of a TOML file; tables and dotted keys are one, lists are joined by commas.
+
+    Raises `UsageError` for a file that is missing, too large or no TOML.
+    """
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise UsageError(f"{path}: {path.stat().st_size} bytes; answers take {_LARGEST}")
+        return _flat(tomllib.loads(path.read_text("utf-8")))
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        why = " ".join(str(error).split())[:100]
+        raise UsageError(f'{path}: no TOML ({why}); a line is key = "answer"') from None
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    found: dict[str, str] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{prefix}{key}.")
+        else:
+            found[prefix + key] = _text(value)
+    return found
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return ",".join(_text(v) for v in value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def answered(asks: Asks, given: Answers, *, terminal: bool) -> dict[str, str]:
+    """Every question answered: by what is given, on the terminal, or by its default.
+
+    Raises `UsageError` for a wrong answer, for one to no question, and, naming all, where open
+    questions are left.
+    """
+    found: dict[str, str] = {}
+    left: dict[str, Question] = {}
+    for _ in range(_MOST):
+        pending = [q for q in asks(found) if q.key not in found and q.key not in left]
+        if not pending:
+            break
+        question = pending[0]
+        if question.key in given:
+            found[question.key] = question.checked(given[question.key])
+        elif terminal:
+            found[question.key] = _prompted(question)
+        elif question.open:
+            left[question.key] = question
+        else:
+            found[question.key] = question.default
+    if left:
+        raise UsageError(_missing(tuple(left.values())))
+    _require_known(given, found)
+    return found
+
+
+def on_a_terminal() -> bool:
+    """Whether somebody is there to be asked."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def listed(asks: Asks, given: Answers) -> str:
+    """The questions as a file of answers: those known so far, the given ones answered."""
+    found: dict[str, str] = {}
+    lines = []
+    for _ in range(_MOST):
+        pending = [q for q in asks(found) if q.key not in found]
+        if not pending:
+            break
+        question = pending[0]
+        answer = given.get(question.key, question.default)
+        found[question.key] = answer
+        lines += [f"# {line}" for line in _explained(question)]
+        lines.append(f'{question.key} = "{answer}"')
+    lines.append("# further questions may follow from these answers: list them with --answers")
+    return "\n".join(lines)
+
+
+def _explained(question: Question) -> list[str]:
+    lines = [question.text]
+    if question.choices:
+        lines.append("one of: " + ", ".join(question.choices))
+    if question.open:
+        lines.append("open: nothing tells it")
+    elif question.why:
+        lines.append(f"'{question.default}': {question.why}")
+    return lines
+
+
+def _prompted(question: Question) -> str:
+    for line in _explained(question):
+        say(line, indent="  ")
+    while True:
+        answer = click.prompt(question.key, default=question.default, show_default=True)
+        try:
+            return question.checked(str(answer))
+        except UsageError as error:
+            say(str(error), "yellow", "  ")
+
+
+def _missing(left: Sequence[Question]) -> str:
+    named = "; ".join(f"{q.key} ({q.text})" for q in left)
+    return (
+        f"{len(left)} question{'s are' if len(left) > 1 else ' is'} open: {named}. Answer in a "
+        "terminal, or with --answers FILE, which --questions writes out"
+    )
+
+
+def _require_known(given: Answers, found: Answers) -> None:
+    odd = [key for key in given if key not in found]
+    if odd:
+        raise UsageError(
+            f"answers to no question: {', '.join(odd)}; {nearest_names(odd[0], set(found))}"
+        )

@@ -1,0 +1,315 @@
+"""Any body under what a recording says moved it: questions by the paths of its parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.cli.asking import Answers, Question
+from validate.cli.holdings import beside
+from validate.cli.new_kind import NewKind, quantity_in
+from validate.cli.rendered import rendered
+from validate.errors import UsageError
+from validate.parameters import describe, with_values
+from validate.recording.types import Recording
+from validate.replay.measured_body import body_of
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.measured_seen import AS_SEEN
+from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh import Mesh
+from validate.scene.named_place import GRAMMAR, axis_of, place_of
+
+_UNKNOWN, _NONE, _RECORDED = "unknown", "none", "recorded"
+_LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "linear"}
+_SHAPES = ("file", "block", "cylinder")
+_FEW = 600  # cells of a mesh file whose quadratic ones can be halved twice in a minute
+_ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
+             "contour": ("m", "distance of the outlines, as 0.5mm")}  # fmt: skip
+_PATHS = {p.path for p in describe(MeasuredBody())}
+
+
+def _fits(recording: Recording) -> bool:
+    units = {s.unit for s in recording.signals.values()}
+    return bool(recording.markers) or bool(units & {"m", "N"} and (
+        recording.contours or {"m", "N"} <= units
+    ))  # fmt: skip
+
+
+# --- the questions --------------------------------------------------------------------------------
+
+
+def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
+    asked = _of_the_body(found)
+    mesh = _mesh_of(found)
+    asked += [
+        _path("material.E", f"Young's modulus, Pa or as 15kPa; {_UNKNOWN}: identified on the lower "
+              "part of the load", skip=_UNKNOWN),
+        _path("material.nu", "Poisson ratio"),
+        Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
+                 "beside it", choices=tuple(_LAWS)),
+    ]  # fmt: skip
+    asked += _of_the_load(recording, mesh, found) + _of_the_supports(mesh)
+    asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
+    forces = [t for t, s in recording.signals.items() if s.unit == "N"]
+    if forces and _unit(recording, found.get("moved.by", "")) == "m":
+        asked.append(_topics("seen.force", "force on the moved place that is judged", forces))
+    return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
+
+
+def _of_the_body(found: Answers) -> list[Question]:
+    shape, file = found.get("body.shape"), found.get("body.file", "")
+    asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
+    if shape == "file":
+        asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (of a surface: "
+                              "`validate body` fills it)", open=True, check=_there))  # fmt: skip
+        if Path(file).suffix.lower() in FOREIGN:
+            asked.append(Question("body.unit", "unit of its lengths, as mm", open=True))
+    elif shape == "block":
+        asked.append(_path("body.block", "sizes along x, y, z from the origin, as 60mm,45mm,70mm"))
+    elif shape == "cylinder":
+        asked.append(_path("body.cylinder", "diameter and height, axis z, as 25mm,30mm"))
+    return asked
+
+
+def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> list[Question]:
+    by = found.get("moved.by")
+    asked = [Question("moved.by", "what loads the body", open=True, choices=_movers(recording))]
+    if by is None:
+        return asked
+    if by != "markers":
+        asked.append(Question("moved.along", "direction of it, as -z (force and displacement are "
+                              "positive along it)", open=True, check=axis_of))  # fmt: skip
+    if by == "gravity":
+        return [*asked, _path("material.rho", "density, kg/m3")]
+    asked.append(_place("moved.place", "place that is moved or pulled", mesh, is_open=True))
+    if by == "markers":
+        names = [n for m in recording.markers.values() for n in m.names]
+        asked.append(_path("moved.markers", f"markers on it, three or more, of {', '.join(names)}"))
+    elif _unit(recording, by) == "m":
+        asked.append(Question("moved.sideways", "whether the moved place is held across its "
+                              "direction (glued, gripped), or slides", open=True,
+                              choices=("true", "false")))  # fmt: skip
+    return asked
+
+
+def _movers(recording: Recording) -> tuple[str, ...]:
+    signals = [t for t, s in recording.signals.items() if s.unit in ("m", "N")]
+    return (*signals, *(("markers",) if recording.markers else ()), "gravity")
+
+
+def _of_the_supports(mesh: Mesh | None) -> list[Question]:
+    return [
+        _place("held.all", "places held in every direction", mesh),
+        *(_place(f"held.{c}", f"places held along {c} alone", mesh) for c in "xyz"),
+    ]
+
+
+def _of_the_markers(recording: Recording, found: Answers) -> list[Question]:
+    if not recording.markers:
+        return []
+    asked = [_topics("seen.markers", "markers that are judged", list(recording.markers))]
+    if found.get("seen.markers") == _NONE and found.get("moved.by") != "markers":
+        return asked
+    known = "marker_layout" in recording.metadata
+    return [
+        *asked,
+        Question("seen.layout", f"where the markers sit in the body's frame: {_RECORDED}, a file "
+                 f"of landmarks, or '{AS_SEEN}' (they were recorded in that frame)",
+                 _RECORDED if known else "", "the record marker_layout", open=not known,
+                 check=_layout),
+        _path("seen.still", "seconds from the start in which the body is unloaded", "0",
+              "the first sample alone"),
+    ]  # fmt: skip
+
+
+def _of_the_outlines(
+    recording: Recording, mesh: Mesh | None, found: Answers
+) -> list[Question]:  # fmt: skip
+    if not recording.contours:
+        return []
+    asked = [_topics("seen.outline", "outlines that are judged", list(recording.contours))]
+    topic = found.get("seen.outline")
+    if topic is None or topic == _NONE:
+        return asked
+    posed = not np.array_equal(recording.contour(topic).pose, np.eye(4))
+    asked += [
+        Question("seen.surface", "facet set whose section the outlines are; surface: the whole "
+                 "body's", "surface", "the whole body's", check=_facets(mesh)),
+        Question("seen.origin", f"the images' first pixel in the body's frame, as 0,20mm,0; "
+                 f"{_RECORDED}: by the recorded pose", _RECORDED if posed else "",
+                 "the recording has a pose", open=not posed,
+                 check=_parsed("seen.origin", _RECORDED)),
+    ]  # fmt: skip
+    if found.get("seen.origin", _RECORDED) not in ("", _RECORDED):
+        asked += [
+            Question(f"seen.image_{c}", f"direction of the images' {c} ({what}) there, as +x",
+                     open=True, check=axis_of)
+            for c, what in (("x", "columns"), ("y", "rows"))
+        ]  # fmt: skip
+    return asked
+
+
+def _of_the_limits(found: Answers) -> list[Question]:
+    return [
+        Question(f"accept.{name}", f"largest error that is accepted, {unit}: {what}", open=True,
+                 check=quantity_in(unit))
+        for name, (unit, what) in _ACCEPTED.items() if name in _judged(found)
+    ]  # fmt: skip
+
+
+def _of_the_ranges(found: Answers) -> list[Question]:
+    words = {"E": "relative, of the modulus", "nu": "of the Poisson ratio",
+             "load": "relative, of what loads the body"}  # fmt: skip
+    if found.get("material.E") == _UNKNOWN:
+        del words["E"]
+    return [_path(f"ranges.{k}", f"standard uncertainty, {text}") for k, text in words.items()]
+
+
+def _judged(found: Answers) -> set[str]:
+    keys = {"force": "seen.force", "marker": "seen.markers", "contour": "seen.outline"}
+    return {name for name, key in keys.items() if found.get(key, _NONE) != _NONE}
+
+
+# --- kinds of questions ---------------------------------------------------------------------------
+
+
+def _path(path: str, text: str, default: str = "", why: str = "", *, skip: str = "") -> Question:
+    """A parameter's value as --set takes it."""
+    return Question(path, text, default, why, open=not default, check=_parsed(path, skip))
+
+
+def _parsed(path: str, skip: str) -> Callable[[str], Any]:
+    return lambda text: None if text == skip else with_values(MeasuredBody(), {path: text})
+
+
+def _place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
+    named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
+    return Question(
+        key, f"{text}: {GRAMMAR}{named}; several joined by +{'' if is_open else '; empty: none'}",
+        open=is_open, check=lambda words: mesh is None or place_of(words, mesh),
+    )  # fmt: skip
+
+
+def _topics(key: str, text: str, topics: list[str]) -> Question:
+    return Question(key, text, topics[0], "the first recorded", choices=(*topics, _NONE))
+
+
+def _there(text: str) -> None:
+    if not Path(text).is_file():
+        raise UsageError("no such file here")
+
+
+def _layout(text: str) -> None:
+    if text not in (_RECORDED, AS_SEEN):
+        _there(text)
+
+
+def _facets(mesh: Mesh | None) -> Callable[[str], Any]:
+    return lambda name: mesh is None or mesh.facet_nodes(name)
+
+
+def _unit(recording: Recording, topic: str) -> str:
+    found = recording.signals.get(topic)
+    return found.unit if found is not None else ""
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def _mesh_of(found: Answers) -> Mesh | None:
+    """The body, once it is known; raises what reading it does."""
+    shape = found.get("body.shape", "")
+    file = found.get("body.file", "")
+    needed = f"body.{shape}" if shape != "file" else "body.unit"
+    if shape == "file" and (not file or Path(file).suffix.lower() not in FOREIGN):
+        needed = "body.file"
+    if not found.get(needed):
+        return None
+    return _read(tuple(sorted((k, v) for k, v in found.items() if k.startswith("body."))))
+
+
+@lru_cache(maxsize=4)
+def _read(said: tuple[tuple[str, str], ...]) -> Mesh:
+    values = {k: v for k, v in said if k in _PATHS and v}
+    card = with_values(MeasuredBody(), values).body
+    return body_of(card, folder=Path())
+
+
+def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> Mapping[str, str]:
+    mesh = _mesh_of(found)
+    if not any(found.get(f"held.{c}") for c in ("all", "x", "y", "z")):
+        raise UsageError("held.all, held.x, held.y and held.z are all empty: the body is not held")
+    if not _judged(found):
+        raise UsageError("nothing is judged: seen.force, seen.markers and seen.outline are none")
+    order = 2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= _FEW else 1
+    parameters = _card(source, folder, found)
+    return {
+        "cards": ",\n    ".join(sorted(_classes(parameters))) + ",",
+        "parameters": rendered(parameters),
+        "methods": "\n        ".join(_methods(found["law"], order)),
+        "accepted": "solid" if found["law"] != "linear" else "linear",
+        "accept": "\n        ".join(
+            f'Accept("{name}", {quantity_in(_ACCEPTED[name][0])(found[f"accept.{name}"]):.6g}, '
+            f'"answered"),  # {_ACCEPTED[name][0]}'
+            for name in _ACCEPTED if name in _judged(found)
+        ),
+    }  # fmt: skip
+
+
+def _card(source: str, folder: Path, found: Answers) -> MeasuredBody:
+    skipped = ("", _UNKNOWN, _RECORDED)
+    values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
+    values |= {"seen.layout": found["seen.layout"]} if found.get("seen.layout") else {}
+    for key in ("body.file", "seen.layout"):
+        if values.get(key, AS_SEEN) not in (AS_SEEN, _RECORDED):
+            values[key] = beside(Path(values[key]), folder / "x.py")
+    values |= {"recording": source}
+    card: MeasuredBody = with_values(MeasuredBody(), values)
+    return card
+
+
+def _methods(law: str, order: int) -> list[str]:
+    cells = "quadratic" if order == 2 else "linear"
+    lines = [f'"linear": solid("linear law, {cells} cells", "linear", {order}),']
+    if law != "linear":
+        words = f"{_LAWS[law]}, {cells} cells"
+        lines.insert(0, f'"solid": solid("{words}", "{law}", {order}),')
+    if order == 2:
+        lines.append('"quick": solid("linear law, linear cells", "linear", 1),')
+    return lines
+
+
+def _classes(card: Any) -> set[str]:
+    """Names of the classes that the file writes out."""
+    inner = (getattr(card, f.name) for f in fields(card) if getattr(card, f.name) != f.default)
+    found = {type(card).__name__}
+    return found.union(*(_classes(value) for value in inner if is_dataclass(value)))
+
+
+def _used(recording: Recording, found: Answers) -> set[str]:
+    keys = ("moved.by", "seen.force", "seen.markers", "seen.outline")
+    used = {found.get(key, "") for key in keys}
+    if found.get("moved.by") == "markers":
+        used |= set(recording.markers)
+    return used | {recording.contours[t].images for t in used if t in recording.contours}
+
+
+def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
+    return ()
+
+
+BODY = NewKind(
+    "body",
+    "any body, held and moved where you say, judged by force, markers or outlines",
+    "markers, or outlines with a signal in m or N",
+    "FEM",
+    "new_body.py.txt",
+    _fits,
+    _asks,
+    _fields,
+    _used,
+    _assumed,
+)

@@ -1,0 +1,114 @@
+"""A log of a testing machine: a body pressed between plates, or pulled between grips."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validate.cli.asking import Answers, Question
+from validate.cli.new_kind import NewKind, quantity_in
+from validate.identify.modulus import stated_test
+from validate.recording.types import Recording
+from validate.replay.compression import stated_sizes
+
+_SIZES = ("diameter", "height")
+_WORDS = {
+    "compression": ("slipping plates", "bonded plates", "plates"),
+    "tension": ("ends free to contract", "gripped ends", "grips"),
+}
+
+
+def _fits(recording: Recording) -> bool:
+    units = {topic: s.unit for topic, s in recording.signals.items()}
+    return units.get("displacement") == "m" and units.get("force") == "N"
+
+
+def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
+    stated, length = stated_sizes(recording), quantity_in("m")
+    asked = []
+    if not stated_test(recording):
+        asked.append(Question("test", "whether the test presses or pulls", "compression",
+                              "assumed", choices=("compression", "tension")))  # fmt: skip
+    asked += [
+        Question(f"specimen.{name}", f"{name} of the specimen, m or as 25mm; empty: left open",
+                 check=length)
+        for name in _SIZES if f"specimen.{name}" not in stated
+    ]  # fmt: skip
+    limit, judged = _judged(recording)[2:]
+    asked.append(Question("accept.force", "largest error of the force that is accepted, N",
+                          f"{limit:.3g}", f"a tenth of {judged}, assumed",
+                          check=quantity_in("N")))  # fmt: skip
+    return asked
+
+
+def _judged(recording: Recording) -> tuple[float, float | None, float, str]:
+    """Strain limit, height m, limit of the error N, and what that is a tenth of."""
+    height = stated_sizes(recording).get("specimen.height")
+    moved = recording.signal("displacement", "m").y[:, 0]
+    force = recording.signal("force", "N").y[:, 0]
+    limit, inside, judged = 0.10, np.full(len(force), True), "the largest force recorded"
+    if height is not None:
+        limit = min(limit, 0.9 * float(np.ptp(moved)) / height)
+        inside = np.abs(moved - moved[0]) <= limit * height
+        judged = "the force at the strain limit"
+    return limit, height, 0.1 * float(np.ptp(force[inside])), judged
+
+
+def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> dict[str, str]:
+    limit, _, accepted, judged = _judged(recording)
+    stated = stated_sizes(recording)
+    by_area = "diameter_m" not in recording.metadata.get("specimen", {})
+    test = stated_test(recording) or found.get("test", "compression")
+    free, fixed, ends = _WORDS[test]
+    own = found.get("accept.force", "")
+    said = quantity_in("N")(own) if own else accepted
+    reason = f"a tenth of {judged}" if f"{said:.3g}" == f"{accepted:.3g}" else "answered"
+    return {
+        "test": f'"{test}",  # {"recorded" if stated_test(recording) else "answered or assumed"}',
+        "diameter": _size("diameter", stated, found, by_area=by_area),
+        "height": _size("height", stated, found),
+        "fit_from": f"{0.05 * limit:.3g}",
+        "fit_to": f"{0.5 * limit:.3g}",
+        "limit": f"{limit:.3g}",
+        "accept": f"{said:.3g}",
+        "judged": reason,
+        "free": free,
+        "fixed": fixed,
+        "ends": ends,
+    }
+
+
+def _size(name: str, stated: dict[str, float], found: Answers, *, by_area: bool = False) -> str:
+    """A value and its comment; what nobody says is left open."""
+    value, said = stated.get(f"specimen.{name}"), found.get(f"specimen.{name}", "")
+    if value is not None:
+        how = "of the header's area" if by_area else "in the header"
+        return f"{value:.6g},  # m, recorded: {how}"
+    if said:
+        return f"{quantity_in('m')(said):.6g},  # m, answered"
+    return "None,  # m, not in the recording: measure it, write it here"
+
+
+def _used(recording: Recording, found: Answers) -> set[str]:
+    return {"displacement", "force"}
+
+
+def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
+    if stated_test(recording) or found.get("test", "compression") != "compression":
+        return ()
+    return ("nothing in the recording says whether it presses or pulls: compression is assumed; "
+            "change it in the file, or answer test = \"tension\"",)  # fmt: skip
+
+
+PLATES = NewKind(
+    "plates",
+    "a body between the plates or grips of a testing machine",
+    "signals 'displacement' (m) and 'force' (N)",
+    "linear FEM",
+    "new_force.py.txt",
+    _fits,
+    _asks,
+    _fields,
+    _used,
+    _assumed,
+)
