@@ -146,7 +146,7 @@ def test_outlines_without_a_pose_are_asked_where_they_lie(here: Path) -> None:
     contours = Contours(T[::20], tuple(ring for _ in T[::20]), 1e-5, np.eye(4), "image")
     write_recording(recording(signals=log(), contours={"o": contours}), here / "o.mcap")
     listing = called("new", "mine", "--from", "o.mcap", "--questions", "--answers", "a.toml")[1]
-    assert 'seen.origin = ""' in listing
+    assert 'seen.pose = ""' in listing
     assert "open: nothing tells it" in listing
 
 

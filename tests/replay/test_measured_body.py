@@ -98,6 +98,8 @@ def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> N
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.01)
     assert verdicts(result) == {"force.rms@low": "fitted", "force.rms@high": "agrees"}
+    assert found["ranges.E"] < 0.01  # of the fit, in place of the assumed one
+    assert any("identified" in note for note in result.notes)
 
 
 def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
@@ -167,12 +169,17 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
     t = T[::16]
     shapes = tuple(outline(float(v)) for v in np.clip((t - 0.5) / 3.0, 0, 1))
     contours = Contours(t, shapes, 2e-5, np.eye(4), "image")
-    p = replace(
-        BASE, seen=SeenOf(outline="o", origin=(0.0, 0.015, 0.0), image_x="+x", image_y="+z")
-    )
+    looks = SeenOf(outline="o", pose="fitted", image_x="+x", image_y="+z")
+    known = replace(looks, pose="declared", origin=(0.0, 0.015, 0.0))
+    p = replace(BASE, seen=known)
     seen = recording(signals=log(), contours={"o": contours})
     result = compare(experiment(tmp_path, p, seen, "contour"))
     assert verdicts(result) == {"contour.rms@low": "agrees", "contour.rms@high": "agrees"}
+    aside = recording(signals=log(), contours={"o": replace(contours, outlines=tuple(
+        s + np.array([0.3, -0.2]) for s in shapes))})  # fmt: skip
+    fitted = compare(experiment(tmp_path, replace(p, seen=looks), aside, "contour"))
+    assert set(verdicts(fitted).values()) == {"agrees"}
+    assert any("was fitted" in note for note in fitted.notes)
     with pytest.raises(UsageError, match="two directions at right angles"):
         compare(experiment(tmp_path, replace(p, seen=replace(p.seen, image_y="+x")), seen))
 
@@ -218,7 +225,7 @@ def test_places_in_words() -> None:
     ({"moved": MovedBy("gravity")}, ComparisonError, "here the body weighs"),
     ({"body": Solid()}, UsageError, "body: none is given"),
     ({"material": Tissue(None), "moved": MovedBy("gravity"), "seen": SeenOf(markers="m")},
-     UsageError, "material.E is not set"),
+     UsageError, "an open modulus is identified on a force"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(
     tmp_path: Path, change: dict[str, Any], error: type[Exception], why: str
@@ -226,6 +233,15 @@ def test_what_cannot_be_is_refused(
     seen = recording(signals=log(), markers={"m": tracked(stretched)})
     with pytest.raises(error, match=why):
         compare(experiment(tmp_path, replace(BASE, **change), seen, "force", "marker"))
+
+
+def test_a_body_that_slides_on_its_plate_neither_drifts_nor_turns(tmp_path: Path) -> None:
+    p = replace(BASE, held=HeldAt(slides="zmin"))
+    result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    assert set(verdicts(result).values()) == {"agrees"}
+    top = replace(BASE, held=HeldAt(all="zmin", slides="zmin+xmin"))
+    with pytest.raises(SceneError, match="slides in a plane across"):
+        compare(experiment(tmp_path, top, recording(signals=log()), "force"))
 
 
 def test_force_and_motion_of_different_signs_are_refused(tmp_path: Path) -> None:

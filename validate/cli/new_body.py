@@ -104,6 +104,7 @@ def _of_the_supports(mesh: Mesh | None) -> list[Question]:
     return [
         _place("held.all", "places held in every direction", mesh),
         *(_place(f"held.{c}", f"places held along {c} alone", mesh) for c in "xyz"),
+        _place("held.slides", "a flat place that slides on its plate", mesh),
     ]
 
 
@@ -138,12 +139,16 @@ def _of_the_outlines(
     asked += [
         Question("seen.surface", "facet set whose section the outlines are; surface: the whole "
                  "body's", "surface", "the whole body's", check=_facets(mesh)),
-        Question("seen.origin", f"the images' first pixel in the body's frame, as 0,20mm,0; "
-                 f"{_RECORDED}: by the recorded pose", _RECORDED if posed else "",
-                 "the recording has a pose", open=not posed,
-                 check=_parsed("seen.origin", _RECORDED)),
+        Question("seen.pose", "where the images lie: recorded, declared (origin and directions), "
+                 "fitted (directions; the outline at rest on the body's section through its "
+                 "middle)", "recorded" if posed else "", "the recording has a pose",
+                 open=not posed, choices=("recorded", "declared", "fitted")),
     ]  # fmt: skip
-    if found.get("seen.origin", _RECORDED) not in ("", _RECORDED):
+    pose = found.get("seen.pose", "recorded")
+    if pose == "declared":
+        asked.append(_path("seen.origin", "the images' first pixel in the body's frame, as "
+                           "0,20mm,0"))  # fmt: skip
+    if pose not in ("", "recorded"):
         asked += [
             Question(f"seen.image_{c}", f"direction of the images' {c} ({what}) there, as +x",
                      open=True, check=axis_of)
@@ -240,8 +245,8 @@ def _read(said: tuple[tuple[str, str], ...]) -> Mesh:
 
 def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> Mapping[str, str]:
     mesh = _mesh_of(found)
-    if not any(found.get(f"held.{c}") for c in ("all", "x", "y", "z")):
-        raise UsageError("held.all, held.x, held.y and held.z are all empty: the body is not held")
+    if not any(found.get(f"held.{c}") for c in ("all", "x", "y", "z", "slides")):
+        raise UsageError("held.all, .x, .y, .z and .slides are all empty: the body is not held")
     if not _judged(found):
         raise UsageError("nothing is judged: seen.force, seen.markers and seen.outline are none")
     order = 2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= _FEW else 1
@@ -260,9 +265,8 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
 
 
 def _card(source: str, folder: Path, found: Answers) -> MeasuredBody:
-    skipped = ("", _UNKNOWN, _RECORDED)
+    skipped = ("", _UNKNOWN)
     values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
-    values |= {"seen.layout": found["seen.layout"]} if found.get("seen.layout") else {}
     for key in ("body.file", "seen.layout"):
         if values.get(key, AS_SEEN) not in (AS_SEEN, _RECORDED):
             values[key] = beside(Path(values[key]), folder / "x.py")

@@ -6,7 +6,7 @@ markers and outlines counts from there. An open modulus is identified up to a sh
 and only what lies beyond is a prediction.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from math import ceil
@@ -19,24 +19,34 @@ from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
 from validate.parameters import known
 from validate.recording.types import Recording
-from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.cards import beside, moved
-from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.experiment import (
+    Change,
+    Experiment,
+    Identified,
+    Input,
+    MeshLadder,
+    Uncertainty,
+)
 from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_seen import LOW, drive_kind, place, prescribed
 from validate.replay.method import Method
+from validate.replay.solved import solve
 from validate.scene.box import box
 from validate.scene.cylinder import whole_cylinder
+from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import linear, of_element, refined
-from validate.scene.scene import Drive, Load, Scene, Support, Weight
+from validate.scene.scene import Drive, Load, Pin, Scene, Support, Weight
+from validate.scene.select import nodes_of
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
-_MODULI = (10.0, 1e9)  # Pa: between them an open modulus is looked for
+_UNIT = 1e3  # Pa: a modulus to scale
+_FLAT = 5e-3  # of a sliding place's width
 _AXES = {"all": (0, 1, 2), "x": (0,), "y": (1,), "z": (2,)}
 
 
@@ -58,15 +68,13 @@ def measured_body(
 ) -> Experiment:
     """The experiment; the last method, the cheapest, is the one that inputs are varied with.
 
-    `folder` is that of the experiment's file, from which a mesh file is found. Raises `UsageError`
-    for an open modulus that nothing which is judged can tell.
+    `folder` is that of the experiment's file, from which a mesh file is found.
     """
     body = partial(body_of, folder=folder)
-    return Experiment(
+    bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
         partial(_build, body=body, folder=folder), partial(place, folder=folder),
         frames=parameters.seen.states + 1,
-        calibrations=_calibrations(parameters, methods, accept),
         uncertainty=Uncertainty(
             mesh=MeshLadder((_level(0.5, 1), _level(0.75, 2), _level(None, None)),
                             partial(_cell, body=body))
@@ -76,19 +84,49 @@ def measured_body(
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
+    return replace(bare, identify=partial(_identify, experiment=bare))
 
 
-def _calibrations(
-    p: MeasuredBody, methods: Mapping[str, Method], accept: tuple[Accept, ...]
-) -> tuple[Calibration, ...]:
-    """An open modulus is found on the force, or where a force moves the body on its markers; each
-    method finds its own."""
-    if p.seen.force is None and (p.moved.by == "gravity" or p.seen.markers is None):
-        return ()
-    quantity = "force" if p.seen.force else "marker"
-    free = (Free("material.E", *_MODULI, "assumed"),)
-    on = (Calibrates((f"{quantity}@{LOW}",), name=f"the load up to {p.seen.fit_to:g} of it"),)
-    return tuple(Calibration(name, free, on) for name in methods)
+def _identify(
+    recordings: Sequence[Recording],
+    p: MeasuredBody,
+    methods: Mapping[str, Method],
+    *,
+    experiment: Experiment,
+) -> Identified:
+    """An open modulus by least squares of the force up to `fit_to` of the load, which is in
+    proportion to it: one solution of the first accepted method, with a modulus of 1 kPa.
+
+    Raises `UsageError` where no force under a displacement is judged, and for a law with further
+    moduli, with which no force is in proportion to E.
+    """
+    if p.material.E is not None:
+        return Identified(p, (), ())
+    if p.material.coefficients != Coefficients():
+        raise UsageError("material.E is not set, beside coefficients of its law: give them all")
+    if p.seen.force is None or drive_kind(recordings[0], p) != "moves":
+        raise UsageError(
+            "material.E is not set: an open modulus is identified on a force under a displacement "
+            "(seen.force, moved.by a signal in m); give it with --set material.E=VALUE"
+        )
+    unit = replace(p, material=replace(p.material, E=_UNIT))
+    name = next(n for n in (*experiment.accepted, *methods) if n in methods)
+    found = solve(experiment, tuple(recordings), name, methods[name], unit)
+    low = found.residuals[f"force@{LOW}"]
+    if low.reference is None:
+        raise UsageError(f"{methods[name].label}: no force up to {p.seen.fit_to:g} of the load")
+    measured = low.reference[:, 0]
+    per_unit = low.values[:, 0] + measured
+    share = float(per_unit @ measured / (per_unit @ per_unit))
+    left = measured - share * per_unit
+    sd = float(np.sqrt(left @ left / (len(left) - 1) / (per_unit @ per_unit))) / share
+    E = share * _UNIT
+    note = (
+        f"E = {E:.5g} ± {2 * sd * E:.3g} Pa (two sd of the fit) was identified by "
+        f"{methods[name].label} on the force up to {100 * p.seen.fit_to:g} % of the load."
+    )
+    fitted = replace(p, material=replace(p.material, E=E), ranges=replace(p.ranges, E=sd))
+    return Identified(fitted, (), (note,), calibrated=(f"force@{LOW}",))
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -103,6 +141,7 @@ def _build(
         Material(known(p.material.E, "material.E"), p.material.nu, model.law, p.material.rho,
                  coefficients=p.material.coefficients.known_to(model.law)),
         _supports(p, mesh, recording),
+        _pins(p, mesh),
         **_load(p, recording, (mesh, folder)),
     )  # fmt: skip
     if mesh.bricks:
@@ -113,11 +152,37 @@ def _build(
 def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Support, ...]:
     said = [(getattr(p.held, name), axes) for name, axes in _AXES.items()]
     held = [Support(place_of(text, mesh), axes) for text, axes in said if text]
+    if p.held.slides:
+        held.append(Support(place_of(p.held.slides, mesh), (_across(p.held.slides, mesh),)))
     if drive_kind(recording, p) == "moves" and p.moved.sideways:
         along = int(np.abs(axis_of(p.moved.along)).argmax())
         across = tuple(c for c in range(3) if c != along)
         held.append(Support(place_of(known_place(p), mesh), across))
     return tuple(held)
+
+
+def _pins(p: MeasuredBody, mesh: Mesh) -> tuple[Pin, ...]:
+    """Two nodes of a place that slides keep the body from sliding off and turning on it."""
+    if not p.held.slides:
+        return ()
+    across = _across(p.held.slides, mesh)
+    one, other = (c for c in range(3) if c != across)
+    x = mesh.nodes[nodes_of(mesh, place_of(p.held.slides, mesh))]
+    middle = x[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()]
+    rim = x[np.abs((x - middle)[:, one]).argmax()]
+    return Pin(tuple(middle), (one, other)), Pin(tuple(rim), (other,))
+
+
+def _across(text: str, mesh: Mesh) -> int:
+    """The axis that a flat place lies across; raises `SceneError` for one that is not flat."""
+    x = mesh.nodes[nodes_of(mesh, place_of(text, mesh))]
+    spread = np.ptp(x, axis=0)
+    if spread.min() > _FLAT * spread.max():
+        raise SceneError(
+            f"held.slides = {text}: {1e3 * spread.min():.3g} mm from flat along an axis; a place "
+            "slides in a plane across x, y or z"
+        )
+    return int(spread.argmin())
 
 
 def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[str, Any]:

@@ -10,6 +10,8 @@ from validate.register.fitting import MarkerFit
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName
 
+Pose = Literal["recorded", "declared", "fitted"]
+
 
 @dataclass(frozen=True)
 class Solid:
@@ -19,7 +21,7 @@ class Solid:
     unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
     block: tuple[float, ...] = quantity((), "m", "sizes along x, y, z of a block from the origin")
     cylinder: tuple[float, ...] = quantity((), "m", "diameter and height of a cylinder along z")
-    cells: int = quantity(8, "1", "cells along the longest edge of a block or cylinder")
+    cells: int = quantity(6, "1", "cells along the longest edge of a block or cylinder")
     finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
     halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
 
@@ -48,6 +50,9 @@ class HeldAt:
     x: str | None = quantity(None, "1", "held along x alone")
     y: str | None = quantity(None, "1", "held along y alone")
     z: str | None = quantity(None, "1", "held along z alone")
+    slides: str | None = quantity(
+        None, "1", "stands on a slippery plate: held across it; its middle stays and does not turn"
+    )
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,12 @@ class MovedBy:
 
 @dataclass(frozen=True)
 class SeenOf:
-    """What of the recording is compared; what is none is not."""
+    """What of the recording is compared; what is none is not.
+
+    A "fitted" pose has the declared directions, its plane passes through the body's middle, and the
+    outline at rest has its centroid where the body's section has it: places are then fitted, and
+    only shapes and motions are evidence.
+    """
 
     force: str | None = quantity(None, "1", "signal in N: the force on the moved place")
     markers: str | None = quantity(None, "1", "markers' topic")
@@ -74,9 +84,10 @@ class SeenOf:
     stands: float = quantity(2e-3, "m", "how far off the body a marker may stand, as on a stalk")
     outline: str | None = quantity(None, "1", "outlines' topic")
     surface: str = quantity("surface", "1", "facet set the outlines show; surface: the whole one")
-    origin: tuple[float, ...] = quantity((), "m", "the image's origin; none: the recording's pose")
-    image_x: str = quantity("+x", "1", "direction of the image's x (columns), with an origin")
-    image_y: str = quantity("-z", "1", "direction of the image's y (rows), with an origin")
+    pose: Pose = quantity("recorded", "1", "where the images lie: as recorded, declared or fitted")
+    origin: tuple[float, ...] = quantity((), "m", "of the images, where it is declared")
+    image_x: str = quantity("+x", "1", "direction of the images' x (columns), where not recorded")
+    image_y: str = quantity("-z", "1", "direction of the images' y (rows), where not recorded")
     states: int = quantity(30, "1", "instants that are solved and compared, evenly spaced")
     still: float = quantity(0.0, "s", "from the first instant, in which the body is unloaded")
     fit_to: float = quantity(0.5, "1", "share of the load below which an open E is identified")

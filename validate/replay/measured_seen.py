@@ -15,13 +15,11 @@ from validate.register.clock import clock_sd, interpolated
 from validate.register.from_rest import noise, rested, since_rest
 from validate.register.markers import MarkerObservation, Together, observe_markers, vector
 from validate.register.observation import Observation, Selection
-from validate.register.outlines import observe_outlines
-from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay.measured_cards import MeasuredBody
+from validate.replay.measured_outline import observed_outline
 from validate.scene.mesh import Mesh
-from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
 from validate.scene.select import Place
 from validate.scene.tracked import Prescribed
@@ -68,7 +66,9 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
         markers, findings = _markers(recording, p, kind, (scene.mesh, folder))
         compared.append(markers)
     if p.seen.outline:
-        compared.append(_outline(recording, p, scene, rest))
+        outline, said = observed_outline(recording, p, scene.mesh, rest)
+        compared.append(outline)
+        findings = (*findings, *said)
     if not compared:
         raise ComparisonError(
             "nothing of the recording is compared: set one of seen.force, seen.markers and "
@@ -265,35 +265,6 @@ def _topic(recording: Recording, p: MeasuredBody) -> str:
     if len(recording.markers) != 1:
         raise UsageError(f"seen.markers is not set; one of {sorted(recording.markers)}")
     return next(iter(recording.markers))
-
-
-def _outline(recording: Recording, p: MeasuredBody, scene: Scene, rest: float) -> Observation:
-    """Outlines against the section of the deformed surface with the images' plane."""
-    topic = str(p.seen.outline)
-    contours = recording.contour(topic)
-    if scene.mesh.bricks:
-        raise RegistrationError(
-            f"outlines need triangular facets, the body has {scene.mesh.kind}: give a body of "
-            "tetrahedra"
-        )
-    scene.mesh.facet_nodes(p.seen.surface)
-    if p.seen.origin:
-        contours = replace(contours, pose=_pose(p))
-    wall = cavity_sampler(scene.mesh, p.seen.surface, None, 4)
-    return observe_outlines(contours, wall, rest, name=topic, sd_t=clock_sd(recording, topic))
-
-
-def _pose(p: MeasuredBody) -> Floats:
-    """T_body_from_image of what is declared; raises `UsageError` for axes that are not square."""
-    x, y = np.array(axis_of(p.seen.image_x)), np.array(axis_of(p.seen.image_y))
-    if len(p.seen.origin) != 3 or abs(float(x @ y)) > 1e-6:
-        raise UsageError(
-            f"seen.origin {p.seen.origin}, image_x {p.seen.image_x}, image_y {p.seen.image_y}: "
-            "three lengths, and two directions at right angles"
-        )
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), p.seen.origin
-    return pose
 
 
 # --- windows --------------------------------------------------------------------------------------
