@@ -134,14 +134,18 @@ def test_what_says_nothing_or_both_is_asked_and_the_answer_is_taken(
         assert recording.record(ASSUMED)["test"] == f"{kind}: said by the user"
 
 
-def test_both_negative_is_compression_and_says_so(tmp_path: Path) -> None:
-    recording = read(tmp_path, BARE + rows(d=-D, f=-F))
+def test_both_negative_tells_nothing_and_the_answer_says_what_was_flipped(tmp_path: Path) -> None:
+    text = BARE + rows(d=-D, f=-F)
+    with pytest.raises(UsageError, match=ASKED):
+        read(tmp_path, text)
+    assert sense(read(tmp_path, text, test="tension")) == PULLS
+    recording = read(tmp_path, text, test="compression")
     assert sense(recording) == PRESSES
     assumed = recording.record(ASSUMED)
-    assert "both go negative, and tension is positive by convention" in assumed["test"]
     assert assumed["signs"].startswith("flipped: displacement, force, ")
     assert "'Load (N)' in N x 1" in assumed["units"]
     assert "'Displacement (mm)' in mm x 0.001" in assumed["units"]
+    assert recording.record("provenance")["given by the user"] == "test=compression"
 
 
 def test_a_test_in_tension_that_goes_negative_is_asked(tmp_path: Path) -> None:

@@ -25,9 +25,25 @@ QUANTITY = {
     "force": "force",
     "strain": "strain",
     "stress": "stress",
+    "stretch": "strain",
 }
-KEYS = (*NEEDED, "test", "specimen", "encoding", "decimal", "repeated")  # of columns, of the file
+DERIVED = ("strain", "stretch", "stress")
+SIZES_SAID = ("area", "length", "measure")  # of the specimen; true or engineering
+KEYS = (
+    *NEEDED,
+    *DERIVED,
+    *SIZES_SAID,
+    "test",
+    "specimen",
+    "encoding",
+    "decimal",
+    "repeated",
+)  # of columns, of the specimen, of the file
 _SIGNS = {":-": -1, ":+": 1}
+
+
+class MissingColumnError(RecordingError):
+    """A quantity that is needed and that no column is called by."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +73,8 @@ class Pick:
 
 def parse_mapping(mapping: Mapping[str, str], table: Table) -> dict[str, Said]:
     """The mapping's entries by role, see `read_instron`; raises `UsageError` naming the nearest."""
-    return {key: _said(key, text, table) for key, text in mapping.items() if key in NEEDED}
+    roles = (*NEEDED, *DERIVED)
+    return {key: _said(key, text, table) for key, text in mapping.items() if key in roles}
 
 
 def _said(key: str, text: str, table: Table) -> Said:
@@ -90,6 +107,11 @@ def _nearest(text: str, table: Table) -> str:
     return f"{did_you_mean(text, labels)}the file has {', '.join(map(repr, labels))}"
 
 
+def columns_called(role: str, table: Table) -> list[Column]:
+    """The columns of a role that hold numbers."""
+    return [c for c in table.columns if role_of(c) == role and not _without_numbers(c)]
+
+
 def role_of(column: Column) -> str | None:
     """The role of a column by its name and unit, None for a column of no interest here."""
     role = role_of_name(column.name)
@@ -120,22 +142,27 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
     of another kind, or a cell is not a number; `UsageError` when the mapping names two columns.
     """
     if said is not None:
-        named = _named(said.column, table)
-        if len(named) != 1:
-            raise UsageError(
-                f"--map {role}: {len(named)} columns are called '{said.column}'; give the column's "
-                "number instead, as #3"
-            )
-        return _pick(role, named[0], table, said)
+        return said_pick(role, table, said)
     found = [column for column in table.columns if role_of(column) == role]
     if not found:
         labels = ", ".join(repr(c.label) for c in table.columns)
         synthetic = " or, at a constant rate, --map time=every:0.1s" if role == "time" else ""
-        raise RecordingError(
+        raise MissingColumnError(
             f"no {role} column among {labels}; name it with --map {role}=COLUMN{synthetic}"
         )
     able = [column for column in found if not _unusable(role, column)] or found
-    return _one_of(_moving([_pick(role, column, table, None) for column in able]), role)
+    return _one_of(_moving([picked(role, column, table, None) for column in able]), role)
+
+
+def said_pick(role: str, table: Table, said: Said) -> Pick:
+    """The column that the user names; raises as `needed_pick`."""
+    named = _named(said.column, table)
+    if len(named) != 1:
+        raise UsageError(
+            f"--map {role}: {len(named)} columns are called '{said.column}'; give the column's "
+            "number instead, as #3"
+        )
+    return picked(role, named[0], table, said)
 
 
 def derived_pick(role: str, table: Table) -> Pick | None:
@@ -143,7 +170,7 @@ def derived_pick(role: str, table: Table) -> Pick | None:
     found = [c for c in table.columns if role_of(c) == role and not _uncompared(role, c, table)]
     if len(found) > 1:
         found = [c for c in found if re.search(r"engineering|nominal", c.name, re.IGNORECASE)]
-    return _pick(role, found[0], table, None) if len(found) == 1 else None
+    return picked(role, found[0], table, None) if len(found) == 1 else None
 
 
 def left_columns(table: Table, used: Collection[str]) -> list[str]:
@@ -154,7 +181,7 @@ def left_columns(table: Table, used: Collection[str]) -> list[str]:
 
 def _left(column: Column, table: Table) -> str:
     role = role_of(column)
-    if role in ("strain", "stress"):
+    if role in DERIVED:
         return _uncompared(role, column, table)
     return _unusable(role, column) if role else _without_numbers(column)
 
@@ -169,7 +196,12 @@ def _unusable(role: str, column: Column) -> str:
 
 
 def _uncompared(role: str, column: Column, table: Table) -> str:
-    """Why a derived column cannot be compared with the others; empty where it can."""
+    """Why a derived column cannot be compared with the others; empty where it can.
+
+    A stretch is compared with nothing.
+    """
+    if role == "stretch":
+        return ""
     why = _unusable(role, column)
     if why:
         return why
@@ -184,7 +216,10 @@ def _without_numbers(column: Column) -> str:
     return "" if any(map(looks_numeric, column.cells)) else "empty"
 
 
-def _pick(role: str, column: Column, table: Table, said: Said | None) -> Pick:
+def picked(role: str, column: Column, table: Table, said: Said | None) -> Pick:
+    """The column in SI; raises as `needed_pick`."""
+    if said is not None:
+        _refuse_derived(role, column)
     unit = (said.unit if said else None) or column.unit
     if column.problem and not (said and said.unit):
         raise RecordingError(f"column '{column.label}': {column.problem}")
@@ -197,10 +232,31 @@ def _pick(role: str, column: Column, table: Table, said: Said | None) -> Pick:
         factor = si_factor(unit, QUANTITY[role])
     except RecordingError as error:
         raise RecordingError(
-            f"column '{column.label}' as {role}: {error}; if columns are swapped or the unit is "
-            f"wrong say so with --map '{role}=COLUMN:UNIT'"
+            f"column '{column.label}' as {role}: {error}; {_way_out(role, column)}"
         ) from error
     return Pick(role, column, unit, factor, table.numbers(column) * factor, said)
+
+
+def _refuse_derived(role: str, column: Column) -> None:
+    """No unit makes a length of a strain, nor a force of a stress: a size is missing."""
+    called = role_of(column)
+    if role in DERIVED or called not in DERIVED or _measures(column, QUANTITY[role]):
+        return
+    size = "area=AREA" if called == "stress" else "length=LENGTH"
+    raise UsageError(
+        f"--map {role}={column.label}: it is called a {called}, which no unit makes a {role}; "
+        f"leave {role} out and give the specimen's size, as --map {size} with its unit"
+    )
+
+
+def _way_out(role: str, column: Column) -> str:
+    weight = (column.unit or "").lower()
+    if role == "force" and weight in ("g", "kg"):
+        return f"say --map 'force={column.label}:{weight}f'"
+    return (
+        "if columns are swapped or the unit is wrong say so with --map "
+        f"'{role}={column.label}:UNIT' or another COLUMN"
+    )
 
 
 def _moving(picks: list[Pick]) -> list[Pick]:

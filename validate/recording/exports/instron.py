@@ -15,6 +15,7 @@ from validate.recording.exports.blocks import parse_tables
 from validate.recording.exports.columns import (
     KEYS,
     NEEDED,
+    MissingColumnError,
     Pick,
     Said,
     derived_pick,
@@ -33,9 +34,18 @@ from validate.recording.exports.consistency import (
 )
 from validate.recording.exports.encoding import whole_file
 from validate.recording.exports.geometry import loaded_area, specimen_of
-from validate.recording.exports.kinds import Kind, kind_of_test
+from validate.recording.exports.kinds import ASK, Kind, kind_of_test
 from validate.recording.exports.repeats import without_repeats
 from validate.recording.exports.signs import Signs, signs
+from validate.recording.exports.sized import (
+    Sized,
+    Sizes,
+    derived,
+    is_derived,
+    require_left,
+    sizes_of,
+    with_sizes,
+)
 from validate.recording.exports.specimens import chosen, specimen_tables
 from validate.recording.exports.table import Column, Table
 from validate.recording.exports.vocabulary import tells_a_stop
@@ -62,6 +72,9 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         displacement=COLUMN[:UNIT][:-]   `:+` keeps it; COLUMN is the header text, with or without
         time=COLUMN[:UNIT]               its unit, or #3 for the third column
         time=every:STEP UNIT             no or useless time column: constant step, `every:0.1s`
+        strain=, stress=, stretch=       COLUMN[:UNIT], where force or displacement is not written:
+        area=314mm2, length=20mm         sizes before the test that make them of stress and strain
+        measure=engineering|true         of which body these are, where their names do not say
         test=compression|tension         where neither words nor the sign of strain say it
         specimen=LABEL                   which of several specimens, by the file's label or number
         repeated=first|last              which row counts where several have the same time
@@ -100,10 +113,14 @@ def recording_of(
         raise RecordingError(
             f"{len(table.lines)} samples, at least {MIN_SAMPLES} are needed; export the whole test"
         )
-    picks = {role: _needed(role, table, said.get(role)) for role in NEEDED}
     specimen = specimen_of(table.header, table.decimal)
     kind = kind_of_test(mapping.get("test"), table.header, _labels(table))
-    flips, notes = _checked(table, picks, specimen, kind)
+    sizes = sizes_of(mapping, specimen, kind)
+    found = _found(table, said, sizes, kind)
+    picks, made = {role: one.pick for role, one in found.items()}, _made(found)
+    kind = kind or next((one.kind for one in made.values() if one.kind), None)
+    specimen = with_sizes(specimen, mapping, kind)
+    flips, notes = _checked(table, found, specimen, kind, sizes)
     time, signals = _signals(picks, flips)
     stamps = np.round(time * 1e9).astype(np.int64)
     digest = hashlib.sha256(data).hexdigest()
@@ -118,8 +135,8 @@ def recording_of(
         metadata={
             "header": dict(table.header),
             "specimen": {**sizes, "test": flips.kind.name if flips.kind else "not stated"},
-            ASSUMED: {**_assumed(picks, flips), **_stop(table.header)},
-            "provenance": {**origin, **_provenance(table, picks, flips, notes)},
+            ASSUMED: {**_assumed(picks, flips), **_by_sizes(made), **_stop(table.header)},
+            "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
         },
     )
 
@@ -127,6 +144,36 @@ def recording_of(
 def _labels(table: Table) -> list[str]:
     """The names of the columns that the test is made of, whether they are taken or not."""
     return [c.label for c in table.columns if role_of(c)]
+
+
+def _found(
+    table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None
+) -> dict[str, Sized]:
+    """The needed roles, those made by a size with words on how; what is missing is told at once."""
+    found: dict[str, Sized] = {}
+    wrong: list[RecordingError] = []
+    for role in NEEDED:
+        try:
+            if is_derived(role, table, said):
+                found[role] = derived(role, table, said, sizes, kind)
+            else:
+                found[role] = Sized(_needed(role, table, said.get(role)), "")
+        except RecordingError as error:
+            wrong.append(error)
+    if len(wrong) == 1 and (kind or not isinstance(wrong[0], MissingColumnError)):
+        raise wrong[0]
+    if wrong:
+        asks = [] if kind else [f"where no strain goes negative, {ASK}"]
+        raise RecordingError("; ".join([*map(str, wrong), *asks]))
+    return found
+
+
+def _made(found: Mapping[str, Sized]) -> dict[str, Sized]:
+    return {role: one for role, one in found.items() if one.words}
+
+
+def _by_sizes(made: Mapping[str, Sized]) -> Record:
+    return {"sizes": "; ".join(one.words for one in made.values())} if made else {}
 
 
 def _needed(role: str, table: Table, said: Said | None) -> Pick:
@@ -153,27 +200,36 @@ def _step(said: Said) -> tuple[float, str]:
 
 
 def _checked(
-    table: Table, picks: Mapping[str, Pick], specimen: Mapping[str, float], kind: Kind | None
+    table: Table,
+    found: Mapping[str, Sized],
+    specimen: Mapping[str, float],
+    kind: Kind | None,
+    sizes: Sizes,
 ) -> tuple[Signs, list[str]]:
     """All checks; the flips and what the derived columns said."""
-    time, displacement, force = (picks[role] for role in NEEDED)
+    time, displacement, force = (found[role].pick for role in NEEDED)
     strain, stress = derived_pick("strain", table), derived_pick("stress", table)
+    made = _made(found)
     check_time(time, table.lines)
-    check_swapped(time, displacement, force, strain, stress)
+    if not made:
+        check_swapped(time, displacement, force, strain, stress)
     pairs = (
         (displacement, strain, specimen.get("height_m")),
         (force, stress, loaded_area(specimen)),
     )
     notes = [
-        check_derived(base, derived, size, table.lines)
-        for base, derived, size in pairs
-        if derived is not None and size is not None
+        check_derived(base, beside, size, table.lines)
+        for base, beside, size in pairs
+        if beside is not None and size is not None and base.role not in made
     ]
-    if "speed_m_per_s" in specimen:
+    if "speed_m_per_s" in specimen and "displacement" not in made:
         check_speed(time, displacement, specimen["speed_m_per_s"])
     flips = signs(displacement, force, kind, strain, stress)
-    if "height_m" in specimen:
-        check_height(displacement, displacement.values * flips.displacement, specimen["height_m"])
+    closing = displacement.values * flips.displacement
+    if "displacement" in made and sizes.length:
+        require_left(made["displacement"], closing, sizes.length)
+    elif "height_m" in specimen:
+        check_height(displacement, closing, specimen["height_m"])
     return flips, notes
 
 
@@ -191,13 +247,19 @@ def _column(x: Floats) -> Floats:
     return x[:, None] + 0.0
 
 
-def _provenance(table: Table, picks: Mapping[str, Pick], flips: Signs, notes: list[str]) -> Record:
+def _provenance(
+    table: Table,
+    picks: Mapping[str, Pick],
+    flips: Signs,
+    notes: list[str],
+    mapping: Mapping[str, str],
+) -> Record:
     used = {picks[role].column.label for role in NEEDED}
     return {
         **{f"{role} column": picks[role].column.label for role in NEEDED},
         **{f"{role} unit": f"{p.unit} x {p.factor!r}" for role, p in picks.items()},
         "signs flipped": _flipped(flips),
-        "given by the user": ", ".join(role for role in NEEDED if picks[role].said) or "nothing",
+        "given by the user": ", ".join(f"{k}={v}" for k, v in mapping.items()) or "nothing",
         "compared": "; ".join(notes) or "nothing: no strain or stress with known geometry",
         "columns not used": ", ".join(c.label for c in table.columns if c.label not in used),
         **told_left(left_columns(table, used)),

@@ -28,9 +28,10 @@ def signs(
     """The flips that make compression positive in both signals.
 
     Signs are those of the largest change since the first sample. `kind` is the stated one; None:
-    strain and stress, or displacement and force that both go negative, decide. Raises `UsageError`
-    when nothing does, or kind and sign that are said contradict each other, `RecordingError` when
-    both go negative in a stated test in tension; the message says what to pass.
+    strain and stress that go negative decide; displacement and force that do tell nothing, as a
+    crosshead may count either way. Raises `UsageError` when nothing does, or kind and sign that are
+    said contradict each other, `RecordingError` when both go negative in a stated test in tension;
+    the message says what to pass.
     """
     d, f = excursion(displacement.values), excursion(force.values)
     if _said_sign(displacement) or _said_sign(force):
@@ -78,9 +79,6 @@ def _by_strain(d: int, f: int, strain: Pick | None, stress: Pick | None) -> Kind
     names = " and ".join(f"'{p.column.label}'" for p in derived)
     if ways == {-1} and (d * f >= 0 or len(derived) == 2):
         return Kind("compression", f"{names} go negative, and tension is positive by convention")
-    if not ways and d + f < 0 and d * f >= 0:
-        why = "displacement and force both go negative, and tension is positive by convention"
-        return Kind("compression", why)
     return None
 
 

@@ -11,38 +11,50 @@ from collections.abc import Iterable
 from functools import cache
 
 _ROLES = {
-    "stress": """stress spannung druckspannung contrainte naprezenie esfuerzo sforzo napeti
-        напряжение 应力 応力""",
-    "strain": """strain dehnung nominaldehnung odksztalcenie nyulas
-        应变 ひずみ 歪み""",
+    "stress": """stress spannung druckspannung zugspannung contrainte naprezenie esfuerzo sforzo
+        tensao spanning drukspanning trekspanning napeti napatie feszultseg gerilme
+        напряжение 应力 応力 응력""",
+    "strain": """strain dehnung nominaldehnung odksztalcenie nyulas rek tojning unitaria
+        unitario 应变 ひずみ 歪み 변형률""",
+    "stretch": "stretch lambda λ streckung etirement",
     "time": """time t elapsed zeit prufzeit pruefzeit testzeit messzeit versuchszeit laufzeit dauer
         temps duree czas tiempo duracion tempo durata duracao cas ido tijd tid zaman sure aika timp
         время 时间 時間 시간""",
     "force": """force load f kraft standardkraft prufkraft pruefkraft druckkraft zugkraft last
-        effort charge sila obciazenie fuerza carga forza carico forca zatizeni ero сила нагрузка
-        усилие 力 载荷 负荷 荷重""",
+        effort charge sila obciazenie fuerza carga forza carico forca zatizeni ero kracht
+        drukkracht trekkracht belasting сила нагрузка усилие 力 载荷 负荷 荷重""",
     "displacement": """displacement disp compression extension crosshead position stroke travel
         deflection deformation closing indentation weg standardweg traversenweg traverse kolbenweg
         verformung stauchung verschiebung deplacement course allongement ecrasement enfoncement
         przemieszczenie droga wydluzenie skrocenie ugiecie deformacja desplazamiento recorrido
         deformacion compresion deslocamento deformacao spostamento corsa allungamento estensione
-        deformazione draha posuv posunuti prodlouzeni stlaceni deformace elmozdulas перемещение
-        деформация 位移 变形 行程 変位 ストローク""",
+        deformazione draha posuv posunuti prodlouzeni stlaceni deformace elmozdulas distance
+        elongation alongamento extensao verlangerung verplaatsing indrukking vervorming verlenging
+        forlangning forskjutning deformering forskydning forlaengelse forlengelse
+        перемещение
+        деформация удлинение 位移 变形 行程 変位 ストローク 伸び""",
 }
 _NOT_MEASURED = """max maximum maximal maximale maxi peak maksymalna maksymalne maximo maxima
     massimo massima command target setpoint sollwert consigne 最大 峰值"""
 _SPEED = """rate speed velocity geschwindigkeit vitesse predkosc velocidad velocita rychlost
     velocidade 速度 速率"""
+# Of the deformed body: stress on the area that is left, strain as a logarithm of the stretch.
+TRUE = """true cauchy log logarithmic hencky wahre vraie reale verdadera verdadero verdadeira ware
+    真"""
+ENGINEERING = "engineering nominal nominale technische conventionnelle ingenieril 工程 公称"
 _NOT = {
-    "stress": "true cauchy rate yield wahre vraie",
-    "strain": "true log logarithmic rate plastic wahre vraie",
+    "stress": TRUE + " rate yield",
+    "strain": TRUE + " rate plastic",
+    "stretch": "rate film",
     "time": "cycle date start step day clock datum 日期",
     "force": "temperature temperatur 温度",
     "displacement": "corrected korrigiert corrige",
 }
 # A word for a length that some machines write over a column of strain: the unit decides.
 LENGTH_OR_STRAIN = """compression deformation verformung stauchung deformacja deformacion deformacao
-    deformazione deformace compresion деформация 变形 extension"""
+    deformazione deformace compresion деформация 变形 extension elongation allongement allungamento
+    alongamento extensao wydluzenie prodlouzeni vervorming verlenging forlangning deformering
+    verlangerung удлинение 伸び"""
 SIZES = {
     "diameter": """diameter durchmesser probendurchmesser diametre srednica diametro prumer atmero
         диаметр 直径""",
@@ -99,7 +111,9 @@ _ENCODING_EVIDENCE = """druckprufung zugprufung ecrasement sciskanie sciskania r
 
 def plain(text: str) -> str:
     """Lower case without accents: `Prüfkraft` -> `prufkraft`, `Siła` -> `sila`."""
-    spread = unicodedata.normalize("NFKD", text.casefold().translate({0x142: "l", 0xF8: "o"}))
+    spread = unicodedata.normalize(
+        "NFKD", text.casefold().translate({0x142: "l", 0xF8: "o", 0xE6: "ae"})
+    )
     return "".join(c for c in spread if not unicodedata.combining(c))
 
 
@@ -152,6 +166,11 @@ def role_of_name(name: str) -> str | None:
             taken = f"{_NOT[role]} {_NOT_MEASURED} {'' if role == 'time' else _SPEED}"
             return None if holds(name, taken) else role
     return None
+
+
+def of_the_deformed(name: str) -> str:
+    """A name without the words that say true stress or strain."""
+    return " ".join(w for w in re.findall(r"[^\W\d_]+", plain(name)) if w not in terms(TRUE))
 
 
 @cache

@@ -1,0 +1,161 @@
+"""Tables of stress, strain and stretch: force and displacement by sizes that are said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.errors import RecordingError, UsageError, ValidateError
+from validate.recording.exports.instron import read_instron
+from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.types import Recording
+
+E = np.linspace(0.0, 0.4, 41)  # engineering strain of the path
+SIGMA = 100.0 * E + 30.0 * E**2  # kPa, engineering
+AREA, LENGTH = 314e-6, 20e-3
+SIZES = {"area": "314mm2", "length": "20mm", "measure": "engineering"}
+PLAIN = "Time (s),Strain (%),Stress (kPa)\n"
+
+
+def table(names: str, *columns: np.ndarray) -> str:
+    rows = zip(np.arange(len(E)) / 10, *columns, strict=True)
+    return names + "".join(",".join(f"{x:.12g}" for x in row) + "\n" for row in rows)
+
+
+def read(folder: Path, text: str, **mapping: str) -> Recording:
+    (folder / "log.csv").write_text(text, encoding="utf-8")
+    return read_instron(folder / "log.csv", mapping)
+
+
+def assert_pulled(recording: Recording, e: np.ndarray = E, sigma: np.ndarray = SIGMA) -> None:
+    d, f = (recording.signals[k].y[:, 0] for k in ("displacement", "force"))
+    assert np.allclose(d, -e * LENGTH, rtol=1e-9, atol=1e-15)
+    assert np.allclose(f, -sigma * 1e3 * AREA, rtol=1e-9, atol=1e-12)
+    assert recording.record("specimen")["test"] == "tension"
+
+
+def test_engineering_measures_are_multiplied(tmp_path: Path) -> None:
+    recording = read(tmp_path, table(PLAIN, 100 * E, SIGMA), **SIZES, test="tension")
+    assert_pulled(recording)
+    told = recording.record(ASSUMED)["sizes"]
+    assert "displacement = engineering strain 'Strain (%)' x length 0.02 m (said)" in told
+    assert "force = engineering stress 'Stress (kPa)' x area 0.000314 m2 (said)" in told
+    assert float(recording.record("specimen")["area_m2"]) == pytest.approx(AREA)
+    assert float(recording.record("specimen")["length_m"]) == pytest.approx(LENGTH)
+
+
+def test_true_measures_are_turned_back(tmp_path: Path) -> None:
+    """ln(1 + e), and the stress on an area that the volume leaves, are those of the same path."""
+    for sign, test in ((1, "tension"), (-1, "compression")):
+        s = 1 + sign * E
+        true = table("Time (s),True strain (-),True stress (kPa)\n", np.log(s), sign * SIGMA * s)
+        recording = read(tmp_path, true, area="314mm2", length="20mm", test=test)
+        d, f = (recording.signals[k].y[:, 0] for k in ("displacement", "force"))
+        assert np.allclose(d, -sign * E * LENGTH, rtol=1e-9, atol=1e-15)
+        assert np.allclose(f, -sign * SIGMA * 1e3 * AREA, rtol=1e-9, atol=1e-12)
+        assert "constant volume assumed" in recording.record(ASSUMED)["sizes"]
+
+
+def test_compression_written_positive_is_true_compression(tmp_path: Path) -> None:
+    s = 1 - E
+    text = table("Time (s),Strain (-),Stress (kPa)\n", -np.log(s), SIGMA * s)
+    recording = read(tmp_path, text, **{**SIZES, "measure": "true"}, test="compression")
+    assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH, atol=1e-13)
+    assert np.allclose(recording.signals["force"].y[:, 0], SIGMA * 1e3 * AREA, atol=1e-9)
+    assert float(recording.record("specimen")["height_m"]) == pytest.approx(LENGTH)
+
+
+def test_a_stretch_says_itself_which_way_it_goes(tmp_path: Path) -> None:
+    text = table("Time (s),Stretch,Nominal stress (kPa)\n", 1 + E, SIGMA)
+    recording = read(tmp_path, text, area="314mm2", length="20mm")
+    assert_pulled(recording)
+    assert recording.record(ASSUMED)["test"] == "tension: 'Stretch' goes above 1"
+    pressed = table("Time (s),Stretch,Nominal stress (kPa)\n", 1 - E, SIGMA)
+    recording = read(tmp_path, pressed, area="314mm2", length="20mm")
+    assert recording.record("specimen")["test"] == "compression"
+    assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
+    with pytest.raises(RecordingError, match=r"tension test .* goes below 1; say --map test=comp"):
+        read(tmp_path, pressed, area="314mm2", length="20mm", test="tension")
+
+
+def test_negative_strain_is_compression(tmp_path: Path) -> None:
+    text = table(PLAIN, -100 * E, -SIGMA)
+    assert read(tmp_path, text, **SIZES).record("specimen")["test"] == "compression"
+
+
+def test_all_that_is_missing_is_told_at_once_and_can_be_followed(tmp_path: Path) -> None:
+    text = table("i,Strain,Stress (kPa)\n", E, SIGMA)
+    with pytest.raises(RecordingError) as told:
+        read(tmp_path, text)
+    words = str(told.value)
+    for advice in ("time=every:0.1s", "'strain=Strain:UNIT'", "area=314mm2", "test=tension",
+                   "measure=engineering"):  # fmt: skip
+        assert f"--map {advice}" in words or advice in words
+    given = {**SIZES, "time": "every:0.1s", "strain": "Strain:1", "test": "tension"}
+    assert_pulled(read(tmp_path, text, **given))
+
+
+@pytest.mark.parametrize("left", ["area", "length", "measure", "test"])
+def test_nothing_is_guessed(left: str, tmp_path: Path) -> None:
+    given = {k: v for k, v in {**SIZES, "test": "tension"}.items() if k != left}
+    with pytest.raises(ValidateError, match=f"--map {left}=" if left != "test" else "--map test="):
+        read(tmp_path, table(PLAIN, 100 * E, SIGMA), **given)
+
+
+def test_the_sizes_of_a_header_count_where_they_are_meant(tmp_path: Path) -> None:
+    header = "Compression test\nDiameter: 25 mm\nHeight: 20 mm\n"
+    recording = read(tmp_path, header + table(PLAIN, 100 * E, SIGMA), measure="engineering")
+    assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
+    area = np.pi * 0.025**2 / 4
+    assert np.allclose(recording.signals["force"].y[:, 0], SIGMA * 1e3 * area)
+    assert "(of the header)" in recording.record(ASSUMED)["sizes"]
+    pulled = "Tensile test\nArea: 314 mm^2\nLength: 80 mm\n" + table(PLAIN, 100 * E, SIGMA)
+    with pytest.raises(RecordingError, match="the length that strain is measured on"):
+        read(tmp_path, pulled, measure="engineering")
+
+
+def test_one_of_the_two_may_be_written(tmp_path: Path) -> None:
+    names = "Time (s),Extension (mm),Stress (kPa)\n"
+    text = "Tensile test\n" + table(names, 1e3 * LENGTH * E, SIGMA)
+    assert_pulled(read(tmp_path, text, area="314mm2", measure="engineering"))
+
+
+def test_a_strain_cannot_be_led_into_being_a_length(tmp_path: Path) -> None:
+    for names in ("Time (s),Strain (%),Load (N)\n", "Time (s),Strain,Load (N)\n"):
+        label = names.split(",")[1]
+        text = "Tensile test\n" + table(names, 100 * E, SIGMA)
+        with pytest.raises(UsageError, match=r"called a strain, which no unit makes a displacem"):
+            read(tmp_path, text, displacement=f"{label}:mm")
+    with pytest.raises(UsageError, match=r"called a stress, which no unit makes a force"):
+        read(tmp_path, table(PLAIN, E, SIGMA), force="Stress (kPa):N")
+    force = 1e3 * AREA * SIGMA
+    text = "Tensile test\n" + table("Time (s),Strain (%),Load (N)\n", 100 * E, force)
+    assert_pulled(read(tmp_path, text, length="20mm", measure="engineering"))
+
+
+@pytest.mark.parametrize(
+    ("mapping", "why"),
+    [
+        ({"area": "314"}, "expected a size above 0 with a unit, as 314mm2"),
+        ({"area": "-3mm2"}, "expected a size above 0"),
+        ({"length": "20mm2"}, "'mm2' is no unit of length"),
+        ({"measure": "nominal"}, "expected one of engineering, true"),
+    ],
+)
+def test_a_size_has_a_unit(mapping: dict[str, str], why: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=why):
+        read(tmp_path, table(PLAIN, 100 * E, SIGMA), **{**SIZES, "test": "tension", **mapping})
+
+
+def test_more_than_all_of_a_specimen_is_refused(tmp_path: Path) -> None:
+    text = table("Time (s),Strain (mm/mm),Stress (kPa)\n", 100 * E, SIGMA)
+    with pytest.raises(RecordingError, match=r"4000 % of its length; .*'strain=Strain .*:%'"):
+        read(tmp_path, text, **SIZES, test="compression")
+    given = {**SIZES, "test": "compression", "strain": "Strain (mm/mm):%"}
+    assert np.allclose(read(tmp_path, text, **given).signals["displacement"].y[:, 0], E * LENGTH)
+
+
+def test_a_name_that_says_its_measure_is_not_overruled(tmp_path: Path) -> None:
+    text = table("Time (s),True strain (%),Stress (kPa)\n", 100 * E, SIGMA)
+    with pytest.raises(UsageError, match=r"'True strain \(%\)' says true itself"):
+        read(tmp_path, text, **SIZES, test="tension")
