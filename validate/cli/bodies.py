@@ -1,8 +1,10 @@
 """`validate body`: a body of another program, checked, filled and kept as npz."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from validate.cli.arguments import complain
+from validate.cli.arguments import complain, pairs
 from validate.cli.display import say, table
 from validate.errors import UsageError
 from validate.places import try_file
@@ -11,17 +13,28 @@ from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.foreign_mesh import ForeignBody, read_foreign
-from validate.scene.mesh import quadratic
+from validate.scene.mesh import Mesh, quadratic
 from validate.scene.mesh_file import read_mesh, write_mesh
+from validate.scene.named_place import place_of
+from validate.scene.select import facets_of
 from validate.units import in_si, split
 
 
-def body(file: Path, unit: str | None, edge: str | None, out: Path | None, *, curved: bool) -> None:
-    """Reads the body in `file`, says what it is like, and writes it to `out`."""
+def body(
+    file: Path,
+    unit: str | None,
+    edge: str | None,
+    faces: tuple[str, ...],
+    out: Path | None,
+    *,
+    curved: bool,
+) -> None:
+    """Reads the body in `file`, names its `faces`, says what it is like, writes it to `out`."""
     if out is not None:
         try_file(out)
     found = _read(file, unit, edge)
-    mesh = quadratic(found.mesh) if curved else found.mesh
+    mesh = _named(found.mesh, pairs(faces, "--face"))
+    mesh = quadratic(mesh) if curved else mesh
     say(str(file), "bold")
     table("", ["of the body", "what"], [[k, v] for k, v in {**facts(mesh), **found.told}.items()])
     worst = quality(mesh)
@@ -36,9 +49,20 @@ def body(file: Path, unit: str | None, edge: str | None, out: Path | None, *, cu
         say(f"{out}: {out.stat().st_size / 1e3:.0f} kB", indent="  ")
 
 
+def _named(mesh: Mesh, faces: Mapping[str, str]) -> Mesh:
+    """The mesh with facet sets by name, each where its words say."""
+    chosen = {name: facets_of(mesh, place_of(words, mesh)) for name, words in faces.items()}
+    return replace(mesh, facets={**mesh.facets, **chosen})
+
+
 def _read(file: Path, unit: str | None, edge: str | None) -> ForeignBody:
     suffix = file.suffix.lower()
-    if suffix not in (*FOREIGN, *SURFACES):
+    if suffix not in (*FOREIGN, *SURFACES, ".npz"):
+        raise UsageError(
+            f"{file.name}: no body that is read; one of npz, {', '.join((*FOREIGN, *SURFACES))}: "
+            "export it as one of these, as Gmsh and meshio do"
+        )
+    if suffix == ".npz":
         return ForeignBody(read_mesh(file), {})
     if unit is None:
         raise UsageError(f"{file.name}: a file of this kind states no unit; say it: --unit mm")

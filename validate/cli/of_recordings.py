@@ -152,13 +152,17 @@ def new(
 @click.argument("file", type=FILE)
 @click.option("--unit", metavar="UNIT", help="Of its lengths, as mm: such files state none.")
 @click.option("--edge", metavar="LENGTH", help="Of the elements that fill a surface, as 2mm.")
+@click.option(
+    "--face", "faces", multiple=True, metavar="NAME=WORDS",
+    help="A facet set by place: top=zmax, side=x=20mm, or box A to B, near P (docs/new.md).",
+)  # fmt: skip
 @click.option("--quadratic", "curved", is_flag=True, help="A node in the middle of every edge.")
 @click.option("-o", "out", type=FILE, help="The npz to write, as experiments take it.")
-def body(file: Path, unit: str | None, edge: str | None, curved: bool, out: Path | None) -> None:
+def body(file: Path, **given: Any) -> None:
     """A body of another program: .inp, .msh, .vtu, .vtk, or a closed surface .stl, .obj, .ply."""
     from validate.cli import bodies
 
-    bodies.body(file, unit, edge, out, curved=curved)
+    bodies.body(file, **given)
 
 
 @click.command()

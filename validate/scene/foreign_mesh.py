@@ -85,6 +85,7 @@ def _body(
         raise SceneError(f"{name}: its elements are {listed}; one of {', '.join(_KINDS)} is taken")
     ((shape, cells),) = shapes.items()
     kind, points = _KINDS[shape], factor * found["points"]
+    unused = len(points) - len(np.unique(cells))
     if kind == "tet10":
         _require_straight(name, points[cells])
         kind, cells = "tet4", cells[:, :4]
@@ -97,8 +98,10 @@ def _body(
         raise SceneError(f"{name}: {error}") from error
     told = {
         "turned": f"{turned} of {len(cells)} elements",
-        "not used": f"{len(points) - len(used)} of {len(points)} nodes",
+        "not used": f"{unused} of {len(points)} nodes",
     }
+    if "beside" in found:
+        told["left out"] = f"{found['beside']} beside the solid; their sets name its facets"
     mesh = replace(mesh, facets=_facets(mesh, used, found))
     return ForeignBody(quadratic(mesh) if shape == "tetra10" else mesh, told)
 

@@ -1,0 +1,70 @@
+"""Files of Gmsh 4.15 (tests/scene/gmsh: a block of 40 x 30 x 50 mm), as it wrote them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from validate.cli.main import cli
+from validate.errors import SceneError, UsageError
+from validate.scene.foreign_mesh import read_foreign
+from validate.scene.mesh import cell_volumes
+from validate.scene.mesh_file import read_mesh
+
+FILES = Path(__file__).parent / "gmsh"
+SIDES = {f"side{i}": n for i, n in enumerate((6, 6, 12, 12, 12, 12), 1)}
+
+
+@pytest.mark.parametrize("name", ["groups_41.msh", "groups_41_binary.msh", "all.inp", "order2.inp"])
+def test_groups_become_facet_sets(name: str) -> None:
+    body = read_foreign(FILES / name, "mm")
+    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-5)
+    found = {k: len(f) for k, f in body.mesh.facets.items()}
+    assert {k: found[k] for k in SIDES} == SIDES
+    top = body.mesh.nodes[body.mesh.facet_nodes("side6")]
+    assert np.ptp(top, axis=0).min() == 0.0
+    assert body.told["not used"].startswith("0 of")
+
+
+def test_what_stands_beside_a_solid_is_told_and_names_facets() -> None:
+    body = read_foreign(FILES / "order2.inp", "mm")
+    assert body.told["left out"].startswith("24 T3D3, 60 CPS6 beside the solid")
+    assert body.mesh.kind == "tet10"
+    assert len(body.mesh.facets["Surface3"]) == 12
+    assert "left out" not in read_foreign(FILES / "groups_41.msh", "mm").told
+
+
+def test_a_shell_on_a_solid_is_no_facet(tmp_path: Path) -> None:
+    text = (FILES / "all.inp").read_text("utf-8").replace("type=CPS3", "type=S3")
+    (tmp_path / "shell.inp").write_text(text, "utf-8")
+    with pytest.raises(SceneError, match="its elements are 60 triangle, 60 tetra"):
+        read_foreign(tmp_path / "shell.inp", "mm")
+
+
+def test_no_group_is_no_set() -> None:
+    assert dict(read_foreign(FILES / "no_groups_22.msh", "mm").mesh.facets) == {}
+
+
+@pytest.mark.parametrize("text", ["$NOD\n1\n1 0 0 0\n$ENDNOD\n", "$MeshFormat\n3 0 8\n"])
+def test_formats_that_are_not_read_are_named(tmp_path: Path, text: str) -> None:
+    old = tmp_path / "old.msh"
+    old.write_text(text, "utf-8")
+    for file in (old, FILES / "groups_40.msh"):
+        with pytest.raises(SceneError, match=r"Gmsh's format [134]; 2\.2 and 4\.1 are read"):
+            read_foreign(file, "mm")
+
+
+def test_faces_are_named_by_words(tmp_path: Path) -> None:
+    out = tmp_path / "body.npz"
+    file = str(FILES / "no_groups_22.msh")
+    names = ["--face", "top=zmax", "--face", "side=x=40mm", "--face", "spot=near 0,15mm,25mm"]
+    CliRunner().invoke(cli, ["body", file, "--unit", "mm", *names, "-o", str(out)])
+    facets = read_mesh(out).facets
+    assert {k: len(f) for k, f in facets.items()} == {"top": 12, "side": 6, "spot": 1}
+    done = CliRunner().invoke(cli, ["body", file, "--unit", "mm", "--face", "a=lid"])
+    assert isinstance(done.exception, SceneError)
+    (tmp_path / "b.unv").write_text("    -1\n", "utf-8")
+    odd = CliRunner().invoke(cli, ["body", str(tmp_path / "b.unv"), "--unit", "mm"])
+    assert isinstance(odd.exception, UsageError)
+    assert "no body that is read; one of npz, .inp" in str(odd.exception)
