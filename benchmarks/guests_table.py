@@ -3,7 +3,7 @@
 OMP_NUM_THREADS=1 python benchmarks/guests_table.py            prints it (some five minutes)
 OMP_NUM_THREADS=1 python benchmarks/guests_table.py --write    puts it into README.md
 
-Needs the recordings, FElupe and CalculiX. All but rate and memory is the same on every machine.
+Needs the recordings, FElupe, CalculiX and MuJoCo. All but rate and memory is the same on every machine.
 """
 
 import sys
@@ -39,8 +39,8 @@ class Judged:
 def judged() -> tuple[Judged, ...]:
     loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
     under = {"recording": str(loaded), "load.mass": "52g"}
-    beams = ("mixed", "still", "felupe", "calculix")
-    cylinders = ("slip", "neo_slip", "felupe", "calculix")
+    beams = ("mixed", "still", "felupe", "calculix", "mujoco", "mujoco_45")
+    cylinders = ("slip", "neo_slip", "svk_slip", "felupe", "calculix", "mujoco")
     rest, rings = "tip.vertical.rms@settled", "ringing.frequency@swing"
     return (
         Judged("silicone_beam", beams, (rest,)),
@@ -50,7 +50,7 @@ def judged() -> tuple[Judged, ...]:
         Judged(
             "hanging_bar",
             ("quadratic", "hexahedra", "felupe", "calculix", "tetrahedra", "felupe_tetrahedra",
-             "calculix_tetrahedra"),
+             "calculix_tetrahedra", "mujoco"),
             ("drop@all",),
         ),
     )  # fmt: skip

@@ -27,6 +27,7 @@ from validate.solve.tabulated import Tabulated
 
 FELUPE = "python benchmarks/guests/felupe_guest.py"
 CALCULIX = "python benchmarks/guests/calculix_guest.py"
+MUJOCO = "python benchmarks/guests/mujoco_guest.py"
 COARSE = Model(radial=4, axial=4)
 TABLE = Tabulated(StaticNewton("none"), 0.0015)
 METHODS: Mapping[str, Method] = {
@@ -60,6 +61,11 @@ METHODS: Mapping[str, Method] = {
         Model("slip", "neo_slip", "neo_hooke", 2, 2),
     ),
     "calculix": Method("CalculiX, linear, slipping plates", Guest(CALCULIX, levels=5), COARSE),
+    "mujoco": Method(
+        "MuJoCo, SVK, slipping plates",
+        Guest(MUJOCO, levels=10),
+        Model("slip", "svk_slip", "svk", 2, 2, 1),
+    ),
 }
 
 

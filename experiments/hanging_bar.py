@@ -20,6 +20,7 @@ from validate.solve.newton import StaticNewton
 STATIC = StaticNewton("none")
 FELUPE = Guest("python benchmarks/guests/felupe_guest.py")
 CALCULIX = Guest("python benchmarks/guests/calculix_guest.py")
+MUJOCO = Guest("python benchmarks/guests/mujoco_guest.py")
 THEIRS, WHOLE = Model("tetrahedra"), Model("hexahedra")
 METHODS = {
     "quadratic": Method("quadratic hexahedra of a quarter", STATIC, Model()),
@@ -29,6 +30,7 @@ METHODS = {
     "felupe_tetrahedra": Method("FElupe, linear tetrahedra, dolfinx's mesh", FELUPE, THEIRS),
     "calculix": Method("CalculiX, hexahedra of incompatible modes, 9 x 9 x 24", CALCULIX, WHOLE),
     "calculix_tetrahedra": Method("CalculiX, linear tetrahedra, dolfinx's mesh", CALCULIX, THEIRS),
+    "mujoco": Method("MuJoCo, linear tetrahedra, dolfinx's mesh", MUJOCO, THEIRS),
 }
 EXPERIMENT = Experiment(
     name="hanging_bar",

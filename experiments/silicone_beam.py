@@ -33,9 +33,11 @@ from validate.solve.viscous_modes import ViscousModes
 
 FELUPE = "python benchmarks/guests/felupe_guest.py"
 CALCULIX = "python benchmarks/guests/calculix_guest.py"
+MUJOCO = "python benchmarks/guests/mujoco_guest.py"
 STATIC = StaticNewton("none")
 BETA = 0.0023  # s: 2 x .055 over 2 pi 7.7 Hz, of the linear models
 LINEAR = Model("linear", damping=BETA)
+CUT = Model("svk", order=1, mixed=False, along=10, across=3, damping=BETA)
 METHODS = {
     "mixed": Method("quadratic hexahedra with a pressure, neo-Hooke", LetGo(), Model()),
     "ring_down": Method("small vibrations about the rest of the same", ViscousModes(), Model()),
@@ -78,6 +80,14 @@ METHODS = {
         "CalculiX, linear hexahedra of incompatible modes",
         GuestLetGo(CALCULIX),
         Model(order=1, mixed=False, along=8, across=2, damping=BETA),
+    ),
+    "mujoco": Method(
+        "MuJoCo, linear tetrahedra (lock), St. Venant-Kirchhoff",
+        GuestLetGo(MUJOCO),
+        CUT,
+    ),
+    "mujoco_45": Method(
+        "MuJoCo, the same at nu .45 (locks less)", GuestLetGo(MUJOCO), replace(CUT, nu=0.45)
     ),
 }
 

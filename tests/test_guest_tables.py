@@ -73,6 +73,7 @@ def test_who_is_first_is_who_takes_least(project_root: Path, rates: ModuleType) 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.skipif(find_spec("felupe") is None, reason="felupe absent: the extra 'peers' has it")
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx absent: apt-get calculix-ccx")
 def test_errors_and_verdicts_are_todays(
     project_root: Path, shared_data: Path, table: ModuleType

@@ -6,18 +6,27 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from validate.scene.box import box, grid
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support, Weight
 from validate.solve.guests.guest import Guest
 from validate.solve.guests.suite import OffBy, check_guest
+from validate.solve.march import run_scheme
+from validate.solve.newton import StaticNewton
 
 STATICS = ("rigid motion", "rigid turn", "patch test", "uniaxial, linear", "hanging bar")
 
 
-def checked(root: Path, script: str) -> dict[str, tuple[OffBy, ...]]:
+def shipped(root: Path, script: str) -> Guest:
     command = [sys.executable, str(root / "benchmarks" / "guests" / script)]
-    guest = Guest(shlex.join(command), seconds=120.0)
-    return {rows[0].scene: rows for rows in check_guest(guest)}
+    return Guest(shlex.join(command), seconds=120.0)
+
+
+def checked(root: Path, script: str) -> dict[str, tuple[OffBy, ...]]:
+    return {rows[0].scene: rows for rows in check_guest(shipped(root, script))}
 
 
 def off(rows: tuple[OffBy, ...]) -> float:
@@ -54,3 +63,47 @@ def test_calculix_solves_all_and_says_that_its_volume_term_is_another(project_ro
     other = found["uniaxial, neo-Hooke"]
     assert 1e-3 < off(other) < 2e-2
     assert "used volumetric = K/2 (J - 1)^2 instead of split" in other[0].why
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
+def test_mujoco_has_one_law_and_says_so(project_root: Path) -> None:
+    """Exact where St. Venant-Kirchhoff's law is asked's own answer; far off where it is not."""
+    found = checked(project_root, "mujoco_guest.py")
+    for name in ("rigid turn", "patch test"):
+        assert off(found[name]) < 1e-6
+    for rows in found.values():
+        assert "used law = svk instead of" in rows[0].why
+        assert "each was cut into six linear tetrahedra" in rows[0].why
+        assert "out of balance" not in rows[0].why
+    assert off(found["uniaxial, linear"]) < 1e-2
+    force = found["uniaxial, neo-Hooke"][1]
+    stretched = 10e3 / 2 * (1.3**2 - 1) * 1.3 * 0.02**2  # N: its own law's
+    assert force.error == pytest.approx(stretched - force.exact, rel=1e-5)
+    for name in ("hanging bar", "ring-down"):
+        assert 0.1 < off(found[name]) < 0.2  # as its law is at a strain of 10 %
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
+@pytest.mark.parametrize("nu", [0.45, 0.499])
+def test_mujoco_bends_a_beam_as_our_tetrahedra_of_its_law_do(project_root: Path, nu: float) -> None:
+    """Locking and all: the measured beam's size and modulus, 10 x 3 x 3 cells."""
+    guest, weight = shipped(project_root, "mujoco_guest.py"), np.full((1, 1), 9.80709)
+    at, ends = np.zeros(1, int), []
+    for make in (box, grid):  # its cut of hexahedra is our box's
+        scene = Scene(
+            make((0.1, 0.03, 0.03), (10, 3, 3)),
+            Material(263_824.0, nu, "svk", 1070.0),
+            (Support("x0", (0, 1, 2)),),
+            loads=(Weight("gravity", (0.0, 0.0, -1.0)),),
+        )
+        run = guest.solve(scene, np.ones(1), weight)
+        assert run.finished, run.outcome.why
+        ends.append(run.u[0, scene.mesh.facet_nodes("x1"), 2].mean())
+        if make is box:
+            assert run.said[1:] == ()  # nothing ignored, changed or out of balance
+            own = run_scheme("own", StaticNewton("none"), scene, np.ones(1), weight, at).u[0]
+            assert np.abs(run.u[0] - own).max() < 1e-5 * np.abs(own).max()
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)
+    assert 1e3 * ends[0] == pytest.approx({0.45: -3.445, 0.499: -0.880}[nu], abs=1e-3)

@@ -48,6 +48,13 @@ def test_the_ring_down_is_reached_in_second_order() -> None:
     assert np.log2(off[1] / off[2]) == pytest.approx(2.0, abs=0.2)
 
 
+def test_the_bar_hangs() -> None:
+    """Stood on its clamp it would buckle by its weight: no question to a guest of large strain."""
+    for small in (s for s in SCENES if s.name in ("hanging bar", "ring-down")):
+        tip = small.scene.mesh.nodes[:, 2].argmax()
+        assert np.sign(small.u[0, tip, 2]) == np.sign(small.scene.loads[0].direction[2]) == 1
+
+
 def test_a_guest_that_can_nothing_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     """Each scene is a row with the reason, and the command fails."""
     assert command_line(["guest", "check", "false", "--json"]) == 1

@@ -86,7 +86,7 @@ def _material(p: ReleasedBeam, model: BeamModel) -> Material:
     relaxes = model.law not in ("linear", "svk") and not model.damping
     return Material(
         known(card.E, "material.E"),
-        card.nu,
+        card.nu if model.nu is None else model.nu,
         model.law,
         card.rho,
         stiffness_damping=model.damping,

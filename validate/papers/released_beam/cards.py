@@ -154,3 +154,4 @@ class BeamModel:
     along: int | None = quantity(None, "1", "cells along the beam; none: the mesh's")
     across: int | None = quantity(None, "1", "cells across it; none: the mesh's")
     damping: float = quantity(0.0, "s", "Rayleigh's beta, in place of what relaxes")
+    nu: float | None = quantity(None, "1", "Poisson ratio of cells that lock; none: the card's")
