@@ -3,7 +3,7 @@
 OMP_NUM_THREADS=1 python benchmarks/guests_table.py            prints it (some five minutes)
 OMP_NUM_THREADS=1 python benchmarks/guests_table.py --write    puts it into README.md
 
-Needs the recordings, FElupe, CalculiX and MuJoCo. All but rate and memory is the same on every machine.
+Needs the recordings, FElupe, CalculiX and MuJoCo. All but rate and memory is the same everywhere.
 """
 
 import sys
