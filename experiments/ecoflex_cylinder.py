@@ -17,7 +17,7 @@ from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
 from validate.papers.ecoflex.specimens import specimen_of
 from validate.replay.cards import moved, quarter_meshes
-from validate.replay.compression import stated_sizes
+from validate.replay.compression_cards import stated_sizes
 from validate.replay.experiment import Experiment, Input, Uncertainty
 from validate.replay.method import Method
 from validate.solve.fluid import NoFluid

@@ -100,7 +100,7 @@ def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> Non
     lines = file.read_text("utf-8").splitlines()
     places = {k: next(i for i, s in enumerate(lines, 1) if f" {k}=None," in s)
               for k in ("diameter", "height")}  # fmt: skip
-    assert "ranges=CompressionRanges(E=0.05, diameter=0.005)" in "".join(lines)
+    assert "ranges=cards.CompressionRanges(E=0.05, diameter=0.005)" in "".join(lines)
     for command in (("run", "bare"), ("study", "tradeoff", "bare", "--quick", "--workers", "0")):
         code, message = in_folder(tmp_path, *command)
         assert code == 2

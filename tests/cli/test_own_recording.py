@@ -2,12 +2,15 @@
 
 import contextlib
 import io
+import json
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from validate.cli.main import run
 from validate.recording.images.image import encode_png
@@ -18,8 +21,11 @@ from validate.recording.types import Recording, Signal, Source
 
 def commands(project_root: Path) -> list[list[str]]:
     section = (project_root / "README.md").read_text("utf-8").split("## Your own recording")[1]
-    (block,) = re.findall(r"```console\n(.*?)```", section, flags=re.DOTALL)[:1]
-    return [shlex.split(line) for line in block.strip().splitlines()]
+    return [shlex.split(line) for line in printed(section, "console").strip().splitlines()]
+
+
+def printed(section: str, language: str) -> str:
+    return re.findall(rf"```{language}\n(.*?)```", section, flags=re.DOTALL)[0]
 
 
 @pytest.fixture
@@ -40,6 +46,24 @@ def own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def pressed_in_images(folder: Path, project_root: Path) -> None:
+    """The cylinder between slipping plates, bright in 28 images of 0.2 mm, 2 a second; answers."""
+    rng, side = np.random.default_rng(2), 0.2e-3
+    y, x = np.mgrid[:190, :180] * side
+    for old in (folder / "images").iterdir():
+        old.unlink()
+    for i in range(28):
+        closed = (0.25 + i / 2) * 0.2e-3
+        half = 0.0125 * (1 + 0.499 * closed / 0.03)
+        body = (abs(x - 0.018) < half) & (y < 0.034) & (y > 0.004 + closed)
+        real, imaginary = (gaussian_filter(rng.normal(size=x.shape), 1.1) for _ in range(2))
+        envelope = np.where(body, 1.0, 0.03) * np.hypot(real, imaginary)
+        grey = np.clip(200 + 100 * np.log10(envelope / envelope.mean() + 1e-3), 0, 255)
+        (folder / "images" / f"frame_{i:03}.png").write_bytes(encode_png(grey.astype(np.uint8)))
+    section = (project_root / "README.md").read_text("utf-8").split("## Your own recording")[1]
+    (folder / "answers.toml").write_text(printed(section, "toml"), "utf-8")
+
+
 def called(arguments: list[str]) -> tuple[int, str, str]:
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -47,8 +71,13 @@ def called(arguments: list[str]) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
+def told(report: Path) -> Any:
+    return json.loads((report / "results.json").read_text("utf-8"))
+
+
 @pytest.mark.slow
 def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root: Path) -> None:
+    pressed_in_images(own_files, project_root)
     outputs = {}
     for program, *arguments in commands(project_root):
         assert program == "validate"
@@ -57,11 +86,19 @@ def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root
         outputs[arguments[0]] = out
     assert "clock_offset/images" in outputs["inspect"]
     assert "seconds 0.25, sd 0.01" in outputs["inspect"]
-    assert "my_gel: agrees; evidence: 1 of 2 checks; measured" in outputs["run"]
-    assert (own_files / "reports" / "my_gel" / "report.html").stat().st_size > 10_000
+    assert "my_gel: agrees; evidence: 5 of 6 checks; measured" in outputs["run"]
+    report = own_files / "reports" / "my_gel"
+    assert (report / "report.html").stat().st_size > 10_000
+    assert (report / "figures" / "outline_images.png").stat().st_size > 50_000
+    (method,) = [m for m in told(report)["methods"] if m["name"] == "slip"]
+    judged = [c for c in method["checks"] if c["name"].startswith("contour.rms@")]
+    assert [c["count"] for c in judged] == [120] * 4
+    assert all(0 < c["u_val"] < 0.2e-3 and c["verdict"] != "cannot decide" for c in judged)
+    bonded = next(m for m in told(report)["methods"] if m["name"] == "bonded")
+    assert {s["name"] for s in bonded["scores"]} >= {c["name"] for c in judged}
     recording = read_recording(own_files / "test.mcap")
     assert set(recording.signals) == {"displacement", "force"}
-    assert recording.frames["images"].m_per_px == (1e-4, 1e-4)
+    assert recording.frames["images"].m_per_px == (2e-4, 2e-4)
     assert recording.frames["images"].t[0] == pytest.approx(0.25)
     assert {"provenance/log", "provenance/images", "merged"} <= set(recording.metadata)
     assert "count" in recording.record("clock_offset/images")

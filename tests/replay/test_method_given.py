@@ -6,14 +6,8 @@ from validate.compare.verdict import Accept
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording, Source
-from validate.replay.compression import (
-    Compression,
-    CompressionRanges,
-    Gel,
-    Specimen,
-    compression,
-    pressed,
-)
+from validate.replay.compression import compression, pressed
+from validate.replay.compression_cards import Compression, CompressionRanges, Gel, Specimen
 from validate.replay.method import Method
 from validate.scene.laws import Coefficients
 from validate.solve.newmark import Newmark

@@ -117,21 +117,26 @@ def test_axes_of_markers_have_labels_each(monkeypatch: pytest.MonkeyPatch) -> No
 def test_every_load_shows_the_section_of_the_judged_method(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    judged, rival = Made(registered=[None]), Made()
+    judged, rival = Made(registered=[None], label="judged"), Made()
     shown: list[Any] = []
     for name, value in {
         "shown_method": lambda result: judged,
         "outline_seen": lambda method: Made(name="o", corners=(), measured=lambda t: t),
         "holds": lambda registered: (Made(t=0.0), Made(t=1.0)),
-        "_drawn": lambda result, measured: [Made(method=rival), Made(method=judged)],
+        "_drawn": lambda result, measured: [
+            Made(method=rival, sections="rival's"),
+            Made(method=judged, sections="judged's"),
+        ],
         "moving_outline": lambda method: (),
         "_at_last": lambda measured, drawn: None,
         "_by_load": lambda measured, first, drawn: shown.append(first.method),
-        "outline_images": lambda recording, topic, holds: (),
+        "outline_images": lambda recording, topic, holds, sections, label: (
+            shown.append((sections, label)) or ()
+        ),
     }.items():
         monkeypatch.setattr(outlines, name, value)
     assert outlines.outlines(Made(recordings=(None,))) is not None
-    assert shown == [judged]
+    assert shown == [judged, ("judged's", "judged")]
 
 
 def test_a_budget_has_the_quantities_of_its_load() -> None:

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.cli import new_outline
 from validate.cli.asking import Answers, Question
 from validate.cli.new_kind import NewKind, quantity_in
 from validate.identify.modulus import stated_test
 from validate.recording.types import Recording
-from validate.replay.compression import stated_sizes
+from validate.replay.compression_cards import stated_sizes
 
 _SIZES = ("diameter", "height")
 _WORDS = {
@@ -38,7 +39,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     asked.append(Question("accept.force", "largest error of the force that is accepted, N",
                           f"{limit:.3g}", f"a tenth of {judged}, assumed",
                           check=quantity_in("N")))  # fmt: skip
-    return asked
+    return [*asked, *new_outline.asks(recording, found)]
 
 
 def _judged(recording: Recording) -> tuple[float, float | None, float, str]:
@@ -75,6 +76,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         "free": free,
         "fixed": fixed,
         "ends": ends,
+        **new_outline.fields(found),
     }
 
 
@@ -90,14 +92,15 @@ def _size(name: str, stated: dict[str, float], found: Answers, *, by_area: bool 
 
 
 def _used(recording: Recording, found: Answers) -> set[str]:
-    return {"displacement", "force"}
+    return {"displacement", "force"} | new_outline.used(recording, found)
 
 
 def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
+    unjudged = new_outline.assumed(recording, found)
     if stated_test(recording) or found.get("test", "compression") != "compression":
-        return ()
+        return unjudged
     return ("nothing in the recording says whether it presses or pulls: compression is assumed; "
-            "change it in the file, or answer test = \"tension\"",)  # fmt: skip
+            "change it in the file, or answer test = \"tension\"", *unjudged)  # fmt: skip
 
 
 PLATES = NewKind(

@@ -6,29 +6,28 @@ fitted line reaches zero force), force from the cell's own offset; the first win
 the modulus where none is given, the second predicts.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from validate.compare.verdict import Accept
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
 from validate.identify.modulus import (
     MIN_SAMPLES,
-    Cylinder,
-    TestKind,
     fit_modulus,
     identify_modulus,
 )
-from validate.parameters import Ranges, known, part, quantity
+from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import beside, moved, require_used, scaled
+from validate.replay.compression_cards import Compression, stated_sizes
 from validate.replay.experiment import (
     Change,
     Experiment,
@@ -39,15 +38,19 @@ from validate.replay.experiment import (
 )
 from validate.replay.method import Method
 from validate.replay.pressed import pressed_log
-from validate.scene.cylinder import quarter_cylinder
-from validate.scene.laws import Coefficients
+from validate.replay.pressed_outline import (
+    OUTLINE_INPUTS,
+    with_outline,
+    with_surface,
+)
+from validate.scene.cylinder import quarter_cylinder, whole_cylinder
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element, refined
-from validate.scene.scene import Drive, Pin, Scene, Support
-from validate.solve.fluid import NoFluid
+from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
+from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 
@@ -55,95 +58,6 @@ STAGE = Drive("stage", "upper_plate", (0.0, 0.0, -1.0))
 PULLED = Drive("stage", "upper_plate", (0.0, 0.0, 1.0))
 SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))  # of a quarter
 _LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
-
-
-def size_of(diameter: float | None, height: float | None) -> Cylinder:
-    """The cylinder of a card; raises `UsageError` while a size is not set."""
-    return Cylinder(known(diameter, "specimen.diameter"), known(height, "specimen.height"))
-
-
-def stated_sizes(recording: Recording) -> dict[str, float]:
-    """What a recording's record `specimen` says of a cylinder, m, by parameter.
-
-    Another cross-section has the diameter of the circle of its area.
-    """
-    said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
-    found = {k: v for k, v in said.items() if v is not None}
-    sizes = {}
-    area = found.get("area_m2")
-    sides = [found[k] for k in ("width_m", "thickness_m", "length_m") if k in found]
-    if area is None and len(sides) >= 2:
-        area = sides[0] * sides[1]
-    if "diameter_m" in found:
-        sizes["specimen.diameter"] = found["diameter_m"]
-    elif area is not None:
-        sizes["specimen.diameter"] = 2 * math.sqrt(area / math.pi)
-    if "height_m" in found:
-        sizes["specimen.height"] = found["height_m"]
-    return sizes
-
-
-def _above_zero(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and value > 0 else None
-
-
-@dataclass(frozen=True)
-class Specimen:
-    """A cylinder; or the body of a mesh file of linear tetrahedra, axis z, with the facet sets
-    "lower_plate" and "upper_plate", whose equivalent diameter is then that of equal area."""
-
-    diameter: float | None = quantity(None, "m", "diameter; none: the recording's", asked=True)
-    height: float | None = quantity(None, "m", "height; none: the recording's", asked=True)
-    mesh: str | None = quantity(None, "1", "mesh file (npz, inp, msh, vtu); none: a cylinder")
-    mesh_unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
-
-    @property
-    def size(self) -> Cylinder:
-        """Raises `UsageError` while a size is not set."""
-        return size_of(self.diameter, self.height)
-
-
-@dataclass(frozen=True)
-class Gel:
-    E: float | None = quantity(None, "Pa", "Young's modulus; none: identified, slipping plates")
-    E_bonded: float | None = quantity(
-        None, "Pa", "of models with bonded plates; none: E, or identified with bonded plates"
-    )
-    nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
-    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
-
-
-@dataclass(frozen=True)
-class CylinderGrid:
-    radial: int = quantity(4, "1", "elements from axis to rim")
-    axial: int = quantity(4, "1", "elements along the axis")
-    finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
-    halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
-
-
-@dataclass(frozen=True)
-class CompressionRanges(Ranges):
-    E: float = quantity(0.05, "1", "relative, of the modulus")
-    diameter: float = quantity(0.005, "1", "relative, of the diameter")
-
-
-@dataclass(frozen=True)
-class Compression:
-    """Everything a user decides of a compression test; `recording` lies beside the file."""
-
-    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
-    test: TestKind = quantity("compression", "1", "whether the upper plate presses or pulls")
-    specimen: Specimen = Specimen()
-    material: Gel = Gel()
-    mesh: CylinderGrid = CylinderGrid()
-    ranges: CompressionRanges = CompressionRanges()
-    fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
-    fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
-    limit: float = quantity(0.10, "1", "strain to which the models are shown; linear: about 0.1")
 
 
 @dataclass(frozen=True)
@@ -156,11 +70,20 @@ class Pressed:
 
 
 def pressed(
-    label: str, plates: Contact = "slip", law: LawName = "linear", order: Literal[1, 2] = 2
+    label: str,
+    plates: Contact = "slip",
+    law: LawName = "linear",
+    order: Literal[1, 2] = 2,
+    *,
+    fluid: bool = False,
 ) -> Method:
-    """A static model of the body between plates that slip or hold it, in a law."""
+    """A static model of the body between plates that slip or hold it, in a law; a linear one may
+    have fluid of constant volume in `specimen.fluid`. Raises `UsageError` for another with it."""
     linear = law == "linear"
-    settings = NoFluid() if linear else Tabulated(StaticNewton("none"), 1.0)
+    if fluid and not linear:
+        raise UsageError(f"method '{label}': fluid is for the linear law, not {law}")
+    slow = Tabulated(StaticNewton("none"), 1.0)
+    settings = ExactPressure() if fluid else NoFluid() if linear else slow
     return Method(label, settings, Pressed(plates, law, order))
 
 
@@ -173,17 +96,20 @@ def compression(
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
 ) -> Experiment:
-    """The experiment: `force` is judged in the windows "fit" and "beyond"."""
+    """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that
+    `parameters` name at images of their own."""
+    shown = parameters.outline.topic is not None
     return Experiment(
-        name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
-        sets=_sets, stated=stated_sizes, identify=_identify, frames=2,
+        name, title, source, parameters, methods, accepted, accept, beside, _build,
+        partial(_place, shown=shown), sets=_sets, stated=stated_sizes, identify=_identify, frames=2,
         uncertainty=Uncertainty(
             mesh=_MESHES,
             inputs=(
                 Input("modulus", moved("material", E=_stiffer("E"), E_bonded=_stiffer("E_bonded")),
                       "E within its declared uncertainty", "assumed"),
-                Input("diameter", moved("material", E=_wider("E"), E_bonded=_wider("E_bonded")),
+                Input("diameter", _wider_body if shown else _stiffer_by_area,
                       "diameter within its declared range", "assumed"),
+                *(OUTLINE_INPUTS if shown else ()),
             ),
             surrogate=accepted[0],
         ),
@@ -196,6 +122,11 @@ def _identify(
     require_used(p.material.coefficients, {m.scene.law for m in methods.values()})
     if p.material.E is not None:
         return Identified(p, (), ())
+    if p.specimen.fluid is not None:
+        raise UsageError(
+            "material.E is not set, and a body with fluid inside is not pressed uniformly: its "
+            "modulus is not the log's slope; give it with --set material.E=VALUE"
+        )
     found = identify_modulus(recordings, p.specimen.size, (p.fit_from, p.fit_to), p.test)
     E, ends = found.mean, "slipping plates" if p.test == "compression" else "ends free to contract"
     note = (
@@ -225,7 +156,7 @@ def _stiffening(recording: Recording, p: Compression) -> float:
 
 
 def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
-    mesh, whole = _body(p), p.specimen.mesh is not None
+    mesh, whole = _body(p), p.specimen.mesh is not None or p.outline.topic is not None
     own = p.material.E_bonded if model.plates == "bonded" else None
     scene = Scene(
         mesh,
@@ -239,17 +170,21 @@ def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
         pins=_pins(mesh) if whole and model.plates == "slip" else (),
         drives=(STAGE if p.test == "compression" else PULLED,),
         copies=1 if whole else 4,
+        cavities=(Cavity("inclusion", p.specimen.fluid),) if p.specimen.fluid else (),
     )
-    for _ in range(p.mesh.halvings if whole else 0):
+    for _ in range(p.mesh.halvings if p.specimen.mesh else 0):
         scene = refined(scene)
     return of_element(scene, "P2" if model.order == 2 else "MD")
 
 
 def _body(p: Compression) -> Mesh:
-    """The body of the mesh file, or a quarter of the cylinder."""
+    """The body of the mesh file, or a quarter of the cylinder; all of it where images show it."""
     if p.specimen.mesh is not None:
-        return read_mesh(Path(p.specimen.mesh), p.specimen.mesh_unit)
+        return with_surface(read_mesh(Path(p.specimen.mesh), p.specimen.mesh_unit))
     size, grid = p.specimen.size, p.mesh
+    if p.outline.topic is not None:
+        whole = whole_cylinder(size.diameter, size.height, grid.radial, grid.axial)
+        return with_surface(whole)
     return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
 
 
@@ -271,7 +206,12 @@ def _pins(mesh: Mesh) -> tuple[Pin, ...]:
 # --- the recording in it --------------------------------------------------------------------------
 
 
-def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
+def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -> Registered:
+    if p.outline.topic is not None and not shown:
+        raise UsageError(
+            "outline.topic: what makes outlines uncertain is chosen as the experiment is declared; "
+            "name them in its file, PressedOutline(topic=...)"
+        )
     fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to), p.test)
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
@@ -282,7 +222,9 @@ def _place(recording: Recording, p: Compression, scene: Scene) -> Registered:
                 f"window '{window.label}': {len(window.t)} samples of {recording.name}, "
                 f"{MIN_SAMPLES} are needed to judge a prediction; widen fit_from, fit_to or limit"
             )
-    return seen
+    if p.outline.topic is None:
+        return seen
+    return with_outline(seen, recording, p.outline, scene.mesh)
 
 
 def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
@@ -320,6 +262,14 @@ def _stiffer(name: str) -> Callable[[Compression, float], float | None]:
     return _times(name, lambda p, z: 1 + z * p.ranges.E)
 
 
+def _wider_body(p: Compression, z: float) -> Compression:
+    """Of a mesh file, whose shape is its own, only the force is changed."""
+    size = p.specimen.diameter
+    if p.specimen.mesh is not None or size is None:
+        return _stiffer_by_area(p, z)
+    return replace(p, specimen=replace(p.specimen, diameter=size * (1 + z * p.ranges.diameter)))
+
+
 def _wider(name: str) -> Callable[[Compression, float], float | None]:
     """A wider specimen is as much stiffer as its area is larger."""
     return _times(name, lambda p, z: (1 + z * p.ranges.diameter) ** 2)
@@ -335,3 +285,8 @@ def _times(
         return None if E is None else E * factor(p, z)
 
     return scaled
+
+
+def _stiffer_by_area(p: Compression, z: float) -> Compression:
+    changed: Compression = moved("material", E=_wider("E"), E_bonded=_wider("E_bonded"))(p, z)
+    return changed

@@ -2,10 +2,8 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from validate.arrays import Floats
-from validate.errors import RegistrationError, UsageError
+from validate.errors import RegistrationError
 from validate.recording.types import Contours, Recording
 from validate.register.clock import clock_sd
 from validate.register.observation import nearest_sample
@@ -14,7 +12,7 @@ from validate.register.outlines import OutlineObservation, observe_outlines
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
 from validate.replay.measured_cards import MeasuredBody
 from validate.scene.mesh import Mesh
-from validate.scene.named_place import axis_of
+from validate.scene.named_place import pose_of
 
 _PARTS = 4  # of a facet's edge
 
@@ -48,16 +46,7 @@ def observed_outline(
 
 
 def _pose(p: MeasuredBody, origin: tuple[float, ...]) -> Floats:
-    """T_body_from_image of declared directions; raises `UsageError` for what is no pose."""
-    x, y = np.array(axis_of(p.seen.image_x)), np.array(axis_of(p.seen.image_y))
-    if len(origin) != 3 or abs(float(x @ y)) > 1e-6:
-        raise UsageError(
-            f"seen.origin {origin}, image_x {p.seen.image_x}, image_y {p.seen.image_y}: three "
-            "lengths, and two directions at right angles"
-        )
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), origin
-    return pose
+    return pose_of(origin, p.seen.image_x, p.seen.image_y)
 
 
 def _fitted(p: MeasuredBody, contours: Contours, wall: SurfaceSampler, rest: float) -> Floats:

@@ -1,4 +1,5 @@
-"""The images of a recording with what was found in them: the outline, and the circle through it."""
+"""The images of a recording with what was found in them: the outline, the circle through a round
+one, and the section that a run has there."""
 
 from textwrap import fill
 from typing import Any
@@ -21,28 +22,41 @@ _MM = 1e3
 _COLUMNS = 2
 _ROOM = 1.1  # inches of labels and legend
 _FOUND, _FITTED = "#F0E442", "#56B4E9"  # light, on dark images
+_SIMULATED = "#FF9F1C"
+_ROUND = 0.05  # rms distance over radius to which an outline is round
 _DASH = (0, (4, 3))
 
 
 def outline_images(
-    recording: Recording, topic: str, holds: tuple[Held, ...]
+    recording: Recording,
+    topic: str,
+    holds: tuple[Held, ...],
+    sections: tuple[Floats, ...],
+    label: str,
 ) -> tuple[Picture, ...]:
-    """One picture of the images at the loads; none where outlines `topic` were not found in any."""
+    """One picture of the images at the loads with the `sections` (k, 2) m of the method `label`;
+    none where outlines `topic` were not found in any."""
     contours = recording.contours.get(topic)
     frames = recording.frames.get(contours.images) if contours is not None else None
     if contours is None or frames is None:
         return ()
-    words = "The circle at rest places the inclusion; the outlines are what runs are compared with."
-    return (outlines_over(frames, contours, holds, "at the loads", words),)
+    words = f"Dotted, orange: the section of {label}, which is compared with the outline."
+    simulated = (f"simulated: {label}", sections)
+    return (outlines_over(frames, contours, holds, "at the loads", words, simulated),)
 
 
 def outlines_over(
-    frames: Frames, contours: Contours, holds: tuple[Held, ...], which: str, words: str
+    frames: Frames,
+    contours: Contours,
+    holds: tuple[Held, ...],
+    which: str,
+    words: str,
+    simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
 ) -> Picture:
-    """The images nearest to the holds in time, with outlines and circles; `which` they are, and
-    `words` on what they are for, stand in the caption."""
-    circles = [_circle(contours, hold) for hold in holds]
-    told = "; ".join(f"{spaced(h.label)}: {_told(c)}" for h, c in zip(holds, circles, strict=True))
+    """The images nearest to the holds in time, with outlines, with circles where the first outline
+    is round, and with what was `simulated` at the holds; `which` they are, and `words` on what they
+    are for, stand in the caption."""
+    circles = _circles(contours, holds)
     rows = -(-len(holds) // _COLUMNS)
     tall = frames.images[0].shape[0] * frames.m_per_px[1]
     wide = frames.images[0].shape[1] * frames.m_per_px[0]
@@ -50,10 +64,14 @@ def outlines_over(
     return Picture(
         "outline_images",
         f"The images '{contours.images}' {which}, image coordinates in mm, with the outline that "
-        "was found in each (solid, yellow) and the circle through it (dashed, blue). Radius of "
-        f"that circle and rms distance of the outline from it: {told}. {words}",
-        f"{len(holds)} images with the outline found in each and the circle fitted to it.",
-        draw(lambda f: _panels(f, frames, contours, holds, circles), WIDTH, panel * rows + _ROOM),
+        f"was found in each (solid, yellow){_of_circles(holds, circles)}. {words}",
+        f"{len(holds)} images with the outline found in each"
+        + (" and the circle fitted to it." if any(circles) else "."),
+        draw(
+            lambda f: _panels(f, frames, contours, holds, circles, simulated),
+            WIDTH,
+            panel * rows + _ROOM,
+        ),
         photo=True,
     )
 
@@ -69,6 +87,24 @@ def _circle(contours: Contours, hold: Held) -> Circle | None:
         return None  # an outline pressed flat is none
 
 
+def _circles(contours: Contours, holds: tuple[Held, ...]) -> list[Circle | None]:
+    found = [_circle(contours, hold) for hold in holds]
+    first = found[0]
+    if first is None or first.rms > _ROUND * first.radius:
+        return [None] * len(holds)
+    return found
+
+
+def _of_circles(holds: tuple[Held, ...], circles: list[Circle | None]) -> str:
+    if not any(circles):
+        return ""
+    told = "; ".join(f"{spaced(h.label)}: {_told(c)}" for h, c in zip(holds, circles, strict=True))
+    return (
+        " and the circle through it (dashed, blue). Radius of that circle and rms distance of the "
+        f"outline from it: {told}"
+    )
+
+
 def _told(circle: Circle | None) -> str:
     if circle is None:
         return "no circle"
@@ -81,16 +117,21 @@ def _panels(
     contours: Contours,
     holds: tuple[Held, ...],
     circles: list[Circle | None],
+    simulated: tuple[str, tuple[Floats, ...]],
 ) -> None:
     rows = -(-len(holds) // _COLUMNS)
     grid = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
-    for ax, hold, circle in zip(grid.flat, holds, circles, strict=False):
+    label, sections = simulated
+    for i, (ax, hold, circle) in enumerate(zip(grid.flat, holds, circles, strict=False)):
         at = nearest_sample(frames.t, hold.t, "images")
         _image(ax, frames, at)
         outline = _MM * _outline(contours, hold)
         _line(ax, np.vstack([outline, outline[:1]]).T, _FOUND, "-", "outline found")
         if circle is not None:
             _line(ax, _round(circle), _FITTED, _DASH, "circle through it")
+        if sections:
+            section = _MM * sections[i]
+            _line(ax, np.vstack([section, section[:1]]).T, _SIMULATED, ":", label)
         ax.set_title(fill(f"{spaced(hold.label)}, image {at}, t = {frames.t[at]:.4g} s", 36),
                      loc="left", fontsize=8.5)  # fmt: skip
         ax.set(xlabel="image x / mm", ylabel="image y / mm")

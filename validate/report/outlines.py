@@ -79,7 +79,7 @@ def outlines(result: Result) -> Exhibit | None:
         pictures=(
             *moving_outline(judged),
             _by_load(measured, first, drawn),
-            *outline_images(result.recordings[0], seen.name, at),
+            *outline_images(result.recordings[0], seen.name, at, first.sections, judged.label),
         ),
     )
 

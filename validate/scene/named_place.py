@@ -15,7 +15,7 @@ from operator import or_
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import SceneError
+from validate.errors import SceneError, UsageError
 from validate.parameters import nearest_names
 from validate.scene.mesh import Mesh
 from validate.scene.select import InBox, Labelled, Nearest, OnPlane, Place, Site
@@ -50,6 +50,19 @@ def axis_of(text: str) -> tuple[float, ...]:
     if v.shape != (3,) or not np.isfinite(v).all() or not v.any():
         raise SceneError(f"direction '{text[:40]}': one of +x -x +y -y +z -z, or three numbers")
     return tuple((v / np.linalg.norm(v)).tolist())
+
+
+def pose_of(origin: tuple[float, ...], image_x: str, image_y: str) -> Floats:
+    """T_body_from_image of what is declared; raises `UsageError` for axes that are not square."""
+    x, y = np.array(axis_of(image_x)), np.array(axis_of(image_y))
+    if len(origin) != 3 or abs(float(x @ y)) > 1e-6:
+        raise UsageError(
+            f"origin {origin}, image_x {image_x}, image_y {image_y}: three lengths, and two "
+            "directions at right angles"
+        )
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), origin
+    return pose
 
 
 def point_of(text: str) -> tuple[float, ...]:

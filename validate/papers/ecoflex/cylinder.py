@@ -16,7 +16,8 @@ from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import QuarterGrid
-from validate.replay.compression import STAGE, SYMMETRY, between, size_of
+from validate.replay.compression import STAGE, SYMMETRY, between
+from validate.replay.compression_cards import size_of
 from validate.replay.pressed import pressed_log
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.material import LawName, Material

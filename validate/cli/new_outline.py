@@ -1,0 +1,144 @@
+"""What `validate new` asks of images beside a log: which surface they show, and where they lie."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields as attributes
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.cli.asking import Answers, Question
+from validate.cli.new_kind import quantity_in
+from validate.errors import UsageError
+from validate.parameters import with_values
+from validate.recording.types import Recording
+from validate.replay.compression_cards import Compression
+from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.named_place import axis_of
+
+_EDGE, _WALL, _OTHER, _RECORDED = "edge", "inclusion", "other", "recorded"
+_WIDTH = 88  # characters of a line inside a card
+_FRAME = "in the body's frame (z: the axis, 0 at the resting plate; x, y: across, 0 on the axis)"
+
+
+def asks(recording: Recording, found: Answers) -> Sequence[Question]:
+    """None of a recording without outlines, nor of what the model does not have."""
+    if not recording.contours:
+        return []
+    topics = tuple(recording.contours)
+    asked = [
+        Question("outline.topic", "outlines that are judged", topics[0], "the first recorded",
+                 choices=topics),
+        Question("outline.shows", f"what they are of: {_EDGE} (the specimen's own), {_WALL} (one "
+                 f"inside, of a mesh file), {_OTHER} (nothing that the model has: not judged)",
+                 open=True, choices=(_EDGE, _WALL, _OTHER)),
+    ]  # fmt: skip
+    shows = found.get("outline.shows", _OTHER)
+    if shows == _OTHER:
+        return asked
+    if shows == _WALL:
+        asked += _of_the_inclusion(found)
+    return [*asked, *_of_the_place(recording, found)]
+
+
+def _of_the_inclusion(found: Answers) -> list[Question]:
+    asked = [
+        Question("specimen.mesh", 'mesh file of the specimen, axis z, with the facet sets '
+                 '"lower_plate", "upper_plate" and the inclusion\'s wall', open=True, check=_there),
+        Question("outline.surface", "facet set of the inclusion's wall", open=True),
+        Question("outline.fluid", "whether fluid fills it, of constant volume", open=True,
+                 choices=("true", "false")),
+        Question("material.E", "Young's modulus, as 15kPa: the log's slope is that of a specimen "
+                 "without a hole", open=True, check=quantity_in("Pa")),
+    ]  # fmt: skip
+    if Path(found.get("specimen.mesh", "")).suffix.lower() in FOREIGN:
+        asked.insert(1, Question("specimen.mesh_unit", "unit of its lengths, as mm", open=True))
+    return asked
+
+
+def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
+    pose = recording.contour(found.get("outline.topic", next(iter(recording.contours)))).pose
+    posed = not np.array_equal(pose, np.eye(4))
+    asked = [
+        Question("outline.origin", f"the images' first pixel {_FRAME}, as -12mm,0mm,30mm; "
+                 f"{_RECORDED}: by the recorded pose", _RECORDED if posed else "",
+                 "the recording has a pose", open=not posed, check=_path("outline.origin")),
+    ]  # fmt: skip
+    if found.get("outline.origin", _RECORDED) not in ("", _RECORDED):
+        asked += [
+            Question(f"outline.image_{c}", f"direction of the images' {c} ({what}) there, as +x",
+                     open=True, check=axis_of)
+            for c, what in (("x", "columns"), ("y", "rows"))
+        ]  # fmt: skip
+    return [
+        *asked,
+        Question("outline.sd", "how well that place is known along x and y of the images, one "
+                 "standard uncertainty, as 0.3mm", open=True, check=quantity_in("m")),
+        Question("accept.contour", "largest distance of the outlines that is accepted, as 0.5mm",
+                 open=True, check=quantity_in("m")),
+    ]  # fmt: skip
+
+
+def _path(path: str) -> Callable[[str], Any]:
+    return lambda text: None if text == _RECORDED else with_values(Compression(), {path: text})
+
+
+def _there(text: str) -> None:
+    if not Path(text).is_file():
+        raise UsageError("no such file here")
+
+
+def used(recording: Recording, found: Answers) -> set[str]:
+    """The outlines that are judged, and the images that they were found in."""
+    if found.get("outline.shows", _OTHER) == _OTHER:
+        return set()
+    topic = found["outline.topic"]
+    return {topic, recording.contour(topic).images} - {""}
+
+
+def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
+    if recording.frames and not recording.contours:
+        return ("no outlines are recorded, so that nothing of the images is judged: find them "
+                "with `validate outline`",)  # fmt: skip
+    return ()
+
+
+def fields(found: Answers) -> dict[str, str]:
+    """What stands in the file: empty where no outlines are judged."""
+    if found.get("outline.shows", _OTHER) == _OTHER:
+        return {"outline": "", "accept_outline": "", "body": "", "fluid": "",
+                "E": "None"}  # fmt: skip
+    limit = quantity_in("m")(found["accept.contour"])
+    inside = found["outline.shows"] == _WALL
+    return {
+        "outline": f"    # The images, and where they lie, m.\n    outline={_card(found)},\n",
+        "accept_outline": f'\n        Accept("contour", {limit:.6g}, "answered, m"),',
+        "body": _mesh(found) if inside else "",
+        "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside else "None",
+        "fluid": ", fluid=True" if inside and found["outline.fluid"] == "true" else "",
+    }
+
+
+def _card(found: Answers) -> str:
+    keys = ("topic", "surface", "origin", "image_x", "image_y", "sd")
+    said = {k: found[f"outline.{k}"] for k in keys if f"outline.{k}" in found}
+    values = {f"outline.{k}": v for k, v in said.items() if v != _RECORDED}
+    card = with_values(Compression(), values).outline
+    told = [
+        f"{f.name}={v!r}" for f in attributes(card) if (v := getattr(card, f.name)) != f.default
+    ]
+    lines: list[str] = []
+    last = told[0]
+    for piece in told[1:]:  # a text may hold spaces: no piece is broken
+        short = len(last) + len(piece) < _WIDTH
+        lines, last = (lines, f"{last}, {piece}") if short else ([*lines, last], piece)
+    inside = "".join(f"        {line},\n" for line in (*lines, last))
+    return f"cards.PressedOutline(\n{inside}    )"
+
+
+def _mesh(found: Answers) -> str:
+    said = {"mesh": found["specimen.mesh"], "mesh_unit": found.get("specimen.mesh_unit")}
+    if found["outline.fluid"] == "true":
+        said["fluid"] = found["outline.surface"]
+    told = ", ".join(f"{k}={v!r}" for k, v in said.items() if v)
+    return f"        {told},  # from where `validate run` is called\n"

@@ -1,0 +1,104 @@
+"""What a user decides of a body between two plates, or between grips: its sizes, material, mesh,
+declared uncertainties, windows of strain, and what images show of it."""
+
+import math
+from dataclasses import dataclass
+
+from validate.identify.modulus import Cylinder, TestKind
+from validate.parameters import Ranges, known, part, quantity
+from validate.recording.types import Recording
+from validate.replay.pressed_outline import PressedOutline
+from validate.scene.laws import Coefficients
+
+
+def size_of(diameter: float | None, height: float | None) -> Cylinder:
+    """The cylinder of a card; raises `UsageError` while a size is not set."""
+    return Cylinder(known(diameter, "specimen.diameter"), known(height, "specimen.height"))
+
+
+def stated_sizes(recording: Recording) -> dict[str, float]:
+    """What a recording's record `specimen` says of a cylinder, m, by parameter.
+
+    Another cross-section has the diameter of the circle of its area.
+    """
+    said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
+    found = {k: v for k, v in said.items() if v is not None}
+    sizes = {}
+    area = found.get("area_m2")
+    sides = [found[k] for k in ("width_m", "thickness_m", "length_m") if k in found]
+    if area is None and len(sides) >= 2:
+        area = sides[0] * sides[1]
+    if "diameter_m" in found:
+        sizes["specimen.diameter"] = found["diameter_m"]
+    elif area is not None:
+        sizes["specimen.diameter"] = 2 * math.sqrt(area / math.pi)
+    if "height_m" in found:
+        sizes["specimen.height"] = found["height_m"]
+    return sizes
+
+
+def _above_zero(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and value > 0 else None
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A cylinder; or the body of a mesh file of linear tetrahedra, axis z, with the facet sets
+    "lower_plate" and "upper_plate", whose equivalent diameter is then that of equal area."""
+
+    diameter: float | None = quantity(None, "m", "diameter; none: the recording's", asked=True)
+    height: float | None = quantity(None, "m", "height; none: the recording's", asked=True)
+    mesh: str | None = quantity(None, "1", "mesh file (npz, inp, msh, vtu); none: a cylinder")
+    mesh_unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
+    fluid: str | None = quantity(None, "1", "facet set around a fluid inside; none: no fluid")
+
+    @property
+    def size(self) -> Cylinder:
+        """Raises `UsageError` while a size is not set."""
+        return size_of(self.diameter, self.height)
+
+
+@dataclass(frozen=True)
+class Gel:
+    E: float | None = quantity(None, "Pa", "Young's modulus; none: identified, slipping plates")
+    E_bonded: float | None = quantity(
+        None, "Pa", "of models with bonded plates; none: E, or identified with bonded plates"
+    )
+    nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
+    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
+
+
+@dataclass(frozen=True)
+class CylinderGrid:
+    radial: int = quantity(4, "1", "elements from axis to rim")
+    axial: int = quantity(4, "1", "elements along the axis")
+    finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
+    halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
+
+
+@dataclass(frozen=True)
+class CompressionRanges(Ranges):
+    E: float = quantity(0.05, "1", "relative, of the modulus")
+    diameter: float = quantity(0.005, "1", "relative, of the diameter")
+    height: float = quantity(0.005, "1", "relative, of the height; with outlines only")
+    nu: float = quantity(0.01, "1", "of the Poisson ratio, with outlines only")
+
+
+@dataclass(frozen=True)
+class Compression:
+    """Everything a user decides of a compression test; `recording` lies beside the file."""
+
+    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
+    test: TestKind = quantity("compression", "1", "whether the upper plate presses or pulls")
+    specimen: Specimen = Specimen()
+    material: Gel = Gel()
+    mesh: CylinderGrid = CylinderGrid()
+    ranges: CompressionRanges = CompressionRanges()
+    outline: PressedOutline = PressedOutline()
+    fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
+    fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
+    limit: float = quantity(0.10, "1", "strain to which the models are shown; linear: about 0.1")
