@@ -8,6 +8,7 @@ import pytest
 
 from validate.errors import RecordingError, UsageError
 from validate.identify.modulus import fit_modulus
+from validate.identify.votes import by_specimen
 from validate.papers.ecoflex.cylinder import (
     CylinderModel,
     LoggedCylinder,
@@ -19,7 +20,6 @@ from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
 from validate.papers.ecoflex.specimens import (
     apart_notes,
-    by_specimen,
     left_out,
     named,
     specimen_of,

@@ -28,7 +28,7 @@ def inspect(
 
 
 @click.command("import")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--as",
     "kind",
@@ -46,17 +46,29 @@ def inspect(
 @click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
 @click.option("--rate", type=float, help="png-stack: images a second, Hz.")
 @click.option("--topic", help="png-stack: its topic (default: images).")
+@click.option(
+    "--specimens", metavar="one|each|A,A,B", help="Several logs: of which specimen each is."
+)
 @click.option("--recover", is_flag=True, help="MCAP without an end: save what of it is whole.")
 def import_(
-    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], recover: bool, **given: Any
+    files: tuple[Path, ...],
+    kind: str | None,
+    out: Path,
+    mapping: tuple[str, ...],
+    recover: bool,
+    specimens: str | None,
+    **given: Any,
 ) -> None:
-    """Turn a file of another program into a recording: motion capture, trackers, images, logs."""
+    """Turn files of another program into a recording: motion capture, trackers, images, logs.
+
+    Several logs of a testing machine, or a folder of them, are repeats: their mean and scatter.
+    """
     from validate.cli import recordings
 
     if recover:
-        recordings.recover_file(file, kind, out, mapping, given)
+        recordings.recover_file(files, kind, out, mapping, {**given, "specimens": specimens})
     else:
-        recordings.import_file(file, kind, out, mapping, given)
+        recordings.import_files(files, kind, out, mapping, specimens, given)
 
 
 @click.command()

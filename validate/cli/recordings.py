@@ -7,44 +7,82 @@ from typing import Any
 from validate.cli.arguments import complain, pairs
 from validate.cli.display import say
 from validate.errors import UsageError
+from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
 from validate.recording.mcap.recover import recover
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
-from validate.recording.readers import named, read_recording, recognised
+from validate.recording.readers import READERS, named, read_recording, recognised
 from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 
 
-def import_file(
-    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], given: Mapping[str, Any]
+def import_files(
+    files: tuple[Path, ...],
+    kind: str | None,
+    out: Path,
+    mapping: tuple[str, ...],
+    specimens: str | None,
+    given: Mapping[str, Any],
 ) -> None:
-    """Reads a foreign file, of the `kind` that it shows where none is said, as a recording."""
+    """Reads foreign files, of the `kind` that they show where none is said, as a recording;
+    several are repeats of one test of a testing machine."""
     try_file(out)
-    reader = named(kind) if kind else recognised(file)
-    said = {key: str(value) for key, value in given.items() if value is not None}
-    recording = reader.read(file, pairs(mapping, "--map") | said)
+    said = pairs(mapping, "--map") | {k: str(v) for k, v in given.items() if v is not None}
+    found = _logs(files, kind)
+    if len(found) == 1 and specimens is None:
+        recording = _read(found[0], kind, said)
+    else:
+        logs = [_read(file, kind, said) for file in found]
+        recording = averaged(logs, labels_of(specimens, logs), out.stem)
+        _tell(recording)
     write_recording(recording, out)
-    why = "as said" if kind else f"because {reader.sign}"
-    say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
-    for key, text in recording.metadata.get(ASSUMED, {}).items():
-        say(f"{key}: {text}", indent="  ")
     written(recording, out)
     for line in _besides(recording):
         complain(line)
     ask_back(recording)
 
 
+def _logs(files: tuple[Path, ...], kind: str | None) -> list[Path]:
+    """The files, and of a folder that is no format of its own those in it, in their order."""
+    if len(files) > 1 or not files[0].is_dir() or kind:
+        return list(files)
+    if any(reader.recognises(files[0]) for reader in READERS):
+        return list(files)
+    inside = sorted(p for p in files[0].iterdir() if p.is_file() and p.name[0] != ".")
+    return inside or list(files)
+
+
+def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> Recording:
+    """A file as its reader makes it, and what decided."""
+    reader = named(kind) if kind else recognised(file)
+    recording = reader.read(file, said)
+    why = "as said" if kind else f"because {reader.sign}"
+    say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
+    _tell(recording)
+    return recording
+
+
+def _tell(recording: Recording) -> None:
+    for key, text in recording.metadata.get(ASSUMED, {}).items():
+        say(f"{key}: {text}", indent="  ")
+
+
 def recover_file(
-    file: Path, kind: str | None, out: Path, mapping: tuple[str, ...], given: Mapping[str, Any]
+    files: tuple[Path, ...],
+    kind: str | None,
+    out: Path,
+    mapping: tuple[str, ...],
+    given: Mapping[str, Any],
 ) -> None:
     """Saves what of an MCAP file without an end is whole, and says what is missing."""
-    if kind not in (None, "mcap") or mapping or any(v is not None for v in given.values()):
-        raise UsageError("--recover copies messages as they are: it takes FILE and -o only")
+    more = mapping or any(v is not None for v in given.values())
+    if kind not in (None, "mcap") or more or len(files) > 1:
+        raise UsageError("--recover copies messages as they are: it takes one FILE and -o only")
     try_file(out)
-    found = recover(file, out)
+    found = recover(files[0], out)
     for line in found.lines:
         say(line, indent="  ")
     topics = ", ".join(f"{topic} ({count})" for topic, count in found.counts.items())

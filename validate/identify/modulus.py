@@ -121,7 +121,7 @@ def fit_modulus(
     log = loading(recording, test)
     d, force = log.d, log.force
     noise = _first_noise(d, force, cylinder.height * high)
-    offset, contact = _zero(d, force, noise, cylinder.height * low)
+    offset, contact = zero_of(d, force, noise, cylinder.height * low)
     strain = (d - contact) / cylinder.height
     used = _loading(strain, high)
     used &= (strain >= low) & (strain <= high)
@@ -249,7 +249,7 @@ def _first_noise(d: Floats, force: Floats, reach: float) -> float:
     return load_noise(force[: max(count, MIN_SAMPLES)])
 
 
-def _zero(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, float]:
+def zero_of(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, float]:
     """Force offset (N) and contact displacement (m).
 
     With an unloaded approach the offset is its mean and contact where the line through the toe

@@ -8,6 +8,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import Rows
+from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.clock import clock_sd, slopes, with_clock
 from validate.register.draws import AnyDraw, from_rest, shifted
@@ -107,10 +108,11 @@ def driving(
 def validating(
     recording: Recording, name: str, unit: str, *, quantity: str, trace: str
 ) -> SignalObservation:
-    """The signal that a run's `trace` must predict, scored as `quantity`."""
+    """The signal that a run's `trace` must predict, scored as `quantity`; a mean of repeats is
+    uncertain by their scatter."""
     s = recording.signal(name, unit)
-    sd_t = clock_sd(recording, name)
-    return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace, sd_t)
+    sd_t, share = clock_sd(recording, name), repeats_share(recording)
+    return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace, sd_t, share)
 
 
 def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:

@@ -24,6 +24,7 @@ from validate.identify.modulus import (
     identify_modulus,
 )
 from validate.parameters import quantity
+from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import beside, moved, require_used, scaled
@@ -215,7 +216,10 @@ def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -
     fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to), p.test)
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
-    seen = pressed_log(recording, fit, p.specimen.size.height, p.limit, strains, noise, test=p.test)
+    seen = pressed_log(
+        recording, fit, p.specimen.size.height, p.limit, strains, noise,
+        share=repeats_share(recording), test=p.test,
+    )  # fmt: skip
     for window in seen.selections:
         if window.t is not None and len(window.t) < MIN_SAMPLES:
             raise ComparisonError(

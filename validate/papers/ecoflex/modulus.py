@@ -21,6 +21,7 @@ from validate.identify.modulus import (
     fit_modulus,
     gent_correction,
 )
+from validate.identify.votes import Votes, by_specimen
 from validate.papers.ecoflex.cylinder import (
     CylinderModel,
     LoggedCylinder,
@@ -31,9 +32,7 @@ from validate.papers.ecoflex.cylinder import (
 )
 from validate.papers.ecoflex.specimens import (
     HeldOut,
-    Moduli,
     apart_notes,
-    by_specimen,
     left_out,
     specimen_of,
     split,
@@ -92,7 +91,7 @@ def _used(
     p: LoggedCylinder,
     moduli: Mapping[str, float],
     found: ModulusSummary,
-    own: Moduli,
+    own: Votes,
     apart: HeldOut,
 ) -> LoggedCylinder:
     """The parameters with what was identified where nothing was set, and how sure that is."""

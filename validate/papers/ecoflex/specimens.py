@@ -14,6 +14,7 @@ import numpy as np
 from validate.compare.score import Score
 from validate.errors import RecordingError, UsageError
 from validate.identify.modulus import ModulusFit, ModulusSummary
+from validate.identify.votes import Votes, by_specimen
 from validate.recording.types import Recording
 
 _NAMES = (re.compile(r"(.+)_([A-Za-z]+)_sample_\d+"), re.compile(r"(.+)_([A-Z]+)\d+"))
@@ -81,42 +82,11 @@ def split(recordings: Sequence[Recording], judged: str | None) -> HeldOut:
     return HeldOut(out, tuple(s for s in every if s != out) or every)
 
 
-@dataclass(frozen=True)
-class Moduli:
-    """Means Pa by specimen; `between`: their sd (None for one), `within`: sd of repeats of one."""
-
-    means: dict[str, float]
-    between: float | None
-    within: float | None
-    logs: int
-
-    @property
-    def mean(self) -> float:
-        return float(np.mean(list(self.means.values())))
-
-
-def by_specimen(values: Sequence[float], specimens: Sequence[str]) -> Moduli:
-    """Values of logs, and the specimen of each; every specimen has one vote."""
-    of = {s: np.array([v for v, o in zip(values, specimens, strict=True) if o == s])
-          for s in dict.fromkeys(specimens)}  # fmt: skip
-    means = {s: float(v.mean()) for s, v in of.items()}
-    between = float(np.std(list(means.values()), ddof=1)) if len(means) > 1 else None
-    freedom = len(values) - len(means)
-    spread = sum(float(((v - v.mean()) ** 2).sum()) for v in of.values())
-    within = float(np.sqrt(spread / freedom)) if freedom > 0 else None
-    return Moduli(means, between, within, len(values))
-
-
 def summarised(fits: Sequence[ModulusFit], specimens: Sequence[str]) -> ModulusSummary:
     """The mean over specimens, and its sd by what scatters most: specimens, repeats, the fit."""
     found = by_specimen([f.E_apparent for f in fits], specimens)
-    if found.between is not None:
-        sd_mean = found.between / np.sqrt(len(found.means))
-    elif found.within is not None:
-        sd_mean = found.within / np.sqrt(found.logs)
-    else:
-        sd_mean = fits[0].sd
-    return ModulusSummary(found.mean, found.within, float(sd_mean), tuple(fits))
+    sd_mean = fits[0].sd if found.sd_mean is None else found.sd_mean
+    return ModulusSummary(found.mean, found.within, sd_mean, tuple(fits))
 
 
 def left_out(values: Sequence[float], specimens: Sequence[str]) -> tuple[Score, ...]:
@@ -132,7 +102,7 @@ def left_out(values: Sequence[float], specimens: Sequence[str]) -> tuple[Score, 
     return tuple(found)
 
 
-def apart_notes(apart: HeldOut, own: Moduli, scatter: float) -> tuple[str, ...]:
+def apart_notes(apart: HeldOut, own: Votes, scatter: float) -> tuple[str, ...]:
     """Fitted on what, predicted what, and whose scatter stands in u_D."""
     k = len(own.means)
     if apart.apart:

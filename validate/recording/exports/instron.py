@@ -125,7 +125,7 @@ def recording_of(
     stamps = np.round(time * 1e9).astype(np.int64)
     digest = hashlib.sha256(data).hexdigest()
     origin = {"file": path.name, "sha256": digest, "specimen in file": label}
-    sizes = {key: repr(value) for key, value in specimen.items()}
+    shown = {key: repr(value) for key, value in specimen.items()}
     return Recording(
         name=path.stem,
         source=Source(path.name, digest, len(data), f"{written_as}: integrity not provable"),
@@ -134,7 +134,7 @@ def recording_of(
         clock={topic: clock_of(topic, None, stamps, stamps) for topic in signals},
         metadata={
             "header": dict(table.header),
-            "specimen": {**sizes, "test": flips.kind.name if flips.kind else "not stated"},
+            "specimen": {**shown, "test": flips.kind.name if flips.kind else "not stated"},
             ASSUMED: {**_assumed(picks, flips), **_by_sizes(made), **_stop(table.header)},
             "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
         },
