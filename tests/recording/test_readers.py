@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import cv2
 import ezc3d
 import nrrd
 import numpy as np
@@ -12,6 +13,7 @@ import openpyxl
 import pytest
 from exports import rows
 from mcap_samples import sample_recording
+from PIL import Image
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import ExplicitVRLittleEndian
 from scipy.io import savemat
@@ -147,6 +149,22 @@ def make_markups(path: Path) -> None:
     path.write_text(json.dumps({"@schema": schema, "markups": lists}))
 
 
+def make_video(path: Path) -> None:
+    code = cv2.VideoWriter.fourcc(*"MJPG")
+    video = cv2.VideoWriter(f"{path}.avi", cv2.CAP_FFMPEG, code, 25.0, (32, 24))
+    for i in range(3):
+        video.write(np.full((24, 32, 3), 60 * i, np.uint8))
+    video.release()
+    Path(f"{path}.avi").rename(path)
+
+
+def make_images(path: Path) -> None:
+    path.mkdir()
+    for i, kind in enumerate((".jpg", ".tif", ".bmp")):
+        image = np.random.default_rng(i).integers(0, 255, (9, 8)).astype(np.uint8)
+        Image.fromarray(image).save(path / f"f{i}{kind}")
+
+
 KINDS = ["domain", "domain", "list"]
 MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "mcap": (make_mcap, {}),
@@ -165,6 +183,8 @@ MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "xlsx": (make_xlsx, {}),
     "matlab": (make_matlab, {"unit": "0.4um"}),
     "png-stack": (make_stack, {"m_per_px": "1e-4", "rate": "10"}),
+    "image-stack": (make_images, {"m_per_px": "1e-4", "rate": "10"}),
+    "video": (make_video, {"m_per_px": "1e-4"}),
 }
 #: Written line by line: what a program that was ended left of the last line is left out, and said.
 LINEWISE = ("trc", "vicon", "qualisys", "optitrack", "ndi")
@@ -265,7 +285,7 @@ def test_a_folder_without_images_is_no_stack(tmp_path: Path) -> None:
 def test_what_no_reader_recognises_names_them_all(tmp_path: Path) -> None:
     (tmp_path / "x").write_bytes(bytes(range(32)))
     with pytest.raises(
-        UsageError, match=r"not recognised .* mcap .* c3d .* ndi .* matlab .* instron .* png-stack"
+        UsageError, match=r"not recognised .* mcap .* c3d .* ndi .* matlab .* png-stack .* instron"
     ):
         recognised(tmp_path / "x")
     with pytest.raises(UsageError, match="no such file"):

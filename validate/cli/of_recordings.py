@@ -43,9 +43,11 @@ def inspect(
     metavar="ROLE=COLUMN[:UNIT][:-]",
     help="Overrides: column, unit, sign of time, displacement, force; specimen=2; unit=mm.",
 )
-@click.option("--m-per-px", metavar="LENGTH", help="png-stack: size of a pixel: 1e-4 (m), 0.1mm.")
-@click.option("--rate", type=float, help="png-stack: images a second, Hz.")
-@click.option("--topic", help="png-stack: its topic (default: images).")
+@click.option(
+    "--m-per-px", metavar="LENGTH", help="Of images and videos: size of a pixel: 1e-4 (m), 0.1mm."
+)
+@click.option("--rate", type=float, help="Of images and videos: images a second, Hz.")
+@click.option("--topic", help="Of images and videos: their topic (default: images).")
 @click.option(
     "--specimens", metavar="one|each|A,A,B", help="Several logs: of which specimen each is."
 )

@@ -17,6 +17,8 @@ from validate.recording.formats.qualisys import QUALISYS
 from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.formats.trc import TRC
 from validate.recording.formats.vicon import VICON
+from validate.recording.formats.video import VIDEO
+from validate.recording.images.image_stack import IMAGE_STACK
 from validate.recording.images.png_stack import PNG_STACK
 from validate.recording.mcap import read as mcap
 from validate.recording.mcap.read import MCAP
@@ -26,7 +28,7 @@ from validate.recording.types import Recording
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
     MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
-    XLSX, INSTRON, PNG_STACK,
+    XLSX, VIDEO, PNG_STACK, IMAGE_STACK, INSTRON,
 )  # fmt: skip
 
 

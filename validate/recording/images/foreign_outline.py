@@ -22,7 +22,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.images.image import decode_png
-from validate.recording.images.png_stack import number_key, numbered
+from validate.recording.images.numbered import number_key, numbered
 from validate.recording.types import Contours, Frames
 from validate.units import in_si
 

@@ -1,7 +1,5 @@
 """A folder of PNG images as a recording."""
 
-import re
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +9,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import above_zero
 from validate.recording.images.image import Pixels, decode_png
+from validate.recording.images.numbered import numbered, pictures
 from validate.recording.reader import Options, Reader, require_known
 from validate.recording.scales import odd_pixel
 from validate.recording.types import Frames, Recording, Source
@@ -40,7 +39,7 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
     topic, name = options.get("topic", "images"), folder.resolve().name
-    streams = _by_size(topic, images)
+    streams = by_size(topic, images)
     made = {"kind": "folder of PNG images", "images": str(len(images)), "rate_hz": repr(rate)}
     return Recording(
         name=name,
@@ -55,7 +54,7 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     )
 
 
-def _by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
+def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
     """Numbers of the images by stream: those of several sizes are streams of their own."""
     sizes = [f"{image.shape[1]}x{image.shape[0]}" for image in images]
     if len(set(sizes)) == 1:
@@ -89,37 +88,6 @@ def _images(folder: Path) -> tuple[Pixels, ...]:
     return tuple(images)
 
 
-def _pictures(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
-    return [f for f in folder.iterdir() if f.suffix.lower() in kinds]
-
-
-def number_key(stem: str) -> tuple[int, ...]:
-    """Numbers in a name, by which files are in order."""
-    return tuple(int(n) for n in re.findall(r"\d+", stem)[:8])
-
-
-def numbered(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
-    """Its files of these kinds in the order of the numbers in their names.
-
-    Raises `RecordingError` for a folder without any, and for numbers that are alike.
-    """
-    try:
-        files = _pictures(folder, kinds)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be read ({error.strerror})") from error
-    if not files:
-        raise RecordingError(f"{folder}: no {' or '.join(f'*{kind}' for kind in kinds)} files")
-    keys = {f: number_key(f.stem) for f in files}
-    files.sort(key=lambda f: (keys[f], f.name))
-    for a, b in pairwise(files):
-        if keys[a] == keys[b]:
-            raise RecordingError(
-                f"{folder.name}: '{a.name}' and '{b.name}' have the same number; "
-                "number the files in order of time"
-            )
-    return files
-
-
 def _read(file: Path) -> Pixels:
     try:
         if file.stat().st_size > MAX_FILE:
@@ -128,12 +96,12 @@ def _read(file: Path) -> Pixels:
     except OSError as error:
         raise RecordingError(f"{file.name}: cannot be read ({error.strerror})") from error
     except RecordingError as error:
-        raise RecordingError(f"{file.name}: {error}") from None
+        raise RecordingError(f"{file.name}: {error}; --as image-stack reads others") from None
 
 
 def _recognises(path: Path) -> bool:
     try:
-        return path.is_dir() and bool(_pictures(path))
+        return path.is_dir() and bool(pictures(path))
     except OSError:
         return False
 

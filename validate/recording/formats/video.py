@@ -1,0 +1,129 @@
+"""Videos (MP4, MOV, AVI) as images: grey, on the container's own times, with a scale that is said.
+
+A container states no size of a pixel; a camera that is not calibrated has none that holds over the
+whole image. Its end is checked by its own account of lengths.
+"""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.formats.apart import decoded
+from validate.recording.formats.options import above_zero, length
+from validate.recording.formats.recorded import recorded
+from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.types import Frames, Recording
+
+_OPTIONS = ("m_per_px", "rate", "every", "topic", "frame")
+_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # an MP4 or MOV begins with one
+_LARGEST = 2**30
+_EVEN = 2.0  # ms by which even frames differ: containers count in coarse ticks
+
+
+def read_video(path: Path, options: Options) -> Recording:
+    """Frames (h, w) in grey. Options: `m_per_px` (needed), `rate` (Hz, in place of the container's
+    times), `every` (10: one frame in ten), `topic` (default images), `frame`.
+
+    Raises `UsageError` without a scale, and for times that the container does not tell;
+    `RecordingError` for a file that is cut, damaged, or shorter than it declares.
+    """
+    require_known(options, _OPTIONS)
+    _require_whole(path)
+    if "m_per_px" not in options:
+        raise UsageError(f"{path.name}: a video states no scale; say it: --m-per-px 0.1mm")
+    side, every = length(options, "m_per_px", "0.1mm"), _every(options)
+    found = decoded("video_arrays", path, "all", {"every": every}, _SECONDS)
+    declared, count = int(found["declared"]), int(found["decoded"])
+    if count < declared:
+        raise RecordingError(
+            f"{path.name}: {count} frames can be decoded, {declared} are declared: damaged"
+        )
+    t, told = _times(path, found["t"], float(found["rate"]), every, options)
+    images = tuple(np.ascontiguousarray(image) for image in found["images"])
+    topic, frame = options.get("topic", "images"), options.get("frame", "image")
+    streams = {topic: Frames(t, images, (side, side), np.eye(4), frame)}
+    said = {
+        "kind": "video",
+        "frames": f"{len(images)} of {count}" + (f", one in {every}" if every > 1 else ""),
+        "times": told,
+        "colour": "made grey (ITU-R 601)" if bool(found["colour"]) else "grey as recorded",
+        "m_per_px": f"{options['m_per_px']} (entered)",
+    }
+    source = source_of(path, "a video keeps no checksum: integrity not provable")
+    return recorded(path.stem, source, streams, said)
+
+
+def _every(options: Options) -> int:
+    every = above_zero({"every": "1", **options}, "every")
+    if every != int(every):
+        raise UsageError(f"--map every={options['every']}: expected a whole number")
+    return int(every)
+
+
+def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> tuple[Floats, str]:
+    """Times from the first frame, s, and where they are from."""
+    if "rate" in options:
+        hz = above_zero(options, "rate")
+        return every * np.arange(len(t)) / hz, f"{options['rate']} Hz (entered)"
+    if len(t) > 1 and not (np.diff(t) > 0).all():
+        if not (np.isfinite(rate) and rate > 0):
+            raise UsageError(f"{path.name}: {len(t)} frames without times; say --rate HZ")
+        return every * np.arange(len(t)) / rate, f"{rate:.6g} Hz as declared; frames have no times"
+    steps = 1e3 * np.diff(t)
+    words = "the container's, even"
+    if len(steps) and np.ptp(steps) > _EVEN:
+        words = f"the container's, uneven: {steps.min():.3g} to {steps.max():.3g} ms apart"
+    return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9), words
+
+
+def _require_whole(path: Path) -> None:
+    """Raises `RecordingError` for a file that ends before its own account of lengths."""
+    if not path.is_file():
+        raise RecordingError(f"{path.name}: no file")
+    size, first = path.stat().st_size, head(path, 12)
+    at = _riff_end(first) if first.startswith(b"RIFF") else _last_box(path, size)
+    if at > size:
+        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: cut")
+
+
+def _riff_end(first: bytes) -> int:
+    return 8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8
+
+
+def _last_box(path: Path, size: int) -> int:
+    """Where the last of an MP4's boxes ends; raises `RecordingError` for what is no box."""
+    at = 0
+    with path.open("rb") as file:
+        while at < size:
+            file.seek(at)
+            tag = file.read(16)
+            if len(tag) < 8:
+                return at + 8
+            count = struct.unpack(">I", tag[:4])[0]
+            if count == 1 and len(tag) == 16:
+                count = struct.unpack(">Q", tag[8:])[0]
+            if count == 0:  # to the end of the file
+                return size
+            if count < 8:
+                raise RecordingError(f"{path.name}: a part of {count} bytes at {at}: damaged")
+            at += count
+    return at
+
+
+def _recognises(path: Path) -> bool:
+    first = head(path, 12)
+    return first[4:8] in _BOXES or (first[:4] == b"RIFF" and first[8:12] == b"AVI ")
+
+
+_SECONDS = 60  # of decoding, and one more for each MB
+VIDEO = Reader(
+    "video",
+    "a video (MP4, MOV, AVI)",
+    _recognises,
+    read_video,
+    "its first bytes are those of MP4, MOV or AVI",
+    _LARGEST,
+)

@@ -1,0 +1,52 @@
+"""What a video holds, as plain arrays: its frames in grey. By OpenCV, in a process of its own."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import RecordingError
+
+MOST = 400 * 2**20  # bytes of all frames together
+
+
+def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
+    """`images` (nt, h, w) uint8 of every so many frames, `t` (nt,) s as the container stamps them,
+    `rate` Hz as it declares it, `declared` and `decoded` counts of frames, whether any is `colour`.
+
+    Raises `RecordingError` for a file without frames, and for frames beyond `MOST` bytes.
+    """
+    import cv2
+
+    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    images, t, count, colour = [], [], 0, False
+    while video.isOpened():
+        done, frame = video.read()
+        if not done:
+            break
+        stamp = video.get(cv2.CAP_PROP_POS_MSEC)  # of the frame just read
+        if count % int(every) == 0:
+            shade = np.ptp(frame[::8, ::8].astype(np.int16), axis=2) if frame.ndim == 3 else [0]
+            colour = colour or float(np.max(shade)) > _GREY
+            images.append(cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) if frame.ndim == 3 else frame)
+            t.append(1e-3 * stamp)
+        count += 1
+        if sum(image.size for image in images[:1]) * len(images) > MOST:
+            raise RecordingError(
+                f"frames of {images[0].shape[1]} x {images[0].shape[0]} beyond {MOST} bytes after "
+                f"{count}; take fewer: --map every=10, or cut it"
+            )
+    if not images:
+        raise RecordingError("no frame of it can be decoded: cut, damaged, or no video")
+    return {
+        "images": np.stack(images),
+        "t": np.array(t),
+        "rate": np.array(video.get(cv2.CAP_PROP_FPS)),
+        "declared": np.array(video.get(cv2.CAP_PROP_FRAME_COUNT)),
+        "decoded": np.array(count),
+        "colour": np.array(colour),
+    }
+
+
+_GREY = 24  # levels between channels that a codec makes of grey

@@ -1,0 +1,126 @@
+"""Images of cameras and microscopes (PNG, JPEG, TIFF, BMP), a folder or the pages of a TIFF."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.formats.apart import decoded
+from validate.recording.formats.options import above_zero, length
+from validate.recording.formats.recorded import recorded
+from validate.recording.images.image import MAX_SIDE, Pixels
+from validate.recording.images.numbered import pictures
+from validate.recording.images.png_stack import by_size
+from validate.recording.images.stack_arrays import SUFFIXES
+from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.types import Frames, Recording, Source
+from validate.units import in_si
+
+_OPTIONS = ("m_per_px", "rate", "topic", "frame", "white")
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_OTHERS = tuple(s for s in SUFFIXES if s != ".png")
+_SECONDS = 60
+
+
+def read_image_stack(path: Path, options: Options) -> Recording:
+    """Frames (h, w) in grey, in the order of the numbers in the files' names or of the pages.
+
+    Options: `m_per_px` and `rate` (Hz), where an ImageJ TIFF states none; `white`: the level that
+    becomes 255 in images deeper than 8 bits (default: the stack's largest, which is told); `topic`
+    and `frame`. Raises `UsageError` without scale or times, `RecordingError` for damage. Images of
+    several sizes are streams of their own.
+    """
+    require_known(options, _OPTIONS)
+    found = decoded("validate.recording.images.stack_arrays", path, "images", None, _SECONDS)
+    deep = [found[f"image.{i}"] for i in range(sum(k.startswith("image.") for k in found))]
+    if not deep:
+        raise RecordingError(f"{path.name}: no image in it")
+    images, levels = _shallow(deep, options)
+    sides, scale = _sides(path, found, options)
+    t, times = _times(path, len(images), found, options)
+    topic, frame = options.get("topic", "images"), options.get("frame", "image")
+    streams = {
+        name: Frames(t[at], tuple(images[i] for i in at), sides, np.eye(4), frame)
+        for name, at in by_size(topic, images).items()
+    }
+    said = {
+        "kind": "images", "images": str(len(images)), "m_per_px": scale, "times": times,
+        "levels": levels,
+        "colour": "made grey (ITU-R 601)" if bool(found["colour"]) else "grey as recorded",
+    }  # fmt: skip
+    name = path.resolve().name if path.is_dir() else path.stem
+    whole = "images keep no common checksum: integrity not provable"
+    source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
+    return recorded(name, source, streams, said)
+
+
+def _shallow(deep: list[Any], options: Options) -> tuple[tuple[Pixels, ...], str]:
+    """The images in 8 bits, and how they became so."""
+    for image in deep:
+        if max(image.shape) > MAX_SIDE:
+            raise RecordingError(f"an image of {image.shape[1]} x {image.shape[0]} px, the limit "
+                                 f"is {MAX_SIDE} a side")  # fmt: skip
+    if all(image.dtype == np.uint8 for image in deep):
+        return tuple(np.ascontiguousarray(image) for image in deep), "8 bits as recorded"
+    top = float(max(image.max(initial=0) for image in deep))
+    white = above_zero(options, "white") if "white" in options else top
+    if not (np.isfinite(white) and white > 0):
+        raise UsageError(f"levels up to {top:g}: say which becomes white: --map white=4095")
+    scaled = (np.clip(np.nan_to_num(image) * (255 / white), 0, 255) for image in deep)
+    bits = "floating point" if any(image.dtype.kind == "f" for image in deep) else "16 bits"
+    said = "entered" if "white" in options else "the largest"
+    return tuple(np.rint(image).astype(np.uint8) for image in scaled), (
+        f"{bits} made 8: 0 to {white:g} ({said}) became 0 to 255"
+    )
+
+
+def _sides(
+    path: Path, found: Mapping[str, Any], options: Options
+) -> tuple[tuple[float, float], str]:
+    if "m_per_px" in options:
+        side = length(options, "m_per_px", "0.1mm")
+        return (side, side), f"{options['m_per_px']} (entered)"
+    unit = str(found["unit"]) if "unit" in found else ""
+    factor = in_si(1.0, unit, "m") if unit else None
+    if factor is None:
+        raise UsageError(
+            f"{path.name}: states no scale{f' (unit {unit})' if unit else ''}; say it: "
+            "--m-per-px 0.1mm"
+        )
+    x, y = (factor * float(side) for side in found["side"])
+    return (x, y), f"{found['side'][0]:.6g} {unit} a pixel (stated by ImageJ)"
+
+
+def _times(
+    path: Path, count: int, found: Mapping[str, Any], options: Options
+) -> tuple[Floats, str]:
+    if "rate" in options:
+        rate = above_zero(options, "rate")
+        return np.arange(count, dtype=np.float64) / rate, f"{rate:g} Hz (entered)"
+    interval = float(found["interval"]) if "interval" in found else 0.0
+    if np.isfinite(interval) and interval > 0:
+        return interval * np.arange(count), f"every {interval:g} s (stated by ImageJ)"
+    if count == 1:
+        return np.zeros(1), "one image"
+    raise UsageError(f"{path.name}: {count} images without times; say --rate HZ")
+
+
+def _recognises(path: Path) -> bool:
+    try:
+        if path.is_dir():
+            return bool(pictures(path, _OTHERS))
+    except OSError:
+        return False
+    return head(path, 4) in _TIFF
+
+
+IMAGE_STACK = Reader(
+    "image-stack",
+    "images (JPEG, TIFF, BMP, PNG of any depth): a folder, or a TIFF's pages",
+    _recognises,
+    read_image_stack,
+    "a folder that holds JPEG, TIFF or BMP files, or a TIFF's first bytes",
+)

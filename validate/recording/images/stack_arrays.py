@@ -1,0 +1,91 @@
+"""What a folder of images or a TIFF of several pages holds. The only file that imports Pillow."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import RecordingError
+from validate.recording.images.numbered import numbered
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
+MOST = 400 * 2**20  # bytes of all images of one stack, in their own depth
+_DESCRIPTION = 270  # TIFF's tag of a text, in which ImageJ states scale and times
+_X_RESOLUTION, _Y_RESOLUTION = 282, 283
+_GREY = ("1", "L", "LA", "I;16", "I;16B", "I;16L", "I", "F")
+
+
+def arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """`image.0` (h, w), `image.1`, ... in their own depth, uint8, uint16 or float64; whether any
+    was in `colour`; of ImageJ's TIFF `side` (2,) in its `unit` and `interval` s, where stated.
+
+    Raises `RecordingError` for images beyond `MOST` bytes, and what Pillow finds damaged.
+    """
+    import warnings
+
+    from PIL import Image
+
+    warnings.simplefilter("error", Image.DecompressionBombWarning)
+    files = numbered(path, SUFFIXES) if path.is_dir() else [path]
+    found: dict[str, NDArray[Any]] = {}
+    colour, taken = False, 0
+    for file in files:
+        for pixels, coloured in _pages(file):
+            taken += pixels.nbytes
+            if taken > MOST:
+                raise RecordingError(f"more than {MOST} bytes of images; split the stack")
+            found[f"image.{len(found)}"] = pixels
+            colour = colour or coloured
+    return {**found, "colour": np.array(colour), **_stated(files[0])}
+
+
+def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
+    """Every page in grey, and whether it was in colour."""
+    from PIL import Image, ImageSequence
+
+    try:
+        with Image.open(file) as opened:
+            for page in ImageSequence.Iterator(opened):
+                coloured = page.mode not in _GREY
+                plain = page.convert("L") if coloured or page.mode in ("1", "LA") else page
+                pixels = np.asarray(plain)
+                yield pixels.astype(_depth(pixels)), coloured and _has_colour(page)
+    except RecordingError:
+        raise
+    except Exception as error:  # whatever a codec raises on damage
+        why = " ".join(str(error).split())[:150] or type(error).__name__
+        raise RecordingError(f"{file.name}: damaged ({why})") from None
+
+
+def _has_colour(page: Any) -> bool:
+    pixels = np.asarray(page.convert("RGB"))[::4, ::4].astype(np.int16)
+    return bool(np.ptp(pixels, axis=2).max(initial=0) > 0)
+
+
+def _depth(pixels: NDArray[Any]) -> Any:
+    if pixels.dtype == np.uint8:
+        return np.uint8
+    whole = pixels.dtype.kind in "iu" and pixels.min() >= 0 and pixels.max() < 2**16
+    return np.uint16 if whole else np.float64
+
+
+def _stated(file: Path) -> dict[str, NDArray[Any]]:
+    """Scale and interval of ImageJ; dots an inch of others are those of a printer."""
+    from PIL import Image
+
+    with Image.open(file) as opened:
+        tags: Any = getattr(opened, "tag_v2", {})
+        text = str(tags.get(_DESCRIPTION, ""))
+        if not text.startswith("ImageJ"):
+            return {}
+        lines = dict(re.findall(r"(?m)^(\w+)=(.*)$", text))
+        sides = [1 / float(tags[k]) for k in (_X_RESOLUTION, _Y_RESOLUTION) if tags.get(k)]
+    found: dict[str, NDArray[Any]] = {}
+    if len(sides) == 2 and lines.get("unit", "pixel") not in ("pixel", "inch"):
+        found |= {"side": np.array(sides), "unit": np.array(lines["unit"].replace("\\u00B5", "u"))}
+    if "finterval" in lines:
+        found["interval"] = np.array(float(lines["finterval"]))
+    return found
