@@ -99,7 +99,7 @@ def _times(
 ) -> tuple[Floats, str]:
     if "rate" in options:
         rate = above_zero(options, "rate")
-        return np.arange(count, dtype=np.float64) / rate, f"{rate:g} Hz (entered)"
+        return np.asarray(np.arange(count) / rate, np.float64), f"{rate:g} Hz (entered)"
     interval = float(found["interval"]) if "interval" in found else 0.0
     if np.isfinite(interval) and interval > 0:
         return interval * np.arange(count), f"every {interval:g} s (stated by ImageJ)"
