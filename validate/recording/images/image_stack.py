@@ -99,10 +99,10 @@ def _times(
 ) -> tuple[Floats, str]:
     if "rate" in options:
         rate = above_zero(options, "rate")
-        return np.asarray(np.arange(count) / rate, np.float64), f"{rate:g} Hz (entered)"
+        return np.arange(count) / rate, f"{rate:g} Hz (entered)"
     interval = float(found["interval"]) if "interval" in found else 0.0
     if np.isfinite(interval) and interval > 0:
-        return interval * np.arange(count), f"every {interval:g} s (stated by ImageJ)"
+        return np.asarray(interval * np.arange(count)), f"every {interval:g} s (stated by ImageJ)"
     if count == 1:
         return np.zeros(1), "one image"
     raise UsageError(f"{path.name}: {count} images without times; say --rate HZ")
