@@ -1,15 +1,20 @@
-"""A testing machine's workbook, written by openpyxl: the same numbers as its text."""
+"""A testing machine's workbook, written by openpyxl, xlwt, odfpy: the same numbers as its text."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import openpyxl
 import pytest
+import xlwt
 from exports import D, F, T, assert_test
+from odf.opendocument import OpenDocumentSpreadsheet
+from odf.table import Table, TableCell, TableRow
+from odf.text import P
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports.xlsx import read_xlsx
+from validate.recording.exports.xlsx import read_sheets, read_xlsx
 from validate.recording.formats import apart, xlsx_arrays
 from validate.recording.readers import recognised
 
@@ -91,3 +96,53 @@ def test_without_the_library_the_extra_is_named(
     monkeypatch.setattr(apart, "_RUN", (sys.executable, "-c", run, "-"))
     with pytest.raises(UsageError, match=r"openpyxl.* pip install 'validate-tissue\[xlsx\]'"):
         read_xlsx(path, {})
+
+
+def as_xls(path: Path) -> None:
+    book = xlwt.Workbook()
+    book.add_sheet("Info").write(0, 0, "made by a machine")
+    sheet = book.add_sheet("Data")
+    for i, row in enumerate(TEST):
+        for k, cell in enumerate(row):
+            sheet.write(i, k, cell)
+    book.save(str(path))
+
+
+def as_ods(path: Path) -> None:
+    book = OpenDocumentSpreadsheet()
+    sheet = Table(name="Data")
+    for cells in TEST:
+        row = TableRow()
+        for value in cells:
+            kind = "float" if isinstance(value, float) else "string"
+            shown = {"value": value} if kind == "float" else {}
+            cell = TableCell(valuetype=kind, **shown)
+            cell.addElement(P(text=str(value)))
+            row.addElement(cell)
+        sheet.addElement(row)
+    book.spreadsheet.addElement(sheet)
+    book.save(str(path))
+
+
+@pytest.mark.parametrize("write", [as_xls, as_ods])
+def test_other_workbooks_are_read_alike(write: Callable[[Path], None], tmp_path: Path) -> None:
+    path = tmp_path / "log.bin"
+    write(path)
+    assert recognised(path).name == "sheets"
+    recording = read_sheets(path, {})
+    assert_test(recording)
+    assert np.allclose(recording.signals["force"].y[:, 0], F, rtol=1e-15, atol=0)
+    assert float(recording.record("specimen")["diameter_m"]) == pytest.approx(0.025)
+    assert recording.record("provenance")["text"].startswith("sheet 'Data' (of a workbook)")
+
+
+def test_other_documents_in_such_containers_are_none(tmp_path: Path) -> None:
+    whole = tmp_path / "log.xls"
+    as_xls(whole)
+    data = whole.read_bytes()
+    whole.write_bytes(data.replace("Workbook".encode("utf-16-le"), "Document".encode("utf-16-le")))
+    with pytest.raises(UsageError, match="not recognised"):
+        recognised(whole)
+    whole.write_bytes(data[:20])
+    with pytest.raises(UsageError, match="not recognised"):
+        recognised(whole)

@@ -11,6 +11,7 @@ import nrrd
 import numpy as np
 import openpyxl
 import pytest
+import xlwt
 from exports import rows
 from mcap_samples import sample_recording
 from PIL import Image
@@ -46,6 +47,15 @@ def make_xlsx(path: Path) -> None:
     for line in ("Time (s),Compressive extension (mm),Load (N)\n" + rows()).splitlines():
         book.active.append([float(c) if c[-1].isdigit() else c for c in line.split(",")])
     book.save(path)
+
+
+def make_sheets(path: Path) -> None:
+    book = xlwt.Workbook()
+    sheet = book.add_sheet("Data")
+    for i, line in enumerate(["Time (s),Compressive extension (mm),Load (N)", *rows().split()]):
+        for k, cell in enumerate(line.split(",")):
+            sheet.write(i, k, float(cell) if cell[-1].isdigit() else cell)
+    book.save(str(path))
 
 
 def make_stack(path: Path) -> None:
@@ -181,6 +191,7 @@ MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "nrrd": (make_nrrd, {}),
     "instron": (make_export, {}),
     "xlsx": (make_xlsx, {}),
+    "sheets": (make_sheets, {}),
     "matlab": (make_matlab, {"unit": "0.4um"}),
     "png-stack": (make_stack, {"m_per_px": "1e-4", "rate": "10"}),
     "image-stack": (make_images, {"m_per_px": "1e-4", "rate": "10"}),

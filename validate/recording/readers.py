@@ -5,7 +5,7 @@ from pathlib import Path
 from validate.errors import RecordingError, UsageError
 from validate.parameters import nearest_names
 from validate.recording.exports.instron import INSTRON
-from validate.recording.exports.xlsx import XLSX
+from validate.recording.exports.xlsx import SHEETS, XLSX
 from validate.recording.formats.c3d import C3D
 from validate.recording.formats.dicom import DICOM
 from validate.recording.formats.matlab import MATLAB
@@ -28,7 +28,7 @@ from validate.recording.types import Recording
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
     MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
-    XLSX, VIDEO, PNG_STACK, IMAGE_STACK, INSTRON,
+    XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, INSTRON,
 )  # fmt: skip
 
 

@@ -1,4 +1,5 @@
-"""Testing machines' exports as workbooks (.xlsx): the sheet with the test, read as text is."""
+"""Testing machines' exports as workbooks (.xlsx, .xls, .ods): the sheet with the test, read as text
+is."""
 
 import zipfile
 from collections.abc import Mapping
@@ -17,6 +18,9 @@ from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.types import Recording
 
 _WORKBOOK = "xl/workbook.xml"
+_ARCHIVE = b"PK\x03\x04"
+_CONTAINER = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_OPEN_DOCUMENT = b"application/vnd.oasis.opendocument.spreadsheet"
 
 
 @dataclass(frozen=True)
@@ -43,9 +47,18 @@ def read_xlsx(path: Path, options: Options) -> Recording:
     and without the library, `RecordingError` where no sheet holds a table, or several hold a test
     and none is named.
     """
+    return _read(path, options, "xlsx_arrays", "xlsx")
+
+
+def read_sheets(path: Path, options: Options) -> Recording:
+    """`read_xlsx` of a workbook of old Excel or OpenDocument."""
+    return _read(path, options, "sheets_arrays", "sheets")
+
+
+def _read(path: Path, options: Options, decoder: str, extra: str) -> Recording:
     require_known(options, (*KEYS, "sheet"))
     data = whole_file(path)
-    found = decoded("xlsx_arrays", path, "xlsx")
+    found = decoded(decoder, path, extra)
     texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
     said = {key: value for key, value in options.items() if key != "sheet"}
     try:
@@ -97,13 +110,35 @@ def _noted(table: Table, used: _Sheet, sheets: list[_Sheet]) -> Table:
 
 
 def _is_workbook(path: Path) -> bool:
-    if not head(path, 4).startswith(b"PK\x03\x04"):
+    return _packs(path, _WORKBOOK)
+
+
+def _packs(path: Path, name: str, holding: bytes = b"") -> bool:
+    """Whether it is an archive with a member that begins so."""
+    if not head(path, 4).startswith(_ARCHIVE):
         return False
     try:
-        with zipfile.ZipFile(path) as packed:
-            return _WORKBOOK in packed.namelist()
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        with zipfile.ZipFile(path) as packed, packed.open(name) as member:
+            return member.read(len(holding)) == holding
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError, KeyError, RuntimeError):
         return False
+
+
+def _is_other_workbook(path: Path) -> bool:
+    if head(path, 8) == _CONTAINER:
+        return any(name in _first_names(path) for name in ("Workbook", "Book"))
+    return _packs(path, "mimetype", _OPEN_DOCUMENT)
+
+
+def _first_names(path: Path) -> list[str]:
+    """Names in the first directory sector of a compound file ([MS-CFB] 2.2, 2.6)."""
+    with path.open("rb") as file:
+        start = file.read(52)
+        size = 1 << min(int.from_bytes(start[30:32], "little"), 12)
+        file.seek((int.from_bytes(start[48:52], "little") + 1) * size)
+        sector = file.read(size)
+    entries = [sector[i : i + 64] for i in range(0, len(sector), 128)]
+    return [e.decode("utf-16-le", "replace").partition("\0")[0] for e in entries]
 
 
 XLSX = Reader(
@@ -112,4 +147,12 @@ XLSX = Reader(
     _is_workbook,
     read_xlsx,
     "it is an archive that holds a workbook",
+)
+
+SHEETS = Reader(
+    "sheets",
+    "a testing machine's export, workbook of old Excel (.xls) or OpenDocument (.ods)",
+    _is_other_workbook,
+    read_sheets,
+    "it is a container or archive that holds a workbook",
 )

@@ -3,7 +3,7 @@
 import csv
 import io
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,18 +24,24 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """
     import openpyxl
 
-    with zipfile.ZipFile(path) as packed:
-        size = sum(member.file_size for member in packed.infolist())
-    if size > MOST_BYTES:
-        raise RecordingError(f"a workbook of {size} bytes unpacked, the limit is {MOST_BYTES}")
+    require_unpacked(path)
     with path.open("rb") as file:  # by its content: openpyxl refuses names of other endings
         book = openpyxl.load_workbook(file, read_only=True, data_only=True)
-        texts = [_text(sheet.iter_rows(values_only=True)) for sheet in book.worksheets]
+        texts = [sheet_text(sheet.iter_rows(values_only=True)) for sheet in book.worksheets]
     found = {str(i): np.frombuffer(text.encode(), np.uint8) for i, text in enumerate(texts)}
     return {"names": np.array([s.title for s in book.worksheets], dtype=np.str_), **found}
 
 
-def _text(rows: Iterable[tuple[Any, ...]]) -> str:
+def require_unpacked(path: Path) -> None:
+    """Raises `RecordingError` for what unpacks to more than is sensible."""
+    with zipfile.ZipFile(path) as packed:
+        size = sum(member.file_size for member in packed.infolist())
+    if size > MOST_BYTES:
+        raise RecordingError(f"a workbook of {size} bytes unpacked, the limit is {MOST_BYTES}")
+
+
+def sheet_text(rows: Iterable[Sequence[Any]]) -> str:
+    """Rows of values as lines with tabs between."""
     out, count = io.StringIO(), 0
     write = csv.writer(out, delimiter="\t", lineterminator="\n").writerow
     for row in rows:
