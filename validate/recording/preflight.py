@@ -7,6 +7,7 @@ so is a file that stops short, as if its writer was ended; only other damage is 
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -14,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from validate.arrays import Ints
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks import GAP_FACTOR, clock_of
 from validate.recording.formats.text_rows import ASSUMED
@@ -34,7 +35,7 @@ from validate.recording.mcap.schemas import (
 from validate.recording.mcap.seen import AllSeen, ChannelSeen
 from validate.recording.mcap.streams import our_channels
 from validate.recording.mcap.verified import Verified, messages_of, opened
-from validate.recording.reader import Options, require_known
+from validate.recording.reader import Options, Reader, require_known, source_of
 from validate.recording.readers import named, no_mcap, recognised
 from validate.recording.scales import odd_stream
 from validate.recording.types import Clock, Frames, Recording, Signal, Source
@@ -101,7 +102,12 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
     if reader is MCAP:
         require_known(options, ())
         return inspect_recording(path)
-    recording = reader.read(path, options)
+    try:
+        recording = reader.read(path, options)
+    except UsageError as asks:
+        if options or reader.holds is None:
+            raise
+        return _not_said(reader, path, reader.holds(path), str(asks))
     topics = [_stream_topic(name, recording) for name in recording.streams]
     never = [_unread_topic(name, why) for name, why in recording.unread.items()]
     facts = [f"{k}: {v}" for r in recording.metadata.values() for k, v in r.items() if v]
@@ -115,6 +121,17 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
         defects=tuple(line for _, found in topics for line in found),
         read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
         facts=tuple(facts),
+    )  # fmt: skip
+
+
+def _not_said(reader: Reader, path: Path, held: Mapping[str, str], asks: str) -> Inspection:
+    """The contents of a file that cannot be read before the user says more of it."""
+    return Inspection(
+        source=source_of(path, "not checked"),
+        profile="", library="", compressions=(), chunks=0, messages=0, attachments=0, metadata=(),
+        topics=tuple(_unread_topic(name, what) for name, what in held.items()),
+        defects=(asks,),
+        read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
     )  # fmt: skip
 
 

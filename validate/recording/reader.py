@@ -5,7 +5,7 @@ A new format is one file with its `Reader`, and a line in `readers.READERS`.
 
 import difflib
 import hashlib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -27,6 +27,8 @@ class Reader:
     or raises one `ValidateError` of one line: for a path that cannot be read, a file that is empty,
     cut or of another kind, and an option that it does not know.
 
+    `holds` lists the contents of a file of which the user must say more before it can be read.
+
     Both are guarded here, for all formats alike: only files of at most `largest` bytes and folders
     are opened (a pipe would wait for ever), and what is wrong in a file names the file.
     """
@@ -37,6 +39,7 @@ class Reader:
     read: Callable[[Path, Options], Recording]
     sign: str
     largest: int = LARGEST
+    holds: Callable[[Path], Mapping[str, str]] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "read", _guarded(self.read, self.largest))
@@ -90,7 +93,7 @@ def source_of(path: Path, integrity: str) -> Source:
     return Source(path.name, digest, path.stat().st_size, integrity)
 
 
-def require_known(options: Options, known: Collection[str]) -> None:
+def require_known(options: Iterable[str], known: Collection[str]) -> None:
     """Raises `UsageError` naming the nearest known key for an option that is not `known`."""
     for key in options:
         if key not in known:

@@ -27,6 +27,7 @@ _SAID, _MISSING = 3, 4  # exit codes of the process: a known error, a library th
 _MEMORY = 2**30  # bytes beyond 40 times the file's
 _SECONDS, _RATE = 20, 2**20  # s, and bytes a second of the file beside
 _RUN = (sys.executable, "-m", f"{_HOME}.apart")
+_OURS = "="  # before every name: savez has arguments called file and allow_pickle
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -57,7 +58,7 @@ def decoded(
                 f"{path.name}: its reader ended with {how}: damaged, or not what its name says"
             )
         with np.load(out, allow_pickle=False) as found:
-            return {name: found[name] for name in found.files}
+            return {name.removeprefix(_OURS): found[name] for name in found.files}
 
 
 def _ended(
@@ -101,7 +102,7 @@ def _decode(decoder: str, path: Path, out: Path, limit: int, given: str = "{}") 
     except Exception as error:  # whatever a library raises on damage is damage
         print(f"damaged ({' '.join(str(error).split())[:200] or type(error).__name__})")
         return _SAID
-    np.savez(out, allow_pickle=False, **arrays)
+    np.savez(out, allow_pickle=False, **{f"{_OURS}{name}": a for name, a in arrays.items()})
     return 0
 
 

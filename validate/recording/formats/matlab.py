@@ -1,4 +1,4 @@
-"""MATLAB 5 files: arrays of points and stacks of images, by the names of their variables.
+"""MATLAB 5 and 7.3 files: arrays that the user names, points and stacks of images.
 
 Such a file states neither units nor times: what an array needs to become a stream is asked for.
 """
@@ -12,44 +12,117 @@ from numpy.typing import NDArray
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
+from validate.recording.formats.matlab_named import (
+    AXES,
+    Arrays,
+    listing,
+    named_array,
+    named_stream,
+    numeric,
+)
 from validate.recording.formats.options import above_zero, length, spread
-from validate.recording.formats.recorded import recorded
+from validate.recording.formats.recorded import begun, recorded
 from validate.recording.reader import Options, Reader, head, require_known, source_of
-from validate.recording.types import Frames, Markers, Recording
+from validate.recording.types import Frames, Markers, Recording, Stream
 
 Variable = NDArray[Any]
 
-_OPTIONS = ("unit", "sd", "m_per_px", "rate", "frame")
+_MAGIC_73 = b"MATLAB 7.3"
+_OPTIONS = ("unit", "sd", "m_per_px", "rate", "frame", "time")
 
 
 def read_matlab(path: Path, options: Options) -> Recording:
-    """Numbers (n, 2 or 3) as points at one instant, uint8 (h, w) or (h, w, nt) as images.
+    """The arrays that the user names (`matlab_named`; images in px); where none is named, numbers
+    (n, 2 or 3) as points at one instant and uint8 (h, w) or (h, w, nt) as images.
 
-    A topic is the variable's name; points are named by their row, from 1. Options: `unit` of the
-    coordinates (mm; 0.4um where they are pixels of that side), `sd` of one (0: not stated),
-    `m_per_px` and `rate` (Hz) of images, `frame` (default matlab). What else the file holds is
+    A topic is the variable's path; points are named by their row, from 1. Options: STREAM=PATH:UNIT
+    for each array that is named, `time` of all of them (PATH:UNIT) or `rate` (Hz), `axes.STREAM`;
+    `unit` of coordinates (mm; 0.4um where they are pixels of that side), `sd` of one (0: not
+    stated), `m_per_px` and `rate` of images, `frame` (default matlab). What else the file holds is
     listed as unread. Raises `UsageError` without an option that an array needs, `RecordingError`
-    for a file that is cut, damaged, of another version, or without points and images.
+    for a file that is cut, damaged, of another version, or without arrays of numbers.
     """
-    require_known(options, _OPTIONS)
+    require_known(
+        [key for key, text in options.items() if not text], (*_OPTIONS, "STREAM=PATH:UNIT")
+    )
     integrity = _integrity(path)
-    found = decoded("matlab_arrays", path, "all")
-    streams = {name: _stream(path, name, values, options) for name, values in found.items()}
-    read = {name: s for name, s in streams.items() if not isinstance(s, str)}
-    unread = {name: s for name, s in streams.items() if isinstance(s, str)}
-    if not read:
+    found = _arrays(path)
+    asked = {k: v for k, v in options.items() if k not in _OPTIONS and not k.startswith(AXES)}
+    for key in options:
+        if key.startswith(AXES) and key.removeprefix(AXES) not in asked:
+            raise UsageError(f"--map {key}=...: no stream of that name; {sorted(asked) or 'none'}")
+    if asked:
+        streams, used = _named(path, asked, found, options)
+    else:
+        streams, used = _unnamed(path, found, options)
+    unread = {name: said for name, said in listing(found).items() if name not in used}
+    told = {"kind": _version(path), **options}
+    return recorded(path.stem, source_of(path, integrity), begun(streams), told, unread)
+
+
+def _named(
+    path: Path, asked: Options, found: Arrays, options: Options
+) -> tuple[dict[str, Stream], set[str]]:
+    """The streams that the user names, and the paths of their arrays."""
+    if "unit" in options:
+        raise UsageError("--map unit=...: each named array says its own, as --map tip=x.tip:mm")
+    streams: dict[str, Stream] = {}
+    said = {key: named_array(key, text, found) for key, text in asked.items()}
+    for key, array in said.items():
+        try:
+            image = array.unit == "px"
+            streams[key] = (
+                _frames(f"{path.name}: {array.path}", found[array.path], options)
+                if image
+                else named_stream(key, array, found, options)
+            )
+        except RecordingError as error:
+            raise RecordingError(f"{path.name}: {array.path}: {error}") from None
+    time = {options["time"].split(":")[0]} if "time" in options else set()
+    return streams, {array.path for array in said.values()} | time
+
+
+def _unnamed(path: Path, found: Arrays, options: Options) -> tuple[dict[str, Stream], set[str]]:
+    """Points and images, which show by their shape."""
+    require_known(options, _OPTIONS)
+    made = {name: _stream(path, name, values, options) for name, values in found.items()}
+    streams: dict[str, Stream] = {name: s for name, s in made.items() if s is not None}
+    if streams:
+        return streams, set(streams)
+    have = numeric(found)
+    if not have:
         raise RecordingError(
-            f"{path.name}: neither points (n, 2 or 3) nor uint8 images (h, w, nt); "
-            f"it holds {unread or 'nothing'}"
+            f"{path.name}: neither points (n, 2 or 3) nor uint8 images (h, w, nt), nor other "
+            f"numbers; it holds {listing(found) or 'nothing'}"
         )
-    told = {"kind": "MATLAB 5", **options}
-    return recorded(path.stem, source_of(path, integrity), read, told, unread)
+    one = max(have, key=lambda name: have[name].size)
+    raise UsageError(
+        f"{path.name}: no array shows what it is; name what is meant, as --map force={one}:N "
+        f"--map rate=100 or --map time=PATH:s; it holds {listing(found)}"
+    )
+
+
+def held_in(path: Path) -> dict[str, str]:
+    """Every array of a MATLAB file with its shape and type, and what is none by its word."""
+    _integrity(path)
+    return listing(_arrays(path))
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    new = head(path, len(_MAGIC_73)) == _MAGIC_73
+    return decoded("matlab73_arrays" if new else "matlab_arrays", path, "matlab")
+
+
+def _version(path: Path) -> str:
+    return head(path, len(_MAGIC_73)).decode("ascii", "replace")
 
 
 def _integrity(path: Path) -> str:
     """What the file's bytes prove; raises `RecordingError` for one that is not whole."""
     if not path.is_file():
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+    if head(path, len(_MAGIC_73)) == _MAGIC_73:
+        return "HDF5 of MATLAB 7.3 keeps no checksum of its numbers: integrity not provable"
     try:
         kinds = [kind for kind, _, _ in elements(path)]
     except RecordingError as error:
@@ -59,8 +132,8 @@ def _integrity(path: Path) -> str:
     return "variables that are not compressed keep no checksum: integrity not provable"
 
 
-def _stream(path: Path, name: str, values: Variable, options: Options) -> Markers | Frames | str:
-    """The variable as a stream, or what it is instead."""
+def _stream(path: Path, name: str, values: Variable, options: Options) -> Markers | Frames | None:
+    """The variable as a stream; none where its shape does not show one."""
     shape = values.shape
     try:
         if values.dtype == np.uint8 and len(shape) in (2, 3):
@@ -69,7 +142,7 @@ def _stream(path: Path, name: str, values: Variable, options: Options) -> Marker
             return _points(f"{path.name}: {name}", values, options)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {name}: {error}") from None
-    return str(values) if values.dtype.kind == "U" else f"{shape} {values.dtype}"
+    return None
 
 
 def _points(what: str, values: Variable, options: Options) -> Markers:
@@ -81,6 +154,8 @@ def _points(what: str, values: Variable, options: Options) -> Markers:
 
 
 def _frames(what: str, values: Variable, options: Options) -> Frames:
+    if values.dtype != np.uint8 or values.ndim not in (2, 3):
+        raise RecordingError(f"{values.shape} {values.dtype}; images are uint8 (h, w, nt)")
     _said(what, "m_per_px", "0.1mm", options, "unit of length")
     side = length(options, "m_per_px", "0.1mm")
     images = tuple(np.moveaxis(np.atleast_3d(values), -1, 0))
@@ -97,8 +172,9 @@ def _said(what: str, key: str, example: str, options: Options, lacks: str) -> No
 
 MATLAB = Reader(
     "matlab",
-    "MATLAB 5",
-    lambda p: head(p, len(MAGIC)) == MAGIC,
+    "MATLAB 5 or 7.3",
+    lambda p: head(p, len(MAGIC)) == MAGIC or head(p, len(_MAGIC_73)) == _MAGIC_73,
     read_matlab,
-    "it begins with 'MATLAB 5.0'",
+    "it begins with 'MATLAB 5.0' or 'MATLAB 7.3'",
+    holds=held_in,
 )

@@ -1,7 +1,9 @@
 """What a MATLAB 5 file holds, as plain arrays. The only file that imports scipy.io."""
 
 import struct
+import warnings
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,6 @@ MAGIC = b"MATLAB 5.0 MAT-file"
 HEADER = 128  # bytes
 MATRIX, COMPRESSED = 14, 15  # types of what may stand behind the header
 _CHUNK = 2**20  # bytes unpacked at once
-_NUMBERS = ("double", "single", "logical", *(f"{u}int{b}" for u in ("", "u") for b in (8, 16, 32)))
 
 
 def elements(path: Path) -> list[tuple[int, int, int]]:
@@ -42,17 +43,50 @@ def elements(path: Path) -> list[tuple[int, int, int]]:
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Every variable of numbers by name, after the checksums of those that are compressed.
+    """Every array of numbers by its path, after the checksums of variables that are compressed.
 
-    Other variables stand as their own word for what they are: an array () of text.
+    `data.load` is the field `load` of the struct `data`. What is no array of numbers stands as its
+    own word for what it is: an array () of text.
     """
-    from scipy.io import loadmat, whosmat
+    from scipy.io import loadmat
 
     _require_sums(path)
-    listed = {name: kind for name, _, kind in whosmat(path)}
-    wanted = [name for name, kind in listed.items() if kind in _NUMBERS]
-    found = loadmat(path, variable_names=wanted) if wanted else {}
-    return {n: np.asarray(found[n]) if n in wanted else np.array(k) for n, k in listed.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the second reading loses what is imaginary
+        # As stored (whole doubles in one byte each), and of the class that they had.
+        stored, classed = loadmat(path), loadmat(path, mat_dtype=True)
+    found: dict[str, NDArray[Any]] = {}
+    for name, value in stored.items():
+        if not name.startswith("__"):
+            found |= dict(_fields(name, value, classed[name]))
+    return found
+
+
+def _fields(path: str, stored: Any, classed: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """A struct's fields by path; what else is no array of numbers is a word."""
+    dtype = getattr(stored, "dtype", np.dtype(object))
+    if type(stored).__name__ == "MatlabOpaque":  # the name stands within
+        yield _text(stored["s0"]) or path, np.array(_text(stored["s2"]) or "object")
+    elif dtype.names and stored.size == 1 and type(stored) is np.ndarray:
+        for name in dtype.names:
+            yield from _fields(f"{path}.{name}", stored.flat[0][name], classed.flat[0][name])
+    elif dtype.kind in "fiubc" and type(stored) is np.ndarray:
+        yield path, stored if dtype.kind == "c" else classed
+    else:
+        yield path, np.array(_word(stored, dtype))
+
+
+def _text(field: Any) -> str:
+    first = np.asarray(field).reshape(-1)[0]
+    return first.decode("ascii", "replace") if isinstance(first, bytes) else ""
+
+
+def _word(value: Any, dtype: np.dtype[Any]) -> str:
+    if type(value) is np.ndarray:
+        return "struct array" if dtype.names else {"O": "cell", "U": "char"}.get(dtype.kind, "?")
+    return (
+        "sparse" if hasattr(value, "nnz") else type(value).__name__.removeprefix("Matlab").lower()
+    )
 
 
 def _require_sums(path: Path) -> None:

@@ -1,0 +1,202 @@
+"""Arrays of MATLAB files as the streams that a user names: both versions, axes, units, contents."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import h5py
+import hdf5storage
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from validate.cli.main import main
+from validate.errors import RecordingError, UsageError
+from validate.recording.formats import matlab, matlab73_arrays, matlab_arrays
+from validate.recording.formats.matlab import read_matlab
+from validate.recording.formats.matlab_named import listing
+from validate.recording.mcap.read import read_recording
+from validate.recording.preflight import inspect_file
+
+T = 0.01 * np.arange(5)
+LOAD = np.array([0.0, 1.5, -2.25, 3.0, 4.125])
+X = np.random.default_rng(3).normal(size=(5, 4, 3))  # times, points, coordinates
+IMAGE = np.random.default_rng(4).integers(0, 255, (6, 7, 5)).astype(np.uint8)
+
+
+def contents() -> dict[str, Any]:
+    test = {"t": T[:, None], "load": {"N": LOAD[:, None], "cells": LOAD[None, :] * [[1], [2]]}}
+    return {"data": {**test, "X": X, "name": "a test"}, "I": IMAGE, "file": np.eye(4)}
+
+
+def old(path: Path) -> Path:
+    savemat(path, contents(), do_compression=True)
+    return path
+
+
+def new(path: Path) -> Path:
+    """By another program's writer of MATLAB 7.3: the file's own axes are turned round."""
+    hdf5storage.savemat(str(path), contents(), format="7.3", oned_as="column")
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Decoded in this process, except by the command: one of its own takes half a second."""
+    if "command" not in request.node.name and "damaged" not in request.node.name:
+        homes = {"matlab_arrays": matlab_arrays, "matlab73_arrays": matlab73_arrays}
+        monkeypatch.setattr(matlab, "decoded", lambda name, path, _: homes[name].arrays(path))
+
+
+@pytest.fixture(params=[old, new])
+def file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    return Path(request.param(tmp_path / "x.mat"))
+
+
+def test_fields_of_structs_come_in_as_they_were_written(file: Path) -> None:
+    got = read_matlab(
+        file,
+        {
+            "time": "data.t:s", "force": "data.load.N:kN:-", "cells": "data.load.cells:V",
+            "markers": "data.X:mm", "images": "I:px", "m_per_px": "0.1mm", "rate": "100",
+            "axes.markers": "tpx",
+        },
+    )  # fmt: skip
+    force = got.signal("force", "N")
+    assert force.y.ravel().tolist() == (-1000 * LOAD).tolist()
+    assert force.t.tolist() == T.tolist()
+    assert got.signal("cells", "V").y.tolist() == [[v, 2 * v] for v in LOAD]
+    assert got.marker("markers").x == pytest.approx(X / 1000, rel=1e-15)
+    assert [i.tolist() for i in got.frame("images").images] == np.moveaxis(IMAGE, -1, 0).tolist()
+    assert got.unread == {"data.name": "char", "file": "(4, 4) float64"}
+
+
+def test_which_axis_is_which_is_told_by_times_or_asked_for(file: Path) -> None:
+    # 5 times: (5, 4, 3) can be only times, points, coordinates
+    told = read_matlab(file, {"time": "data.t:s", "m": "data.X:mm"})
+    assert told.marker("m").x.shape == (5, 4, 3)
+    with pytest.raises(UsageError, match=r"m: an array of \(5, 4, 3\) and no times .*axes.m=tpx"):
+        read_matlab(file, {"m": "data.X:mm", "rate": "9"})
+    other = read_matlab(file, {"m": "data.X:mm", "rate": "9", "axes.m": "ptx"})
+    assert other.marker("m").x.shape == (4, 5, 3)
+    one = read_matlab(file, {"m": "file:mm", "rate": "9", "axes.m": "tc"} | {"m": "file:V"})
+    assert one.signal("m", "V").y.tolist() == np.eye(4).tolist()
+    with pytest.raises(UsageError, match=r"axes.m=txp: an array"):
+        read_matlab(file, {"m": "data.X:mm", "rate": "9", "axes.m": "txp"})
+
+
+@pytest.mark.parametrize(
+    ("options", "asks"),
+    [
+        ({"force": "data.load.N"}, r"states no unit; say it: --map force=data.load.N:N"),
+        ({"force": "data.load.N:N"}, r"force states no times; .*time=PATH:s or --map rate"),
+        ({"force": "data.lod.N:N"}, r"is no array; did you mean 'data.load.N'\?"),
+        ({"force": "data.name:N"}, r"'data.name' is char, no real numbers"),
+        ({"force": "data.load.N:N:+"}, r"expected PATH:UNIT or PATH:UNIT:-"),
+        ({"force": "data.load.N:N", "time": "data.t:mm"}, r"expected a vector and a unit of time"),
+        ({"force": "I:V", "time": "data.t:s", "unit": "mm"}, r"unit=...: each named array"),
+        ({"m": "data.X:N", "time": "data.t:s"}, r"m: coordinates in 'N'; expected a length"),
+        ({"axes.m": "tpx"}, r"axes.m=...: no stream of that name"),
+        ({"f": "file:N", "time": "data.t:s"}, r"\(4, 4\) and 5 times leave open"),
+        ({}, "states no unit|no array shows|states no unit of length"),
+    ],
+)  # fmt: skip
+def test_what_is_not_said_is_asked_for(file: Path, options: dict[str, str], asks: str) -> None:
+    with pytest.raises(UsageError, match=asks):
+        read_matlab(file, options)
+
+
+def test_inspect_lists_the_arrays_before_anything_is_said(file: Path) -> None:
+    got = inspect_file(file, None, {})
+    assert {t.name: t.kind for t in got.topics} == {
+        "data.t": "not read: (5, 1) float64", "data.load.N": "not read: (5, 1) float64",
+        "data.load.cells": "not read: (2, 5) float64", "data.X": "not read: (5, 4, 3) float64",
+        "data.name": "not read: char", "I": "not read: (6, 7, 5) uint8",
+        "file": "not read: (4, 4) float64",
+    }  # fmt: skip
+    assert "m_per_px" in got.defects[0]
+    with pytest.raises(UsageError, match="is no array"):
+        inspect_file(file, "matlab", {"force": "nothing:N"})
+
+
+def test_import_and_inspect_by_the_command(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = file.with_suffix(".mcap")
+    said = ["--map", "force=data.load.N:N", "--map", "time=data.t:ms"]
+    with pytest.raises(SystemExit, match="0"):
+        main(["inspect", str(file), *said])
+    assert "force" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="0"):
+        main(["import", str(file), "--as", "matlab", "-o", str(out), *said])
+    force = read_recording(out).signal("force", "N")
+    assert force.y.ravel().tolist() == LOAD.tolist()
+    assert force.t == pytest.approx(T / 1000)
+
+
+def test_what_is_no_array_of_numbers_is_named(tmp_path: Path) -> None:
+    """As MATLAB itself lays them out in HDF5: cells and arrays of structs refer elsewhere."""
+    with h5py.File(tmp_path / "x.mat", "w", userblock_size=512) as file:
+        file["n"] = np.arange(6.0).reshape(2, 3)
+        file["n"].attrs["MATLAB_class"] = np.bytes_("double")
+        kept = file.create_group("#refs#").create_dataset("a", data=[1.0])
+        for name, kind in (("c", "cell"), ("s/f", "double")):
+            file.create_dataset(name, data=[[kept.ref]], dtype=h5py.ref_dtype)
+            file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+        file["s"].attrs["MATLAB_class"] = np.bytes_("struct")
+        file["z"] = np.array([[(1.0, 2.0)]], dtype=[("real", "f8"), ("imag", "f8")])
+        file["gone"] = np.zeros(2, np.uint64)
+        file["gone"].attrs["MATLAB_class"] = np.bytes_("double")
+        file["gone"].attrs["MATLAB_empty"] = 1
+        file["away"] = h5py.ExternalLink("/etc/passwd", "/x")
+        file["back"] = h5py.SoftLink("/")
+        file["loop"] = h5py.SoftLink("/loop")
+        file.create_dataset("out", (4,), "f8", external=[("/etc/passwd", 0, 32)])
+    whole = (tmp_path / "x.mat").read_bytes()
+    (tmp_path / "x.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + whole[512:])
+    got = inspect_file(tmp_path / "x.mat", None, {})
+    assert {t.name: t.kind.removeprefix("not read: ") for t in got.topics} == {
+        "n": "(3, 2) float64", "c": "cell", "s.f": "struct array", "z": "(1, 1) complex",
+        "gone": "empty double", "away": "a link, not followed", "back": "a link, not followed",
+        "loop": "a link, not followed", "out": "data in another file, not followed",
+    }  # fmt: skip
+
+
+def test_a_damaged_file_of_the_new_kind_costs_a_line(tmp_path: Path) -> None:
+    whole = new(tmp_path / "y.mat").read_bytes()
+    path = tmp_path / "x.mat"
+    for count in (11, 600, len(whole) // 2):
+        path.write_bytes(whole[:count])
+        with pytest.raises(RecordingError, match=r"x\.mat: damaged"):
+            read_matlab(path, {"force": "data.load.N:N"})
+
+
+MATLAB_WROTE = {
+    "testmulti_7.4_GLNX86": {"a": "(3, 5) float64", "theta": "(1, 9) float64"},
+    "teststruct_7.4_GLNX86": {
+        "teststruct.stringfield": "char", "teststruct.doublefield": "(1, 3) float64",
+        "teststruct.complexfield": "(1, 3) complex128",
+    },
+    "teststructarr_7.4_GLNX86": {"teststructarr": "struct array"},
+    "testcellnest_7.1_GLNX86": {"testcellnest": "cell"},
+    "testfunc_7.4_GLNX86": {"testfunc": "function"},
+    "testobject_7.4_GLNX86": {"testobject": "object"},
+    "testsparse_7.4_GLNX86": {"testsparse": "sparse"},
+    "testbool_8_WIN64": {"testbools": "(2, 1) bool"},
+}  # fmt: skip
+
+
+def matlab_s(name: str) -> Path:
+    """A file that MATLAB itself wrote, as scipy carries them."""
+    return Path(str(resources.files("scipy.io.matlab") / "tests" / "data" / f"{name}.mat"))
+
+
+def test_files_that_matlab_wrote_are_listed_whatever_they_hold() -> None:
+    for name, held in MATLAB_WROTE.items():
+        assert listing(matlab_arrays.arrays(matlab_s(name))) == held
+
+
+def test_numbers_that_matlab_wrote_are_read_with_their_class() -> None:
+    """Its whole doubles are stored in a byte each: they are no images."""
+    said = {"theta": "theta:1", "rate": "10", "a": "a:V", "axes.a": "ct"}
+    got = read_matlab(matlab_s("testmulti_7.4_GLNX86"), said)
+    assert got.signal("theta", "1").y.ravel() == pytest.approx(np.pi / 4 * np.arange(9))
+    assert got.signal("a", "V").y.T.tolist() == [[1, 2, 3, 4, 5], [2, 0, 0, 0, 0], [3, 0, 0, 0, 0]]
