@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 
+import nrrd
 import numpy as np
 import pytest
 from commands import here, refused
@@ -68,6 +69,10 @@ def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
         away = radii(outline, CENTRE + [3 * i, 0]) - RADIUS
         assert abs(away.mean()) < 0.8
         assert np.sqrt((away**2).mean()) * SIDE < contours.sd
+    assert contours.each is not None
+    assert contours.each[:, 1] == pytest.approx(1.0, abs=0.1)
+    assert np.sqrt((contours.each[:, 0] ** 2).mean()) == pytest.approx(contours.sd)
+    assert len(set(contours.each[:, 0])) == 3  # each image's own
     assert found.record("found/outline")["rivals"] == "none"
     assert moving.with_name("a-outline.png").stat().st_size > 20_000
     assert here("outline", str(moving))[0] == 0  # again: its own stream is made anew
@@ -95,8 +100,20 @@ def test_what_is_meant_is_said(two: Path, tmp_path: Path) -> None:
     where = ("--centre", "110px,11mm", "--radius", "20px")
     code, _, err = here("outline", str(two), "-o", str(tmp_path / "c.mcap"), *where)
     assert (code, err) == (0, "")
-    (outline,) = read_recording(tmp_path / "c.mcap").contour("outline").outlines
+    found = read_recording(tmp_path / "c.mcap")
+    (outline,) = found.contour("outline").outlines
+    assert found.record("found/outline")["rivals"] == "none"
+    assert found.record("found/outline")["beside the place said"].startswith("(9.")
     assert radii(outline, np.array([110, 55])).mean() == pytest.approx(21, abs=0.5)
+
+
+def test_a_rival_that_leaves_too_little_confidence_refuses(two: Path, tmp_path: Path) -> None:
+    out = tmp_path / "c.mcap"
+    told = refused("outline", str(two), "-o", str(out), "--confidence", "0.9")
+    assert "0.9 is needed beside rivals: (22." in told
+    assert "(--centre X,Y) or take it (--confidence 0.56)" in told
+    assert not out.exists()
+    assert here("outline", str(two), "-o", str(out), "--confidence", "0.56")[0] == 0
 
 
 def test_an_image_without_an_outline_is_left_out_and_said(tmp_path: Path) -> None:
@@ -130,6 +147,8 @@ def drawn(folder: Path, kind: str) -> Path:
             np.save(path, mask()[None] > 0)
         case "npz":
             np.savez(path, masks=mask())
+        case "nrrd":
+            nrrd.write(str(path), np.ascontiguousarray(mask()[None].T > 0).astype(np.uint8))
         case "csv":
             with path.open("w", newline="") as file:
                 rows = csv.writer(file)
@@ -148,7 +167,7 @@ def drawn(folder: Path, kind: str) -> Path:
 @pytest.mark.parametrize(
     "kind",
     ["png", "csv", "json"]
-    + [pytest.param(k, marks=pytest.mark.slow) for k in ("npy", "npz", "coco.json")],
+    + [pytest.param(k, marks=pytest.mark.slow) for k in ("npy", "npz", "nrrd", "coco.json")],
 )
 def test_outlines_of_others_come_in(kind: str, two: Path, tmp_path: Path) -> None:
     """A mask's edge runs half a pixel outside its outermost pixels, at the circle that cut it."""

@@ -56,7 +56,14 @@ def _plain(r: Recording) -> Any:
         {k: [_bits(m.t), m.names, _bits(m.x), m.sd, m.frame] for k, m in r.markers.items()},
         {k: [_bits(s.t), _bits(s.y), s.unit, s.sd, s.frame] for k, s in r.signals.items()},
         {
-            k: [_bits(c.t), [_bits(o) for o in c.outlines], c.sd, _bits(c.pose), c.frame]
+            k: [
+                _bits(c.t),
+                [_bits(o) for o in c.outlines],
+                c.sd,
+                _bits(c.pose),
+                c.frame,
+                None if c.each is None else _bits(c.each),
+            ]
             for k, c in r.contours.items()
         },
         {

@@ -11,6 +11,7 @@ from mcap_samples import T0, markers_json, sample_recording, signal_json, write_
 from validate.errors import RecordingError
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.preflight import inspect_recording
 
 M, S, C = "validate.Markers", "validate.Signal", "validate.Contour"
 STEP = 10_000_000  # ns
@@ -172,6 +173,11 @@ CONTOUR = {"stamp": _stamp(T0), "frame": "w", "x": [0, 1, 1], "y": [0, 0, 1], "s
         (_signal(1, values=[None]), "field 'values' holds NoneType, expected numbers"),
         ([("/\n", M, T0, b"")], r"'/\\n' message 0: no readable JSON"),
         ([("/c", C, T0, CONTOUR)], "no record 'pose//c' with T_frame_from_image, 16 numbers"),
+        ([("/c", C, T0, CONTOUR | {"own_sd": 1e-4})], "field 'confidence' is missing"),
+        (
+            [("/c", C, T0, CONTOUR | {"own_sd": 1e-4, "confidence": 1.5})],
+            r"confidence 1\.5: 0 or above, to 1",
+        ),
         (_raw(b'{"x":[NaN]}'), "NaN is no JSON number; write null"),
         (_raw(b'{"x":[-Infinity]}'), "-Infinity is no JSON number"),
         (_raw(b'{"frame":"w","names":["a"],"x":[1e999],"y":[0],"z":[0],"sd":0}'), "beyond float64"),
@@ -229,6 +235,18 @@ def test_a_pose_that_is_none_is_refused(tmp_path: Path, text: str, message: str)
     path = write_foreign(tmp_path / "f.mcap", [("/c", C, T0, CONTOUR)], metadata=metadata)
     with pytest.raises(RecordingError, match=message):
         read_recording(path)
+
+
+def test_outlines_have_their_own_sd_all_or_none(tmp_path: Path) -> None:
+    own = CONTOUR | {"own_sd": 1e-4, "confidence": 0.9}
+    pose = {"pose//c": {"T_frame_from_image": " ".join(map(str, np.eye(4).ravel()))}}
+    messages = [("/c", C, T0, own), ("/c", C, T0, own), ("/c", C, T0, CONTOUR)]
+    path = write_foreign(tmp_path / "f.mcap", messages[:2], metadata=pose)
+    assert read_recording(path).contour("/c").each == pytest.approx(np.array([[1e-4, 0.9]] * 2))
+    path = write_foreign(tmp_path / "g.mcap", messages, metadata=pose)
+    with pytest.raises(RecordingError, match="only some outlines have their own sd"):
+        read_recording(path)
+    assert any("only some outlines" in d for d in inspect_recording(path).defects)
 
 
 def test_a_format_of_the_future_is_refused(tmp_path: Path) -> None:

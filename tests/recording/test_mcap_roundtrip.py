@@ -218,6 +218,7 @@ def _recordings(draw: st.DrawFn) -> Recording:
     outlines = [
         draw(hnp.arrays(np.float64, (draw(st.integers(3, 5)), 2), elements=_NUMBERS)) for _ in tc
     ]
+    each = st.none() | hnp.arrays(np.float64, (len(tc), 2), elements=st.floats(0, 1))
     y = draw(hnp.arrays(np.float64, (len(t), draw(st.integers(0, 3))), elements=_NUMBERS))
     x = draw(hnp.arrays(np.float64, shape, elements=maybe))
     pose = draw(hnp.arrays(np.float64, (4, 4), elements=_NUMBERS))
@@ -232,7 +233,11 @@ def _recordings(draw: st.DrawFn) -> Recording:
         t0_ns=draw(st.integers(0, 2**62)),
         markers={"m": Markers(_from(tm, start), tuple(names), x, draw(_SPREADS), frame)},
         signals={"s": Signal(_from(t, start), y, unit, draw(_SPREADS), frame)},
-        contours={"c": Contours(_from(tc, start), tuple(outlines), draw(_SPREADS), pose, frame)},
+        contours={
+            "c": Contours(
+                _from(tc, start), tuple(outlines), draw(_SPREADS), pose, frame, each=draw(each)
+            )
+        },
         frames={"f": Frames(_from(tf, start), tuple(pixels), sides, pose, frame)},
         metadata=draw(
             st.dictionaries(_TEXTS, st.dictionaries(_TEXTS, _TEXTS, max_size=2), max_size=2)

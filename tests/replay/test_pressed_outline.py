@@ -96,6 +96,13 @@ def test_a_uniformly_pressed_cylinder_has_the_outline_it_should(body: Mesh) -> N
     wide = float(body.nodes[:, 0].max()) - D / 2
     assert np.abs(off.values).max() < 1.1 * wide
     assert np.abs(off.values[:20]).max() < 1e-9  # the moving plate's edge
+    assert off.sd == outline.sd
+    told = replace(outline, sds=np.linspace(1e-5, 9e-5, len(outline.t)))
+    apart = {d.quantity: d for d in told.deviations(run, last)}  # type: ignore[arg-type]
+    assert apart["contour"].sd == pytest.approx(9e-5)
+    both = np.sqrt((1e-5**2 + 9e-5**2) / 2)  # what changed since the first image has both
+    area = {d.quantity: d for d in outline.deviations(run, last)}["contour.area"].sd  # type: ignore[arg-type]
+    assert apart["contour.area"].sd / area == pytest.approx(both / outline.sd)
 
 
 def test_what_places_the_images_is_asked_for(body: Mesh) -> None:

@@ -81,8 +81,10 @@ def import_(
 @click.option("--shape", type=click.Choice(["free", "ellipse", "circle"]), default="free",
               show_default=True, help="What runs along the wall.")  # fmt: skip
 @click.option("--bright", is_flag=True, help="A bright region on dark ground.")
+@click.option("--confidence", type=click.FloatRange(0, 1), default=0.5, show_default=True,
+              help="Less, beside other regions as distinct, is refused.")  # fmt: skip
 @click.option("--from", "drawn", type=click.Path(path_type=Path),
-              help="Of others: masks (.png, folder, .npy, .npz), .csv, .json.")  # fmt: skip
+              help="Of others: masks (.png, folder, .npy, .npz, .nrrd), .csv, .json.")  # fmt: skip
 @click.option("--sd", metavar="LENGTH", help="How far theirs may be off, as 0.3mm or 2px.")
 @click.option("--unit", metavar="UNIT", help="Of their points (default: px).")
 @click.option("--name", default="outline", show_default=True, help="The stream to write.")

@@ -13,12 +13,13 @@ from validate.errors import RecordingError, UsageError
 from validate.places import try_file
 from validate.recording.images.followed import EXPERTS, FollowedOutline, Hint, followed
 from validate.recording.images.foreign_outline import foreign_outlines
+from validate.recording.images.outline import RivalRegion
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.recording.types import Contours, Frames, Recording
 from validate.report.encode import png
 from validate.report.observed import Held
-from validate.report.outline_images import outlines_over
+from validate.report.outline_images import PlaceSaid, outlines_over
 from validate.units import in_si, split
 
 _SHOWN = 6  # images of the picture
@@ -35,8 +36,9 @@ def outline(
     images = topic or _only(recording)
     frames = recording.frame(images)
     _require_free(recording, name)
+    marks: tuple[PlaceSaid, ...] = ()
     if drawn is None:
-        contours, told = _found(frames, images, given)
+        contours, told, marks = _found(frames, images, given)
     else:
         contours, told = _drawn(drawn, frames, images, given)
     records = {**recording.metadata, f"found/{name}": {"images": images, **told}}
@@ -44,7 +46,7 @@ def outline(
     write_recording(replace(recording, contours=streams, metadata=records), out)
     for key, text in told.items():
         say(f"{key}: {text}", indent="  ")
-    _pictured(frames, contours, out.with_name(f"{out.stem}-{name}.png"))
+    _pictured(frames, contours, out.with_name(f"{out.stem}-{name}.png"), marks)
     say(
         f"{out}: {name} ({len(contours.t)} outlines); {out.stat().st_size / 1e3:.0f} kB",
         indent="  ",
@@ -77,16 +79,28 @@ def _require_free(recording: Recording, name: str) -> None:
         raise UsageError(f"{recording.name} has a stream '{name}' already: choose --name OTHER")
 
 
-def _found(frames: Frames, images: str, given: dict[str, Any]) -> tuple[Contours, dict[str, str]]:
+def _found(
+    frames: Frames, images: str, given: dict[str, Any]
+) -> tuple[Contours, dict[str, str], tuple[PlaceSaid, ...]]:
     for option in ("sd", "unit"):
         if given[option]:
             raise UsageError(f"--{option} is for outlines of others: with --from FILE")
     hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
                 given["shape"], given["bright"])  # fmt: skip
     with progress("outlines") as told:
-        found = followed(frames, hint, images, told)
+        found = followed(frames, hint, images, told, given["confidence"])
     _warned(found)
-    return found.contours, _told(found, hint)
+    return found.contours, _told(found, hint), _marks(found, hint)
+
+
+def _marks(found: FollowedOutline, hint: Hint) -> tuple[PlaceSaid, ...]:
+    """What was said, a radius alone about the outline, and the other regions."""
+    first = found.contours.outlines[0].mean(axis=0)
+    said = PlaceSaid("as said", first if hint.centre is None else hint.centre, hint.radius, True)
+    others = (
+        PlaceSaid("another region", r.centre, r.radius) for r in (*found.rivals, *found.beside)
+    )
+    return (*([] if hint.centre is None and hint.radius is None else [said]), *others)
 
 
 def _warned(found: FollowedOutline) -> None:
@@ -105,17 +119,26 @@ def _warned(found: FollowedOutline) -> None:
 
 def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
     sd, c = found.contours.sd, found.confidence
+    assert found.contours.each is not None
+    own = 1e3 * found.contours.each[:, 0]
     told = {
         "confidence": f"{c.min():.2f} to {c.max():.2f}",
-        "sd": f"{1e3 * sd:.3g} mm, {EXPERTS:.2f} times that of the wall on twins, as far as "
-        "experts' lines were off elsewhere; not measured on these images",
+        "sd": f"{1e3 * sd:.3g} mm ({own.min():.3g} to {own.max():.3g}), {EXPERTS:.2f} times "
+        "that of the wall on twins, as far as experts' lines were off elsewhere: assumed, not "
+        "measured on these images",
         "searched": f"{'bright' if hint.bright else 'dark'} region, {hint.shape}, from "
         + ("the centre that was said" if hint.centre is not None else "the most distinct disc"),
-        "rivals": "; ".join(f"{r.words}: {r.share:.2f}" for r in found.rivals) or "none",
+        "rivals": _named(found.rivals),
     }
+    if found.beside:
+        told["beside the place said"] = _named(found.beside)
     if found.without:
         told["left out"] = ", ".join(map(str, found.without))
     return told
+
+
+def _named(regions: tuple[RivalRegion, ...]) -> str:
+    return "; ".join(f"{r.words}: {r.share:.2f}" for r in regions) or "none"
 
 
 def _drawn(
@@ -155,12 +178,13 @@ def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> flo
     return float(value)
 
 
-def _pictured(frames: Frames, contours: Contours, file: Path) -> None:
-    """Up to six images, evenly, with their outlines."""
+def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[PlaceSaid, ...]) -> None:
+    """Up to six images, evenly, with their outlines; in the first one what was said of the place
+    and what else might be meant."""
     at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
     holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
     try:
-        picture = outlines_over(frames, contours, holds, "evenly over time", "")
+        picture = outlines_over(frames, contours, holds, "evenly over time", "", marks=marks)
         file.write_bytes(png(picture))
     except OSError as error:
         raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error

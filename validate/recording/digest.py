@@ -59,6 +59,8 @@ def _markers(m: Markers) -> Json:
 
 def _contours(c: Contours) -> Json:
     own = {"frame": c.frame, "sd": c.sd, "pose": c.pose.tolist(), "t": _array(c.t)}
+    if c.each is not None:
+        own["each"] = _array(c.each)
     lengths = np.array([len(o) for o in c.outlines], dtype=np.float64)
     return {**own, "counts": _array(lengths), "outlines": _array(np.concatenate(c.outlines))}
 

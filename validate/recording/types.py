@@ -87,6 +87,9 @@ class Signal:
 class Contours:
     """Closed outlines in an image plane: outlines nt x (k_i, 2) m, sd m along the normal.
 
+    `each` (nt, 2) is the sd m of every outline, of which `sd` is the root mean square, and the
+    confidence 0..1 that it is the one that is meant; None where nobody told them apart.
+
     `pose` is T_frame_from_image (4, 4): image x, y in metres become `frame` coordinates. `images`
     is the topic of the images that they were found in; empty: recorded as outlines.
     """
@@ -97,9 +100,12 @@ class Contours:
     pose: Floats
     frame: str
     images: str = ""
+    each: Floats | None = None
 
     def __post_init__(self) -> None:
         _set(self, "t", _times(self.t, "contours"))
+        if self.each is not None:
+            _set(self, "each", _told_apart(self.each, len(self.t)))
         if len(self.outlines) != len(self.t):
             raise RecordingError(f"contours: {len(self.outlines)} outlines, {len(self.t)} times")
         outlines = tuple(
@@ -112,6 +118,13 @@ class Contours:
         _set(self, "outlines", outlines)
         _set(self, "sd", _spread(self.sd, "contours"))
         _set(self, "pose", checked(self.pose, "contours pose", (4, 4), error=RecordingError))
+
+
+def _told_apart(each: Floats, count: int) -> Floats:
+    each = checked(each, "contours' sd [m] and confidence", (count, 2), error=RecordingError)
+    if (each < 0).any() or (each[:, 1] > 1).any():
+        raise RecordingError("contours: an sd below 0, or a confidence that is not within 0..1")
+    return each
 
 
 def _image(image: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:

@@ -47,6 +47,7 @@ class Corner:
 class OutlineObservation:
     """Outlines (k_i, 2) m in image coordinates, and the wall that the simulation moves.
 
+    `sds` (nt,) m are the outlines' own standard deviations, where they have any; `sd` is of all.
     `rest` s is the unloaded instant, from which displacements of the outline count; `sd_t` s says
     how uncertain the clock is.
     """
@@ -61,6 +62,7 @@ class OutlineObservation:
     rest: float
     corners: tuple[Corner, ...] = ()
     sd_t: float = 0.0
+    sds: Floats | None = None
 
     def simulated(self, u: Floats) -> Floats:
         """The section (k, 2) m of the deformed wall with the image plane."""
@@ -69,6 +71,12 @@ class OutlineObservation:
     def measured(self, t: float) -> Floats:
         """The outline (k, 2) m nearest in time."""
         return self.outlines[nearest_sample(self.t, t, self.name)]
+
+    def _sd_at(self, *times: float) -> float:
+        """m, the root mean square of the outlines nearest to times s."""
+        if self.sds is None:
+            return self.sd
+        return rms([float(self.sds[nearest_sample(self.t, t, self.name)]) for t in times])
 
     def rows(self) -> Rows | None:
         return None
@@ -98,7 +106,9 @@ class OutlineObservation:
         late = draw.lateness(self.sd_t)
         if late:
             exact = [o + late * self._velocity(exact, i) for i, o in enumerate(exact)]
-        noisy = (o + draw.white(self.sd, (len(o), 1)) * normals(o) for o in exact)
+        sds = np.full(len(exact), self.sd) if self.sds is None else self.sds
+        pairs = zip(sds.tolist(), exact, strict=True)
+        noisy = (o + draw.white(sd, (len(o), 1)) * normals(o) for sd, o in pairs)
         return replace(self, outlines=tuple(noisy))
 
     def _velocity(self, outlines: list[Floats], i: int) -> Floats:
@@ -127,7 +137,9 @@ class OutlineObservation:
     def _between(
         self, start: tuple[Floats, Floats], end: tuple[Floats, Floats], t: float
     ) -> list[Deviation]:
-        return [self._distance(*end), *(self._changes(start, end) if t != self.rest else [])]
+        own = replace(self, sd=self._sd_at(t))
+        both = replace(self, sd=self._sd_at(self.rest, t))
+        return [own._distance(*end), *(both._changes(start, end) if t != self.rest else [])]
 
     def _on_clock(self, found: list[Deviation], t: float, sd_t: float) -> list[Deviation]:
         """Speeds are what the same quantities make of the outlines before and after."""
@@ -246,4 +258,5 @@ def observe_outlines(
         rest,
         corners,
         sd_t,
+        None if contours.each is None else contours.each[:, 0],
     )

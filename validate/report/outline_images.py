@@ -1,6 +1,7 @@
 """The images of a recording with what was found in them: the outline, the circle through a round
 one, and the section that a run has there."""
 
+from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
@@ -24,7 +25,31 @@ _ROOM = 1.1  # inches of labels and legend
 _FOUND, _FITTED = "#F0E442", "#56B4E9"  # light, on dark images
 _SIMULATED = "#FF9F1C"
 _ROUND = 0.05  # rms distance over radius to which an outline is round
-_DASH = (0, (4, 3))
+_SAID = "#FF77BB"
+_DASH, _DOTS = (0, (4, 3)), (0, (1, 1.5))
+_ANGLES = np.linspace(0, 2 * np.pi, 121)
+_AROUND = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+
+
+@dataclass(frozen=True)
+class PlaceSaid:
+    """A place in the first image: centre (2,) m, and a radius m about it where one is known;
+    `certain` where a user said it."""
+
+    label: str
+    centre: Floats
+    radius: float | None
+    certain: bool = False
+
+
+@dataclass(frozen=True)
+class _ImageLine:
+    """Points (2, k) mm of a line; of one point a cross."""
+
+    label: str
+    colour: str
+    dash: Any
+    points: Floats
 
 
 def outline_images(
@@ -52,11 +77,24 @@ def outlines_over(
     which: str,
     words: str,
     simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
+    marks: tuple[PlaceSaid, ...] = (),
 ) -> Picture:
     """The images nearest to the holds in time, with outlines, with circles where the first outline
-    is round, and with what was `simulated` at the holds; `which` they are, and `words` on what they
-    are for, stand in the caption."""
+    is round, with what was `simulated` at the holds, and with `marks` in the first; `which` they
+    are, and `words` on what they are for, stand in the caption."""
     circles = _circles(contours, holds)
+    lines = [
+        [_ImageLine("outline found", _FOUND, "-", _closed(_outline(contours, hold)))]
+        + (
+            []
+            if circle is None
+            else [_ImageLine("circle through it", _FITTED, _DASH, _round(circle))]
+        )
+        for hold, circle in zip(holds, circles, strict=True)
+    ]
+    for drawn, section in zip(lines, simulated[1], strict=False):
+        drawn.append(_ImageLine(simulated[0], _SIMULATED, ":", _closed(section)))
+    lines[0] += [_marked(mark) for mark in marks]
     rows = -(-len(holds) // _COLUMNS)
     tall = frames.images[0].shape[0] * frames.m_per_px[1]
     wide = frames.images[0].shape[1] * frames.m_per_px[0]
@@ -68,7 +106,7 @@ def outlines_over(
         f"{len(holds)} images with the outline found in each"
         + (" and the circle fitted to it." if any(circles) else "."),
         draw(
-            lambda f: _panels(f, frames, contours, holds, circles, simulated),
+            lambda f: _panels(f, frames, holds, lines),
             WIDTH,
             panel * rows + _ROOM,
         ),
@@ -114,24 +152,16 @@ def _told(circle: Circle | None) -> str:
 def _panels(
     figure: Figure,
     frames: Frames,
-    contours: Contours,
     holds: tuple[Held, ...],
-    circles: list[Circle | None],
-    simulated: tuple[str, tuple[Floats, ...]],
+    lines: list[list[_ImageLine]],
 ) -> None:
     rows = -(-len(holds) // _COLUMNS)
     grid = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
-    label, sections = simulated
-    for i, (ax, hold, circle) in enumerate(zip(grid.flat, holds, circles, strict=False)):
+    for ax, hold, drawn in zip(grid.flat, holds, lines, strict=False):
         at = nearest_sample(frames.t, hold.t, "images")
         _image(ax, frames, at)
-        outline = _MM * _outline(contours, hold)
-        _line(ax, np.vstack([outline, outline[:1]]).T, _FOUND, "-", "outline found")
-        if circle is not None:
-            _line(ax, _round(circle), _FITTED, _DASH, "circle through it")
-        if sections:
-            section = _MM * sections[i]
-            _line(ax, np.vstack([section, section[:1]]).T, _SIMULATED, ":", label)
+        for line in drawn:
+            _line(ax, line)
         ax.set_title(fill(f"{spaced(hold.label)}, image {at}, t = {frames.t[at]:.4g} s", 36),
                      loc="left", fontsize=8.5)  # fmt: skip
         ax.set(xlabel="image x / mm", ylabel="image y / mm")
@@ -146,10 +176,16 @@ def _panels(
         text.set_color("white")
 
 
-def _line(ax: Axes, points: Floats, colour: str, dash: Any, label: str) -> None:
-    """With a dark seam, to be seen on light and dark pixels and on grey paper."""
-    ax.plot(*points, color="black", lw=2.8, alpha=0.6)
-    ax.plot(*points, color=colour, ls=dash, lw=1.4, label=label)
+def _line(ax: Axes, line: _ImageLine) -> None:
+    """With a dark seam, to be seen on light and dark pixels and on grey paper; a cross of a place
+    without a size."""
+    if line.points.shape[1] == 1:
+        ax.plot(*line.points, "+", color=line.colour, ms=9, mew=1.8, label=line.label)
+        return
+    known = ax.get_legend_handles_labels()[1]
+    label = line.label if line.label not in known else None
+    ax.plot(*line.points, color="black", lw=2.8, alpha=0.6)
+    ax.plot(*line.points, color=line.colour, ls=line.dash, lw=1.4, label=label)
 
 
 def _image(ax: Axes, frames: Frames, i: int) -> None:
@@ -161,8 +197,18 @@ def _image(ax: Axes, frames: Frames, i: int) -> None:
     ax.grid(visible=False)
 
 
+def _marked(mark: PlaceSaid) -> _ImageLine:
+    points = _MM * mark.centre[:, None]
+    if mark.radius is not None:
+        points = points + _MM * mark.radius * _AROUND
+    return _ImageLine(mark.label, _SAID if mark.certain else _SIMULATED, _DOTS, points)
+
+
+def _closed(outline: Floats) -> Floats:
+    """A closed line (2, k + 1) mm."""
+    return np.asarray(_MM * np.vstack([outline, outline[:1]]).T)
+
+
 def _round(circle: Circle) -> Floats:
     """A closed line (2, k) mm."""
-    angle = np.linspace(0, 2 * np.pi, 121)
-    around = np.stack([np.cos(angle), np.sin(angle)])
-    return np.asarray(_MM * (circle.centre[:, None] + circle.radius * around))
+    return np.asarray(_MM * (circle.centre[:, None] + circle.radius * _AROUND))

@@ -7,6 +7,7 @@ An image without an outline is left out and said; more without than with one is 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,22 +53,30 @@ class Hint:
 
 @dataclass(frozen=True)
 class FollowedOutline:
-    """Outlines with their confidences (nt,) 0..1, the first image's rivals, and by the number of
-    the image why it has none."""
+    """Outlines with their own sd and confidence, the first image's rivals, those of its other
+    regions that lie beside the place that was said, and by the number of the image why it has
+    none."""
 
     contours: Contours
-    confidence: Floats
     rivals: tuple[RivalRegion, ...]
+    beside: tuple[RivalRegion, ...]
     without: dict[int, str]
+
+    @property
+    def confidence(self) -> Floats:
+        """(nt,) 0..1."""
+        assert self.contours.each is not None
+        return self.contours.each[:, 1]
 
 
 def followed(
-    frames: Frames, hint: Hint, images: str, told: Told = lambda *_: None
+    frames: Frames, hint: Hint, images: str, told: Told = lambda *_: None, least: float = 0.0
 ) -> FollowedOutline:
     """The outline in the `frames` of topic `images`; sd m is that of distances to experts' lines.
 
-    A rival counts only where no centre was said. Raises `RecordingError` where the first search
-    finds nothing, and where over half of the images have no outline.
+    A region beside the centre that was said lowers no confidence. Raises `RecordingError` where the
+    first search finds nothing, where over half of the images have no outline, and where rivals
+    leave the first image's less confidence than `least`.
     """
     found, without = _searched(frames, hint, told)
     if len(without) >= len(frames.images) / 2:
@@ -77,14 +86,15 @@ def followed(
             f"(t = {frames.t[i]:.3f} s): {why}"
         )
     first = next(iter(found))
-    rivals = () if hint.centre is not None else _rivals(frames, first, found[first], hint)
+    rivals, beside = _rivals(frames, first, found[first], hint)
+    doubt = 1 - max((r.share for r in rivals), default=0.0) / 2
+    each = np.array([(EXPERTS * o.sd, doubt * o.closed * o.contrast) for o in found.values()])
+    _require_sure(rivals, float(each[0, 1]), least)
     contours = Contours(
         frames.t[list(found)], tuple(o.points for o in found.values()),
-        EXPERTS * rms([o.sd for o in found.values()]), frames.pose, frames.frame, images,
+        rms(each[:, 0]), frames.pose, frames.frame, images, each,
     )  # fmt: skip
-    doubt = 1 - max((r.share for r in rivals), default=0.0) / 2
-    confidence = doubt * np.array([o.closed * o.contrast for o in found.values()])
-    return FollowedOutline(contours, confidence, rivals, without)
+    return FollowedOutline(contours, rivals, beside, without)
 
 
 def _searched(frames: Frames, hint: Hint, told: Told) -> tuple[dict[int, Outline], dict[int, str]]:
@@ -117,7 +127,27 @@ def _next(
     return outline
 
 
-def _rivals(frames: Frames, i: int, outline: Outline, hint: Hint) -> tuple[RivalRegion, ...]:
+def _rivals(
+    frames: Frames, i: int, outline: Outline, hint: Hint
+) -> tuple[tuple[RivalRegion, ...], tuple[RivalRegion, ...]]:
+    """Other regions as distinct: those that may be meant, and those beside the centre that was
+    said, which neither hold it nor are nearer to it than the outline."""
     image, scale = frames.images[i], frames.m_per_px
     found = rivals_of(image, scale, outline, radius=hint.radius, bright=hint.bright)
-    return tuple(replace(r, share=min(r.share, 1.0)) for r in found if r.share >= SIMILAR)
+    alike = [replace(r, share=min(r.share, 1.0)) for r in found if r.share >= SIMILAR]
+    if hint.centre is None:
+        return tuple(alike), ()
+    said, own = hint.centre, float(np.linalg.norm(outline.centre - hint.centre))
+    near = [bool(np.linalg.norm(r.centre - said) < max(r.radius, own)) for r in alike]
+    meant = tuple(r for r, at in zip(alike, near, strict=True) if at)
+    return meant, tuple(r for r, at in zip(alike, near, strict=True) if not at)
+
+
+def _require_sure(rivals: tuple[RivalRegion, ...], confidence: float, least: float) -> None:
+    if rivals and confidence < least:
+        named = "; ".join(r.words for r in rivals)
+        raise RecordingError(
+            f"the outline has the confidence {confidence:.2f}, {least:g} is needed beside rivals: "
+            f"{named}; say which is meant (--centre X,Y) or take it (--confidence "
+            f"{floor(100 * confidence) / 100:g})"
+        )

@@ -1,8 +1,9 @@
 """Outlines that others drew in the images of a recording: masks, tables of points, polygons.
 
-Masks are PNG files (a folder, numbered; one for a single image) or an array (n, h, w) in .npy or
-.npz: what is not zero is inside, and the outline runs half a pixel outside the outermost pixels'
-centres; an image without an outline has an empty mask. Tables are CSV with the columns frame, x, y;
+Masks are PNG files (a folder, numbered; one for a single image), an array (n, h, w) in .npy or
+.npz, or an NRRD (w, h, n), as segmentations are stored: what is not zero is inside, and the outline
+runs half a pixel outside the outermost pixels' centres; an image without an outline has an empty
+mask. Tables are CSV with the columns frame, x, y;
 polygons JSON as LabelMe (`shapes`, a file an image) or COCO (`annotations`) has them. There are as
 many masks or files as images, in the order of the numbers in their names: fewer would leave open
 whose they are. Points of tables and polygons are pixels, centres whole numbers, unless a unit is
@@ -21,13 +22,14 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.recording.formats.apart import decoded
 from validate.recording.images.image import decode_png
 from validate.recording.images.numbered import number_key, numbered
 from validate.recording.types import Contours, Frames
 from validate.units import in_si
 
 MAX_FILE = 256 * 2**20  # bytes
-KINDS = (".png", ".npy", ".npz", ".csv", ".json")
+KINDS = (".png", ".npy", ".npz", ".nrrd", ".csv", ".json")
 Outlines = Mapping[int, Floats]
 
 
@@ -58,7 +60,7 @@ def _scale(path: Path, frames: Frames, unit: str) -> Floats:
     metres = None if unit == "px" else in_si(1.0, unit, "m")
     if unit != "px" and metres is None:
         raise UsageError(f"unit {unit} of {path.name}: px, or a length as mm")
-    drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz")
+    drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
     return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
 
 
@@ -74,7 +76,8 @@ def _read(path: Path, frames: Frames) -> Outlines:
             return _table(path)
         if kind == ".json":
             return _polygons(path, files, len(frames.images))
-        return _masks(path, _pictures(files) if kind == ".png" else _array(path), frames)
+        masks = _pictures(files) if kind == ".png" else _volume(path) if kind == ".nrrd" else None
+        return _masks(path, _array(path) if masks is None else masks, frames)
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be read ({error.strerror})") from error
 
@@ -119,6 +122,17 @@ def _array(path: Path) -> Any:
     if masks.ndim not in (2, 3):
         raise RecordingError(f"{path.name}: {masks.shape}, expected masks (n, h, w) or (h, w)")
     return masks if masks.ndim == 3 else masks[None]
+
+
+def _volume(path: Path) -> Any:
+    """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored."""
+    masks = decoded("nrrd_arrays", path, "nrrd")["pixels"]
+    if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
+        raise RecordingError(
+            f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) of "
+            "whole numbers"
+        )
+    return masks.T if masks.ndim == 3 else masks.T[None]
 
 
 def _edge(inside: Any, what: str) -> Floats:

@@ -3,7 +3,8 @@
     validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
                                                            z null as a whole: points in a plane
     validate.Signal    {stamp, frame, unit, values, sd}     in `unit`
-    validate.Contour   {stamp, frame, x, y, sd}             m, image plane, closed
+    validate.Contour   {stamp, frame, x, y, sd,             m, image plane, closed
+                        own_sd, confidence}                 both of this one; may be left out
     foxglove.CompressedImage {timestamp, frame_id, data, format}
                                                            PNG, 8-bit grey, base64; read where the
                                                            file holds its calibration
@@ -39,7 +40,8 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Sample:
-    """One decoded message; `names` of markers only, `unit` of signals only, `image` of frames only.
+    """One decoded message; `names` of markers only, `unit` of signals only, `image` of frames,
+    `each` (own sd m, confidence) of contours only.
 
     values: markers (k, 2 or 3) m with NaN = not seen, signal (c,) in `unit`, contour (k, 2) m.
     """
@@ -51,6 +53,7 @@ class Sample:
     unit: str
     values: Floats
     image: Pixels | None = None
+    each: tuple[float, float] | None = None
 
     @property
     def size(self) -> int:
@@ -62,6 +65,11 @@ def _object(title: str, **properties: Json) -> Json:
     """An object of these fields, all required."""
     fields = {"properties": properties, "required": list(properties)}
     return {"title": title, "type": "object", **fields}
+
+
+def _with_own(contour: Json) -> Json:
+    own = {"own_sd": _SPREAD, "confidence": _SPREAD | {"maximum": 1}}
+    return {**contour, "properties": {**contour["properties"], **own}}
 
 
 def _list(items: Json) -> Json:
@@ -81,6 +89,7 @@ _POSE = _object("foxglove.Pose", position=_POINT, orientation=_TURN)
 _OURS = {"stamp": _STAMP, "frame": _TEXT}
 _FOXGLOVE = {"timestamp": _STAMP, "frame_id": _TEXT}
 _MAYBE_FLAT = _SEEN | {"type": ["array", "null"]}
+_OWN = ("own_sd", "confidence")
 _BASE64 = _TEXT | {"contentEncoding": "base64"}
 
 SCHEMAS: Mapping[str, Json] = {
@@ -88,7 +97,7 @@ SCHEMAS: Mapping[str, Json] = {
     for schema in (
         _object(MARKERS, **_OURS, names=_list(_TEXT), x=_SEEN, y=_SEEN, z=_MAYBE_FLAT, sd=_SPREAD),
         _object(SIGNAL, **_OURS, unit=_TEXT, values=_NUMBERS, sd=_SPREAD),
-        _object(CONTOUR, **_OURS, x=_NUMBERS, y=_NUMBERS, sd=_SPREAD),
+        _with_own(_object(CONTOUR, **_OURS, x=_NUMBERS, y=_NUMBERS, sd=_SPREAD)),
         _object(IMAGE, **_FOXGLOVE, data=_BASE64, format=_TEXT),
         _object(MIRROR, **_FOXGLOVE, poses=_list(_POSE)),
     )
@@ -136,10 +145,14 @@ def signal_message(ns: int, frame: str, unit: str, values: Floats, sd: float) ->
     return {**_ours(ns, frame), "unit": unit, "values": values.tolist(), "sd": sd}
 
 
-def contour_message(ns: int, frame: str, outline: Floats, sd: float) -> Json:
-    """The message of one instant; outline (k, 2) m in the image plane."""
+def contour_message(
+    ns: int, frame: str, outline: Floats, sd: float, each: Floats | None = None
+) -> Json:
+    """The message of one instant; outline (k, 2) m in the image plane, `each` its own sd m and
+    confidence."""
     x, y = outline.T.tolist()
-    return {**_ours(ns, frame), "x": x, "y": y, "sd": sd}
+    own = {} if each is None else dict(zip(_OWN, each.tolist(), strict=True))
+    return {**_ours(ns, frame), "x": x, "y": y, "sd": sd, **own}
 
 
 def image_message(ns: int, frame: str, image: Pixels) -> Json:
@@ -171,8 +184,18 @@ def decode(schema: str, data: bytes) -> Sample:
         unit, values = _text(message, "unit"), _numbers(message, "values")
     else:
         values = _columns([_numbers(message, "x"), _numbers(message, "y")])
-    sd = float(_array("sd", [_field(message, "sd")], {int, float})[0])
-    return Sample(_stamp_ns(message, "stamp"), _text(message, "frame"), sd, names, unit, values)
+    sd = _number(message, "sd")
+    each = None
+    if schema == CONTOUR and any(name in message for name in _OWN):
+        each = (_number(message, _OWN[0]), _number(message, _OWN[1]))
+        if each[0] < 0 or not 0 <= each[1] <= 1:
+            raise RecordingError(f"own_sd {each[0]} m, confidence {each[1]}: 0 or above, to 1")
+    ns, frame = _stamp_ns(message, "stamp"), _text(message, "frame")
+    return Sample(ns, frame, sd, names, unit, values, each=each)
+
+
+def _number(message: Json, name: str) -> float:
+    return float(_array(name, [_field(message, name)], {int, float})[0])
 
 
 def _image(message: Json) -> Sample:

@@ -22,6 +22,7 @@ from validate.recording.mcap.streams import (
     in_order,
     is_ours,
     like_first,
+    own_of,
     require_all_stamped,
     require_forward,
     require_same,
@@ -102,6 +103,8 @@ class ChannelSeen:
                 self._changes[what] = str(error)
 
     def _outline(self, sample: Sample) -> None:
+        first = self.first or sample
+        self._differs("each", lambda: own_of(self.channel.topic, [first, sample]))
         if len(sample.values) < 3 and self._short is None:
             self._short = self.count
         if self._largest is None or _extent(sample) > _extent(self._largest):
@@ -126,7 +129,7 @@ class ChannelSeen:
         """
         topic, t0 = self.channel.topic, int(times_ns.min())
         require_forward(topic, times_ns, t0)
-        for what in ("frame", "sd", "unit", "values"):
+        for what in ("frame", "sd", "unit", "values", "each"):
             if what in self._changes:
                 raise RecordingError(self._changes[what])
         if self.schema in (CONTOUR, IMAGE):

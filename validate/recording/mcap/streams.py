@@ -5,7 +5,7 @@ samples out of order, a unit, frame, spread or set of names that changes on the 
 messages only. Markers whose names are the same in another order are put in the first message's.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -158,10 +158,25 @@ def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stre
     if raw.schema == CONTOUR:
         outlines = tuple(s.values for s in raw.samples)
         found_in = records[POSE + topic].get(FOUND_IN, "")
-        return _named(topic, lambda: Contours(t, outlines, sd, pose, frame, found_in))
+        each = own_of(topic, raw.samples)
+        return _named(topic, lambda: Contours(t, outlines, sd, pose, frame, found_in, each))
     images = tuple(s.image for s in raw.samples if s.image is not None)
     scale = scale_of(records, topic)
     return _named(topic, lambda: Frames(t, images, scale, pose, frame))
+
+
+def own_of(topic: str, samples: Sequence[Sample]) -> Floats | None:
+    """The own sd and confidence (nt, 2) of outlines; None where none has them.
+
+    Raises `RecordingError` where only some have.
+    """
+    told = [s.each for s in samples if s.each is not None]
+    if told and len(told) != len(samples):
+        raise RecordingError(
+            f"{topic!r}: only some outlines have their own sd and confidence; give them to all or "
+            "none"
+        )
+    return np.array(told) if told else None
 
 
 def _named(topic: str, make: Callable[[], Stream]) -> Stream:

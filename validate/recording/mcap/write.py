@@ -71,7 +71,13 @@ def _message(stream: Stream, i: int, ns: int) -> Json:
     if isinstance(stream, Signal):
         return schemas.signal_message(ns, stream.frame, stream.unit, stream.y[i], stream.sd)
     if isinstance(stream, Contours):
-        return schemas.contour_message(ns, stream.frame, stream.outlines[i], stream.sd)
+        return schemas.contour_message(
+            ns,
+            stream.frame,
+            stream.outlines[i],
+            stream.sd,
+            None if stream.each is None else stream.each[i],
+        )
     return schemas.image_message(ns, stream.frame, stream.images[i])
 
 
