@@ -63,6 +63,16 @@ def decode_png(data: bytes) -> Pixels:
     return grey
 
 
+def png_size(data: bytes) -> tuple[int, int]:
+    """Width and height px that the first bytes of a PNG declare; raises `RecordingError` for a PNG
+    that `decode_png` does not take, or whose header fails its checksum."""
+    if not data.startswith(_SIGNATURE):
+        raise RecordingError("no PNG (wrong first bytes); only PNG images are read")
+    kind, content = next(_chunks(data), (b"", b""))
+    header = _header(kind, content)
+    return header.width, header.height
+
+
 def _checked(data: bytes) -> tuple[_Header, bytes]:
     """Header and packed pixels of a PNG whose chunks are whole."""
     if not data.startswith(_SIGNATURE):

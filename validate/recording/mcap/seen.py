@@ -15,6 +15,7 @@ from validate.errors import RecordingError
 from validate.recording.mcap import streams
 from validate.recording.mcap.batches import Alike, batch
 from validate.recording.mcap.metadata import pose_of, scale_of
+from validate.recording.mcap.pictures import pictures
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import CONTOUR, IMAGE, MARKERS, SIGNAL, Sample, decode
 from validate.recording.mcap.streams import (
@@ -32,6 +33,7 @@ from validate.recording.mcap.streams import (
 from validate.recording.types import Record, Stream
 
 _TOGETHER = 256  # messages parsed at once: more leave the processor's cache
+_PICTURES = 16  # images looked at at once
 
 
 class ChannelSeen:
@@ -50,6 +52,12 @@ class ChannelSeen:
 
     def take(self, messages: Sequence[bytes]) -> None:
         """Look at messages that follow those before; nothing more once one was wrong."""
+        if self.first is None:
+            self._one_by_one(messages[:1])
+            messages = messages[1:]
+        if self.schema == IMAGE:
+            self._take_pictures(messages)
+            return
         for start in range(0, len(messages), _TOGETHER):
             part = messages[start : start + _TOGETHER]
             found = batch(self.schema, part) if self.first and not self.error else None
@@ -57,6 +65,21 @@ class ChannelSeen:
                 self._stamps.frombytes(found.stamps_ns.tobytes())
                 self.count += len(part)
                 self.numbers += found.values.size
+            else:
+                self._one_by_one(part)
+
+    def _take_pictures(self, messages: Sequence[bytes]) -> None:
+        """Pictures like the first one are not unpacked; a run does that."""
+        for start in range(0, len(messages), _PICTURES):
+            part = messages[start : start + _PICTURES]
+            found = pictures(part) if self.first and not self.error else None
+            first = self.first.image if self.first else None
+            if found and self.first and first is not None and (found.frame, found.shape) == (
+                self.first.frame, first.shape
+            ):  # fmt: skip
+                self._stamps.frombytes(found.stamps_ns.tobytes())
+                self.count += len(part)
+                self.numbers += len(part) * self.first.size
             else:
                 self._one_by_one(part)
 

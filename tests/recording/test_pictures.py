@@ -1,0 +1,78 @@
+"""Images are inspected by head and end; what is odd is looked at whole, and told as before."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from validate.errors import RecordingError
+from validate.recording.mcap.pictures import pictures
+from validate.recording.mcap.records import Channel, Schema
+from validate.recording.mcap.schemas import IMAGE, decode, image_message
+from validate.recording.mcap.seen import ChannelSeen
+
+GREY = [np.random.default_rng(i).integers(0, 255, (30, 40)).astype(np.uint8) for i in range(40)]
+
+
+def messages(frame: str = "probe") -> list[bytes]:
+    made = (image_message(10**9 + i, frame, image) for i, image in enumerate(GREY))
+    return [json.dumps(one, separators=(",", ":")).encode() for one in made]
+
+
+def seen(data: list[bytes]) -> ChannelSeen:
+    found = ChannelSeen(Channel(1, 1, "/us", "json", {}), Schema(1, IMAGE, "jsonschema", b"{}"))
+    found.take(data)
+    return found
+
+
+def test_pictures_that_are_alike_are_one_batch() -> None:
+    found = pictures(messages())
+    assert found is not None
+    assert (found.frame, found.shape) == ("probe", (30, 40))
+    assert found.stamps_ns.tolist() == [10**9 + i for i in range(40)]
+    whole = seen(messages())
+    assert (whole.count, whole.error) == (40, "")
+    assert whole.numbers == 40 * 150  # float64 of 1200 bytes
+    assert np.array_equal(whole.stamps_ns(), found.stamps_ns)
+
+
+@pytest.mark.parametrize("frame", ['a "probe"', "a:b", "Sonde \u00e4"])
+def test_an_odd_frame_is_looked_at_whole(frame: str) -> None:
+    assert pictures(messages(frame)) is None
+    assert seen(messages(frame)).count == 40
+
+
+@pytest.mark.parametrize(("change", "why"), [
+    (lambda m: m.replace(b'"png"', b'"jpg"'), "image format 'jpg'"),
+    (lambda m: m[:-30] + m[-22:], "field 'data' is no base64|damaged PNG"),
+    (lambda m: m.replace(b"iVBORw0KGgo", b"jVBORw0KGgo"), "no PNG"),
+    (lambda m: m.replace(b"UgAAACgAAAAe", b"UgAAACkAAAAe"), "wrong CRC of the chunk"),
+    (lambda m: m[:-1], "no readable JSON"),
+    (lambda m: m.replace(b'"frame_id"', b'"frame"'), "field 'frame_id' is missing"),
+])  # fmt: skip
+def test_the_first_odd_message_is_named(change: object, why: str) -> None:
+    data = messages()
+    assert change(data[20]) != data[20]  # type: ignore[operator]
+    data[20] = change(data[20])  # type: ignore[operator]
+    assert pictures(data) is None
+    found = seen(data)
+    assert found.error.startswith("'/us' message 20: ")
+    assert re.search(why, found.error)
+
+
+def test_images_of_other_sizes_are_told() -> None:
+    data = messages()
+    other = image_message(2 * 10**9, "probe", np.zeros((8, 9), np.uint8))
+    data[30] = json.dumps(other, separators=(",", ":")).encode()
+    assert pictures(data) is None
+    assert seen(data)._shapes == {(30, 40), (8, 9)}
+
+
+def test_a_run_still_finds_wrong_pixels() -> None:
+    """An inspection does not unpack; `decode`, which a run reads by, does."""
+    data = messages()
+    data[5] = data[5][:400] + (b"A" if data[5][400:401] != b"A" else b"B") + data[5][401:]
+    assert pictures(data) is not None
+    with pytest.raises(RecordingError, match="wrong CRC of the chunk"):
+        decode(IMAGE, data[5])
