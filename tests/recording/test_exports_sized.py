@@ -124,9 +124,9 @@ def test_a_strain_cannot_be_led_into_being_a_length(tmp_path: Path) -> None:
     for names in ("Time (s),Strain (%),Load (N)\n", "Time (s),Strain,Load (N)\n"):
         label = names.split(",")[1]
         text = "Tensile test\n" + table(names, 100 * E, SIGMA)
-        with pytest.raises(UsageError, match=r"called a strain, which no unit makes a displacem"):
+        with pytest.raises(UsageError, match=r"it is a strain, which no unit makes a displacem"):
             read(tmp_path, text, displacement=f"{label}:mm")
-    with pytest.raises(UsageError, match=r"called a stress, which no unit makes a force"):
+    with pytest.raises(UsageError, match=r"it is a stress, which no unit makes a force"):
         read(tmp_path, table(PLAIN, E, SIGMA), force="Stress (kPa):N")
     force = 1e3 * AREA * SIGMA
     text = "Tensile test\n" + table("Time (s),Strain (%),Load (N)\n", 100 * E, force)

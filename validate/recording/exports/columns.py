@@ -28,6 +28,7 @@ QUANTITY = {
     "stretch": "strain",
 }
 DERIVED = ("strain", "stretch", "stress")
+_SIZE_OF = {"displacement": "length=20mm", "force": "area=314mm2"}
 SIZES_SAID = ("area", "length", "measure")  # of the specimen; true or engineering
 KEYS = (
     *NEEDED,
@@ -43,7 +44,11 @@ _SIGNS = {":-": -1, ":+": 1}
 
 
 class MissingColumnError(RecordingError):
-    """A quantity that is needed and that no column is called by."""
+    """A quantity that is needed and that no column is called by; `asks`: what is to be said."""
+
+    def __init__(self, what: str, asks: tuple[str, ...] = ()) -> None:
+        super().__init__(f"{what}: give {'; '.join(asks)}" if asks else what)
+        self.what, self.asks = what, asks
 
 
 @dataclass(frozen=True)
@@ -149,9 +154,22 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
         synthetic = " or, at a constant rate, --map time=every:0.1s" if role == "time" else ""
         raise MissingColumnError(
             f"no {role} column among {labels}; name it with --map {role}=COLUMN{synthetic}"
+            f"{_by_unit(role, table)}"
         )
     able = [column for column in found if not _unusable(role, column)] or found
     return _one_of(_moving([picked(role, column, table, None) for column in able]), role)
+
+
+def _by_unit(role: str, table: Table) -> str:
+    """The advice where a column without a known name has the unit of a strain or stress."""
+    derived = {"displacement": "strain", "force": "stress"}.get(role, "")
+    other = [c for c in table.columns if derived and not role_of(c) and _measures(c, derived)]
+    if not other:
+        return ""
+    return (
+        f" or, if '{other[0].label}' is a {derived}, --map '{derived}={other[0].label}' "
+        f"--map {_SIZE_OF[role]}"
+    )
 
 
 def said_pick(role: str, table: Table, said: Said) -> Pick:
@@ -239,14 +257,16 @@ def picked(role: str, column: Column, table: Table, said: Said | None) -> Pick:
 
 def _refuse_derived(role: str, column: Column) -> None:
     """No unit makes a length of a strain, nor a force of a stress: a size is missing."""
-    called = role_of(column)
-    if role in DERIVED or called not in DERIVED or _measures(column, QUANTITY[role]):
+    if role not in _SIZE_OF or _measures(column, QUANTITY[role]):
         return
-    size = "area=AREA" if called == "stress" else "length=LENGTH"
-    raise UsageError(
-        f"--map {role}={column.label}: it is called a {called}, which no unit makes a {role}; "
-        f"leave {role} out and give the specimen's size, as --map {size} with its unit"
-    )
+    called = role_of(column)
+    for derived in DERIVED:
+        if called == derived or (called != role and _measures(column, QUANTITY[derived])):
+            raise UsageError(
+                f"--map {role}={column.label}: it is a {derived}, which no unit makes a {role}; "
+                f"say --map '{derived}={column.label}' and the specimen's size, as --map "
+                f"{_SIZE_OF['force' if derived == 'stress' else 'displacement']}"
+            )
 
 
 def _way_out(role: str, column: Column) -> str:

@@ -101,8 +101,9 @@ def check_swapped(
         raise RecordingError(
             f"'{force.column.label}' moves as a crosshead does and '{displacement.column.label}' "
             f"as a load (1 - r^2 over time {ramp:.1e} and {other:.1e}): swapped columns or a "
-            f"load-controlled test; say which with --map 'force={force.column.label}' or "
-            f"--map 'force={displacement.column.label}:UNIT'"
+            f"load-controlled test; say which with --map 'force={force.column.label}', or "
+            f"--map 'force={displacement.column.label}:UNIT' and "
+            f"--map 'displacement={force.column.label}:UNIT'"
         )
 
 

@@ -160,12 +160,35 @@ def _found(
                 found[role] = Sized(_needed(role, table, said.get(role)), "")
         except RecordingError as error:
             wrong.append(error)
-    if len(wrong) == 1 and (kind or not isinstance(wrong[0], MissingColumnError)):
-        raise wrong[0]
     if wrong:
-        asks = [] if kind else [f"where no strain goes negative, {ASK}"]
-        raise RecordingError("; ".join([*map(str, wrong), *asks]))
+        raise _all(wrong, kind)
+    _require_apart(found["displacement"].pick, found["force"].pick, table)
     return found
+
+
+def _require_apart(displacement: Pick, force: Pick, table: Table) -> None:
+    """Raises `UsageError` where one column would be both."""
+    if displacement.column is not force.column:
+        return
+    kept = "force" if force.said else "displacement"
+    other = "displacement" if force.said else "force"
+    left = [c.label for c in table.columns if role_of(c) == kept and c is not force.column]
+    raise UsageError(
+        f"column '{force.column.label}' would be displacement and force at once; say which is the "
+        f"other, as --map '{other}={left[0] if left else 'COLUMN'}:UNIT'"
+    )
+
+
+def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
+    """One error for all that is missing, each thing to be said once."""
+    missing = [e for e in wrong if isinstance(e, MissingColumnError)]
+    if len(wrong) == 1 and (kind or not missing):
+        return wrong[0]
+    what = [e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong]
+    asks = dict.fromkeys(ask for e in missing for ask in e.asks)
+    if missing and not kind:
+        asks[f"where neither strain nor stretch says it, {ASK.removeprefix('say ')}"] = None
+    return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
 
 
 def _made(found: Mapping[str, Sized]) -> dict[str, Sized]:

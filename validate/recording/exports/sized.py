@@ -111,7 +111,7 @@ def derived(
     measure, asked = _measure(stress, sizes)
     if sizes.area is None:
         asked.append("the specimen's loaded area, as --map area=314mm2")
-    _refuse_unsaid(f"no force, but '{stress.column.label}'", asked)
+    _refuse_unsaid(f"no force, but stress '{stress.column.label}'", asked)
     assert sizes.area is not None
     nominal, words = stress.values, f"{measure} stress '{stress.column.label}'"
     if measure == "true":
@@ -122,11 +122,15 @@ def derived(
 
 
 def _displacement(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None) -> Sized:
-    source = _elongation(table, said)
+    length = "the length that strain is measured on, as --map length=20mm"
+    missing = () if sizes.length else (length,)
+    try:
+        source = _elongation(table, said)
+    except RecordingError as error:
+        raise MissingColumnError(str(error), missing) from error
     measure, asked = ("", []) if source.role == "stretch" else _measure(source, sizes)
-    if sizes.length is None:
-        asked.append("the length that strain is measured on, as --map length=20mm")
-    _refuse_unsaid(f"no displacement, but '{source.column.label}'", asked)
+    asked += missing
+    _refuse_unsaid(f"no displacement, but {source.role} '{source.column.label}'", asked)
     assert sizes.length is not None
     what = f"{measure} strain" if measure else "(stretch - 1) of"
     words = f"displacement = {what} '{source.column.label}' x length {sizes.length:.6g} m"
@@ -253,7 +257,7 @@ def _refuse_other(kind: Kind | None, shown: Kind | None, source: Pick) -> None:
 
 def _refuse_unsaid(what: str, asked: list[str]) -> None:
     if asked:
-        raise MissingColumnError(f"{what}: give {'; '.join(asked)}")
+        raise MissingColumnError(what, tuple(asked))
 
 
 def _made(source: Pick, role: str, values: Floats, size: float) -> Pick:

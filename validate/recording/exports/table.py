@@ -89,7 +89,7 @@ def columns_of(names: list[str], units: list[str], rows: Sequence[Line]) -> tupl
     count = len(rows[0][1])
     padded = units + [""] * (count - len(units))
     columns = []
-    for i, (label, below) in enumerate(zip(names, padded, strict=False)):
+    for i, (label, below) in enumerate(zip(names[:count], padded, strict=False)):
         name, unit = split_unit(label)
         below = below.strip("()[]<>{} ") if below else ""
         if below and unit and not is_unit(unit):
@@ -102,7 +102,7 @@ def columns_of(names: list[str], units: list[str], rows: Sequence[Line]) -> tupl
                 label or f"#{i + 1}", name, below or unit or None, cells, problem if twice else ""
             )
         )
-    return tuple(columns[:count])
+    return tuple(columns)
 
 
 def split_unit(label: str) -> tuple[str, str | None]:

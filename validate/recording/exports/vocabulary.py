@@ -18,8 +18,8 @@ _ROLES = {
         unitario 应变 ひずみ 歪み 변형률""",
     "stretch": "stretch lambda λ streckung etirement",
     "time": """time t elapsed zeit prufzeit pruefzeit testzeit messzeit versuchszeit laufzeit dauer
-        temps duree czas tiempo duracion tempo durata duracao cas ido tijd tid zaman sure aika timp
-        время 时间 時間 시간""",
+        testtijd meettijd temps duree czas tiempo duracion tempo durata duracao cas ido tijd tid
+        zaman sure aika timp время 时间 時間 시간""",
     "force": """force load f kraft standardkraft prufkraft pruefkraft druckkraft zugkraft last
         effort charge sila obciazenie fuerza carga forza carico forca zatizeni ero kracht
         drukkracht trekkracht belasting сила нагрузка усилие 力 载荷 负荷 荷重""",
@@ -29,9 +29,9 @@ _ROLES = {
         przemieszczenie droga wydluzenie skrocenie ugiecie deformacja desplazamiento recorrido
         deformacion compresion deslocamento deformacao spostamento corsa allungamento estensione
         deformazione draha posuv posunuti prodlouzeni stlaceni deformace elmozdulas distance
-        elongation alongamento extensao verlangerung verplaatsing indrukking vervorming verlenging
-        forlangning forskjutning deformering forskydning forlaengelse forlengelse
-        перемещение
+        erweiterung elongation alongamento extensao verlangerung verplaatsing indrukking
+        vervorming verlenging forlangning forskjutning deformering forskydning forlaengelse
+        forlengelse перемещение
         деформация удлинение 位移 变形 行程 変位 ストローク 伸び""",
 }
 _NOT_MEASURED = """max maximum maximal maximale maxi peak maksymalna maksymalne maximo maxima
