@@ -54,10 +54,7 @@ def _header(path: Path) -> tuple[dict[str, str], int]:
 
 def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[np.uint8], ...]:
     """Images n x (h, w); none where the sequence has transforms alone."""
-    sizes = _whole(path, fields, "DimSize")
-    if len(sizes) not in (2, 3) or min(sizes) < 0:
-        raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2 or 3 numbers")
-    width, height, count = (*sizes, 1)[:3]
+    width, height, count = _sizes(path, fields)
     if not width * height * count:
         return ()
     kind, channels = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
@@ -70,6 +67,18 @@ def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[np.
         raise RecordingError(f"{path.name}: {size} bytes of pixels, limit {MAX_PIXELS}; split it")
     data = _unpacked(path, fields, _packed(path, fields, after, size), size)
     return tuple(np.frombuffer(data, dtype=np.uint8).reshape(count, height, width))
+
+
+def _sizes(path: Path, fields: dict[str, str]) -> tuple[int, int, int]:
+    """Width, height and count; of four numbers the third is the depth of each image: 1."""
+    sizes = _whole(path, fields, "DimSize")
+    if len(sizes) not in (2, 3, 4) or min(sizes) < 0:
+        raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2, 3 or 4 numbers")
+    if len(sizes) == 4 and sizes[2] > 1:
+        raise RecordingError(
+            f"{path.name}: DimSize {sizes}: volumes {sizes[2]} px deep; images (depth 1) are read"
+        )
+    return sizes[0], sizes[1], sizes[-1] if len(sizes) > 2 else 1
 
 
 def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:

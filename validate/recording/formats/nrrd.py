@@ -33,9 +33,11 @@ def read_nrrd(path: Path, options: Options) -> Recording:
 
 
 def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[np.uint8], ...]:
-    """Images n x (h, w) of pixels (w, h, n) or (w, h), x first."""
+    """Images n x (h, w) of pixels (w, h, 1, n), (w, h, n) or (w, h), x first."""
     if not pixels.size:
         return ()
+    if pixels.ndim == 4 and pixels.shape[2] == 1:
+        pixels = pixels[:, :, 0]
     if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.size > MAX_PIXELS:
         raise RecordingError(
             f"{path.name}: pixels {pixels.shape} {pixels.dtype}; images of 8-bit grey up to "
