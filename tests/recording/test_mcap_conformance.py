@@ -77,6 +77,7 @@ def test_what_rosbag2_always_writes_is_no_defect(shared_data: Path) -> None:
 def test_a_dds_recording_is_listed(shared_data: Path) -> None:
     got = inspect_recording(shared_data / "mcap" / "dds" / "configuration_type.mcap")
     assert (got.messages, got.attachments, got.metadata) == (12, 1, ("version",))
+    assert got.facts == ("attachment dynamic_types: no media type, 685 bytes",)
     assert {t.name: t.count for t in got.topics} == {
         "/ddsrecorder/status": 2,
         "configuration_topic": 10,

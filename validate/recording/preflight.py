@@ -198,12 +198,12 @@ def _inspection(
         compressions=verified.compressions,
         chunks=verified.chunks,
         messages=verified.messages,
-        attachments=verified.attachments,
+        attachments=len(verified.attachments),
         metadata=tuple(record.name for record in verified.metadata),
         topics=tuple(topic for topic, _ in topics),
         defects=(*defects, *(line for _, found in topics for line in found)),
         clock_offsets=tuple(_offset_lines(verified)),
-        facts=tuple(_assumed(verified)),
+        facts=(*_assumed(verified), *_attached(verified)),
     )
 
 
@@ -230,6 +230,13 @@ def _assumed(verified: Verified) -> list[str]:
         for record in verified.metadata
         if record.name.split("/")[0] == ASSUMED
         for key, text in record.values.items()
+    ]
+
+
+def _attached(verified: Verified) -> list[str]:
+    return [
+        f"attachment {a.name}: {a.media_type or 'no media type'}, {a.size} bytes"
+        for a in verified.attachments
     ]
 
 

@@ -14,6 +14,7 @@ import zlib
 from array import array
 from collections import Counter
 from collections.abc import Set
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO, Protocol
@@ -27,6 +28,7 @@ from validate.recording.mcap.records import (
     MAGIC,
     MAX_RECORD,
     MESSAGE_HEAD,
+    Attachment,
     Channel,
     Chunk,
     Footer,
@@ -34,7 +36,6 @@ from validate.recording.mcap.records import (
     Metadata,
     Op,
     Schema,
-    check_attachment,
     chunk_index_place,
     records_in,
     statistics_messages,
@@ -98,7 +99,8 @@ class _Walk:
         self._stream = stream
         self._taker = taker
         self._kept: dict[int, list[bytes] | None] = {}  # None: nobody wants them
-        self._at = self._crc = self._attachments = 0
+        self._at = self._crc = 0
+        self._attachments: list[Attachment] = []
         self._sha = hashlib.sha256()
         self._header: Header | None = None
         self._data_crc: int | None = None  # None: still in the data section
@@ -197,8 +199,9 @@ class _Walk:
             case Op.CHUNK:
                 self._take_chunk(content)
             case Op.ATTACHMENT:
-                check_attachment(content)
-                self._attachments += 1
+                found = Attachment.read(content)
+                begin = self._at - len(content)
+                self._attachments.append(replace(found, at=begin + found.at))
             case Op.METADATA:
                 self._metadata.append(Metadata.read(content))
             case Op.STATISTICS:
@@ -316,7 +319,7 @@ class _Walk:
             log_ns={i: _int64(self._log.get(i), "log") for i in self._channels},
             publish_ns={i: _int64(self._publish.get(i), "publish") for i in self._channels},
             metadata=tuple(self._metadata),
-            attachments=self._attachments,
+            attachments=tuple(self._attachments),
             chunks=self.chunks,
             messages=self.messages,
             compressions=tuple(sorted(self._compressions)),

@@ -122,6 +122,7 @@ class Channel:
 @dataclass(frozen=True)
 class Message:
     channel_id: int
+    sequence: int
     log_ns: int
     publish_ns: int
     data: bytes
@@ -130,8 +131,8 @@ class Message:
     def read(content: bytes) -> "Message":
         if len(content) < MESSAGE_HEAD.size:
             raise RecordingError(f"a message record of {len(content)} bytes, at least 22 needed")
-        channel, _, log, publish = MESSAGE_HEAD.unpack_from(content)
-        return Message(channel, log, publish, content[MESSAGE_HEAD.size :])
+        channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(content)
+        return Message(channel, sequence, log, publish, content[MESSAGE_HEAD.size :])
 
 
 @dataclass(frozen=True)
@@ -175,16 +176,31 @@ class Chunk:
         return Chunk(compression, data)
 
 
-def check_attachment(content: bytes) -> None:
-    """Raises `RecordingError` unless the attachment's fields fit and its CRC (0: none) is right."""
-    fields = Cursor(content)
-    fields.take(16)  # log and creation time
-    fields.text(), fields.text()  # name and media type: never used as a path
-    fields.take(fields.integer(8))
-    actual = zlib.crc32(content[: fields.at])
-    declared = fields.integer(4)
-    if declared and declared != actual:
-        raise RecordingError(f"attachment CRC {actual:#010x}, declared {declared:#010x}")
+@dataclass(frozen=True)
+class Attachment:
+    """Times ns, name and media type (never used as a path), where in its record the data lie."""
+
+    log_ns: int
+    created_ns: int
+    name: str
+    media_type: str
+    at: int
+    size: int
+
+    @staticmethod
+    def read(content: bytes) -> "Attachment":
+        """Raises `RecordingError` unless the fields fit and the CRC (0: none) is right."""
+        fields = Cursor(content)
+        times = fields.integer(8), fields.integer(8)
+        words = fields.text(), fields.text()
+        size = fields.integer(8)
+        at = fields.at
+        fields.take(size)
+        actual = zlib.crc32(content[: fields.at])
+        declared = fields.integer(4)
+        if declared and declared != actual:
+            raise RecordingError(f"attachment CRC {actual:#010x}, declared {declared:#010x}")
+        return Attachment(*times, *words, at, size)
 
 
 def statistics_messages(content: bytes) -> int:

@@ -9,6 +9,7 @@ from typing import BinaryIO
 from validate.arrays import Ints
 from validate.errors import RecordingError
 from validate.recording.mcap.records import (
+    Attachment,
     Channel,
     Chunk,
     Header,
@@ -56,7 +57,7 @@ class Verified:
     log_ns: Mapping[int, Ints]
     publish_ns: Mapping[int, Ints]
     metadata: tuple[Metadata, ...]
-    attachments: int
+    attachments: tuple[Attachment, ...]  # their data begin at byte `at` of the file
     chunks: int
     messages: int
     compressions: tuple[str, ...]
