@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import sys
 import time
@@ -91,6 +92,55 @@ def shell(script: str, **settings: float) -> Guest:
 
 def solved(one: Guest, scene: Scene = SCENE) -> Run:
     return run_scheme("guest", one, scene, T, INPUTS, np.array([0, 1]))
+
+
+SERIES = """
+import meshio
+mesh = meshio.read(folder / "mesh.vtu")
+(folder / "answer.json").write_text(json.dumps(answer))
+for i in range(len(t)):
+    mesh.point_data = {"displacement": fields["u"][i], "reaction": fields["reactions"][i]}
+    mesh.write(folder / f"step{i}.vtu", binary=%s)
+sets = "".join(f'<DataSet timestep="{x!r}" file="step{i}.vtu"/>' for i, x in enumerate(t.tolist()))
+(folder / "fields.pvd").write_text(
+    f'<VTKFile type="Collection"><Collection>{sets}</Collection></VTKFile>')
+"""
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_a_series_of_vtu_is_an_answer_as_arrays_are(tmp_path: Path, binary: bool) -> None:
+    twist = "u[:, :, 0] = 1e-9 * np.arange(24).reshape(2, 12)\n"
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    plain = answered(tmp_path / "a", twist)
+    series = answered(tmp_path / "b", twist, SERIES % binary)
+    assert plain.outcome == series.outcome
+    assert not binary or plain.said == series.said
+    digits = 0.0 if binary else 1e-9  # meshio's text has eleven
+    assert np.allclose(plain.u, series.u, rtol=digits, atol=0)
+    assert series.traces["lift.force"].y.tolist() == plain.traces["lift.force"].y.tolist()
+
+
+@pytest.mark.parametrize(
+    ("after", "why"),
+    [
+        ("(folder / 'step1.vtu').unlink()", "step1.vtu: no ordinary file"),
+        ("(folder / 'step1.vtu').write_bytes(b'<VTKFile')", "damaged|cannot read"),
+        ("m = meshio.read(folder / 'step0.vtu'); m.points = m.points[::-1]; "
+         "m.write(folder / 'step0.vtu')", "points that are not the 12 nodes of the job"),
+        ("(folder / 'fields.pvd').write_text((folder / 'fields.pvd').read_text()"
+         ".replace('step1.vtu', '../step1.vtu'))", "files beside it"),
+        ("(folder / 'fields.pvd').write_text('<!DOCTYPE a>' + '<a/>')", "declares entities"),
+        ("m = meshio.read(folder / 'step1.vtu'); m.point_data = {'speed': m.points}; "
+         "m.write(folder / 'step1.vtu')", "expected a displacement"),
+        ("(folder / 'fields.pvd').write_text((folder / 'fields.pvd').read_text()"
+         ".replace('0.5', '0.25'))", "time 0 is 0.25 s, asked 0.5 s"),
+    ],
+)  # fmt: skip
+def test_a_series_that_is_none_is_a_row(tmp_path: Path, after: str, why: str) -> None:
+    run = answered(tmp_path, "", SERIES % True + after)
+    assert run.outcome.state == "invalid"
+    assert re.search(why, run.outcome.why), run.outcome.why
 
 
 def test_an_honest_guest_is_a_run(tmp_path: Path) -> None:

@@ -1,13 +1,10 @@
-"""What a guest answered: `answer.json` and `fields.npz`, read as a stranger's files are.
+"""What a guest answered: `answer.json` and its fields, read as a stranger's files are.
 
 Nothing in them is believed unchecked: sizes and shapes before memory is taken, mesh and times
 against the job, law and parameters against what was asked, forces against each other.
 """
 
 import json
-import stat
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,22 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats
-from validate.errors import ValidateError
 from validate.scene.scene import Weight
+from validate.solve.guests.fields import NoAnswerError, fields_of, regular
 from validate.solve.guests.job import GuestJob
 from validate.solve.guests.ran import plain
 
 ANSWER_SCHEMA = "validate-guest-answer/1"
 _STATES = ("finished", "cannot_run", "diverged", "not_converged")
-_JSON_BYTES, _HEADER_BYTES = 4_000_000, 4096
+_JSON_BYTES = 4_000_000
 _LINES = 20  # of what it could not do
 _ECHO = 1e-6  # relative difference of a parameter that is the same
 _UNBALANCED = 1e-3  # of the largest force
 _HUGE = 1e12  # m or N
-
-
-class NoAnswerError(ValidateError):
-    """Files that are no answer to the job."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +56,7 @@ def read_answer(folder: Path, job: GuestJob) -> GuestAnswer:
         return GuestAnswer(name, state, why, nothing, None, 0.0, None, _limits(said))
     if said.get("mesh_sha256") != job.document["mesh"]["sha256"]:
         raise NoAnswerError("answer.json: mesh_sha256 is not that of the job's mesh.vtu")
-    arrays = _arrays(folder / "fields.npz", job)
+    arrays = fields_of(folder, job)
     u, reactions, step = arrays["u"], arrays.get("reactions"), _times_done(arrays["t"], job, state)
     finite = np.all([_usable(a) for a in (u, reactions) if a is not None], axis=0)
     if not finite.all():
@@ -102,7 +95,7 @@ def _same(asked: Any, used: Any) -> bool:
 
 
 def _document(folder: Path) -> dict[str, Any]:
-    raw = _regular(folder / "answer.json", _JSON_BYTES).read_bytes()
+    raw = regular(folder / "answer.json", _JSON_BYTES).read_bytes()
     try:
         said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
@@ -116,19 +109,6 @@ def _no_number(text: str) -> float:
     raise ValueError(f"{text} is no number in JSON")
 
 
-def _regular(path: Path, most: int) -> Path:
-    """The path of an ordinary file of so many bytes: no link, pipe or device is opened."""
-    try:
-        found = path.lstat()
-    except OSError:
-        raise NoAnswerError(f"no {path.name} was written") from None
-    if not stat.S_ISREG(found.st_mode) or found.st_size > most:
-        raise NoAnswerError(
-            f"{path.name}: {found.st_size} bytes, the limit is {most}, or no ordinary file"
-        )
-    return path
-
-
 def _text(said: Mapping[str, Any], key: str) -> str:
     value = said.get(key, "")
     return plain(value) if isinstance(value, str) else ""
@@ -139,40 +119,6 @@ def _limits(said: Mapping[str, Any]) -> tuple[str, ...]:
     if not isinstance(lines, list):
         return ("says no list of what it could not do",)
     return tuple(f"could not: {plain(line)}" for line in lines[:_LINES] if isinstance(line, str))
-
-
-def _arrays(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
-    """t (k,), u (k, n, 3) and, where given, reactions of that shape, with k at most the job's."""
-    nodes, most = job.scene.mesh.nodes.size, len(job.times)
-    room = 8 * most * (2 * nodes + 1) + 3 * _HEADER_BYTES
-    _regular(path, room + _HEADER_BYTES)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-            if size > room:
-                raise NoAnswerError(f"fields.npz: {size} bytes unpacked, the job has {room}")
-        with np.load(path, allow_pickle=False) as file:
-            wanted = [name for name in ("t", "u", "reactions") if name in file.files]
-            found = {name: _number_array(file[name], name) for name in wanted}
-    except (
-        ValueError, EOFError, KeyError, OSError, MemoryError, zipfile.BadZipFile, RuntimeError,
-        NotImplementedError, zlib.error,
-    ) as error:  # fmt: skip
-        raise NoAnswerError(f"fields.npz: damaged ({plain(str(error))})") from None
-    if not {"t", "u"} <= set(found):
-        raise NoAnswerError(f"fields.npz: arrays {sorted(found)}, expected t and u")
-    k = len(np.atleast_1d(found["t"]))
-    for name, array in found.items():
-        shape = (k,) if name == "t" else (k, *job.scene.mesh.nodes.shape)
-        if array.shape != shape or k > most:
-            raise NoAnswerError(f"fields.npz: {name} of shape {array.shape}, expected {shape}")
-    return found
-
-
-def _number_array(array: NDArray[Any], name: str) -> Floats:
-    if array.dtype.kind not in "fiu":
-        raise NoAnswerError(f"fields.npz: {name} of type {array.dtype}, expected numbers")
-    return array.astype(np.float64)
 
 
 def _usable(values: Floats) -> NDArray[np.bool_]:

@@ -12,8 +12,9 @@ from validate.errors import SceneError, UsageError
 from validate.fem.locate import probe_rows
 from validate.parameters import quantity
 from validate.scene.scene import Scene
-from validate.solve.guests.answer import GuestAnswer, NoAnswerError, read_answer
+from validate.solve.guests.answer import GuestAnswer, read_answer
 from validate.solve.guests.asked import Asked, at_levels, at_rest, changes, plain_questions
+from validate.solve.guests.fields import NoAnswerError
 from validate.solve.guests.job import GuestJob, write_job
 from validate.solve.guests.ran import Ended, Limits, run_guest, size_of, words
 from validate.solve.handles import LARGE, Handles, require_handled
