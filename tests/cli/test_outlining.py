@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter
 from validate.arrays import Floats
 from validate.recording.images.followed import EXPERTS
 from validate.recording.images.image import encode_png
+from validate.recording.images.outline import extract_outline
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Recording, Source
@@ -85,6 +86,12 @@ def test_the_sd_says_that_it_is_widened_to_distances_from_experts_lines(
     assert code == 0
     assert f"{EXPERTS:.2f} times that of the wall on twins" in out
     assert pytest.approx(5 / 3) == EXPERTS
+    found = read_recording(tmp_path / "c.mcap")
+    each = found.contour("other").each
+    assert each is not None
+    frames = found.frame("images")
+    wall = extract_outline(frames.images[0], frames.m_per_px).sd
+    assert each[0, 0] == pytest.approx(EXPERTS * wall)
 
 
 def test_a_rival_is_named_and_lowers_the_confidence(two: Path, tmp_path: Path) -> None:

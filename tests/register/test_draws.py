@@ -121,6 +121,9 @@ def test_an_outline_read_exactly_lies_on_the_section() -> None:
     assert rms(np.concatenate([np.linalg.norm(o, axis=1) for o in off])) == pytest.approx(
         1e-4, rel=0.2
     )
+    known = replace(seen, sds=np.array([0.0, 1e-4, 3e-4])).anew(seen.left(run), drawn())
+    own = [rms(a - b) for a, b in zip(known.outlines, anew.outlines, strict=True)]
+    assert own == pytest.approx(np.array([0.0, 1e-4, 3e-4]) / np.sqrt(2), rel=0.3, abs=1e-15)
 
 
 def test_rays_end_on_the_straight_edges() -> None:
