@@ -19,6 +19,7 @@ from validate.recording.types import Frames, Recording
 
 _OPTIONS = ("m_per_px", "rate", "every", "topic", "frame")
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # an MP4 or MOV begins with one
+_STILLS = (b"heic", b"heix", b"mif1", b"avif")  # photographs in the same container
 _LARGEST = 2**30
 _EVEN = 2.0  # ms by which even frames differ: containers count in coarse ticks
 
@@ -28,7 +29,8 @@ def read_video(path: Path, options: Options) -> Recording:
     times), `every` (10: one frame in ten), `topic` (default images), `frame`.
 
     Raises `UsageError` without a scale, and for times that the container does not tell;
-    `RecordingError` for a file that is cut, damaged, or shorter than it declares.
+    `RecordingError` for a file that is cut, damaged, or shorter than it declares, or whose pixels
+    are not square.
     """
     require_known(options, _OPTIONS)
     _require_whole(path)
@@ -115,7 +117,8 @@ def _last_box(path: Path, size: int) -> int:
 
 def _recognises(path: Path) -> bool:
     first = head(path, 12)
-    return first[4:8] in _BOXES or (first[:4] == b"RIFF" and first[8:12] == b"AVI ")
+    moving = first[4:8] in _BOXES and first[8:] not in _STILLS
+    return moving or (first[:4] == b"RIFF" and first[8:12] == b"AVI ")
 
 
 _SECONDS = 60  # of decoding, and one more for each MB

@@ -1,6 +1,8 @@
 """What a video holds, as plain arrays: its frames in grey. By OpenCV, in a process of its own."""
 
+import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,11 +17,13 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
     """`images` (nt, h, w) uint8 of every so many frames, `t` (nt,) s as the container stamps them,
     `rate` Hz as it declares it, `declared` and `decoded` counts of frames, whether any is `colour`.
 
-    Raises `RecordingError` for a file without frames, and for frames beyond `MOST` bytes.
+    Raises `RecordingError` for a file without frames, for frames beyond `MOST` bytes, and for
+    pixels that are not square.
     """
     import cv2
 
-    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    video = _opened(path)
+    _require_square(video.get(cv2.CAP_PROP_SAR_NUM), video.get(cv2.CAP_PROP_SAR_DEN))
     images, t, count, colour = [], [], 0, False
     while video.isOpened():
         done, frame = video.read()
@@ -47,6 +51,26 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
         "decoded": np.array(count),
         "colour": np.array(colour),
     }
+
+
+def _opened(path: Path) -> Any:
+    """The video, by a name of ours: FFmpeg takes one with % for a row of pictures. One thread: each
+    takes address space, and a machine has many cores."""
+    import cv2
+
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "protocol_whitelist;file"
+    with TemporaryDirectory(prefix="validate-") as folder:
+        link = Path(folder) / "video"
+        link.symlink_to(path.resolve())
+        return cv2.VideoCapture(str(link), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
+
+
+def _require_square(wide: float, high: float) -> None:
+    if wide > 0 and high > 0 and wide != high:
+        raise RecordingError(
+            f"its pixels are {wide:g}:{high:g}, not square; make them square first, as by "
+            "`ffmpeg -i IN -vf scale=iw*sar:ih,setsar=1 OUT.mp4`"
+        )
 
 
 _GREY = 24  # levels between channels that a codec makes of grey
