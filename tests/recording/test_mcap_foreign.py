@@ -233,7 +233,7 @@ def test_what_foxglove_wrote_is_read(tmp_path: Path) -> None:
     assert got.marker("/all").x.shape == (1, 2, 3)
     assert (got.frame("/raw").images[0] == grey).all()
     assert got.frame("/jpg").images[0].shape == (3, 4)
-    assert got.marker("/cloud").x[0].tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert got.marker("/cloud").x[0] == pytest.approx(np.array([[0, 2, 5], [-3, 5, 8]]))
     assert got.signal("/tf/probe/translation", "m").y.tolist() == [[4, 5, 6]]
     assert got.signal("/tf/probe/translation", "m").frame == "world"
     assert not got.unread

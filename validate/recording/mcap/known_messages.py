@@ -137,7 +137,17 @@ def _ros_cloud(m: Plain) -> Sequence[MessagePart]:
 def _foxglove_cloud(m: Plain) -> Sequence[MessagePart]:
     offsets = {f["name"]: (f["offset"], f["type"]) for f in m["fields"]}
     data, stride = binary(m["data"]), int(m["point_stride"])
-    return _points(*_own(m), _packed(data, offsets, stride, "<", len(data) // max(stride, 1)))
+    x = _packed(data, offsets, stride, "<", len(data) // max(stride, 1))
+    return _points(*_own(m), _placed(x, m.get("pose")))
+
+
+def _placed(x: Floats, pose: Any) -> Floats:
+    """Points of a cloud in its frame: its own origin lies there by `pose`; none is no motion."""
+    if not pose:
+        return x
+    q = np.array([[*_xyz(pose["orientation"]), float(pose["orientation"]["w"])]])
+    turned = x @ rotations(q, "pose")[0].T if q.any() else x  # Protobuf's zeros: not said
+    return turned + np.array(_xyz(pose["position"]))
 
 
 def _packed(data: bytes, offsets: Mapping[str, Any], stride: int, order: str, count: int) -> Floats:
