@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 
 from validate.cli.main import run
@@ -96,6 +97,41 @@ def test_a_folder_of_logs_is_imported(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "10 % sd of the mean" in " ".join(capsys.readouterr().out.split())
     assert run(["inspect", str(out)]) == 0
     assert "10 % sd of the mean" in " ".join(capsys.readouterr().out.split())
+
+
+def two_specimens(folder: Path) -> Path:
+    table = "Time (s),Displacement (mm),Load (N)\n"
+    text = "Compression test\n"
+    for number, scale in ((1, 0.9), (2, 1.1)):
+        cells = zip(T, D, scale * F, strict=True)
+        text += f"Specimen {number}\n{table}"
+        text += "".join(f"{t:.1f},{d:.8f},{f:.8f}\n" for t, d, f in cells)
+    (folder / "both.csv").write_text(text, "utf-8")
+    return folder / "both.csv"
+
+
+def as_workbook(text: Path) -> Path:
+    book = openpyxl.Workbook()
+    for line in text.read_text("utf-8").splitlines():
+        cells = line.split(",")
+        book.active.append([float(c) if c[-1].isdigit() and len(cells) > 1 else c for c in cells])
+    book.save(text.with_suffix(".xlsx"))
+    return text.with_suffix(".xlsx")
+
+
+def test_the_specimens_of_one_file_are_repeats(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = two_specimens(tmp_path)
+    out = tmp_path / "mean.mcap"
+    for path in (text, as_workbook(text)):
+        assert run(["import", str(path), "-o", str(out)]) == 2
+        assert "specimen=all" in capsys.readouterr().err
+        given = ["--map", "specimen=all", "--specimens", "each"]
+        assert run(["import", str(path), "-o", str(out), *given]) == 0
+        recording = read_recording(out)
+        assert repeats_share(recording) == pytest.approx(0.1, rel=1e-4)
+        assert {"force/both-1", "force/both-2"} <= set(recording.signals)
 
 
 def test_logs_are_counted_from_contact(tmp_path: Path) -> None:

@@ -181,6 +181,8 @@ def test_a_kind_that_is_neither_is_refused() -> None:
         "Versuch abgebrochen",
         "Essai interrompu",
         "Prova interrotta",
+        "Proef afgebroken",
+        "Provningen avbruten",
         "Ensayo interrumpido",
         "Испытание прервано",
         "试验中止",

@@ -10,6 +10,7 @@ from validate.errors import UsageError
 from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
+from validate.recording.exports.every import ALL, every_specimen
 from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
 from validate.recording.mcap.recover import recover
 from validate.recording.mcap.write import write_recording
@@ -32,10 +33,10 @@ def import_files(
     try_file(out)
     said = pairs(mapping, "--map") | {k: str(v) for k, v in given.items() if v is not None}
     found = _logs(files, kind)
-    if len(found) == 1 and specimens is None:
-        recording = _read(found[0], kind, said)
+    logs = [log for file in found for log in _read(file, kind, said)]
+    if len(logs) == 1 and specimens is None:
+        recording = logs[0]
     else:
-        logs = [_read(file, kind, said) for file in found]
         recording = averaged(logs, labels_of(specimens, logs), out.stem)
         _tell(recording)
     write_recording(recording, out)
@@ -55,14 +56,16 @@ def _logs(files: tuple[Path, ...], kind: str | None) -> list[Path]:
     return inside or list(files)
 
 
-def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> Recording:
-    """A file as its reader makes it, and what decided."""
+def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recording]:
+    """A file as its reader makes it, all its specimens where that is said, and what decided."""
     reader = named(kind) if kind else recognised(file)
-    recording = reader.read(file, said)
+    every = said.get("specimen") == ALL
+    found = every_specimen(reader, file, said) if every else [reader.read(file, said)]
     why = "as said" if kind else f"because {reader.sign}"
     say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
-    _tell(recording)
-    return recording
+    for recording in found:
+        _tell(recording)
+    return found
 
 
 def _tell(recording: Recording) -> None:

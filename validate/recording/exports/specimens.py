@@ -47,7 +47,7 @@ def chosen(found: Mapping[str, Table], said: str | None) -> tuple[str, Table]:
     if said is None:
         raise RecordingError(
             f"{len(found)} specimens in one file: {_listed(found)}; choose one with "
-            f"--map 'specimen={next(iter(found))}'"
+            f"--map 'specimen={next(iter(found))}'; import takes all as repeats with specimen=all"
         )
     by_number = dict(zip(map(str, range(1, len(found) + 1)), found, strict=True))
     label = said if said in found else by_number.get(said)

@@ -93,7 +93,7 @@ BESIDE_THE_TEST = """material materia werkstoff cell messdose aufnehmer capteur 
     serial instrument frame prepar 材料 传感器 夹具 公司 备注 操作"""
 STOPPED = """aborted cancelled canceled interrupted abgebrochen interrompu interrotto interrotta
     interrumpido interrumpida abortado abortada interrompido прерван прервано przerwano przerwane
-    preruseno megszakitva 中止 中断"""
+    preruseno megszakitva afgebroken avbruten avbrutet afbrudt 中止 中断"""
 _BY_HAND = re.compile(r"\b(stopped|ended|terminated) by (the )?(operator|user)\b")
 NEGATED = "no false none nein non nie нет off 否"
 SPECIMEN = """specimen sample test probe prufling eprouvette echantillon essai probka probeta

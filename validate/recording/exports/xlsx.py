@@ -56,18 +56,30 @@ def read_sheets(path: Path, options: Options) -> Recording:
 
 
 def _read(path: Path, options: Options, decoder: str, extra: str) -> Recording:
-    require_known(options, (*KEYS, "sheet"))
-    data = whole_file(path)
-    found = decoded(decoder, path, extra)
-    texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
     said = {key: value for key, value in options.items() if key != "sheet"}
+    data = whole_file(path)
     try:
-        sheets = [_sheet(name, text, said.get("decimal")) for name, text in texts.items()]
-        sheet = _chosen(sheets, options.get("sheet"))
+        sheet, sheets = _test_sheet(path, options, decoder, extra)
         label, table = chosen(sheet.tables, said.get("specimen"))
         return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
+
+
+def specimens_in_sheet(path: Path, options: Options) -> tuple[str, ...]:
+    """The labels of the specimens in the sheet that would be read; raises as `read_xlsx`."""
+    decoder = ("xlsx_arrays", "xlsx") if _is_workbook(path) else ("sheets_arrays", "sheets")
+    return tuple(_test_sheet(path, options, *decoder)[0].tables)
+
+
+def _test_sheet(
+    path: Path, options: Options, decoder: str, extra: str
+) -> tuple[_Sheet, list[_Sheet]]:
+    require_known(options, (*KEYS, "sheet"))
+    found = decoded(decoder, path, extra)
+    texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
+    sheets = [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
+    return _chosen(sheets, options.get("sheet")), sheets
 
 
 def _sheet(name: str, text: bytes, decimal: str | None) -> _Sheet:
