@@ -56,8 +56,9 @@ def pressed_in_images(folder: Path, project_root: Path) -> None:
         closed = (0.25 + i / 2) * 0.2e-3
         half = 0.0125 * (1 + 0.499 * closed / 0.03)
         body = (abs(x - 0.018) < half) & (y < 0.034) & (y > 0.004 + closed)
-        real, imaginary = (gaussian_filter(rng.normal(size=x.shape), 1.1) for _ in range(2))
-        envelope = np.where(body, 1.0, 0.03) * np.hypot(real, imaginary)
+        strength = np.where(body, 1.0, 0.03)  # of scatterers, which the beam blurs
+        parts = (gaussian_filter(strength * rng.normal(size=x.shape), 1.1) for _ in range(2))
+        envelope = np.hypot(*parts)
         grey = np.clip(200 + 100 * np.log10(envelope / envelope.mean() + 1e-3), 0, 255)
         (folder / "images" / f"frame_{i:03}.png").write_bytes(encode_png(grey.astype(np.uint8)))
     section = (project_root / "README.md").read_text("utf-8").split("## Your own recording")[1]
@@ -94,6 +95,8 @@ def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root
     judged = [c for c in method["checks"] if c["name"].startswith("contour.rms@")]
     assert [c["count"] for c in judged] == [120] * 4
     assert all(0 < c["u_val"] < 0.2e-3 and c["verdict"] != "cannot decide" for c in judged)
+    code, out, _ = called(["run", "my_gel", "--set", "outline.origin=-17mm,0mm,34mm"])  # 1 mm off
+    assert (code, out.count("mm  120  differs")) == (1, 4)
     bonded = next(m for m in told(report)["methods"] if m["name"] == "bonded")
     assert {s["name"] for s in bonded["scores"]} >= {c["name"] for c in judged}
     recording = read_recording(own_files / "test.mcap")
