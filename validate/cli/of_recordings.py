@@ -132,15 +132,32 @@ def align(files: tuple[Path, Path], out: Path, by: str, **options: Any) -> None:
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--points", required=True, type=FILE, help="CSV: image, u, v (px), target.")
-@click.option("--targets", required=True, type=FILE,
+@click.option("--points", type=FILE, help="CSV: image, u, v (px), target.")
+@click.option("--targets", type=FILE,
               help="CSV: target, x, y, z; a wire has x2, y2, z2, too.")  # fmt: skip
-@click.option("--unit", required=True, metavar="UNIT", help="Of the targets, as mm.")
-@click.option("--probe", required=True, metavar="TOOL", help="Its poses, as ProbeToReference.")
+@click.option("--unit", metavar="UNIT", help="Of the targets, as mm.")
+@click.option("--probe", metavar="TOOL", help="Its poses, as ProbeToReference.")
 @click.option("--topic", default="images", show_default=True, help="The images.")
+@click.option("--pivot", "tool", metavar="TOOL", help="Its tip, from turns about a point.")
+@click.option("--reference", default="", metavar="TOOL", help="--pivot: tracked, and may move.")
+@click.option("--tip", "rough", default="", metavar="X,Y,Z",
+              help="--pivot: roughly, as 108mm,8mm,3mm: several points.")  # fmt: skip
 @click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
-def calibrate(file: Path, out: Path, **given: Any) -> None:
-    """Find where the image plane lies on a tracked probe, by landmarks or wires (N-wire)."""
+def calibrate(
+    file: Path, out: Path, tool: str | None, reference: str, rough: str, **given: Any
+) -> None:
+    """Find where the image plane lies on a tracked probe, by landmarks or wires (N-wire).
+
+    With --pivot: where the tip of a tracked tool is.
+    """
+    if tool is not None:
+        from validate.cli import pivoting
+
+        pivoting.calibrate_tip(file, out, tool, reference, rough)
+        return
+    for name, value in given.items():
+        if value is None:
+            raise click.UsageError(f"Missing option '--{name}'.")
     from validate.cli import calibrating
 
     calibrating.calibrate(file, out, **given)

@@ -147,7 +147,7 @@ def _placed(x: Floats, pose: Any) -> Floats:
         return x
     q = np.array([[*_xyz(pose["orientation"]), float(pose["orientation"]["w"])]])
     turned = x @ rotations(q, "pose")[0].T if q.any() else x  # Protobuf's zeros: not said
-    return turned + np.array(_xyz(pose["position"]))
+    return np.asarray(turned + np.array(_xyz(pose["position"])))
 
 
 def _packed(data: bytes, offsets: Mapping[str, Any], stride: int, order: str, count: int) -> Floats:
