@@ -1,15 +1,25 @@
-"""`validate guest check`: what a program of others can do, and how far off it is."""
+"""`validate guest check`: what a program of others can do, and how far off it is; `guest job`: what
+it is given, as a folder to keep."""
 
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
 
 from validate.cli.arguments import FAILED, OK
 from validate.cli.display import say, table
+from validate.errors import UsageError
+from validate.parameters import nearest_names
+from validate.replay.find import find
+from validate.replay.own_body import meshed, own_body
 from validate.solve.guests.guest import Guest
+from validate.solve.guests.job import write_job
 from validate.solve.guests.suite import OffBy, check_guest
 
 _STATES = {"finished": "yes", "refused": "no"}
+_TOLERANCE = 1e-6  # asked of a guest's equations
 
 
 def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
@@ -25,6 +35,35 @@ def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
         _print(found)
     states = {row.state for row in found}
     return OK if "finished" in states and states <= set(_STATES) else FAILED
+
+
+def job(
+    name: str,
+    folder: Path,
+    method: str | None,
+    times: int,
+    experiments: tuple[Path, ...],
+    *,
+    inertia: bool,
+) -> None:
+    """Writes what a guest is given of one method's scene to an empty `folder`."""
+    if folder.exists() and any(folder.iterdir()):
+        raise UsageError(f"{folder} is not empty; a job takes a folder of its own")
+    own = own_body(find(name, Path.cwd(), experiments))
+    experiment, key = own.experiment, method or own.experiment.accepted[0]
+    if key not in experiment.methods:
+        raise UsageError(f"no method '{key}'; {nearest_names(key, set(experiment.methods))}")
+    options = experiment.methods[key].scene
+    scene = meshed(experiment.build(own.recording, own.parameters, options))
+    seen = experiment.place(own.recording, own.parameters, scene)
+    kept = np.arange(len(seen.t))
+    if not inertia:
+        kept = np.unique(np.linspace(0, len(kept) - 1, times).round().astype(int))
+    folder.mkdir(parents=True, exist_ok=True)
+    made = write_job(folder, scene, seen.t[kept], seen.inputs[kept], inertia, _TOLERANCE)
+    mesh = made.document["mesh"]
+    what = f"{mesh['cells']} {mesh['kind']}, {len(kept)} times"
+    say(f"{folder}: job.json and mesh.vtu of {key}: {what}", indent="  ")
 
 
 def _print(found: Sequence[OffBy]) -> None:

@@ -9,6 +9,7 @@ import click
 
 from validate import __version__
 from validate.cli.arguments import BAD_INPUT, BUG, EXPERIMENTS, FILE, FOLDER, INTERRUPTED, complain
+from validate.cli.of_guests import guest
 from validate.cli.of_recordings import COMMANDS
 from validate.errors import UsageError, ValidateError
 from validate.places import of_the_place, why_not
@@ -326,25 +327,5 @@ def live_(name: str, **options: Any) -> int:
     return living.run(name, **options)
 
 
-@cli.group("guest")
-def guest_() -> None:
-    """Programs of others that solve our scenes (docs/guests.md)."""
-
-
-@guest_.command("check", context_settings={"ignore_unknown_options": True})
-@click.option("--seconds", type=float, default=60.0, show_default=True, help="Limit of a scene.")
-@click.option("--memory", type=float, default=8192.0, show_default=True, help="Limit in MB.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-@click.argument("command", nargs=-1, required=True, type=click.UNPROCESSED)
-def guest_check(command: tuple[str, ...], **options: Any) -> int:
-    """Small scenes with exact answers: what COMMAND can do, and how far off it is."""
-    from shlex import join
-
-    from validate.cli import guesting
-
-    text = command[0] if len(command) == 1 else join(command)
-    return guesting.check(text, **options)
-
-
-for _command in COMMANDS:
+for _command in (*COMMANDS, guest):
     cli.add_command(_command)
