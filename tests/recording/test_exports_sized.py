@@ -120,6 +120,25 @@ def test_one_of_the_two_may_be_written(tmp_path: Path) -> None:
     assert_pulled(read(tmp_path, text, area="314mm2", measure="engineering"))
 
 
+def test_a_true_stress_beside_a_displacement(tmp_path: Path) -> None:
+    names = "Time (s),Extension (mm),True stress (kPa)\n"
+    text = "Tensile test\n" + table(names, 3 + 1e3 * LENGTH * E, SIGMA * (1 + E))
+    with pytest.raises(RecordingError, match=r"the area that is left: give .*--map length=20mm"):
+        read(tmp_path, text, area="314mm2")
+    force = read(tmp_path, text, area="314mm2", length="20mm").signals["force"].y[:, 0]
+    assert np.allclose(force, -SIGMA * 1e3 * AREA, rtol=1e-9, atol=1e-12)
+
+
+def test_a_size_beside_force_and_displacement_is_the_specimens(tmp_path: Path) -> None:
+    names = "Time (s),Extension (mm),Load (N),Stress (kPa)\n"
+    text = table(names, 1e3 * LENGTH * E, SIGMA * 1e3 * AREA, SIGMA)
+    recording = read(tmp_path, text, area="314mm2", length="20mm", test="tension")
+    assert_pulled(recording)
+    assert "'Stress (kPa)' is 1 x 'Load (N)'" in recording.record("provenance")["compared"]
+    with pytest.raises(RecordingError, match=r"a factor of 1e-1\); .*, or the true size"):
+        read(tmp_path, text, area="31.4mm2", test="tension")
+
+
 def test_a_strain_cannot_be_led_into_being_a_length(tmp_path: Path) -> None:
     for names in ("Time (s),Strain (%),Load (N)\n", "Time (s),Strain,Load (N)\n"):
         label = names.split(",")[1]

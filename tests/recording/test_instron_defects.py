@@ -105,7 +105,7 @@ DEFECTS: dict[str, tuple[str | bytes, str]] = {
     "stress": (full(FULL.replace("kPa", "N/mm^2")), r"contradictory units \(a factor of 1e\+3"),
     "metres": (full(FULL.replace("(mm)", "(m)")), r"contradictory units \(a factor of 1e-3"),
     "percent": (full(FULL.replace("[-]", "[%]")), r"contradictory units \(a factor of 1e-2"),
-    "diameter": (full(head=HEAD.replace("50mm", "40mm")), "is 0.64 x 'Load .*header geometry"),
+    "diameter": (full(head=HEAD.replace("50mm", "40mm")), "is 0.64 x 'Load .*sizes and columns"),
     "speed": (
         "Speed: 18 mm/min\n" + bare("Time (s),Displacement (cm),Load (N)"),
         "header declares 0.0003 m/s, the columns move at 10 times",

@@ -122,8 +122,8 @@ def _cause(slope: float, base: Pick) -> str:
     fix = f"give the true unit with --map '{base.role}={base.column.label}:UNIT'"
     power = _power_of_ten(abs(slope))
     if power:
-        return f"contradictory units (a factor of 1e{power:+d}); {fix}"
-    return f"expected 1: header geometry and columns contradict each other; mend one or {fix}"
+        return f"contradictory units (a factor of 1e{power:+d}); {fix}, or the true size"
+    return f"expected 1: sizes and columns contradict each other; mend one or {fix}"
 
 
 def _power_of_ten(ratio: float) -> int:

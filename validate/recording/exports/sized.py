@@ -17,6 +17,7 @@ from validate.recording.exports.columns import (
     Pick,
     Said,
     columns_called,
+    needed_pick,
     picked,
     said_pick,
 )
@@ -35,6 +36,7 @@ from validate.units import si_factor, split
 
 MEASURES = ("engineering", "true")
 _FROM = {"displacement": ("strain", "stretch"), "force": ("stress",)}
+_LENGTH = "the length that strain is measured on, as --map length=20mm"
 _LONGEST = 20.0  # no rubber is stretched so far: per cent that are called numbers
 
 
@@ -122,8 +124,7 @@ def derived(
 
 
 def _displacement(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None) -> Sized:
-    length = "the length that strain is measured on, as --map length=20mm"
-    missing = () if sizes.length else (length,)
+    missing = () if sizes.length else (_LENGTH,)
     try:
         source = _elongation(table, said)
     except RecordingError as error:
@@ -198,15 +199,21 @@ def _measure(pick: Pick, sizes: Sizes) -> tuple[str, list[str]]:
 
 
 def _stretch(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None) -> Floats:
-    """Stretch (n,) for a true stress; raises `MissingColumnError` without a strain."""
-    try:
-        source = _elongation(table, said)
-    except MissingColumnError as error:
-        raise MissingColumnError(f"true stress, and the area that is left: {error}") from error
+    """Stretch (n,) for a true stress: by strain or stretch, else by displacement over length."""
+    if not ({"strain", "stretch"} & set(said) or _strained(table)):
+        moved = needed_pick("displacement", table, said.get("displacement"))
+        if sizes.length is None:
+            raise MissingColumnError("true stress, and the area that is left", (_LENGTH,))
+        return 1 + _signed((moved.values - moved.values[0]) / sizes.length, kind, moved)
+    source = _elongation(table, said)
     shown = _shown_by_stretch(source) if source.role == "stretch" else None
     measure, asked = ("", []) if source.role == "stretch" else _measure(source, sizes)
     _refuse_unsaid("true stress", asked)
     return np.asarray(1 + _signed(_relative(source, measure, kind or shown), kind or shown, source))
+
+
+def _strained(table: Table) -> bool:
+    return any(_candidates(role, table) for role in ("strain", "stretch"))
 
 
 def _relative(source: Pick, measure: str, kind: Kind | None) -> Floats:
