@@ -51,13 +51,51 @@ def test_what_itk_writes_is_read_pixel_by_pixel(
     np.testing.assert_allclose(moved.y, [[0.01, -0.002, 1.0]] * 2)
 
 
-@pytest.mark.parametrize("ending", ["mha", "nrrd"])
+READ = {"mha": read_metaimage, "nrrd": read_nrrd}
+BOTH = pytest.mark.parametrize("ending", ["mha", "nrrd"])
+
+
+@BOTH
 def test_volumes_and_pixels_of_other_depths_are_called_so(ending: str, tmp_path: Path) -> None:
-    read = read_nrrd if ending == "nrrd" else read_metaimage
     with pytest.raises(RecordingError, match=r"2 px deep|\(5, 4, 2, 3\)"):
-        read(by_itk(tmp_path / f"x.{ending}", deep=2), {})
-    with pytest.raises(RecordingError, match=r"MET_USHORT|uint16"):
-        read(by_itk(tmp_path / f"x.{ending}", dtype=np.uint16), {})
+        READ[ending](by_itk(tmp_path / f"x.{ending}", deep=2), {})
+    with pytest.raises(RecordingError, match=r"MET_FLOAT|float32"):
+        READ[ending](by_itk(tmp_path / f"x.{ending}", dtype=np.float32), {})
+
+
+@BOTH
+def test_16_bits_become_8_by_a_level_that_is_said(ending: str, tmp_path: Path) -> None:
+    path = by_itk(tmp_path / f"x.{ending}", dtype=np.uint16)
+    top = int(PIXELS[:2].max())
+    got = READ[ending](path, {})
+    shown = np.rint(PIXELS[:2] * (255 / top)).astype(np.uint8)
+    np.testing.assert_array_equal(np.array(got.frame("images").images), shown)
+    said = got.metadata["provenance"]["levels"]
+    assert said == f"16 bits made 8: 0 to {top} (the largest) became 0 to 255"
+    half = READ[ending](path, {"white": "510"}).frame("images").images
+    np.testing.assert_array_equal(np.array(half), np.rint(PIXELS[:2] / 2).astype(np.uint8))
+
+
+def test_16_bits_in_the_other_order_of_bytes_are_the_same(tmp_path: Path) -> None:
+    path = by_itk(tmp_path / "x.mha", dtype=np.uint16, compressed=False)
+    plain = read_metaimage(path, {}).frame("images").images
+    whole = path.read_bytes()
+    size = 2 * PIXELS.size
+    turned = np.frombuffer(whole[-size:], "<u2").astype(">u2").tobytes()
+    path.write_bytes(whole[:-size].replace(b"MSB = False", b"MSB = True") + turned)
+    np.testing.assert_array_equal(
+        np.array(plain), np.array(read_metaimage(path, {}).frame("images").images)
+    )
+
+
+@BOTH
+def test_levels_below_zero_are_refused(ending: str, tmp_path: Path) -> None:
+    image = SimpleITK.GetImageFromArray(PIXELS.astype(np.int16) - 100)
+    image.SetMetaData("Seq_Frame0000_ImageStatus", "OK")
+    image.SetSpacing((0.1, 0.1, 1.0))
+    SimpleITK.WriteImage(image, str(tmp_path / f"x.{ending}"))
+    with pytest.raises(RecordingError, match=r"levels from -100 to 15\d; save them from 0 on"):
+        READ[ending](tmp_path / f"x.{ending}", {"rate": "10"})
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ limit to a line, within one to the whole. Pixels are raw or one zlib stream.
 import re
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from validate.recording.types import Recording
 
 _HEADER = 128 * 2**20  # bytes: some 200 000 frames of two tools
 _LAST = "ElementDataFile"
+_DEPTHS = {"MET_UCHAR": np.uint8, "MET_USHORT": np.uint16, "MET_SHORT": np.int16}
+_BIG = ("BinaryDataByteOrderMSB", "ElementByteOrderMSB")
 _KNOWN = ("ObjectType", "NDims", "Comment", "ObjectSubType", "DimSize")
 
 
@@ -26,7 +29,7 @@ def read_metaimage(path: Path, options: Options) -> Recording:
     """Transforms and images of a sequence, as `sequence.recorded` has them.
 
     Raises `RecordingError` for a file that is cut, damaged, too large, or of other pixels than
-    8-bit grey, and a .mhd whose pixels do not lie beside it; `UsageError` as `recorded`.
+    grey of 8 or 16 bits, and a .mhd whose pixels do not lie beside it; `UsageError` as `recorded`.
     """
     fields, after = _header(path)
     images = _images(path, fields, after)
@@ -52,21 +55,28 @@ def _header(path: Path) -> tuple[dict[str, str], int]:
     return {key.strip(): value.strip() for key, sign, value in pairs if sign}, last.end()
 
 
-def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[np.uint8], ...]:
+def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[Any], ...]:
     """Images n x (h, w); none where the sequence has transforms alone."""
     width, height, count = _sizes(path, fields)
     if not width * height * count:
         return ()
-    kind, channels = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
-    if kind != "MET_UCHAR" or channels != "1":
-        raise RecordingError(
-            f"{path.name}: pixels {kind or 'of no type'} x {channels}; save as 8-bit grey"
-        )
-    size = width * height * count
+    depth = _depth(path, fields)
+    size = width * height * count * depth.itemsize
     if size > MAX_PIXELS:
         raise RecordingError(f"{path.name}: {size} bytes of pixels, limit {MAX_PIXELS}; split it")
     data = _unpacked(path, fields, _packed(path, fields, after, size), size)
-    return tuple(np.frombuffer(data, dtype=np.uint8).reshape(count, height, width))
+    return tuple(np.frombuffer(data, dtype=depth).reshape(count, height, width))
+
+
+def _depth(path: Path, fields: dict[str, str]) -> np.dtype[Any]:
+    """The type of a pixel, grey, in the file's order of bytes."""
+    kind, channels = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
+    if kind not in _DEPTHS or channels != "1":
+        raise RecordingError(
+            f"{path.name}: pixels {kind or 'of no type'} x {channels}; save as grey of 8 or 16 bits"
+        )
+    said = (fields.get(key, "False").lower() for key in _BIG)
+    return np.dtype(_DEPTHS[kind]).newbyteorder(">" if "true" in said else "<")
 
 
 def _sizes(path: Path, fields: dict[str, str]) -> tuple[int, int, int]:

@@ -18,8 +18,8 @@ _MAGIC = b"NRRD000"
 def read_nrrd(path: Path, options: Options) -> Recording:
     """Transforms and images of a sequence, as `sequence.recorded` has them.
 
-    Raises `RecordingError` for a file that is cut, damaged, no NRRD, or of other pixels than 8-bit
-    grey; `UsageError` without the library, and as `recorded`.
+    Raises `RecordingError` for a file that is cut, damaged, no NRRD, or of other pixels than grey
+    of 8 or 16 bits; `UsageError` without the library, and as `recorded`.
     """
     if not path.is_file():
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
@@ -32,19 +32,20 @@ def read_nrrd(path: Path, options: Options) -> Recording:
     return recorded(path, Sequence(fields, _images(path, found["pixels"]), (x, y), "NRRD"), options)
 
 
-def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[np.uint8], ...]:
+def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Images n x (h, w) of pixels (w, h, 1, n), (w, h, n) or (w, h), x first."""
     if not pixels.size:
         return ()
     if pixels.ndim == 4 and pixels.shape[2] == 1:
         pixels = pixels[:, :, 0]
-    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.size > MAX_PIXELS:
+    whole = pixels.dtype.kind in "iu" and (pixels.dtype == np.uint8 or pixels.itemsize == 2)
+    if not whole or pixels.ndim not in (2, 3) or pixels.nbytes > MAX_PIXELS:
         raise RecordingError(
-            f"{path.name}: pixels {pixels.shape} {pixels.dtype}; images of 8-bit grey up to "
+            f"{path.name}: pixels {pixels.shape} {pixels.dtype}; images of 8 or 16-bit grey up to "
             f"{MAX_PIXELS} bytes are read"
         )
-    whole = pixels if pixels.ndim == 3 else pixels[..., None]
-    return tuple(np.ascontiguousarray(image.T) for image in np.moveaxis(whole, 2, 0))
+    stack = pixels if pixels.ndim == 3 else pixels[..., None]
+    return tuple(np.ascontiguousarray(image.T) for image in np.moveaxis(stack, 2, 0))
 
 
 def _recognises(path: Path) -> bool:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.poses import pose_signals
 from validate.recording.formats.recorded import begun
 from validate.recording.formats.recorded import recorded as of_streams
+from validate.recording.images.levels import shallow
 from validate.recording.reader import Options, require_known, source_of
 from validate.recording.types import Frames, Recording, Signal, Stream
 
@@ -27,16 +29,16 @@ MAX_PIXELS = 400 * 2**20  # bytes of all images of one sequence
 _MM = 1e-3  # m: PLUS writes millimetres
 _FIELD = re.compile(r"Seq_Frame(\d{1,9})_(\w+)")
 _TOOL = re.compile(r"(\w+To\w+)Transform")
-_OPTIONS = ("m_per_px", "rate", "images")
+_OPTIONS = ("m_per_px", "rate", "images", "white")
 
 
 @dataclass(frozen=True)
 class Sequence:
-    """What a file holds: texts by frame and field, images n x (h, w) uint8 or none, `spacing` (2,)
-    as the file states it, `kind` in words."""
+    """What a file holds: texts by frame and field, images n x (h, w) of 8 or 16 bits or none,
+    `spacing` (2,) as the file states it, `kind` in words."""
 
     fields: Mapping[int, Mapping[str, str]]
-    images: tuple[NDArray[np.uint8], ...]
+    images: tuple[NDArray[Any], ...]
     spacing: tuple[float, float]
     kind: str
 
@@ -56,8 +58,9 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
     linear part row by row, and `XToY/translation` (nt, 3) m; images as `images`.
 
     Options: `m_per_px`, which a spacing of 1 (pixels, not mm) needs; `images=no` leaves them out;
-    `rate` (Hz) for frames without times. Raises `UsageError` where one of them is needed,
-    `RecordingError` for a field that is none, and a file in which nothing was seen.
+    `rate` (Hz) for frames without times; `white` as `shallow` has it. Raises `UsageError` where
+    one of them is needed, `RecordingError` for a field that is none, and a file in which nothing
+    was seen.
     """
     require_known(options, _OPTIONS)
     t = _times(path, held, options)
@@ -68,8 +71,10 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
         found = _tool(path, held, tool, t)
         streams |= found
         never += [] if found else [tool]
+    levels: dict[str, str] = {}
     if held.images and options.get("images") != "no":
-        streams |= _images(path, held, t, options)
+        shown, levels["levels"] = _images(path, held, t, options)
+        streams |= shown
     if not streams:
         raise RecordingError(
             f"{path.name}: {len(t)} frames, no image and no transform in them is OK; "
@@ -82,6 +87,7 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
         "not_seen": "; ".join(
             f"{n}: {len(t) - len(s.t)}" for n, s in streams.items() if len(s.t) < len(t)
         ),
+        **levels,
     }
     source = source_of(path, f"{held.kind} keeps no checksum: integrity not provable")
     unread = dict.fromkeys(never, "never seen")
@@ -143,15 +149,18 @@ def _tool(path: Path, held: Sequence, tool: str, t: Floats) -> dict[str, Signal]
     return pose_signals(tool, t[list(texts)], T[:, :3, :3], _MM * T[:, :3, 3], frame)
 
 
-def _images(path: Path, held: Sequence, t: Floats, options: Options) -> dict[str, Frames]:
-    """Images whose status is OK, or says nothing."""
+def _images(
+    path: Path, held: Sequence, t: Floats, options: Options
+) -> tuple[dict[str, Frames], str]:
+    """Images whose status is OK, or says nothing, and how they became 8 bits deep."""
     fields = [held.fields.get(i, {}) for i in range(len(held.images))]
     said = [f.get("ImageStatus", f.get("Status", "OK")) for f in fields]
     good = [i for i, status in enumerate(said) if status == "OK"]
     if not good:
-        return {}
-    images = tuple(held.images[i] for i in good)
-    return {IMAGES: Frames(t[good], images, _pixel(path, held, options), np.eye(4), "image")}
+        return {}, "none"
+    images, levels = shallow([held.images[i] for i in good], options)
+    pixel = _pixel(path, held, options)
+    return {IMAGES: Frames(t[good], images, pixel, np.eye(4), "image")}, levels
 
 
 def _pixel(path: Path, held: Sequence, options: Options) -> tuple[float, float]:

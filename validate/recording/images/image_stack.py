@@ -11,7 +11,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
-from validate.recording.images.image import MAX_SIDE, Pixels
+from validate.recording.images.levels import shallow
 from validate.recording.images.numbered import pictures
 from validate.recording.images.png_stack import by_size
 from validate.recording.images.stack_arrays import SUFFIXES
@@ -38,7 +38,7 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     deep = [found[f"image.{i}"] for i in range(sum(k.startswith("image.") for k in found))]
     if not deep:
         raise RecordingError(f"{path.name}: no image in it")
-    images, levels = _shallow(deep, options)
+    images, levels = shallow(deep, options)
     sides, scale = _sides(path, found, options)
     t, times = _times(path, len(images), found, options)
     topic, frame = options.get("topic", "images"), options.get("frame", "image")
@@ -55,26 +55,6 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     whole = "images keep no common checksum: integrity not provable"
     source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
     return recorded(name, source, streams, said)
-
-
-def _shallow(deep: list[Any], options: Options) -> tuple[tuple[Pixels, ...], str]:
-    """The images in 8 bits, and how they became so."""
-    for image in deep:
-        if max(image.shape) > MAX_SIDE:
-            raise RecordingError(f"an image of {image.shape[1]} x {image.shape[0]} px, the limit "
-                                 f"is {MAX_SIDE} a side")  # fmt: skip
-    if all(image.dtype == np.uint8 for image in deep):
-        return tuple(np.ascontiguousarray(image) for image in deep), "8 bits as recorded"
-    top = float(max(image.max(initial=0) for image in deep))
-    white = above_zero(options, "white") if "white" in options else top
-    if not (np.isfinite(white) and white > 0):
-        raise UsageError(f"levels up to {top:g}: say which becomes white: --map white=4095")
-    scaled = (np.clip(np.nan_to_num(image) * (255 / white), 0, 255) for image in deep)
-    bits = "floating point" if any(image.dtype.kind == "f" for image in deep) else "16 bits"
-    said = "entered" if "white" in options else "the largest"
-    return tuple(np.rint(image).astype(np.uint8) for image in scaled), (
-        f"{bits} made 8: 0 to {white:g} ({said}) became 0 to 255"
-    )
 
 
 def _sides(
