@@ -37,7 +37,7 @@ from validate.solve.newton import StaticNewton
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- rates: begin -->", "<!-- rates: end -->"
-HEAD = ("scene", "error", "ours, ms", "FElupe", "CalculiX", "first")
+HEAD = ("scene", "error", "ours, ms", "FElupe", "CalculiX", "MuJoCo", "first")
 LEVELS = (0.03, 0.01, 0.003, 0.001)  # of the converged motion
 SWING_LEVELS = (0.2, 0.1, 0.05, 0.02)
 REPEATS = 3
@@ -60,8 +60,11 @@ SWINGS = {
     "hex27": ((2, 1, 1), (3, 1, 1), (4, 2, 2), (6, 2, 2)),
 }
 PARTS = (1, 2, 4)  # of a frame
-GUESTS = {"FElupe": "felupe_guest.py", "CalculiX": "calculix_guest.py"}
-CARRIED = ("hex8", "tet10")  # of the cells here, by a guest's job
+GUESTS = {
+    "FElupe": "felupe_guest.py", "CalculiX": "calculix_guest.py", "MuJoCo": "mujoco_guest.py",
+}  # fmt: skip
+CARRIED = {"hex8": tuple(GUESTS), "tet10": ("FElupe", "CalculiX")}  # of the cells here; cut: MuJoCo
+MOVING = ("CalculiX", "MuJoCo")
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,7 @@ def still_points(name: str, truth: float) -> list[Point]:
             scene = make(kind, level)  # type: ignore[operator]
             u, seconds = ours(scene, pull)
             answers = {"ours": (u, seconds, 0)}
-            for who in GUESTS if kind in CARRIED else ():
+            for who in CARRIED.get(kind, ()):
                 solved = theirs(who, scene, np.ones(1), pull, moving=False)
                 answers |= {who: (solved[0][0], *solved[1:])} if solved else {}
             for who, (field, s, memory) in answers.items():
@@ -181,15 +184,16 @@ def still_points(name: str, truth: float) -> list[Point]:
 
 def swing_points(truth: Floats) -> list[Point]:
     """Of the whole trace at every frame, rms over the reference's. Ours takes 1, 2 or 4 steps in a
-    frame, CalculiX those that it chooses."""
+    frame, CalculiX those that it chooses, MuJoCo five."""
     t, found = FRAME * np.arange(1, round(SPAN / FRAME) + 1), []
     for kind, levels in SWINGS.items():
         for level in levels:
             scene = beam(kind, level)
             answers = [("ours", kind if n == 1 else f"{kind}/{n}", (*ours_swinging(scene, n), 0))
                        for n in PARTS]  # fmt: skip
-            if kind in CARRIED and (solved := theirs("CalculiX", scene, t, G, moving=True)):
-                answers.append(("CalculiX", kind, solved))
+            for who in (who for who in CARRIED.get(kind, ()) if who in MOVING):
+                if solved := theirs(who, scene, t, G, moving=True):
+                    answers.append((who, kind, solved))
             for who, cells, (u, s, memory) in answers:
                 off = end(scene, u) - truth
                 error = float(np.sqrt((off**2).mean() / (truth**2).mean()))

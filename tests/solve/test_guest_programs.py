@@ -11,7 +11,7 @@ import pytest
 
 from validate.scene.box import box, grid
 from validate.scene.material import Material
-from validate.scene.scene import Scene, Support, Weight
+from validate.scene.scene import Drive, Scene, Support, Weight
 from validate.solve.guests.guest import Guest
 from validate.solve.guests.suite import OffBy, check_guest
 from validate.solve.march import run_scheme
@@ -107,3 +107,26 @@ def test_mujoco_bends_a_beam_as_our_tetrahedra_of_its_law_do(project_root: Path,
             assert np.abs(run.u[0] - own).max() < 1e-5 * np.abs(own).max()
     assert ends[0] == pytest.approx(ends[1], rel=1e-9)
     assert 1e3 * ends[0] == pytest.approx({0.45: -3.445, 0.499: -0.880}[nu], abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    find_spec("newton") is None, reason="newton absent: a guest by hand, pip newton"
+)
+def test_newton_is_told_its_own_moduli(project_root: Path) -> None:
+    """4/3 mu and lambda + 5/6 mu: given Lame's it would be a quarter too soft in shear."""
+    scene = Scene(
+        box((0.02, 0.02, 0.02), (2, 2, 2)),
+        Material(10e3, 0.3),
+        (Support("x0", (0,)), Support("y0", (1,)), Support("z0", (2,))),
+        drives=(Drive("pull", "z1", (0.0, 0.0, 1.0)),),
+    )
+    strain = 1e-3
+    run = shipped(project_root, "newton_guest.py").solve(
+        scene, np.ones(1), np.array([[strain * 0.02]])
+    )
+    assert run.finished, run.outcome.why
+    assert "used law = neo_hooke instead of linear" in run.said
+    exact = scene.mesh.nodes * strain * np.array([-0.3, -0.3, 1.0])
+    assert np.abs(run.u[0] - exact).max() < 1e-2 * strain * 0.02
+    assert run.traces["pull.force"].y[0] == pytest.approx(10e3 * strain * 0.02**2, rel=1e-2)
