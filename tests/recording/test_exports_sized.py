@@ -178,3 +178,24 @@ def test_a_name_that_says_its_measure_is_not_overruled(tmp_path: Path) -> None:
     text = table("Time (s),True strain (%),Stress (kPa)\n", 100 * E, SIGMA)
     with pytest.raises(UsageError, match=r"'True strain \(%\)' says true itself"):
         read(tmp_path, text, **SIZES, test="tension")
+
+
+def test_real_stretches_and_stresses(shared_data: Path) -> None:
+    """Rubber of Treloar, digitised by others: no time, no size, no sense but the stretch's."""
+    path = shared_data / "force/multimode/treloar_uniaxial.csv"
+    with pytest.raises(RecordingError) as told:
+        read_instron(path)
+    for advice in ("time=every:0.1s", "length=20mm", "area=314mm2"):
+        assert f"--map {advice}" in str(told.value)
+    sizes = {"time": "every:1s", "length": "20mm", "area": "10mm2"}
+    recording = read_instron(path, sizes)
+    stretch, stress = np.loadtxt(path, delimiter=",", skiprows=1).T
+    d, f = (recording.signals[k].y[:, 0] for k in ("displacement", "force"))
+    assert np.allclose(d, -0.02 * (stretch - 1), rtol=1e-12, atol=0)
+    assert np.allclose(f, -1e6 * stress * 10e-6, rtol=1e-12, atol=0)
+    assert recording.record("specimen")["test"] == "tension"
+
+
+def test_two_directions_are_asked_about(shared_data: Path) -> None:
+    with pytest.raises(RecordingError, match=r"2 columns may be stress: .*--map area=314mm2"):
+        read_instron(shared_data / "force/multimode/kawabata1981_biaxial.csv")

@@ -187,7 +187,7 @@ def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
     what = [e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong]
     asks = dict.fromkeys(ask for e in missing for ask in e.asks)
     if missing and not kind:
-        asks[f"where neither strain nor stretch says it, {ASK.removeprefix('say ')}"] = None
+        asks[f"{ASK.removeprefix('say ')}, where neither strain nor stretch says it"] = None
     return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
 
 

@@ -37,6 +37,7 @@ from validate.units import si_factor, split
 MEASURES = ("engineering", "true")
 _FROM = {"displacement": ("strain", "stretch"), "force": ("stress",)}
 _LENGTH = "the length that strain is measured on, as --map length=20mm"
+_AREA = "the specimen's loaded area, as --map area=314mm2"
 _LONGEST = 20.0  # no rubber is stretched so far: per cent that are called numbers
 
 
@@ -109,10 +110,13 @@ def derived(
     """Displacement or force by a size; raises `MissingColumnError` naming all that is asked."""
     if role == "displacement":
         return _displacement(table, said, sizes, kind)
-    stress = _source("stress", table, said)
+    missing = () if sizes.area else (_AREA,)
+    try:
+        stress = _source("stress", table, said)
+    except RecordingError as error:
+        raise MissingColumnError(str(error), missing) from error
     measure, asked = _measure(stress, sizes)
-    if sizes.area is None:
-        asked.append("the specimen's loaded area, as --map area=314mm2")
+    asked += missing
     _refuse_unsaid(f"no force, but stress '{stress.column.label}'", asked)
     assert sizes.area is not None
     nominal, words = stress.values, f"{measure} stress '{stress.column.label}'"
