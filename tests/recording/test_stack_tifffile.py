@@ -1,0 +1,44 @@
+"""TIFF stacks that tifffile wrote: ImageJ's scale and times, depths, colour, BigTIFF."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+
+from validate.errors import UsageError
+from validate.recording.images.image_stack import read_image_stack
+from validate.recording.readers import recognised
+
+LEVELS = np.random.default_rng(0).integers(0, 4096, (3, 40, 50)).astype(np.uint16)
+BYTES = (LEVELS >> 4).astype(np.uint8)
+SAID = {"m_per_px": "1mm", "rate": "2"}
+
+
+def test_a_stack_of_imagej_states_its_scale_and_its_times(tmp_path: Path) -> None:
+    """0.65 um a pixel, an image every 0.5 s, 12 bits in 16."""
+    path = tmp_path / "x.tif"
+    told = {"unit": "um", "finterval": 0.5, "axes": "TYX"}
+    tifffile.imwrite(path, LEVELS, imagej=True, resolution=(1 / 0.65, 1 / 0.65), metadata=told)
+    assert recognised(path).name == "image-stack"
+    frames = read_image_stack(path, {"white": "4095"}).frame("images")
+    assert frames.m_per_px == pytest.approx((6.5e-7, 6.5e-7), rel=1e-5)
+    assert frames.t.tolist() == [0, 0.5, 1]
+    shown = np.rint(LEVELS * (255 / 4095)).astype(np.uint8)
+    np.testing.assert_array_equal(np.array(frames.images), shown)
+
+
+@pytest.mark.parametrize("how", [{"compression": "zlib"}, {"bigtiff": True}, {"byteorder": ">"}])
+def test_8_bits_are_bit_for_bit(how: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "x.tif"
+    tifffile.imwrite(path, BYTES, photometric="minisblack", **how)
+    got = read_image_stack(path, SAID).frame("images")
+    np.testing.assert_array_equal(np.array(got.images), BYTES)
+
+
+def test_dots_a_centimetre_of_others_are_a_printers(tmp_path: Path) -> None:
+    path = tmp_path / "x.tif"
+    tifffile.imwrite(path, BYTES[0], resolution=(100, 100), resolutionunit="CENTIMETER")
+    with pytest.raises(UsageError, match=r"x\.tif: states no scale; say it"):
+        read_image_stack(path, {"rate": "2"})
