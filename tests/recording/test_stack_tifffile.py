@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import tifffile
 
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
+from validate.recording.images import stack_arrays
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.readers import recognised
 
@@ -42,3 +43,15 @@ def test_dots_a_centimetre_of_others_are_a_printers(tmp_path: Path) -> None:
     tifffile.imwrite(path, BYTES[0], resolution=(100, 100), resolutionunit="CENTIMETER")
     with pytest.raises(UsageError, match=r"x\.tif: states no scale; say it"):
         read_image_stack(path, {"rate": "2"})
+
+
+def test_pages_that_are_small_packed_are_counted_before_they_are_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "x.tif"
+    pages = np.zeros((40, 300, 300), np.uint8)
+    tifffile.imwrite(path, pages, photometric="minisblack", compression="zlib")
+    assert path.stat().st_size < 40_000
+    monkeypatch.setattr(stack_arrays, "MOST", 2 * 300 * 300)
+    with pytest.raises(RecordingError, match="40 images of 300 x 300 px, more than 180000 bytes"):
+        stack_arrays.arrays(path)

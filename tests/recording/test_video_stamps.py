@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from validate.cli.main import cli
 from validate.errors import RecordingError
+from validate.recording.formats import video_arrays
 from validate.recording.formats.video import VIDEO, read_video
 
 UNEVEN = (0, 40, 80, 200, 230, 330, 500)  # ms
@@ -86,3 +87,13 @@ def test_it_is_inspected_by_the_command(tmp_path: Path) -> None:
     assert seen.exception is None
     assert "images" in seen.output
     assert "read as video" in seen.output
+
+
+def test_frames_that_are_small_packed_are_counted_before_they_are_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = film(tmp_path / "x.mp4")
+    monkeypatch.setattr(video_arrays, "MOST", 3 * 64 * 48)
+    with pytest.raises(RecordingError, match="it declares 7 frames of 64 x 48, beyond 9216 bytes"):
+        video_arrays.arrays(path)
+    assert len(video_arrays.arrays(path, every=3)["images"]) == 3

@@ -22,8 +22,10 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
     """
     import cv2
 
+    declared = (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
     video = _opened(path)
     _require_square(video.get(cv2.CAP_PROP_SAR_NUM), video.get(cv2.CAP_PROP_SAR_DEN))
+    _require_few(*(video.get(key) for key in declared), every)
     images, t, count, colour = [], [], 0, False
     while video.isOpened():
         done, frame = video.read()
@@ -63,6 +65,15 @@ def _opened(path: Path) -> Any:
         link = Path(folder) / "video"
         link.symlink_to(path.resolve())
         return cv2.VideoCapture(str(link), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
+
+
+def _require_few(count: float, width: float, height: float, every: float) -> None:
+    """What is declared, before anything is decoded: packed, it may be small."""
+    if width * height * (count // every) > MOST:
+        raise RecordingError(
+            f"it declares {count:.0f} frames of {width:.0f} x {height:.0f}, beyond {MOST} bytes; "
+            "take fewer: --map every=10, or cut it"
+        )
 
 
 def _require_square(wide: float, high: float) -> None:

@@ -48,6 +48,7 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
 
     try:
         with Image.open(file) as opened:
+            _require_few(opened)
             for page in ImageSequence.Iterator(opened):
                 coloured = page.mode not in _GREY
                 plain = page.convert("L") if coloured or page.mode in ("1", "LA") else page
@@ -58,6 +59,15 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
     except Exception as error:  # whatever a codec raises on damage
         why = " ".join(str(error).split())[:150] or type(error).__name__
         raise RecordingError(f"{file.name}: damaged ({why})") from None
+
+
+def _require_few(opened: Any) -> None:
+    """What the pages declare, before any is decoded: packed, they may be small."""
+    pages, (width, height) = getattr(opened, "n_frames", 1), opened.size
+    if pages * width * height > MOST:
+        raise RecordingError(
+            f"{pages} images of {width} x {height} px, more than {MOST} bytes; split the stack"
+        )
 
 
 def _has_colour(page: Any) -> bool:
