@@ -25,23 +25,24 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
     declared = (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
     video = _opened(path)
     _require_square(video.get(cv2.CAP_PROP_SAR_NUM), video.get(cv2.CAP_PROP_SAR_DEN))
-    _require_few(*(video.get(key) for key in declared), every)
-    images, t, count, colour = [], [], 0, False
+    count, width, height = (video.get(key) for key in declared)
+    _require_few(count, width, height, every)
+    images, t, made, colour = [], [], 0, False
     while video.isOpened():
         done, frame = video.read()
         if not done:
             break
         stamp = video.get(cv2.CAP_PROP_POS_MSEC)  # of the frame just read
-        if count % int(every) == 0:
+        if made % int(every) == 0:
             shade = np.ptp(frame[::8, ::8].astype(np.int16), axis=2) if frame.ndim == 3 else [0]
             colour = colour or float(np.max(shade)) > _GREY
             images.append(cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) if frame.ndim == 3 else frame)
             t.append(1e-3 * stamp)
-        count += 1
+        made += 1
         if sum(image.size for image in images[:1]) * len(images) > MOST:
             raise RecordingError(
                 f"frames of {images[0].shape[1]} x {images[0].shape[0]} beyond {MOST} bytes after "
-                f"{count}; take fewer: --map every=10, or cut it"
+                f"{made}; take fewer: --map every=10, or cut it"
             )
     if not images:
         raise RecordingError("no frame of it can be decoded: cut, damaged, or no video")
@@ -50,7 +51,7 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
         "t": np.array(t),
         "rate": np.array(video.get(cv2.CAP_PROP_FPS)),
         "declared": np.array(video.get(cv2.CAP_PROP_FRAME_COUNT)),
-        "decoded": np.array(count),
+        "decoded": np.array(made),
         "colour": np.array(colour),
     }
 
