@@ -1,5 +1,6 @@
 """Several logs of one test as one: the mean, its scatter by specimens, and what that is worth."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -119,19 +120,20 @@ def as_workbook(text: Path) -> Path:
     return text.with_suffix(".xlsx")
 
 
+@pytest.mark.parametrize(
+    "written", [Path, pytest.param(as_workbook, marks=pytest.mark.slow)], ids=["text", "workbook"]
+)
 def test_the_specimens_of_one_file_are_repeats(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    written: Callable[[Path], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = two_specimens(tmp_path)
-    out = tmp_path / "mean.mcap"
-    for path in (text, as_workbook(text)):
-        assert run(["import", str(path), "-o", str(out)]) == 2
-        assert "specimen=all" in capsys.readouterr().err
-        given = ["--map", "specimen=all", "--specimens", "each"]
-        assert run(["import", str(path), "-o", str(out), *given]) == 0
-        recording = read_recording(out)
-        assert repeats_share(recording) == pytest.approx(0.1, rel=1e-4)
-        assert {"force/both-1", "force/both-2"} <= set(recording.signals)
+    path, out = written(two_specimens(tmp_path)), tmp_path / "mean.mcap"
+    assert run(["import", str(path), "-o", str(out)]) == 2
+    assert "specimen=all" in capsys.readouterr().err
+    given = ["--map", "specimen=all", "--specimens", "each"]
+    assert run(["import", str(path), "-o", str(out), *given]) == 0
+    recording = read_recording(out)
+    assert repeats_share(recording) == pytest.approx(0.1, rel=1e-4)
+    assert {"force/both-1", "force/both-2"} <= set(recording.signals)
 
 
 def test_logs_are_counted_from_contact(tmp_path: Path) -> None:
