@@ -8,17 +8,20 @@ from validate.errors import RecordingError
 from validate.recording.formats.options import length, spread
 from validate.recording.formats.recorded import distinct, recorded
 from validate.recording.formats.text_rows import (
+    ABSENT,
     TextRow,
     TextRows,
+    as_number,
     numbers,
     text_rows,
     told_left,
     whole_points,
+    without_zeros,
 )
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Markers, Recording
 
-_MAGIC = b"NO_OF_FRAMES"
+_MAGIC = (b"NO_OF_FRAMES", b"FILE_VERSION")  # the latter since its version 2.0.0
 _NAMES = "MARKER_NAMES"
 _OPTIONS = ("unit", "sd", "frame")
 
@@ -38,8 +41,7 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     before = _before(body, len(names))
     values, rows, left = numbers(held, body, before + 3 * len(names))
     x = values[:, before:].reshape(len(values), -1, 3)
-    x = np.where((x == 0).all(axis=2, keepdims=True), np.nan, x)
-    x = whole_points(held, x, names, rows)
+    x = whole_points(held, without_zeros(x)[0], names, rows)
     factor = length({"unit": "mm", **options}, "unit", "mm")
     t = np.arange(len(values)) / rate
     markers = Markers(t, names, factor * x, spread(options), options.get("frame", "capture"))
@@ -55,9 +57,9 @@ def read_qualisys(path: Path, options: Options) -> Recording:
 
 def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRow]]:
     """Header, names of the points, and the rows of numbers."""
-    if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
+    if not held.rows or held.rows[0].cell(0).encode() not in _MAGIC:
         raise RecordingError(f"{held.name}: no Qualisys text: its first cell is not NO_OF_FRAMES")
-    keys = [r for r in held.rows if r.cell(0).isupper() and not r.cell(0).isnumeric()]
+    keys = [r for r in held.rows if r.cell(0).isupper() and r.cell(0) not in ABSENT]
     header = {r.cell(0): r.cell(1) for r in keys if r.cell(0) != _NAMES}
     if header.get("DATA_INCLUDED", "3D") != "3D":
         raise RecordingError(
@@ -72,24 +74,13 @@ def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRo
         )
     last = max(r.line for r in keys)
     rows = [r for r in held.rows if r.line > last and any(r.cells)]
-    if rows and not _is_number(next(c for c in rows[0].cells if c)):
+    if rows and not any(as_number(c) is not None for c in rows[0].cells):
         rows = rows[1:]  # a line of column names
     return header, distinct(named, len(named)), rows
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
 def _rate(held: TextRows, header: dict[str, str]) -> float:
-    try:
-        rate = float(header.get("FREQUENCY", ""))
-    except ValueError:
-        rate = 0.0
+    rate = as_number(header.get("FREQUENCY", "")) or 0.0
     if not 0 < rate < np.inf:
         raise RecordingError(
             f"{held.name}: FREQUENCY '{header.get('FREQUENCY', '')}' is no number of Hz above 0"
@@ -106,7 +97,7 @@ def _before(rows: list[TextRow], points: int) -> int:
 QUALISYS = Reader(
     "qualisys",
     "motion capture (Qualisys TSV)",
-    lambda p: head(p, 12) == _MAGIC,
+    lambda p: head(p, 15).removeprefix(b"\xef\xbb\xbf")[:12] in _MAGIC,
     read_qualisys,
-    "its first cell is NO_OF_FRAMES",
+    "its first cell is NO_OF_FRAMES or FILE_VERSION",
 )

@@ -1,8 +1,8 @@
 """Tables of coordinates as motion capture and trackers write them: rows of cells and numbers.
 
-A blank cell, `nan` or `-` is "not seen". Programs that log write line by line: where one was ended
-the last line is cut. It is left out then, and the recording says so; every other odd line is an
-error that names it.
+A blank cell, `nan`, `NULL` or `-` is "not seen". Where no number has a point a comma is one.
+Programs that log write line by line: where one was ended the last line is cut. It is left out then,
+and the recording says so; every other odd line is an error that names it.
 """
 
 import csv
@@ -19,7 +19,7 @@ from validate.recording.exports.encoding import decode, whole_file
 
 ASSUMED = "assumed"  # a record: what was taken of a file and what decided, a line each
 LEFT_OUT = "left out"  # a record's key: what of the file did not become data
-_ABSENT = {"", "nan", "NaN", "NAN", "-"}
+ABSENT = {"", "nan", "NaN", "NAN", "-", "NULL", "Null", "null"}
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,8 @@ def numbers(
             )
     wanted = range(width) if columns is None else columns
     texts = [[_plain(row.cell(i)) for i in wanted] for row in whole]
+    if not any("." in text for row in texts for text in row):
+        texts = [[_pointed(text) for text in row] for row in texts]
     try:
         found = np.array(texts, dtype=np.float64)
     except ValueError:
@@ -100,7 +102,27 @@ def numbers(
 
 
 def _plain(cell: str) -> str:
-    return "nan" if cell in _ABSENT else cell
+    return "nan" if cell in ABSENT else cell
+
+
+def _pointed(cell: str) -> str:
+    """With the comma of a decimal number as a point."""
+    return cell.replace(",", ".") if cell.count(",") == 1 else cell
+
+
+def as_number(cell: str) -> float | None:
+    """A number with either sign of decimals; none where it is no number."""
+    try:
+        return float(_pointed(cell))
+    except ValueError:
+        return None
+
+
+def without_zeros(x: Floats) -> tuple[Floats, int]:
+    """Points (nt, k, 3), those that are exactly zero as not seen, and how many: programs write
+    zeros for what no camera saw, and no camera sees a point at zero in all digits."""
+    zero = (x == 0).all(axis=2, keepdims=True)
+    return np.where(zero, np.nan, x), int(zero.sum())
 
 
 def _first_odd(rows: Sequence[TextRow], columns: Sequence[int]) -> str:
@@ -130,7 +152,7 @@ def _whole(
 
 
 def _decimals(cell: str) -> int:
-    found = re.fullmatch(r"[-+]?\d*\.(\d*)(?:[eE].*)?", cell)
+    found = re.fullmatch(r"[-+]?\d*[.,](\d*)(?:[eE].*)?", cell)
     return len(found[1]) if found else 0
 
 

@@ -18,16 +18,27 @@ from validate.recording.formats.recorded import begun, distinct, recorded
 from validate.recording.formats.text_rows import (
     TextRow,
     TextRows,
+    as_number,
     numbers,
     text_rows,
     told_left,
     whole_points,
+    without_zeros,
 )
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Markers, Recording, Signal, Stream
 
 _POINTS, _DEVICES = "Trajectories", "Devices"
-_TITLES = (_POINTS, _DEVICES, "Segments", "Joints", "Model Outputs", "Events", "Force Plates")
+_TITLES = (
+    _POINTS,
+    _DEVICES,
+    "Segments",
+    "Joints",
+    "Model Outputs",
+    "Events",
+    "Force Plates",
+    "Objects",
+)
 _OPTIONS = ("unit", "sd", "frame")
 _BEFORE = 2  # columns before the first value: frame, sub-frame
 
@@ -100,10 +111,7 @@ def _block(held: TextRows, rows: tuple[TextRow, ...]) -> CsvBlock | None:
     if len(rows) < 6:
         return None
     _, rate, names, columns, units, *values = rows
-    try:
-        hz = float(rate.cell(0))
-    except ValueError:
-        hz = 0.0
+    hz = as_number(rate.cell(0)) or 0.0
     if not 0 < hz < np.inf:
         raise RecordingError(
             f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is no rate in Hz; damaged"
@@ -122,7 +130,8 @@ def _points(held: TextRows, block: CsvBlock, options: Options) -> tuple[Markers,
     names = distinct([block.names[i] if i < len(block.names) else "" for i in at], len(at))
     values, rows, left = numbers(held, block.rows, block.width)
     columns = np.array(at)[:, None] + np.arange(3)
-    x = whole_points(held, values[:, columns], names, rows)
+    shown, zeros = without_zeros(values[:, columns])
+    x = whole_points(held, shown, names, rows)
     unit = next((u for u in block.units[_BEFORE:] if u), "")
     factor, stated = metres(options, unit, held.name)
     markers = Markers(
@@ -131,6 +140,7 @@ def _points(held: TextRows, block: CsvBlock, options: Options) -> tuple[Markers,
     )  # fmt: skip
     missing = f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}"
     return markers, {"unit": stated, "rate_hz": repr(block.rate), "points_not_seen": missing,
+                     **({"three zeros": f"{zeros} points, taken as not seen"} if zeros else {}),
                      **told_left(left)}  # fmt: skip
 
 

@@ -1,0 +1,151 @@
+"""What Vicon, Qualisys and OptiTrack export by their settings: decimal commas, separators, what was
+not seen, versions of headers, units, rotations. Two points over two frames, the second not seen in
+the second frame."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import here
+
+from validate.errors import RecordingError
+from validate.recording.readers import recognised
+from validate.recording.types import Recording
+
+A, B = [1.5, 2.0, 3.25], [4.0, 5.0, 6.0]
+GONE = {"blank": "{s}{s}", "zeros": "0{s}0{s}0", "decimal zeros": "0.000{s}0.000{s}0.000",
+        "NaN": "NaN{s}NaN{s}NaN", "NULL": "NULL{s}NULL{s}NULL"}  # fmt: skip
+
+
+def rows(separator: str, gone: str, before: tuple[str, str] = ("", ""), comma: bool = False) -> str:
+    def text(values: list[float]) -> str:
+        return separator.join(str(v) for v in values)
+
+    first = before[0] + text(A) + separator + text(B)
+    second = before[1] + text(A) + separator + GONE[gone].format(s=separator)
+    table = f"{first}\n{second}\n"
+    return table.replace(".", ",") if comma else table
+
+
+def vicon(
+    separator: str, gone: str, unit: str = "mm", comma: bool = False, lone: bool = True
+) -> str:
+    s, units = separator, separator.join([unit] * 6)
+    end = "" if lone else 7 * s
+    head = f"Trajectories{end}\n100{end}\n{s}{s}x:A{s}{s}{s}x:B{s}{s}\nFrame{s}Sub Frame{s}"
+    head += f"X{s}Y{s}Z{s}X{s}Y{s}Z\n{s}{s}{units}\n"
+    return head + rows(s, gone, (f"1{s}0{s}", f"2{s}0{s}"), comma)
+
+
+def qualisys(gone: str, version: int = 1, event: bool = False, comma: bool = False) -> str:
+    head = "NO_OF_FRAMES\t2\nNO_OF_CAMERAS\t8\nNO_OF_MARKERS\t2\nFREQUENCY\t100\nDESCRIPTION\t--\n"
+    head += "TIME_STAMP\t2020-01-01, 10:00:00.000\t12345.6\nDATA_INCLUDED\t3D\n"
+    head += "EVENT\tHeel strike\t5\t0.04\n" if event else ""
+    head += "MARKER_NAMES\tA\tB\n"
+    if version == 1:
+        return head + rows("\t", gone, comma=comma)
+    head = "FILE_VERSION\t2.0.0\n" + head + "TRAJECTORY_TYPES\tMeasured\tMixed\n"
+    head += "Frame\tTime\tA X\tA Y\tA Z\tB X\tB Y\tB Z\n"
+    return head + rows("\t", gone, ("1\t0.00\t", "2\t0.01\t"), comma)
+
+
+def optitrack(separator: str, version: str, unit: str, turn: str, comma: bool = False) -> str:
+    wide = 4 if turn == "Quaternion" else 3
+    kinds = ["Rigid Body"] * (wide + 4) + ["Marker"] * 6
+    names = ["Box"] * (wide + 4) + ["A"] * 3 + ["B"] * 3
+    parts = ["Rotation"] * wide + ["Position"] * 3 + ["Mean Marker Error"] + ["Position"] * 6
+    axes = [*"XYZW"[:wide], *"XYZ", "", *"XYZXYZ"]
+    lines = [["", "Type", *kinds], ["", "Name", *names], ["", "ID", *["1"] * len(names)]]
+    if version == "1.24":
+        lines.append(["", "Parent", *["Box"] * len(names)])
+    lines += [["", "", *parts], ["Frame", "Time (Seconds)", *axes]]
+    head = ["Format Version", version, "Take Name", "T", "Rotation Type", turn, "Length Units",
+            unit, "Coordinate Space", "Global"]  # fmt: skip
+    s = separator
+    pose = [*(["0"] * (wide - 1)), "1", "7", "8", "9", "0.5"]
+    before = tuple(s.join([str(k), f"0.0{k}", *pose]) + s for k in range(2))
+    told = "\n".join(s.join(line) for line in [head, [], *lines])
+    return f"{told}\n{rows(s, 'blank', before, comma)}"  # type: ignore[arg-type]
+
+
+CASES = {
+    **{f"vicon {g}": vicon(",", g) for g in GONE},
+    "vicon semicolons": vicon(";", "blank", lone=False),
+    "vicon decimal comma": vicon(";", "zeros", comma=True, lone=False),
+    "vicon decimal comma, lone": vicon(";", "blank", comma=True),
+    "vicon tabs": vicon("\t", "blank"),
+    "vicon metres": vicon(",", "blank", unit="m"),
+    **{f"qualisys {g}": qualisys(g) for g in GONE},
+    **{f"qualisys 2 {g}": qualisys(g, 2) for g in GONE},
+    "qualisys decimal comma": qualisys("blank", comma=True),
+    "qualisys 2 decimal comma": qualisys("decimal zeros", 2, comma=True),
+    "qualisys event": qualisys("NULL", event=True),
+    "optitrack 1.21 metres": optitrack(",", "1.21", "Meters", "Quaternion"),
+    "optitrack 1.23 angles": optitrack(",", "1.23", "Millimeters", "XYZ"),
+    "optitrack 1.24 cm": optitrack(",", "1.24", "Centimeters", "Quaternion"),
+    "optitrack decimal comma": optitrack(";", "1.23", "Millimeters", "Quaternion", comma=True),
+}
+
+
+def read(path: Path, text: str, start: bytes = b"") -> Recording:
+    path.write_bytes(start + text.encode())
+    return recognised(path).read(path, {})
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_export_holds_the_same_points(name: str, tmp_path: Path) -> None:
+    got = read(tmp_path / "x.csv", CASES[name])
+    scale = {"metres": 1.0, "cm": 0.01}.get(name.split()[-1], 0.001)
+    wanted = scale * np.array([[A, B], [A, [np.nan] * 3]])
+    assert got.marker("markers").x == pytest.approx(wanted, rel=1e-12, nan_ok=True)
+    assert got.marker("markers").names in (("A", "B"), ("x:A", "x:B"))
+    assert got.marker("markers").t == pytest.approx([0, 0.01])
+    if name.startswith("optitrack"):
+        quaternion = "angles" not in name
+        assert ("Box/rotation" in got.signals) == quaternion
+        assert got.unread == ({} if quaternion else {"Box": "its rotation is no quaternion"})
+
+
+@pytest.mark.parametrize("name", ["vicon blank", "qualisys 2 NULL", "optitrack 1.24 cm"])
+def test_a_mark_of_the_encoding_changes_nothing(name: str, tmp_path: Path) -> None:
+    got = read(tmp_path / "x.csv", CASES[name], b"\xef\xbb\xbf")
+    assert got.marker("markers").x.shape == (2, 2, 3)
+
+
+def test_a_row_that_begins_with_null_loses_no_row(tmp_path: Path) -> None:
+    """It looks like a line of the header, which ended the header there."""
+    table = "1.5\t2\t3\t4\t5\t6\nNULL\tNULL\tNULL\t4\t5\t6\n1.5\t2\t3\t4\t5\t6\n"
+    head = qualisys("blank").split("1.5")[0]
+    x = read(tmp_path / "x.tsv", head + table).marker("markers").x
+    assert x.shape == (3, 2, 3)
+    assert np.isnan(x[1, 0]).all()
+
+
+def test_zeros_that_were_taken_as_not_seen_are_told(tmp_path: Path) -> None:
+    got = read(tmp_path / "x.csv", CASES["vicon zeros"])
+    assert got.metadata["provenance"]["three zeros"] == "1 points, taken as not seen"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (qualisys("blank", 2).replace("\t3D", "\t6D"), "data of kind '6D'; only 3D is read"),
+        ("Objects\n100\n,,Box\nFrame,Sub Frame,RX\n,,rad\n1,0,0.1\n", "it has Objects"),
+        (vicon(";", "blank").replace("1.5", "1,5"), "'1,5' is no number"),
+    ],
+)
+def test_what_is_not_read_is_named(text: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=says):
+        read(tmp_path / "x.csv", text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("vicon", "vicon decimal comma"), ("qualisys", "qualisys 2 NULL")]
+)
+def test_import_and_inspect_by_the_command(kind: str, name: str, tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(CASES[name])
+    given = (str(tmp_path / "x.csv"), "--as", kind)
+    assert "markers" in here("inspect", *given)[1]
+    code, said, _ = here("import", *given, "-o", str(tmp_path / "y.mcap"))
+    assert code == 0
+    assert "markers" in said
