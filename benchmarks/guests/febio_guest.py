@@ -20,6 +20,7 @@ import numpy as np
 
 CELLS = {10: "tet4", 12: "hex8", 24: "tet10"}
 DOFS = "xyz"
+HEX8 = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
 def arrays(path):
@@ -143,21 +144,51 @@ def control(spec, job, steps, step):
     child(stepper, "dtmax", f"{step:.12e}")
 
 
+def shares(points, cells):
+    """Volume (e, k) m3 of each cell that its nodes have: the integrals of their shape functions."""
+    x, k = points[cells], cells.shape[1]
+    if k != 8:
+        volume = np.abs(np.linalg.det(x[:, 1:4] - x[:, :1])) / 6
+        return np.outer(volume, [-1 / 20] * 4 + [1 / 5] * 6 if k == 10 else [1 / 4] * 4)
+    found = np.zeros(cells.shape)
+    for at in HEX8 / np.sqrt(3):
+        factors = (1 + HEX8 * at) / 2
+        slopes = [HEX8[:, i] / 2 * np.delete(factors, i, 1).prod(1) for i in range(3)]
+        found += np.linalg.det(np.einsum("ia,eaj->eij", slopes, x))[:, None] * factors.prod(1)
+    return found
+
+
 def weights(points, cells, job):
-    """Mass (n,) kg of every node, a cell's in equal shares (tet10: in its own), and what hangs."""
-    x = points[cells[:, [0, 1, 3, 4]]] if cells.shape[1] == 8 else points[cells[:, :4]]
-    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (1 if cells.shape[1] == 8 else 6)
-    share = np.array([-1 / 20] * 4 + [1 / 5] * 6) if cells.shape[1] == 10 else 1 / cells.shape[1]
+    """Mass (n,) kg of every node, of the body and of what hangs."""
     found = np.zeros(len(points))
-    rho = job["material"].get("rho", 0.0)
-    np.add.at(found, cells, rho * volume[:, None] * share * np.ones(cells.shape[1]))
+    np.add.at(found, cells, job["material"].get("rho", 0.0) * shares(points, cells))
     np.add.at(found, job["masses"]["nodes"], job["masses"]["kg"])
     return found
+
+
+def apart(drives):
+    """The same motion, no unknown in two drives: a later `bc` would replace the earlier."""
+    moved = {}
+    for j, d in enumerate(drives):
+        for n, c, p in zip(d["nodes"], d["components"], d["per_unit"], strict=True):
+            moved.setdefault((n, c), []).append((j, p))
+    if all(len(by) == 1 for by in moved.values()):
+        return drives
+    groups = {}
+    for unknown, by in moved.items():
+        groups.setdefault(tuple(by), []).append(unknown)
+    return [
+        {"name": f"drives {i}", "nodes": [n for n, _ in at], "components": [c for _, c in at],
+         "per_unit": [1.0] * len(at),
+         "history": sum(p * np.array(drives[j]["history"]) for j, p in by).tolist()}
+        for i, (by, at) in enumerate(groups.items(), 1)
+    ]  # fmt: skip
 
 
 def document(job, path, used, could_not):
     """The .feb of a job; statics count the job's instants in place of seconds."""
     points, cells, kind = arrays(path)
+    job = job | {"drives": apart(job["drives"])}
     t = np.array(job["instants"])
     if job["inertia"] and np.ptp(np.diff(t)) > 1e-6 * t[-1] / len(t):
         raise LookupError("dynamics of uneven times")

@@ -23,6 +23,7 @@ PLUGINS = (
     "Sofa.Component.StateContainer", "Sofa.Component.Topology.Container.Dynamic",
 )  # fmt: skip
 CELLS = {10: "tetrahedra", 12: "hexahedra"}
+HEX8 = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 SCENE = '''"""A job of `validate` as a scene: runSofa -l SofaPython3 -g batch -n {steps} scene.py"""
 
 import json
@@ -143,12 +144,23 @@ def constraints(job, shape):
     return found
 
 
+def shares(points, cells):
+    """Volume (e, k) m3 of each cell that its nodes have: the integrals of their shape functions."""
+    x = points[cells]
+    if cells.shape[1] == 4:
+        return np.outer(np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6, [1 / 4] * 4)
+    found = np.zeros(cells.shape)
+    for at in HEX8 / np.sqrt(3):
+        factors = (1 + HEX8 * at) / 2
+        slopes = [HEX8[:, i] / 2 * np.delete(factors, i, 1).prod(1) for i in range(3)]
+        found += np.linalg.det(np.einsum("ia,eaj->eij", slopes, x))[:, None] * factors.prod(1)
+    return found
+
+
 def weights(points, cells, rho):
-    """Mass (n,) kg of every node, a cell's in equal shares."""
-    x = points[cells[:, [0, 1, 3, 4]]] if cells.shape[1] == 8 else points[cells]
-    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (1 if cells.shape[1] == 8 else 6)
+    """Mass (n,) kg of every node."""
     found = np.zeros(len(points))
-    np.add.at(found, cells, rho * volume[:, None] / cells.shape[1] * np.ones(cells.shape[1]))
+    np.add.at(found, cells, rho * shares(points, cells))
     return found
 
 

@@ -8,15 +8,18 @@ import sys
 import types
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from validate.arrays import Floats
 from validate.scene.box import box, grid
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
 from validate.solve.guests.answer import read_answer
 from validate.solve.guests.job import GuestJob, write_job
@@ -101,16 +104,31 @@ def test_a_feb_has_the_sections_and_sets_of_its_format(tmp_path: Path) -> None:
     assert (answer.state, "febio4 body.feb" in answer.why) == ("cannot_run", True)
 
 
+def skewed() -> Scene:
+    """Hexahedra that are no boxes, whose top two drives move along one direction."""
+    plain, rng = grid(SIZE, (2, 2, 2)), np.random.default_rng(2)
+    nodes = plain.nodes + rng.uniform(-1e-3, 1e-3, plain.nodes.shape)
+    mesh = Mesh(nodes, plain.cells, plain.kind, plain.facets)
+    drives = Drive("push", "z1", (0.0, 0.0, -1.0)), Drive("lean", "z1", (0.0, 0.0, -1.0))
+    return replace(TET, mesh=mesh, supports=TET.supports[:1], drives=drives)
+
+
+LEANING = np.insert(INPUTS, 1, [4e-4, 5e-4, 6e-4], axis=1)
+
+
 @pytest.mark.usefixtures("bare")
-def test_a_feb_holds_moves_and_pulls_as_the_job_does(tmp_path: Path) -> None:
-    job = written("febio", tmp_path, TET)
+@pytest.mark.parametrize(("scene", "inputs"), [(TET, INPUTS), (skewed(), LEANING)])
+def test_a_feb_holds_moves_and_pulls_as_the_job_does(
+    tmp_path: Path, scene: Scene, inputs: Floats
+) -> None:
+    job = written("febio", tmp_path, scene, inputs=inputs)
     spec = ET.parse(tmp_path / "body.feb").getroot()
     sets = {s.get("name"): np.array(vector(s.text), dtype=int) - 1 for s in spec.iter("NodeSet")}
     curves = {
         c.get("id"): [vector(p.text) for p in c.iter("pt")] for c in spec.iter("load_controller")
     }
     at = {k: dict(map(tuple, v)) for k, v in curves.items()}  # type: ignore[arg-type]
-    u, f = np.full(TET.mesh.nodes.shape, np.nan), np.zeros(TET.mesh.nodes.shape)
+    u, f = np.full(scene.mesh.nodes.shape, np.nan), np.zeros(scene.mesh.nodes.shape)
     for bc in spec.iter("bc"):
         own = sets[bc.get("node_set")]
         if bc.get("type") == "zero displacement":
@@ -120,6 +138,7 @@ def test_a_feb_holds_moves_and_pulls_as_the_job_does(tmp_path: Path) -> None:
             value = bc.find("value")
             assert value is not None
             c = "xyz".index(bc.findtext("dof", ""))
+            assert np.isnan(u[own, c]).all()  # a later one would replace it
             u[own, c] = vector(value.text)[0] * at[value.get("lc")][3.0]
     for load in spec.iter("nodal_load"):
         assert load.get("type") == "nodal_force"
@@ -127,12 +146,22 @@ def test_a_feb_holds_moves_and_pulls_as_the_job_does(tmp_path: Path) -> None:
         assert value is not None
         f[sets[load.get("node_set")]] += np.array(vector(value.text)) * at[value.get("lc")][3.0]
     system = job.system
-    asked = (system.moves @ INPUTS[2, :1]).reshape(u.shape)
+    asked = (system.moves @ inputs[2, : len(scene.drives)]).reshape(u.shape)
     held = np.zeros(u.size, bool)
     held[system.held] = True
     assert np.array_equal(np.isfinite(u.ravel()), held)
     assert u.ravel()[held] == pytest.approx(asked.ravel()[held])
-    assert f == pytest.approx((system.loads @ INPUTS[2, 1:]).reshape(f.shape), abs=1e-12)
+    assert f == pytest.approx(
+        (system.loads @ inputs[2, len(scene.drives) :]).reshape(f.shape), abs=1e-12
+    )
+
+
+def test_sofa_weighs_hexahedra_that_are_no_boxes_as_we_do(tmp_path: Path) -> None:
+    scene = skewed()
+    job = write_job(tmp_path, scene, T, LEANING, False, 1e-6)
+    path = Path(__file__).parents[2] / "benchmarks" / "guests" / "sofa_guest.py"
+    mass = runpy.run_path(str(path))["weights"](scene.mesh.nodes, scene.mesh.cells, 1000.0)
+    assert mass == pytest.approx(-job.system.loads[2::3, 1])
 
 
 LOG = """#!{python}
