@@ -127,13 +127,13 @@ def test_a_feb_holds_moves_and_pulls_as_the_job_does(
     curves = {
         c.get("id"): [vector(p.text) for p in c.iter("pt")] for c in spec.iter("load_controller")
     }
-    at = {k: dict(map(tuple, v)) for k, v in curves.items()}  # type: ignore[arg-type]
+    at = {k: {point[0]: point[1] for point in v} for k, v in curves.items()}
     u, f = np.full(scene.mesh.nodes.shape, np.nan), np.zeros(scene.mesh.nodes.shape)
     for bc in spec.iter("bc"):
         own = sets[bc.get("node_set")]
         if bc.get("type") == "zero displacement":
             free = [bc.findtext(f"{c}_dof") for c in "xyz"]
-            u[np.ix_(own, [i for i, on in enumerate(free) if on == "1"])] = 0.0
+            u[np.ix_(own, np.array([i for i, on in enumerate(free) if on == "1"]))] = 0.0
         else:
             value = bc.find("value")
             assert value is not None
