@@ -129,3 +129,17 @@ def test_a_missing_library_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"x")
     with pytest.raises(UsageError, match=r"pip install 'validate-tissue\[c3d\]'"):
         apart.decoded("absent_decoder", tmp_path / "file", "c3d")
+
+
+@pytest.mark.parametrize("name", [b"FRAMES", b"USED", b"LABELS"])
+def test_a_forged_number_of_values_is_told_before_any_library_reads_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: bytes
+) -> None:
+    path = written(tmp_path / "x.c3d")
+    raw = bytearray(path.read_bytes())
+    at = raw.index(name) + len(name) + 3
+    raw[at : at + 8] = bytes([7, *[255] * 7])
+    path.write_bytes(raw)
+    monkeypatch.setattr("validate.recording.formats.c3d.decoded", None)
+    with pytest.raises(RecordingError, match=rf"'{name.decode()}' tells of 7\.01e\+16 values"):
+        read_c3d(path, {})

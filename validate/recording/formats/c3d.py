@@ -5,6 +5,8 @@ meet in a point, not a standard deviation: it is told, never used as one.
 """
 
 import struct
+from collections.abc import Iterator
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from validate.recording.types import Markers, Record, Recording, Signal
 
 MARKERS = "markers"
 _BLOCK = 512  # bytes
+_BIG = 86  # the processor whose numbers stand the other way round
 _KEY = 80  # the second byte of every C3D file
 _OPTIONS = ("unit", "sd", "frame")
 
@@ -64,6 +67,39 @@ def _require_whole(path: Path) -> None:
             f"{path.name}: {size} bytes, its header tells of {frames} frames of {points} points "
             f"and {analog} analog numbers: {needs} bytes; cut or damaged"
         )
+    _require_parameters(path, head(path, _BLOCK * (start - 1)), _BLOCK * max(first[0] - 1, 1))
+
+
+def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
+    """No parameter tells of more values than the file has bytes left: ezc3d takes memory for them
+    before it reads, for seconds."""
+    size = path.stat().st_size
+    for name, dimensions, at in _parameters(raw, begin):
+        told = prod(d for d in dimensions if d)
+        if told > size - at:
+            raise RecordingError(
+                f"{path.name}: its parameter {name!r} tells of {told:.3g} values, {size - at} "
+                "bytes are left: damaged"
+            )
+
+
+def _parameters(raw: bytes, begin: int) -> Iterator[tuple[str, bytes, int]]:
+    """Name, dimensions and place of each parameter, as far as their links lead; groups have none.
+
+    C3D user guide, parameter section: four bytes, then records that are linked.
+    """
+    order = ">" if raw[begin + 3 : begin + 4] == bytes([_BIG]) else "<"
+    at, ahead = begin + 4, 1
+    while ahead > 0 and at + 2 <= len(raw):
+        length, group = struct.unpack("bb", raw[at : at + 2])
+        after = at + 2 + abs(length)  # of a locked one it is negative
+        if length == 0 or after + 4 > len(raw):
+            return
+        if group > 0:
+            name = raw[at + 2 : after].decode("ascii", "replace")
+            yield name, raw[after + 4 : after + 4 + raw[after + 3]], after
+        (ahead,) = struct.unpack(f"{order}h", raw[after : after + 2])
+        at = after + ahead
 
 
 def _markers(found: dict[str, Any], rate: float, factor: float, sd: float, frame: str) -> Markers:
