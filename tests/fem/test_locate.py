@@ -5,12 +5,14 @@ import pytest
 from phantoms import CAPSULE, COARSE_GRID, grid_mesh, phantom_mesh
 
 from validate.errors import RegistrationError
+from validate.fem.feet import nearest_on_surface
 from validate.fem.locate import (
     barycentric_rows,
     facet_samples,
     nearest_node_rows,
     probe_rows,
     require_inside,
+    standing_rows,
 )
 from validate.scene.box import box
 from validate.scene.mesh import Mesh, quadratic
@@ -112,3 +114,18 @@ def test_a_marker_on_a_stalk_is_turned_with_the_surface(order: int) -> None:
     assert ((rows.outside[:2] >= 0.006 - 1e-12) & (rows.outside[:2] < 0.009)).all()
     u = np.random.default_rng(1).normal(size=mesh.nodes.shape)
     assert np.allclose(rows.apply(u)[2], barycentric_rows(mesh, points).apply(u)[2])
+
+
+def test_the_foot_of_a_marker_on_a_stalk_is_the_nearest_point_of_the_surface() -> None:
+    """Off faces, edges and corners of a block of tetrahedra, and within it."""
+    mesh = box((0.1, 0.03, 0.03), (6, 2, 2))
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.02, 0.05, (200, 3)) + np.array([0.03, 0.0, 0.0])
+    nearest = np.clip(points, 0, [0.1, 0.03, 0.03])
+    out = np.linalg.norm(points - nearest, axis=1)
+    rows = standing_rows(mesh, points)
+    assert rows.outside == pytest.approx(out, abs=1e-12)
+    outside = points[out > 0]
+    assert nearest_on_surface(mesh, outside) == pytest.approx(nearest[out > 0], abs=1e-12)
+    G = rng.normal(size=(3, 3))
+    assert rows.apply(mesh.nodes @ G) == pytest.approx(points @ G, abs=1e-12)

@@ -156,7 +156,9 @@ def _prompted(question: Question) -> str:
     for line in _explained(question):
         say(line, indent="  ")
     while True:
-        answer = click.prompt(question.key, default=question.default, show_default=True)
+        answer = click.prompt(
+            question.key, default=question.default, show_default=bool(question.default)
+        )
         try:
             return question.checked(str(answer))
         except UsageError as error:

@@ -51,7 +51,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
         Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
                  "beside it", choices=tuple(_LAWS)),
     ]  # fmt: skip
-    asked += _of_the_load(recording, mesh, found) + _of_the_supports(mesh)
+    asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
     if forces and _unit(recording, found.get("moved.by", "")) == "m":
@@ -191,9 +191,11 @@ def _parsed(path: str, skip: str) -> Callable[[str], Any]:
 
 
 def _place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
+    """The first of them says what words there are; it is asked in every interview."""
     named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
+    words = f": {GRAMMAR}{named}; several joined by +" if key == "held.all" else ""
     return Question(
-        key, f"{text}: {GRAMMAR}{named}; several joined by +{'' if is_open else '; empty: none'}",
+        key, f"{text}{words}{'' if is_open else '; empty: none'}",
         open=is_open, check=lambda words: mesh is None or place_of(words, mesh),
     )  # fmt: skip
 

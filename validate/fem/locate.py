@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
+from validate.fem.feet import nearest_on_surface
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe
 from validate.scene.shape_functions import (
@@ -49,13 +50,18 @@ def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
 
 
 def standing_rows(mesh: Mesh, points: Floats) -> Rows:
-    """Rows of points off the surface, as markers on stalks: each moves with its foot on the cell
-    below it, and turns with that cell, by the slope of the affine field (least squares) of its
-    nodes. Points within the mesh are read as `barycentric_rows` does.
+    """Rows of points off the surface, as markers on stalks: each moves with its foot, the nearest
+    point of the surface (of bricks: of the nearest cell), and turns with the cell below it, by the
+    slope of the affine field (least squares) of its nodes. Points within the mesh are read as
+    `barycentric_rows` does.
     """
     rows = barycentric_rows(mesh, points)
+    off = rows.outside > 0
+    if off.any() and not mesh.bricks and mesh.dimension == 3:
+        below = np.where(off[:, None], nearest_on_surface(mesh, points), points)
+        rows = Rows(barycentric_rows(mesh, below).weights, np.linalg.norm(points - below, axis=1))
     weights, feet = rows.weights.copy(), rows.apply(mesh.nodes)
-    for i in np.flatnonzero(rows.outside > 0):
+    for i in np.flatnonzero(off):
         own = slice(weights.indptr[i], weights.indptr[i + 1])  # all nodes of the cell
         x = mesh.nodes[weights.indices[own]]
         affine = np.linalg.pinv(np.column_stack([np.ones(len(x)), x - x.mean(axis=0)]))

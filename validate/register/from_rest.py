@@ -52,7 +52,12 @@ def since_rest(
     """
     rest: Floats = whole.x[0]
     rows = standing_rows(mesh, rest)
-    require_inside(rows, whole.names, stands)
+    try:
+        require_inside(rows, whole.names, stands)
+    except RegistrationError as error:
+        raise RegistrationError(
+            f"{error}; of markers on stalks say how far: --set seen.stands=15mm"
+        ) from None
     moved = np.nan_to_num(whole.x - rest)
     most = moved[np.linalg.norm(moved, axis=2).max(axis=1).argmax()]
     centre = np.broadcast_to(whole.rest.mean(axis=0), rest.shape)
