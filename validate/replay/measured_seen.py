@@ -10,6 +10,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError, RecordingError, RegistrationError, UsageError
 from validate.identify.modulus import MIN_SAMPLES, load_noise
 from validate.recording.readers import recognised
+from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording, Signal
 from validate.register.clock import clock_sd, interpolated
 from validate.register.from_rest import noise, rested, since_rest
@@ -200,7 +201,7 @@ def _force(
         )
     return SignalObservation(
         topic, "validates", t[1:], y[1:, None], "N", force.sd, "force", "moved.force",
-        clock_sd(recording, topic),
+        clock_sd(recording, topic), repeats_share(recording),
     )  # fmt: skip
 
 
