@@ -107,10 +107,12 @@ def recording() -> Recording:
 
 
 HOLDS = (Held("0mm", 0.0, "m", 0.0), Held("3mm", 0.003, "m", 1.0))
+RING = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 6, 20)])
+SECTIONS = (0.01 + 0.004 * RING, 0.01 + 0.003 * RING, 0.01 + 0.002 * RING)
 
 
 def test_images_are_shown_with_the_outline_found_and_the_circle(recording: Recording) -> None:
-    (picture,) = outline_images(recording, "outline", HOLDS)
+    (picture,) = outline_images(recording, "outline", HOLDS, SECTIONS[:2], "a model")
     assert "The images 'b_mode'" in picture.caption
     radii = [part.split(" mm")[0] for part in picture.caption.split("mm: ")[1:]]
     assert [float(r) for r in radii] == pytest.approx([4.8, 4.0], abs=0.15)
@@ -129,7 +131,7 @@ def test_images_leave_room_for_their_labels(
     """Tall images, in one row and in two."""
     tall = Frames(np.array([0.0, 1.0, 2.0]), 3 * (np.zeros((310, 200), np.uint8),), (2e-4, 2e-4),
                   np.eye(4), "body")  # fmt: skip
-    ring = 0.02 + 0.01 * np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 6, 20)])
+    ring = 0.02 + 0.01 * RING
     found = Contours(tall.t, 3 * (ring,), 1e-4, np.eye(4), "body", "b_mode")
     made = replace(recording, frames={"b_mode": tall}, contours={"outline": found})
     seen: list[Figure] = []
@@ -140,12 +142,13 @@ def test_images_leave_room_for_their_labels(
 
     monkeypatch.setattr("validate.report.outline_images.draw", kept)
     holds = tuple(Held(f"{i}mm", 1e-3 * i, "m", float(i)) for i in range(count))
-    assert len(outline_images(made, "outline", holds)) == 1
+    assert len(outline_images(made, "outline", holds, SECTIONS[:count], "a model")) == 1
     assert faults(seen[0]) == []
 
 
 def test_outlines_recorded_as_such_show_no_images(recording: Recording) -> None:
     found = recording.contours["outline"]
     made = Contours(found.t, found.outlines, found.sd, found.pose, found.frame)
-    assert outline_images(replace(recording, contours={"outline": made}), "outline", HOLDS) == ()
-    assert outline_images(recording, "another", HOLDS) == ()
+    bare = replace(recording, contours={"outline": made})
+    assert outline_images(bare, "outline", HOLDS, SECTIONS[:2], "a model") == ()
+    assert outline_images(recording, "another", HOLDS, SECTIONS[:2], "a model") == ()

@@ -6,20 +6,25 @@ from scipy.spatial import cKDTree
 from validate.arrays import Floats
 from validate.scene.mesh import Mesh
 
-_NEAR = 48  # triangles tried a point, by their middles
 _EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 def nearest_on_surface(mesh: Mesh, points: Floats) -> Floats:
-    """Feet (k, 3) m of points on the flat facets of tetrahedra, among those whose middles are
-    near."""
+    """Feet (k, 3) m of points on the flat facets of tetrahedra.
+
+    The facet of the nearest middle bounds the distance; no facet whose middle is further off than
+    that and the largest facet's radius can be nearer.
+    """
     corners = mesh.nodes[mesh.surface[:, :3]]
-    count = min(_NEAR, len(corners))
-    _, near = cKDTree(corners.mean(axis=1)).query(points, count)
-    triangles = corners[np.reshape(near, (len(points), count))]
-    feet = _on_triangles(triangles, points[:, None])
-    best = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
-    return np.asarray(feet[np.arange(len(points)), best])
+    middles = corners.mean(axis=1)
+    tree, radius = cKDTree(middles), np.linalg.norm(corners - middles[:, None], axis=2).max()
+    feet = np.empty_like(points)
+    firsts = np.asarray(tree.query(points)[1])
+    for i, (p, first) in enumerate(zip(points, firsts, strict=True)):
+        bound = float(np.linalg.norm(_on_triangles(corners[[first]], p)[0] - p))
+        found = _on_triangles(corners[tree.query_ball_point(p, 1.001 * (bound + radius))], p)
+        feet[i] = found[np.linalg.norm(found - p, axis=1).argmin()]
+    return feet
 
 
 def _on_triangles(x: Floats, p: Floats) -> Floats:

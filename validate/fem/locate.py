@@ -20,6 +20,7 @@ from validate.scene.shape_functions import (
 )
 
 _CANDIDATES = 24  # nearest cell centres tried per point
+_ROUNDING = 1e-12  # of the body's size: how far off the surface a point within it may seem
 _INVERSIONS = 12  # Newton steps to a brick's local coordinates; a parallelepiped takes one
 _STRAY = 4.0  # how far outside its unit cell such a step may go: a brick's map folds further out
 
@@ -56,7 +57,7 @@ def standing_rows(mesh: Mesh, points: Floats) -> Rows:
     `barycentric_rows` does.
     """
     rows = barycentric_rows(mesh, points)
-    off = rows.outside > 0
+    off = rows.outside > _ROUNDING * float(np.ptp(mesh.nodes, axis=0).max())
     if off.any() and not mesh.bricks and mesh.dimension == 3:
         below = np.where(off[:, None], nearest_on_surface(mesh, points), points)
         rows = Rows(barycentric_rows(mesh, below).weights, np.linalg.norm(points - below, axis=1))
