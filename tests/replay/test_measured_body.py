@@ -235,6 +235,14 @@ def test_what_cannot_be_is_refused(
         compare(experiment(tmp_path, replace(BASE, **change), seen, "force", "marker"))
 
 
+def test_markers_that_rise_against_gravity_are_refused(tmp_path: Path) -> None:
+    """A frame whose z points down, or another axis up: 1 mm of rise instead of sag."""
+    p = replace(BASE, moved=MovedBy("gravity", None, "-z"), seen=SeenOf(markers="m", still=0.4))
+    seen = recording(markers={"m": tracked(lambda x: np.array([0.0, 0.0, 0.02]) * x)})
+    with pytest.raises(RegistrationError, match=r"against -z, along which 'gravity' moves"):
+        compare(experiment(tmp_path, p, seen, "marker"))
+
+
 def test_a_body_that_slides_on_its_plate_neither_drifts_nor_turns(tmp_path: Path) -> None:
     p = replace(BASE, held=HeldAt(slides="zmin"))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))

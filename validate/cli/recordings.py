@@ -10,6 +10,7 @@ from validate.errors import UsageError
 from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
+from validate.recording.chain import require_chain
 from validate.recording.exports.every import ALL, every_specimen
 from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
 from validate.recording.mcap.recover import recover
@@ -39,6 +40,7 @@ def import_files(
     else:
         recording = averaged(logs, labels_of(specimens, logs), out.stem)
         _tell(recording)
+    require_chain(recording)
     write_recording(recording, out)
     written(recording, out)
     for line in _besides(recording):
@@ -103,6 +105,7 @@ def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> 
     """Writes one recording with all streams, moved where the user says so."""
     try_file(out)
     merged = merge([read_recording(f) for f in files], out.stem)
+    require_chain(merged)
     for topic, text in pairs(shifts, "--shift").items():
         merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))
     write_recording(merged, out)

@@ -17,6 +17,7 @@ import numpy as np
 from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.alignment import RECORD as CLOCK_OFFSET
+from validate.recording.chain import chain_faults
 from validate.recording.clocks import GAP_FACTOR, clock_of
 from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.mcap.integrity import verify
@@ -118,7 +119,7 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
         attachments=0,
         metadata=tuple(recording.metadata),
         topics=(*(topic for topic, _ in topics), *never),
-        defects=tuple(line for _, found in topics for line in found),
+        defects=(*(line for _, found in topics for line in found), *chain_faults(recording)),
         read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
         facts=tuple(facts),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Scales of images and outlines beyond reason: by how much, and which unit may have been meant.
+"""Scales of images, outlines and markers beyond reason: by how much, and which unit may be meant.
 
 A recording whose metres are millimetres agrees with itself as well as any other, so it is asked
 back where images enter.
@@ -8,11 +8,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from validate.recording.types import Contours, Frames, Recording
+from validate.arrays import Floats
+from validate.recording.types import Contours, Frames, Markers, Recording
 
 _PIXELS = (1e-6, 1e-2)  # m: sides of a pixel from a microscope's to a photograph's of a table
 _EXTENTS = (1e-4, 5.0)  # m: of an image, from a cell's to a room's
 _OUTLINES = (1e-5, 5.0)  # m: of an outline in such an image
+_SPREADS = (1e-3, 50.0)  # m: of markers, from a biopsy's to a hall's
 _UNITS = (("mm", 1e-3), ("um", 1e-6))
 
 
@@ -30,7 +32,7 @@ def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = Non
 
 
 def odd_scales(recording: Recording) -> tuple[str, ...]:
-    """A line for every stream of images or outlines whose metres may be something else."""
+    """A line for every stream of images, outlines or markers whose metres may be something else."""
     return tuple(f"'{topic}': {text}" for topic, text in _odd(recording) if text)
 
 
@@ -39,12 +41,25 @@ def odd_stream(stream: object) -> str:
     if isinstance(stream, Frames):
         height, width = stream.images[0].shape
         return odd_pixel(stream.m_per_px, (height, width))
+    if isinstance(stream, Markers):
+        return _odd_spread(stream.x)
     return _odd_outlines(stream) if isinstance(stream, Contours) else ""
 
 
 def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
     for topic, stream in recording.streams.items():
         yield topic, odd_stream(stream)
+
+
+def _odd_spread(x: Floats) -> str:
+    """Of markers x (nt, k, d) m, by the first instant at which two of them are seen."""
+    seen = np.isfinite(x).all(axis=2)
+    at = np.flatnonzero(seen.sum(axis=1) >= 2)
+    size = float(np.ptp(x[at[0]][seen[at[0]]], axis=0).max()) if len(at) else 1.0
+    low, high = _SPREADS
+    if low <= size <= high or size == 0:
+        return ""
+    return f"markers {size:.3g} m apart are outside {low:g} to {high:g} m{_factor(size, _SPREADS)}"
 
 
 def _odd_outlines(contours: Contours) -> str:

@@ -21,6 +21,7 @@ from validate.register.signals import SignalObservation
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_outline import observed_outline
 from validate.scene.mesh import Mesh
+from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
 from validate.scene.select import Place
 from validate.scene.tracked import Prescribed
@@ -30,6 +31,7 @@ AS_SEEN = "as seen"
 Kind = Literal["weighs", "pulls", "moves", "follows"]
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
 _At = tuple[Mesh, Path]  # the body's mesh, and the experiment's folder
+_AGAINST = 0.2  # of the farthest marker's way: so far back the mean of all may go
 _FEWEST = 3  # markers on a place that follows them
 
 
@@ -65,6 +67,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
         compared.append(_force(recording, p, kind, drive, rest))
     if p.seen.markers:
         markers, findings = _markers(recording, p, kind, (scene.mesh, folder))
+        _require_along(p, markers, kind, float(drive.y[-1, 0]))
         compared.append(markers)
     if p.seen.outline:
         outline, said = observed_outline(recording, p, scene.mesh, rest)
@@ -222,6 +225,25 @@ def _markers(
     found = since_rest(part, at[0], noise(source), samples, p.seen.stands)
     said = (f"markers not seen at rest are left out: {', '.join(unseen)}",) if unseen else ()
     return replace(found, together=_TOGETHER), said
+
+
+def _require_along(p: MeasuredBody, markers: MarkerObservation, kind: Kind, amount: float) -> None:
+    """Raises `RegistrationError` where the markers go against what moves the body: the frame then
+    has another axis up, or is left-handed."""
+    if kind == "follows":
+        return
+    moved = markers.x[-1] - markers.rest
+    seen = moved[np.isfinite(moved).all(axis=1)]
+    if not len(seen):
+        return
+    along = float(np.sign(amount) * (seen @ np.array(axis_of(p.moved.along))).mean())
+    most = float(np.linalg.norm(seen, axis=1).max())
+    if along < -_AGAINST * most and -along > 5 * markers.sd / np.sqrt(len(seen)):
+        raise RegistrationError(
+            f"the markers went {-1e3 * along:.3g} mm against {p.moved.along}, along which "
+            f"'{p.moved.by}' moves the body (the farthest by {1e3 * most:.3g} mm): another axis is "
+            "up in their frame, or the sign is the other one; set moved.along, or seen.layout"
+        )
 
 
 def _registered(recording: Recording, p: MeasuredBody, at: _At) -> MarkerObservation:

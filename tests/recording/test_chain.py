@@ -1,0 +1,103 @@
+"""Frames along a chain: ways that agree, ways that contradict, mirrors; scales of markers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from validate.errors import RecordingError
+from validate.recording.chain import chain_faults, links, require_chain
+from validate.recording.formats.poses import pose_signals
+from validate.recording.readers import recognised
+from validate.recording.scales import odd_scales
+from validate.recording.types import Markers, Recording, Signal, Source
+
+T = np.arange(40) / 20
+RNG = np.random.default_rng(4)
+FIRST = Rotation.random(40, random_state=1).as_matrix(), RNG.normal(0, 0.1, (40, 3))
+SECOND = Rotation.random(40, random_state=2).as_matrix(), RNG.normal(0, 0.1, (40, 3))
+
+
+def posed(name: str, R: np.ndarray, x: np.ndarray, frame: str) -> dict[str, Signal]:
+    return pose_signals(name, T, R, x, frame)
+
+
+def joined() -> tuple[np.ndarray, np.ndarray]:
+    """The stylus in the room, by way of the tracker."""
+    (R, x), (S, y) = FIRST, SECOND
+    return S @ R, (S @ x[..., None])[..., 0] + y
+
+
+def recording(**changed: tuple[np.ndarray, np.ndarray]) -> Recording:
+    poses = {"StylusToTracker": FIRST, "TrackerToRoom": SECOND, "StylusToRoom": joined()} | changed
+    signals: dict[str, Signal] = {}
+    for name, (R, x) in poses.items():
+        signals |= posed(name, R, x, name.rpartition("To")[2])
+    return Recording("r", Source("r", "", 0, ""), 0, signals=signals)
+
+
+def test_ways_that_agree_are_no_fault() -> None:
+    made = recording()
+    assert [(link.child, link.parent) for link in links(made)] == [
+        ("Stylus", "Tracker"), ("Tracker", "Room"), ("Stylus", "Room"),
+    ]  # fmt: skip
+    assert list(chain_faults(made)) == []
+    require_chain(made)
+
+
+def test_a_transform_that_is_turned_round_contradicts() -> None:
+    R, x = SECOND
+    back = R.swapaxes(1, 2), -(R.swapaxes(1, 2) @ x[..., None])[..., 0]
+    with pytest.raises(RecordingError, match="degrees off the pose recorded between them"):
+        require_chain(recording(TrackerToRoom=back))
+
+
+def test_a_shift_beyond_what_is_allowed_is_told_in_mm() -> None:
+    R, x = joined()
+    (line,) = chain_faults(recording(StylusToRoom=(R, x + np.array([0.0, 0.005, 0.0]))))
+    assert "is 5 mm and" in line
+    assert list(chain_faults(recording(StylusToRoom=(R, x + 1e-3)))) == []
+
+
+def test_a_left_handed_pose_is_told() -> None:
+    R, x = FIRST
+    mirrored = R * np.array([1.0, 1.0, -1.0])
+    lines = list(chain_faults(recording(StylusToTracker=(mirrored, x))))
+    assert "40 of 40 are left-handed (determinant -1)" in lines[0]
+    (scaled, *_) = chain_faults(recording(StylusToTracker=(1.1 * R, x)))
+    assert "off a rotation by 0.21" in scaled
+
+
+def test_poses_at_other_times_are_not_compared() -> None:
+    made = recording()
+    late = {k: Signal(s.t + 100, s.y, s.unit, s.sd, s.frame)
+            for k, s in made.signals.items() if k.startswith("StylusToRoom")}  # fmt: skip
+    other = Recording("r", made.source, 0, signals={**made.signals, **late})
+    assert list(chain_faults(other)) == []
+
+
+@pytest.mark.parametrize("file", ["stylus", "freehand"])
+def test_real_sequences_have_a_chain_without_fault(shared_data: Path, file: str) -> None:
+    found = [p for p in sorted((shared_data / "ultrasound" / "tracked").rglob("*.m*"))
+             if recognised(p).name == "metaimage"]  # fmt: skip
+    some = [p for p in found if file in str(p).lower()] or found
+    options = {"m_per_px": "0.1mm"}
+    faults = [line for p in some for line in chain_faults(_read(p, options))]
+    assert faults == []
+
+
+def _read(path: Path, options: dict[str, str]) -> Recording:
+    try:
+        return recognised(path).read(path, {})
+    except Exception:
+        return recognised(path).read(path, options)
+
+
+def test_markers_of_millimetres_taken_as_metres_are_asked_back() -> None:
+    x = np.array([[[0.0, 0, 0], [120.0, 30, 5]]])
+    made = Recording("r", Source("r", "", 0, ""), 0,
+                     markers={"m": Markers(np.zeros(1), ("a", "b"), x, 0.0, "lab")})  # fmt: skip
+    (line,) = odd_scales(made)
+    assert "markers 120 m apart are outside 0.001 to 50 m" in line
+    assert "a factor 1000?" in line
