@@ -53,7 +53,7 @@ def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
 
 def _odd_spread(x: Floats) -> str:
     """Of markers x (nt, k, d) m, by the first instant at which two of them are seen."""
-    seen = np.isfinite(x).all(axis=2)
+    seen = np.asarray(np.isfinite(x).all(axis=2))
     at = np.flatnonzero(seen.sum(axis=1) >= 2)
     size = float(np.ptp(x[at[0]][seen[at[0]]], axis=0).max()) if len(at) else 1.0
     low, high = _SPREADS
