@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.recording.chain import chain_faults, links, require_chain
 from validate.recording.formats.poses import pose_signals
-from validate.recording.readers import recognised
+from validate.recording.mcap.write import write_recording
+from validate.recording.preflight import inspect_recording
+from validate.recording.readers import read_recording, recognised
 from validate.recording.scales import odd_scales
 from validate.recording.types import Markers, Recording, Signal, Source
 
@@ -49,15 +51,52 @@ def test_ways_that_agree_are_no_fault() -> None:
 def test_a_transform_that_is_turned_round_contradicts() -> None:
     R, x = SECOND
     back = R.swapaxes(1, 2), -(R.swapaxes(1, 2) @ x[..., None])[..., 0]
-    with pytest.raises(RecordingError, match="degrees off the pose recorded between them"):
+    with pytest.raises(
+        RecordingError, match="contradicts the way by 'Tracker' in 40 of 40 samples"
+    ):
         require_chain(recording(TrackerToRoom=back))
 
 
 def test_a_shift_beyond_what_is_allowed_is_told_in_mm() -> None:
     R, x = joined()
     (line,) = chain_faults(recording(StylusToRoom=(R, x + np.array([0.0, 0.005, 0.0]))))
-    assert "is 5 mm and" in line
+    assert "in 40 of 40 samples, by up to 5 mm and" in line
     assert list(chain_faults(recording(StylusToRoom=(R, x + 1e-3)))) == []
+
+
+def test_a_few_poses_are_outliers_a_third_is_a_fault() -> None:
+    R, x = joined()
+    for count, faults in ((3, 0), (14, 1)):
+        moved = x.copy()
+        moved[:count] += 0.05
+        assert len(list(chain_faults(recording(StylusToRoom=(R, moved))))) == faults
+
+
+def test_longer_ways_pairs_and_frames_in_themselves_are_closed() -> None:
+    (R, x), here = FIRST, (np.tile(np.eye(3), (40, 1, 1)), np.zeros((40, 3)))
+    S, y = joined()
+    off = y + np.array([0.05, 0.0, 0.0])
+    back = R.swapaxes(1, 2), -(R.swapaxes(1, 2) @ (x + 0.05)[..., None])[..., 0]
+    far = {"RoomToHall": here, "StylusToHall": (S, off)}
+    for extra, by in ((far, "'Tracker', 'Room'"), ({"TrackerToStylus": back}, "the other pose"),
+                      ({"RoomToRoom": (here[0], here[1] + 0.05)}, "the other pose")):  # fmt: skip
+        (line,) = chain_faults(recording(**extra))
+        assert f"contradicts the way by {by}" in line
+
+
+def test_one_pose_alone_stands_for_all_times_and_sds_widen_what_is_allowed() -> None:
+    (R, x), (S, y) = FIRST, SECOND
+    still = {f"TrackerToRoom/{k}": Signal(T[:1], v[:1].reshape(1, -1), u, 0.0, "Room")
+             for k, v, u in (("rotation", S, "1"), ("translation", y, "m"))}  # fmt: skip
+    way = S[0] @ R, x @ S[0].T + y[0] + np.array([0.005, 0.0, 0.0])
+    poses = posed("StylusToTracker", *FIRST, "Tracker") | still
+    made = Recording("r", Source("r", "", 0, ""), 0,
+                     signals=poses | posed("StylusToRoom", *way, "Room"))  # fmt: skip
+    (line,) = chain_faults(made)
+    assert "40 of 40 samples, by up to 5 mm" in line
+    sure = {k: Signal(s.t, s.y, s.unit, 5e-3 if s.unit == "m" else 0.0, s.frame)
+            for k, s in made.signals.items()}  # fmt: skip
+    assert list(chain_faults(Recording("r", made.source, 0, signals=sure))) == []
 
 
 def test_a_left_handed_pose_is_told() -> None:
@@ -65,7 +104,7 @@ def test_a_left_handed_pose_is_told() -> None:
     mirrored = R * np.array([1.0, 1.0, -1.0])
     lines = list(chain_faults(recording(StylusToTracker=(mirrored, x))))
     assert "40 of 40 are left-handed (determinant -1)" in lines[0]
-    (scaled, *_) = chain_faults(recording(StylusToTracker=(1.1 * R, x)))
+    scaled = next(chain_faults(recording(StylusToTracker=(1.1 * R, x))))
     assert "off a rotation by 0.21" in scaled
 
 
@@ -75,6 +114,16 @@ def test_poses_at_other_times_are_not_compared() -> None:
             for k, s in made.signals.items() if k.startswith("StylusToRoom")}  # fmt: skip
     other = Recording("r", made.source, 0, signals={**made.signals, **late})
     assert list(chain_faults(other)) == []
+
+
+def test_every_road_tells_it(tmp_path: Path) -> None:
+    """Of a file of ours too: inspected as a defect, refused where it is read."""
+    R, x = joined()
+    write_recording(recording(StylusToRoom=(R, x + 0.05)), tmp_path / "r.mcap")
+    (line,) = inspect_recording(tmp_path / "r.mcap").defects
+    assert "contradicts the way by 'Tracker'" in line
+    with pytest.raises(RecordingError, match="contradicts the way"):
+        read_recording(tmp_path / "r.mcap")
 
 
 @pytest.mark.parametrize("file", ["stylus", "freehand"])
@@ -90,7 +139,7 @@ def test_real_sequences_have_a_chain_without_fault(shared_data: Path, file: str)
 def _read(path: Path, options: dict[str, str]) -> Recording:
     try:
         return recognised(path).read(path, {})
-    except Exception:
+    except UsageError:  # no scale is stated
         return recognised(path).read(path, options)
 
 

@@ -1,34 +1,48 @@
 """Frames along a chain of transforms: whether they turn as bodies do, and whether two ways from one
 frame to another say the same.
 
-A pose `<X>To<Y>/rotation`, `/translation`, or `<X>/...` in the frame Y, is T_Y_from_X.
+A pose `<X>To<Y>/rotation`, `/translation`, or `<X>/...` in the frame Y, is T_Y_from_X. One pose
+alone stands for all times. Poses that link frames anew make a tree; each other one closes a way,
+and is held against it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.formats.poses import ROTATION, TRANSLATION
 from validate.recording.types import Recording
 
 _PROPER = 1e-3  # off an orthogonal matrix
-APART, TURNED = 2e-3, 2.0  # m and degrees by which two ways to a frame may differ in their median
+APART, TURNED = 2e-3, 2.0  # m and degrees by which two ways to a frame may differ
+_SDS = 3.0  # or so many standard deviations of all translations on the way, if that is more
+_SHARE = 0.1  # of the poses that may do otherwise, as outliers
 _NEAR = 0.02  # s between poses that are compared
 
 
 @dataclass(frozen=True)
 class Link:
-    """T_parent_from_child at t (nt,) s: rotations (nt, 3, 3), translations (nt, 3) m."""
+    """T_parent_from_child at t (nt,) s: rotations (nt, 3, 3), translations (nt, 3) m, sd m."""
 
     child: str
     parent: str
     t: Floats
     R: Floats
     x: Floats
+    sd: float = 0.0
+
+    @property
+    def back(self) -> "Link":
+        R = self.R.swapaxes(1, 2)
+        return Link(self.parent, self.child, self.t, R, -_turned(R, self.x), self.sd)
+
+    def at(self, t: Floats) -> tuple[Ints, Floats]:
+        """Indices of the poses nearest to t (m,) s, and whether they are near: one alone is."""
+        index = _nearest(self.t, t)
+        return index, np.asarray((np.abs(self.t[index] - t) < _NEAR) | (len(self.t) == 1))
 
 
 def links(recording: Recording) -> tuple[Link, ...]:
@@ -41,24 +55,22 @@ def links(recording: Recording) -> tuple[Link, ...]:
             continue
         name, _, to = tool.strip("/").rpartition("To")
         child, parent = (name, to) if name else (tool.strip("/"), turned.frame)
-        found.append(Link(child, parent, turned.t, turned.y.reshape(-1, 3, 3), moved.y))
+        R = turned.y.reshape(-1, 3, 3)
+        found.append(Link(child, parent, turned.t, R, moved.y, moved.sd))
     return tuple(found)
 
 
 def chain_faults(recording: Recording) -> Iterator[str]:
     """A line for every link that mirrors or is no rotation, and for ways that contradict."""
-    found = links(recording)
-    for link in found:
+    tree: dict[str, list[Link]] = {}
+    for link in links(recording):
         yield from _improper(link)
-    known = {(link.child, link.parent): link for link in found}
-    known |= {(p, c): _turned_round(link) for (c, p), link in known.items() if (p, c) not in known}
-    frames = dict.fromkeys(f for pair in known for f in pair)
-    told: set[frozenset[str]] = set()
-    for a, b, c in permutations(frames, 3):
-        if frozenset((a, b, c)) in told or not {(a, b), (b, c), (a, c)} <= known.keys():
+        way = _way(tree, link.child, link.parent)
+        if way is not None:
+            yield from _differing(link, way)
             continue
-        told.add(frozenset((a, b, c)))
-        yield from _differing(known, a, b, c)
+        tree.setdefault(link.child, []).append(link)
+        tree.setdefault(link.parent, []).append(link.back)
 
 
 def require_chain(recording: Recording) -> None:
@@ -80,34 +92,51 @@ def _improper(link: Link) -> Iterator[str]:
         yield f"{where}: off a rotation by {off:.2g}: scaled, sheared, or of other columns"
 
 
-def _turned_round(link: Link) -> Link:
-    R = link.R.swapaxes(1, 2)
-    return Link(link.parent, link.child, link.t, R, -(R @ link.x[..., None])[..., 0])
+def _way(tree: dict[str, list[Link]], start: str, end: str) -> list[Link] | None:
+    """The links of the tree from one frame to another; none from a frame to itself."""
+    ways: dict[str, list[Link]] = {start: []}
+    queue = [start]
+    while queue and end not in ways:
+        frame = queue.pop(0)
+        for link in tree.get(frame, []):
+            if link.parent not in ways:
+                ways[link.parent] = [*ways[frame], link]
+                queue.append(link.parent)
+    return ways.get(end)
 
 
-def _differing(known: Mapping[tuple[str, str], Link], a: str, b: str, c: str) -> Iterator[str]:
-    """Whether a to c is a to b to c, at the times of the first that the others were seen at."""
-    first, second, direct = known[a, b], known[b, c], known[a, c]
-    i, j = (_nearest(other.t, first.t) for other in (second, direct))
-    met = (np.abs(second.t[i] - first.t) < _NEAR) & (np.abs(direct.t[j] - first.t) < _NEAR)
+def _differing(direct: Link, way: Sequence[Link]) -> Iterator[str]:
+    """Whether a pose is what the way between its frames makes of it, where all were seen."""
+    n = len(direct.t)
+    R, x, met = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.full(n, True)
+    for link in way:
+        i, near = link.at(direct.t)
+        R, x, met = link.R[i] @ R, _turned(link.R[i], x) + link.x[i], met & near
     if not met.any():
         return
-    i, j = i[met], j[met]
-    R = second.R[i] @ first.R[met]
-    x = (second.R[i] @ first.x[met][..., None])[..., 0] + second.x[i]
-    apart = float(np.median(np.linalg.norm(x - direct.x[j], axis=1)))
-    cosine = (np.trace(R.swapaxes(1, 2) @ direct.R[j], axis1=1, axis2=2) - 1) / 2
-    turned = float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
-    if apart > APART or turned > TURNED:
-        yield (
-            f"from '{a}' to '{c}' by way of '{b}' is {1e3 * apart:.3g} mm and {turned:.3g} degrees "
-            f"off the pose recorded between them (median of {len(i)}; {1e3 * APART:g} mm and "
-            f"{TURNED:g} degrees are allowed): a transform is turned round, or of another session"
-        )
+    apart = np.linalg.norm(x - direct.x, axis=1)[met]
+    cosine = (np.trace(R.swapaxes(1, 2) @ direct.R, axis1=1, axis2=2)[met] - 1) / 2
+    turned = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    allowed = max(APART, _SDS * float(np.linalg.norm([link.sd for link in (direct, *way)])))
+    beyond = (apart > allowed) | (turned > TURNED)
+    if beyond.mean() <= _SHARE:
+        return
+    by = ", ".join(f"'{link.parent}'" for link in way[:-1]) or "the other pose between them"
+    yield (
+        f"pose of '{direct.child}' in '{direct.parent}' contradicts the way by {by} in "
+        f"{int(beyond.sum())} of {len(apart)} samples, by up to {1e3 * apart.max():.3g} mm and "
+        f"{turned.max():.3g} degrees ({1e3 * allowed:.3g} mm and {TURNED:g} degrees are allowed): "
+        "a transform is turned round, or of another session"
+    )
 
 
-def _nearest(times: Floats, t: Floats) -> np.ndarray:
+def _turned(R: Floats, x: Floats) -> Floats:
+    return np.asarray((R @ x[..., None])[..., 0])
+
+
+def _nearest(times: Floats, t: Floats) -> Ints:
     after = np.clip(np.searchsorted(times, t), 1, max(len(times) - 1, 1))
     after = np.minimum(after, len(times) - 1)
     before = np.maximum(after - 1, 0)
-    return np.where(np.abs(times[before] - t) <= np.abs(times[after] - t), before, after)
+    return np.asarray(np.where(np.abs(times[before] - t) <= np.abs(times[after] - t),
+                               before, after))  # fmt: skip

@@ -19,10 +19,11 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.chain import chain_faults
 from validate.recording.clocks import GAP_FACTOR, clock_of
+from validate.recording.formats.poses import ROTATION
 from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
-from validate.recording.mcap.read import MCAP
+from validate.recording.mcap.read import MCAP, read_recording
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import (
     CONTOUR,
@@ -166,7 +167,17 @@ def inspect_recording(path: Path) -> Inspection:
         _look_again(stream, verified, seen)
     defects = [*_cut(verified), *_file_defects(verified), *([seen.limit] if seen.limit else [])]
     topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
-    return _inspection(verified, topics, defects)
+    return _inspection(verified, topics, [*defects, *_chained(path, verified)])
+
+
+def _chained(path: Path, verified: Verified) -> list[str]:
+    """What contradicts of the poses, which are read once more for it."""
+    if not any(c.topic.endswith(f"/{ROTATION}") for c in verified.channels.values()):
+        return []
+    try:
+        return list(chain_faults(read_recording(path)))
+    except RecordingError:
+        return []  # told where it was inspected
 
 
 def _cut(verified: Verified) -> list[str]:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from validate.errors import RecordingError, UsageError
 from validate.parameters import nearest_names
+from validate.recording.chain import require_chain
 from validate.recording.exports.instron import INSTRON
 from validate.recording.exports.xlsx import SHEETS, XLSX
 from validate.recording.formats.c3d import C3D
@@ -43,12 +44,14 @@ def told_apart(path: Path) -> str:
 
 
 def read_recording(path: Path) -> Recording:
-    """The recording in an MCAP file (`mcap.read.read_recording`); a file of another format is
-    called by its name in the error, with the command that takes it."""
+    """The recording in an MCAP file (`mcap.read.read_recording`), its frames without contradiction;
+    a file of another format is called by its name in the error, with the command that takes it."""
     try:
-        return mcap.read_recording(path)
+        recording = mcap.read_recording(path)
     except RecordingError as error:
         raise no_mcap(path, error) from None
+    require_chain(recording)
+    return recording
 
 
 def no_mcap(path: Path, error: RecordingError) -> RecordingError:
