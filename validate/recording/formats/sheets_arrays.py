@@ -6,15 +6,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from validate.errors import RecordingError
 from validate.recording.formats.xlsx_arrays import require_unpacked, sheet_text
+
+_SECTOR = 512  # bytes: an old Excel file is a container of whole sectors
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """As `xlsx_arrays.arrays`, of a workbook of old Excel (.xls) or OpenDocument (.ods)."""
     import python_calamine
 
-    if path.read_bytes()[:4] == b"PK\x03\x04":
+    data = path.read_bytes()
+    if data[:4] == b"PK\x03\x04":
         require_unpacked(path)
+    elif len(data) % _SECTOR:
+        raise RecordingError(f"{len(data)} bytes, no multiple of its sectors of {_SECTOR}: cut")
     book = python_calamine.CalamineWorkbook.from_path(str(path))
     names = list(book.sheet_names)
     texts = [sheet_text(book.get_sheet_by_name(name).to_python()) for name in names]
