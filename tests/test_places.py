@@ -20,7 +20,13 @@ from validate.places import (
     why_not,
     write_whole,
 )
-from validate.recording.mcap.channels import JsonChannel, JsonMessage, write_channels
+from validate.recording.mcap.channels import (
+    WrittenChannel,
+    WrittenMessage,
+    json_schema,
+    write_channels,
+)
+from validate.recording.mcap.schemas import to_bytes
 from validate.report.folder import MARK, replace_folder, try_results
 
 
@@ -129,8 +135,9 @@ def test_an_error_that_is_ours_stays_a_bug(tmp_path: Path) -> None:
 
 def test_a_recording_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
-    channel = JsonChannel("a", "s", {"type": "object"})
-    messages = [JsonMessage("a", i, {"text": f"{i * 7919 % 10007}" * 60}) for i in range(2000)]
+    channel = WrittenChannel("a", json_schema("s", {"type": "object"}))
+    texts = [{"text": f"{i * 7919 % 10007}" * 60} for i in range(2000)]
+    messages = [WrittenMessage("a", i, to_bytes(text)) for i, text in enumerate(texts)]
     with small_files(4000), pytest.raises(RecordingError) as caught:
         write_channels(path, [channel], messages, {})
     assert "cannot be written (File too large: more than 4" in one_line(caught)

@@ -208,10 +208,8 @@ def test_a_topic_without_messages_is_refused(tmp_path: Path) -> None:
 
 
 def test_our_schema_in_another_encoding_is_refused(tmp_path: Path) -> None:
-    path = write_foreign(tmp_path / "f.mcap", _markers(), encodings=("protobuf", "protobuf"))
-    with pytest.raises(
-        RecordingError, match="Markers in 'protobuf/protobuf', expected 'jsonschema"
-    ):
+    path = write_foreign(tmp_path / "f.mcap", _markers(), encodings=("protobuf", "cbor"))
+    with pytest.raises(RecordingError, match="Markers in 'protobuf/cbor', expected 'jsonschema"):
         read_recording(path)
 
 

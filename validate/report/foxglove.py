@@ -1,19 +1,33 @@
-"""Messages in Foxglove's well-known JSON schemas. Lengths m, colours 0..1, rotations x y z w."""
+"""Messages in Foxglove's well-known schemas, in Protobuf. Owns foxglove-sdk.
+
+Lengths m, colours 0..1, rotations x y z w.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from foxglove import messages as known
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints
-from validate.recording.mcap.schemas import Json, stamp
+from validate.recording.mcap.channels import MessageSchema
 
-_UNTURNED: Json = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-_AT_ORIGIN: Json = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": _UNTURNED}
-_LINE_LOOP = 1
+Entity = known.SceneEntity
+_UNTURNED = known.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+_AT_ORIGIN = known.Pose(position=known.Vector3(x=0.0, y=0.0, z=0.0), orientation=_UNTURNED)
 _LINE_WIDTH = 2.5  # pixels on the screen
-_PRIMITIVES = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models")
+_CLOUD = np.dtype([(name, "<f4") for name in "xyz"]
+                  + [(name, "u1") for name in ("red", "green", "blue", "alpha")])  # fmt: skip
+_PACKED = {4: known.PackedElementFieldNumericType.Float32,
+           1: known.PackedElementFieldNumericType.Uint8}  # fmt: skip
+_KINDS = (known.SceneUpdate, known.FrameTransforms, known.CompressedImage, known.PointCloud)
+LAST_NS = 2**32 * 10**9 - 1  # its stamps count seconds in 32 bits
+SCHEMAS = {
+    found.name: MessageSchema(found.name, found.encoding, found.data)
+    for found in (kind.get_schema() for kind in _KINDS)
+}
+SCENE, TRANSFORMS, IMAGE, CLOUD = SCHEMAS  # in the order of _KINDS
 
 
 @dataclass(frozen=True)
@@ -26,91 +40,156 @@ class Rgba:
     a: float = 1.0
 
     @property
-    def message(self) -> Json:
-        return {"r": self.r, "g": self.g, "b": self.b, "a": self.a}
+    def message(self) -> known.Color:
+        return known.Color(r=self.r, g=self.g, b=self.b, a=self.a)
 
 
-def frame_transforms(ns: int, parent: str, children: Sequence[tuple[str, Floats]]) -> Json:
+def frame_transforms(ns: int, parent: str, children: Sequence[tuple[str, Floats]]) -> bytes:
     """`children`: frame name and T_parent_from_child (4, 4), a proper rotation and shift m."""
-    return {"transforms": [_transform(ns, parent, *child) for child in children]}
+    transforms = [_transform(ns, parent, *child) for child in children]
+    return known.FrameTransforms(transforms=transforms).encode()
 
 
-def _transform(ns: int, parent: str, child: str, pose: Floats) -> Json:
-    turn = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
-    return {
-        "timestamp": stamp(ns),
-        "parent_frame_id": parent,
-        "child_frame_id": child,
-        "translation": _xyz(pose[:3, 3]),
-        "rotation": dict(zip("xyzw", turn, strict=True)),
-    }
+def _transform(ns: int, parent: str, child: str, pose: Floats) -> known.FrameTransform:
+    x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+    return known.FrameTransform(
+        timestamp=_time(ns),
+        parent_frame_id=parent,
+        child_frame_id=child,
+        translation=_vector(pose[:3, 3]),
+        rotation=known.Quaternion(x=x, y=y, z=z, w=w),
+    )
 
 
-def scene_update(*entities: Json) -> Json:
+def picture(ns: int, frame: str, png: bytes) -> bytes:
+    """An image as PNG."""
+    return known.CompressedImage(
+        timestamp=_time(ns), frame_id=frame, data=png, format="png"
+    ).encode()
+
+
+def scene_update(*entities: Entity) -> bytes:
     """Each entity takes the place of the earlier one with its id."""
-    return {"deletions": [], "entities": list(entities)}
+    return known.SceneUpdate(entities=list(entities)).encode()
 
 
-def outline(ns: int, frame: str, name: str, points: Floats, colour: Rgba, **notes: str) -> Json:
-    """An entity: the closed line through points (k, 2) m in the plane z = 0 of `frame`."""
-    flat = np.hstack([points, np.zeros((len(points), 1))])
-    line = {
-        "type": _LINE_LOOP,
-        "pose": _AT_ORIGIN,
-        "thickness": _LINE_WIDTH,
-        "scale_invariant": True,
-        "points": [_xyz(p) for p in flat],
-        "color": colour.message,
-        "colors": [],
-        "indices": [],
-    }
+def outline(ns: int, frame: str, name: str, points: Floats, colour: Rgba, **notes: str) -> Entity:
+    """The closed line through points (k, 2) m in the plane z = 0 of `frame`."""
+    line = known.LinePrimitive(
+        type=known.LinePrimitiveLineType.LineLoop,
+        pose=_AT_ORIGIN,
+        thickness=_LINE_WIDTH,
+        scale_invariant=True,
+        points=_points(points),
+        color=colour.message,
+    )
     return _entity(ns, frame, name, notes, lines=[line])
 
 
 def spheres(
     ns: int, frame: str, name: str, centres: Floats, colour: Rgba, *, diameter: float, **notes: str
-) -> Json:
-    """An entity: equal spheres at centres (k, 2 or 3) m; those with NaN (not seen) are left out."""
-    there = centres[np.isfinite(centres).all(axis=1)]
-    size = {"x": diameter, "y": diameter, "z": diameter}
+) -> Entity:
+    """Equal spheres at centres (k, 2 or 3) m; those with NaN (not seen) are left out."""
+    size = known.Vector3(x=diameter, y=diameter, z=diameter)
     drawn = [
-        {"pose": {"position": _xyz(c), "orientation": _UNTURNED}, "size": size,
-         "color": colour.message}
-        for c in there
-    ]  # fmt: skip
+        known.SpherePrimitive(
+            pose=known.Pose(position=_vector(centre), orientation=_UNTURNED),
+            size=size,
+            color=colour.message,
+        )
+        for centre in _seen(centres)
+    ]
     return _entity(ns, frame, name, notes, spheres=drawn)
 
 
 def surface(
     ns: int, frame: str, name: str, points: Floats, triangles: Ints, colours: Floats, **notes: str
-) -> Json:
-    """An entity: triangles (t, 3) between points (v, 3) m, coloured by colours (v, 4) per point.
+) -> Entity:
+    """Triangles (t, 3) between points (v, 3) m, coloured by colours (v, 4) per point.
 
     Points are rounded to micrometres and colours to a thousandth: it is for the eye.
     """
-    shades = np.round(colours, 3).tolist()
-    drawn = {
-        "pose": _AT_ORIGIN,
-        "points": [_xyz(p) for p in np.round(points, 6)],
-        "color": Rgba(1.0, 1.0, 1.0).message,
-        "colors": [dict(zip("rgba", shade, strict=True)) for shade in shades],
-        "indices": triangles.ravel().tolist(),
-    }
+    drawn = known.TriangleListPrimitive(
+        pose=_AT_ORIGIN,
+        points=_points(np.round(points, 6)),
+        color=Rgba(1.0, 1.0, 1.0).message,
+        colors=[Rgba(*shade).message for shade in np.round(colours, 3).tolist()],
+        indices=triangles.ravel().tolist(),
+    )
     return _entity(ns, frame, name, notes, triangles=[drawn])
 
 
-def _entity(ns: int, frame: str, name: str, notes: dict[str, str], **drawn: list[Json]) -> Json:
-    return {
-        "timestamp": stamp(ns),
-        "frame_id": frame,
-        "id": name,
-        "lifetime": {"sec": 0, "nsec": 0},  # for ever
-        "frame_locked": True,
-        "metadata": [{"key": key, "value": value} for key, value in notes.items()],
-        **{kind: drawn.get(kind, []) for kind in _PRIMITIVES},
-    }
+def cloud(ns: int, frame: str, points: Floats, colours: Floats) -> bytes:
+    """Points (k, 2 or 3) m, rounded to float32, coloured by colours (k or 1, 4) 0..1.
+
+    Those with NaN (not seen) are left out. For viewers that draw points, but no scenes.
+    """
+    there = np.isfinite(points).all(axis=1)
+    packed = np.zeros(len(points), _CLOUD)
+    for name, column in zip("xyz", points.T, strict=False):
+        packed[name] = column
+    shades = np.broadcast_to(np.rint(255 * colours), (len(points), 4))
+    for name, column in zip(("red", "green", "blue", "alpha"), shades.T, strict=True):
+        packed[name] = column
+    return known.PointCloud(
+        timestamp=_time(ns),
+        frame_id=frame,
+        pose=_AT_ORIGIN,
+        point_stride=_CLOUD.itemsize,
+        fields=_fields(),
+        data=packed[there].tobytes(),
+    ).encode()
 
 
-def _xyz(point: Floats) -> Json:
+def _fields() -> list[known.PackedElementField]:
+    assert _CLOUD.fields is not None
+    return [
+        known.PackedElementField(name=name, offset=offset, type=_PACKED[part.itemsize])
+        for name, (part, offset, *_) in _CLOUD.fields.items()
+    ]
+
+
+def _entity(
+    ns: int,
+    frame: str,
+    name: str,
+    notes: dict[str, str],
+    *,
+    lines: list[known.LinePrimitive] | None = None,
+    spheres: list[known.SpherePrimitive] | None = None,
+    triangles: list[known.TriangleListPrimitive] | None = None,
+) -> Entity:
+    return Entity(
+        timestamp=_time(ns),
+        frame_id=frame,
+        id=name,
+        lifetime=known.Duration(sec=0, nsec=0),  # for ever
+        frame_locked=True,
+        metadata=[known.KeyValuePair(key=key, value=value) for key, value in notes.items()],
+        lines=lines,
+        spheres=spheres,
+        triangles=triangles,
+    )
+
+
+def _time(ns: int) -> known.Timestamp:
+    return known.Timestamp(sec=ns // 10**9, nsec=ns % 10**9)
+
+
+def _seen(points: Floats) -> Floats:
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _vector(point: Floats) -> known.Vector3:
     """Points in a plane get z = 0."""
-    return dict(zip("xyz", [*point.tolist(), 0.0][:3], strict=True))
+    x, y, z = [*point.tolist(), 0.0][:3]
+    return known.Vector3(x=x, y=y, z=z)
+
+
+def _points(points: Floats) -> list[known.Point3]:
+    return [known.Point3(x=x, y=y, z=z) for x, y, z, *_ in _in_space(points)]
+
+
+def _in_space(points: Floats) -> list[list[float]]:
+    flat: list[list[float]] = np.hstack([points, np.zeros((len(points), 1))]).tolist()
+    return flat

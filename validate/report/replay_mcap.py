@@ -1,4 +1,4 @@
-"""replay.mcap: measurement and simulation in one timeline, to be opened in Foxglove.
+"""replay.mcap: measurement and simulation in one timeline, to be opened in Foxglove or Rerun.
 
 Topics, after /<recording> where there are several; X is `measured` or `simulated`:
 
@@ -6,11 +6,17 @@ Topics, after /<recording> where there are several; X is `measured` or `simulate
     /<signal>/X            validate.Signal           every sample as compared, every step
     /outline/X             validate.Contour          image plane, as judged; simulated at the loads
     /outline/X/scene       foxglove.SceneUpdate      the same as lines, the simulated one moving
+    /outline/X/points      foxglove.PointCloud       the same as points
     /markers/X             validate.Markers          with names; simulated at the loads
     /markers/X/scene       foxglove.SceneUpdate      the same as spheres, the simulated ones moving
-    /surface/simulated     foxglove.SceneUpdate      coloured by displacement, moving
+    /markers/X/points      foxglove.PointCloud       the same as points
+    /surface/simulated/scene   foxglove.SceneUpdate  coloured by displacement, moving
+    /surface/simulated/points  foxglove.PointCloud   its nodes
     /image/measured        foxglove.CompressedImage  where the recording has images
     /tf                    foxglove.FrameTransforms  image and marker frames in the scene's
+
+Every message is Protobuf. Rerun draws points, images and transforms, and gives the fields of the
+others; Foxglove draws all (`replay_layout` writes which panels show them).
 
 Time is the recording's own clock, t0_ns + t. Simulated numbers are those of the method that the
 report shows, with sd 0. What is interpolated, thinned or left out stands in the metadata record
@@ -25,12 +31,14 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.result import MethodResult, Result
-from validate.recording.mcap.channels import JsonChannel, JsonMessage, write_channels
-from validate.recording.mcap.schemas import CONTOUR, MARKERS, SCHEMAS, SIGNAL
+from validate.recording.mcap.channels import WrittenChannel, WrittenMessage, write_channels
+from validate.recording.mcap.own_protobuf import protobuf_schema
+from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL
+from validate.report import foxglove
 from validate.report.environment import file_name
-from validate.report.foxglove_schemas import DEFINITIONS
 from validate.report.loads import HOW
 from validate.report.observed import shown_method
+from validate.report.replay_layout import Shown, layout
 from validate.report.replay_signals import images, signals
 from validate.report.replay_space import markers, outlines, surface, transforms
 from validate.report.replay_view import Track, View, over_time
@@ -40,22 +48,28 @@ RECORD = "validate.replay"
 INPUT = "input/"  # metadata record INPUT + name of every recording
 _NUMBERS = (SIGNAL, CONTOUR, MARKERS)
 _COARSEST = 64
-_ALL = {**SCHEMAS, **DEFINITIONS}
+_ALL = {**foxglove.SCHEMAS, **{name: protobuf_schema(name) for name in _NUMBERS}}
 
 
 def write_replay(result: Result, path: Path) -> None:
-    """Write the replay of `result` to `path`; without recordings it holds metadata only."""
+    """Write the replay of `result` to `path`, and its layout beside it (`.layout.json`).
+
+    Without recordings it holds metadata only, and has no layout.
+    """
     coarse = 1
     while True:
-        _write(result, path, coarse)
+        shown = [(view, tracks(view)) for view in views(result, coarse)]
+        _write(result, path, shown, coarse)
         if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
-            return
+            break
         coarse *= 2
+    if shown:
+        path.with_suffix(".layout.json").write_text(layout(shown), "utf-8")
 
 
-def _write(result: Result, path: Path, coarse: int) -> None:
-    found = tuple(t for view in views(result, coarse) for t in tracks(view))
-    channels = [JsonChannel(t.topic, t.schema, _ALL[t.schema]) for t in found]
+def _write(result: Result, path: Path, shown: Shown, coarse: int) -> None:
+    found = tuple(t for _, tracks in shown for t in tracks)
+    channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
     metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
     metadata |= {name: values for t in found for name, values in t.records}
     write_channels(path, channels, _in_time(found), metadata)
@@ -91,10 +105,15 @@ def tracks(view: View) -> tuple[Track, ...]:
         *markers(view),
         *surface(view),
     ]
-    return (*transforms(view, found), *found)
+    return tuple(t for t in (*transforms(view, found), *found) if not _too_late(t))
 
 
-def _in_time(found: Sequence[Track]) -> Iterator[JsonMessage]:
+def _too_late(track: Track) -> bool:
+    """Foxglove's stamps end in 2106; ours do not."""
+    return track.schema in foxglove.SCHEMAS and int(track.ns[-1]) > foxglove.LAST_NS
+
+
+def _in_time(found: Sequence[Track]) -> Iterator[WrittenMessage]:
     """All messages in order of time, topics in their order when equal."""
     if not found:
         return
@@ -103,7 +122,7 @@ def _in_time(found: Sequence[Track]) -> Iterator[JsonMessage]:
     number = np.concatenate([np.arange(len(t.ns)) for t in found])
     for k in np.argsort(ns, kind="stable"):
         track = found[which[k]]
-        yield JsonMessage(track.topic, int(ns[k]), track.message(int(number[k])))
+        yield WrittenMessage(track.topic, int(ns[k]), track.message(int(number[k])))
 
 
 def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, str]:
@@ -127,7 +146,7 @@ def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, st
 def _interpolated(result: Result) -> str:
     if any(over_time(view) for view in views(result)):
         return "nothing: output frames at their own times"
-    return f".../simulated/scene and /surface: {HOW}"
+    return f".../simulated/scene and points: {HOW}"
 
 
 def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:
@@ -142,6 +161,8 @@ def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track
         other = topic.replace("/measured", "/simulated")
         if other not in topics:
             yield f"{other}: the run does not predict it"
+    if any(int(t.ns[-1]) > foxglove.LAST_NS for t in found):
+        yield "all but numbers: Foxglove's stamps end in 2106"
     if method.scene.mesh.dimension != 3:
         yield "surface: the mesh is planar"
 

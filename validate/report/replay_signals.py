@@ -7,8 +7,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.metadata import CALIBRATION, CALIBRATION_KEYS
-from validate.recording.mcap.schemas import IMAGE, SIGNAL, image_message, signal_message
+from validate.recording.mcap.own_protobuf import protobuf_message
+from validate.recording.mcap.schemas import SIGNAL, signal_message
 from validate.recording.types import Frames
+from validate.report.foxglove import IMAGE, picture
 from validate.report.observed import holds
 from validate.report.observed import signals as scalar_signals
 from validate.report.replay_view import Track, View, pose_records
@@ -47,9 +49,12 @@ def _names(quantities: list[str]) -> list[str]:
 def _signal(view: View, topic: str, t: Floats, y: Floats, unit: str, sd: float) -> Track:
     every = one_in(len(t), _SAMPLES // view.coarse)
     kept, frame, note = y[::every], view.drive_frame, thinned(every, len(t), "samples")
-    return view.track(
-        topic, SIGNAL, t[::every], lambda ns, i: signal_message(ns, frame, unit, kept[i], sd), note
-    )
+
+    def message(ns: int, i: int) -> bytes:
+        return protobuf_message(SIGNAL, signal_message(ns, frame, unit, kept[i], sd))
+
+    track = view.track(topic, SIGNAL, t[::every], message, note)
+    return replace(track, unit=unit, width=y.shape[1])
 
 
 def images(view: View) -> list[Track]:
@@ -63,7 +68,7 @@ def images(view: View) -> list[Track]:
 
 
 def _images(view: View, topic: str, frames: Frames) -> Track:
-    size = max(1, len(encode_png(frames.images[0])) * 4 // 3)  # base64
+    size = max(1, len(encode_png(frames.images[0])))
     every = one_in(len(frames.t), _IMAGE_BYTES // view.coarse // size)
     at_loads = {int(np.abs(frames.t - hold.t).argmin()) for hold in holds(view.registered)}
     kept = sorted({*range(0, len(frames.t), every), *at_loads})
@@ -72,7 +77,7 @@ def _images(view: View, topic: str, frames: Frames) -> Track:
     calibration = (CALIBRATION + named, {key: repr(scale) for key, scale in scales})
     return view.track(
         topic, IMAGE, frames.t[kept],
-        lambda ns, i: image_message(ns, frames.frame, frames.images[kept[i]]),
+        lambda ns, i: picture(ns, frames.frame, encode_png(frames.images[kept[i]])),
         thinned(every, len(frames.t), "images, and those at the loads"),
         (*pose_records(named, frames.pose), calibration),
     )  # fmt: skip

@@ -1,7 +1,8 @@
 """Topics of a replay that lie in space: outlines, markers, the simulated surface, transforms.
 
 Numbers (`validate.Contour`, `validate.Markers`) are those of the comparison, at the measured times
-and at the loads; `.../scene` topics are to look at and add interpolated instants.
+and at the loads; `.../scene` and `.../points` are to look at and add interpolated instants: the
+same as lines, spheres and a surface, and as points for viewers that draw no scenes.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,11 +14,11 @@ import matplotlib as mpl
 import numpy as np
 
 from validate.arrays import Floats
+from validate.recording.mcap.own_protobuf import protobuf_message
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
 from validate.recording.types import Markers
 from validate.report import foxglove, observed
-from validate.report.foxglove import Rgba
-from validate.report.foxglove_schemas import SCENE, TRANSFORMS
+from validate.report.foxglove import CLOUD, SCENE, TRANSFORMS, Entity, Rgba
 from validate.report.replay_signals import one_in, thinned
 from validate.report.replay_view import Track, View, load_of, pose_records
 from validate.report.skin import OUTSIDE, SurfacePart, skins
@@ -48,7 +49,7 @@ def transforms(view: View, others: Sequence[Track]) -> list[Track]:
         return []
     start = min(int(t.ns[0]) for t in others)
 
-    def message(_: int) -> Json:
+    def message(_: int) -> bytes:
         return foxglove.frame_transforms(start, view.frame, children)
 
     return [Track(f"{view.prefix}/tf", TRANSFORMS, np.array([start]), message)]
@@ -59,7 +60,7 @@ def transforms(view: View, others: Sequence[Track]) -> list[Track]:
 
 @dataclass(frozen=True)
 class _Kind:
-    """What becomes four topics: `t` (n,) s and the measured samples, and how a run is sampled.
+    """What becomes six topics: `t` (n,) s and the measured samples, and how a run is sampled.
 
     `number` makes the message of a sample from (ns, frame, sample, sd), `look` the entity that
     shows it from (ns, frame, name, sample, colour).
@@ -72,7 +73,7 @@ class _Kind:
     simulated: Callable[[Floats], Floats]
     sd: float
     number: Callable[[int, str, Floats, float], Json]
-    look: Callable[..., Json]
+    look: Callable[..., Entity]
     frames: tuple[tuple[str, str], tuple[str, str]]  # measured, simulated; of numbers, to look at
     note: str = ""
     pose: Floats | None = None
@@ -116,7 +117,7 @@ def _tracks(view: View, kind: _Kind) -> list[Track]:
     words = ["as measured"] * len(kind.t)
     found = [
         _numbers(view, kind, "measured", numbers, kind.t, kind.measured),
-        _looks(view, kind, "measured", look, kind.t, kind.measured, words),
+        *_looks(view, kind, "measured", look, kind.t, kind.measured, words),
     ]
     if at := view.held():
         between = view.moving()
@@ -124,7 +125,7 @@ def _tracks(view: View, kind: _Kind) -> list[Track]:
         words = [load_of(i) for i in between]
         found += [
             _numbers(view, kind, "simulated", simulated, [i.t for i in at], judged),
-            _looks(view, kind, "simulated", moving, [i.t for i in between], drawn, words),
+            *_looks(view, kind, "simulated", moving, [i.t for i in between], drawn, words),
         ]
     return found
 
@@ -133,21 +134,31 @@ def _numbers(view: View, kind: _Kind, who: Who, frame: str, t: Times, x: Sequenc
     topic, known = f"/{kind.name}/{who}", who == "measured"
     sd, note = (kind.sd, kind.note) if known else (0.0, "")
     records = () if kind.pose is None else pose_records(view.prefix + topic, kind.pose)
-    return view.track(
-        topic, kind.schema, t, lambda ns, i: kind.number(ns, frame, x[i], sd), note, records
-    )
+
+    def message(ns: int, i: int) -> bytes:
+        return protobuf_message(kind.schema, kind.number(ns, frame, x[i], sd))
+
+    return view.track(topic, kind.schema, t, message, note, records)
 
 
 def _looks(
     view: View, kind: _Kind, who: Who, frame: str, t: Times, x: Sequence[Floats], loads: list[str]
-) -> Track:
+) -> list[Track]:
     name, colour = f"{kind.name} {who}", COLOURS[who]
     note = kind.note if who == "measured" else ""
+    shade = np.array([[colour.r, colour.g, colour.b, colour.a]])
 
-    def message(ns: int, i: int) -> Json:
+    def scene(ns: int, i: int) -> bytes:
         return foxglove.scene_update(kind.look(ns, frame, name, x[i], colour, load=loads[i]))
 
-    return view.track(f"/{kind.name}/{who}/scene", SCENE, t, message, note)
+    def points(ns: int, i: int) -> bytes:
+        return foxglove.cloud(ns, frame, x[i], shade)
+
+    topic = f"/{kind.name}/{who}"
+    return [
+        view.track(f"{topic}/scene", SCENE, t, scene, note),
+        view.track(f"{topic}/points", CLOUD, t, points, note),
+    ]
 
 
 def _recorded(view: View) -> Markers | None:
@@ -175,7 +186,7 @@ def surface(view: View) -> list[Track]:
     if scene.copies > 1:
         notes["part"] = f"one of {scene.copies} symmetric parts"
 
-    def message(ns: int, i: int) -> Json:
+    def scenes(ns: int, i: int) -> bytes:
         u, said = moving[i].u, {"load": load_of(moving[i])} | notes
         return foxglove.scene_update(
             *(
@@ -188,8 +199,17 @@ def surface(view: View) -> list[Track]:
             )
         )  # fmt: skip
 
-    note = ", ".join(_left_out(parts, len(moving), len(view.held())))
-    return [view.track("/surface/simulated", SCENE, [i.t for i in moving], message, note)]
+    shown = np.unique(np.concatenate([part.nodes for part in parts]))
+
+    def points(ns: int, i: int) -> bytes:
+        u = moving[i].u[shown]
+        return foxglove.cloud(ns, view.frame, scene.mesh.nodes[shown] + u, _shades(u, top))
+
+    note, t = ", ".join(_left_out(parts, len(moving), len(view.held()))), [i.t for i in moving]
+    return [
+        view.track("/surface/simulated/scene", SCENE, t, scenes, note),
+        view.track("/surface/simulated/points", CLOUD, t, points, note),
+    ]
 
 
 def _left_out(parts: Sequence[SurfacePart], shown: int, frames: int) -> Iterator[str]:
@@ -200,7 +220,7 @@ def _left_out(parts: Sequence[SurfacePart], shown: int, frames: int) -> Iterator
         yield f"{shown} of {frames} output frames"
 
 
-def _shades(u: Floats, top: float, part: str) -> Floats:
+def _shades(u: Floats, top: float, part: str = "") -> Floats:
     """Colours (v, 4) of displacements (v, 3) m between 0 and `top` m."""
     size = np.linalg.norm(u, axis=1) / (top or 1.0)
     shades = np.asarray(mpl.colormaps["viridis"](size))

@@ -8,7 +8,6 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult
 from validate.recording.mcap.metadata import POSE, POSE_KEY
-from validate.recording.mcap.schemas import Json
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.registered import Registered
@@ -23,19 +22,21 @@ _INSTANTS = 60  # instants of what is only looked at: interpolated, or frames of
 
 @dataclass(frozen=True)
 class Track:
-    """A topic: its schema's name, times ns (n,) int64, the message of number i.
+    """A topic: its schema's name, times ns (n,) int64, the message of number i in Protobuf.
 
     `note` says what was thinned; `records` are the metadata records that belong to it; a run is
-    `given` what drives it, and predicts the others.
+    `given` what drives it, and predicts the others. A signal has a `unit` and `width` numbers.
     """
 
     topic: str
     schema: str
     ns: Ints
-    message: Callable[[int], Json]
+    message: Callable[[int], bytes]
     note: str = ""
     records: Records = ()
     given: bool = False
+    unit: str = ""
+    width: int = 1
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class View:
         topic: str,
         schema: str,
         t: Floats | Sequence[float],
-        message: Callable[[int, int], Json],
+        message: Callable[[int, int], bytes],
         note: str = "",
         records: Records = (),
     ) -> Track:

@@ -1,4 +1,4 @@
-"""JSON channels of any schema as one MCAP file: whole or not at all, both CRCs, chunks zstd.
+"""Channels of any schema, JSON or Protobuf, as one MCAP file: whole or not at all, both CRCs, zstd.
 
 The only writer: of recordings and of files that are made to be looked at, such as a report's
 replay. `enable_data_crcs` is off by default in the `mcap` package. Equal channels, messages and
@@ -16,35 +16,48 @@ from mcap.writer import CompressionType, Writer
 
 from validate.errors import RecordingError
 from validate.places import size_of, why_not
-from validate.recording.mcap.schemas import MESSAGE_ENCODING, SCHEMA_ENCODING, Json, to_bytes
+from validate.recording.mcap.schemas import ENCODINGS, JSON_SCHEMA, Json, to_bytes
 
 LIBRARY = "validate"  # without a version: two versions write the same bytes
 LAST_NS = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class JsonChannel:
-    """A topic whose messages follow the JSON schema `definition`, known to viewers as `schema`."""
+class MessageSchema:
+    """How messages are laid out: a JSON schema or a Protobuf set of files, known by its name."""
+
+    name: str
+    encoding: str
+    data: bytes
+
+
+def json_schema(name: str, definition: Json) -> MessageSchema:
+    """The schema of messages that `schemas.to_bytes` writes."""
+    return MessageSchema(name, JSON_SCHEMA, to_bytes(definition))
+
+
+@dataclass(frozen=True)
+class WrittenChannel:
+    """A topic whose messages follow `schema`."""
 
     topic: str
-    schema: str
-    definition: Json
+    schema: MessageSchema
     metadata: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class JsonMessage:
-    """One message of a topic; log time = publish time = `ns`, int64 nanoseconds."""
+class WrittenMessage:
+    """One encoded message of a topic; log time = publish time = `ns`, int64 nanoseconds."""
 
     topic: str
     ns: int
-    content: Json
+    data: bytes
 
 
 def write_channels(
     path: Path,
-    channels: Sequence[JsonChannel],
-    messages: Iterable[JsonMessage],
+    channels: Sequence[WrittenChannel],
+    messages: Iterable[WrittenMessage],
     metadata: Mapping[str, Mapping[str, str]],
 ) -> None:
     """Write `messages`, already in order of time, replacing `path` only when all is written.
@@ -81,25 +94,25 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             part.unlink(missing_ok=True)
 
 
-def _check(path: Path, channels: Sequence[JsonChannel]) -> None:
+def _check(path: Path, channels: Sequence[WrittenChannel]) -> None:
     topics = [c.topic for c in channels]
     twice = sorted({t for t in topics if topics.count(t) > 1})
     if twice:
         raise RecordingError(f"{path.name}: topics used twice: {twice}; rename one")
-    known: dict[str, Json] = {}
+    known: dict[str, MessageSchema] = {}
     for channel in channels:
-        if known.setdefault(channel.schema, channel.definition) != channel.definition:
+        if known.setdefault(channel.schema.name, channel.schema) != channel.schema:
             raise RecordingError(
-                f"{path.name}: schema '{channel.schema}' of {channel.topic!r} differs from that of "
-                "another topic; one name, one definition"
+                f"{path.name}: schema '{channel.schema.name}' of {channel.topic!r} differs from "
+                "that of another topic; one name, one definition"
             )
 
 
 def _write(
     stream: BinaryIO,
     name: str,
-    channels: Sequence[JsonChannel],
-    messages: Iterable[JsonMessage],
+    channels: Sequence[WrittenChannel],
+    messages: Iterable[WrittenMessage],
     metadata: Mapping[str, Mapping[str, str]],
 ) -> None:
     writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
@@ -117,24 +130,22 @@ def _write(
                 f"{name}: {topic!r} at {ns} ns, expected {before} .. {LAST_NS}: put the messages "
                 "in order of time"
             )
-        data = to_bytes(message.content)
         writer.add_message(
-            numbers[topic], log_time=ns, publish_time=ns, sequence=counts[topic], data=data
+            numbers[topic], log_time=ns, publish_time=ns, sequence=counts[topic], data=message.data
         )
         counts[topic], before = counts[topic] + 1, ns
     writer.finish()  # type: ignore[no-untyped-call]
 
 
-def _register(writer: Writer, channels: Sequence[JsonChannel]) -> dict[str, int]:
+def _register(writer: Writer, channels: Sequence[WrittenChannel]) -> dict[str, int]:
     """Channel numbers by topic; a schema shared by topics is written once."""
-    definitions = {c.schema: c.definition for c in channels}
     schemas = {
-        name: writer.register_schema(name, SCHEMA_ENCODING, to_bytes(definition))
-        for name, definition in definitions.items()
+        schema.name: writer.register_schema(schema.name, schema.encoding, schema.data)
+        for schema in {c.schema.name: c.schema for c in channels}.values()
     }
     return {
         c.topic: writer.register_channel(
-            c.topic, MESSAGE_ENCODING, schemas[c.schema], dict(c.metadata)
+            c.topic, ENCODINGS[c.schema.encoding], schemas[c.schema.name], dict(c.metadata)
         )
         for c in channels
     }

@@ -36,7 +36,7 @@ def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
         if channel.encoding == "cbor":
             return _cbor()
     except ImportError as missing:
-        extra = {"cdr": "ros2", "protobuf": "foxglove"}.get(channel.encoding, channel.encoding)
+        extra = {"cdr": "ros2"}.get(channel.encoding, channel.encoding)
         return (
             f"the library '{missing.name}' that reads it is not installed; "
             f"pip install 'validate-tissue[{extra}]'"

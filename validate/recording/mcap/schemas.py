@@ -1,4 +1,4 @@
-"""The JSON messages of our own recordings: their schemas, how they are written and read.
+"""The messages of our own recordings: their JSON schemas, how they are written and read.
 
     validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
                                                            z null as a whole: points in a plane
@@ -12,13 +12,14 @@
 
 `stamp` is {sec, nsec}; a foreign writer may leave it out, then publish time counts. Numbers are
 written in their shortest exact form, so they return bit for bit. Own schemas because the
-well-known pose list has no names and JSON has no NaN.
+well-known pose list has no names and JSON has no NaN. A replay holds the same in Protobuf
+(`own_protobuf`), where NaN is a point not seen, no z is points in a plane, and an image is bytes.
 """
 
 import base64
 import binascii
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,10 +33,12 @@ MARKERS, SIGNAL, CONTOUR = "validate.Markers", "validate.Signal", "validate.Cont
 IMAGE = "foxglove.CompressedImage"
 MIRROR = "foxglove.PosesInFrame"
 MIRROR_OF = "validate.mirror_of"  # key in a mirror channel's metadata: the topic it repeats
-SCHEMA_ENCODING, MESSAGE_ENCODING = "jsonschema", "json"
+JSON_SCHEMA, PROTOBUF = "jsonschema", "protobuf"
+ENCODINGS = {JSON_SCHEMA: "json", PROTOBUF: "protobuf"}  # of messages, by that of their schema
 MAX_MESSAGE = 16 * 2**20  # bytes of one JSON message: Python objects take some 10 x as much
 
 Json = dict[str, Any]
+Parse = Callable[[bytes], Json]  # of one message; raises `RecordingError`
 
 
 @dataclass(frozen=True)
@@ -165,13 +168,31 @@ def image_message(ns: int, frame: str, image: Pixels) -> Json:
     return {"timestamp": stamp(ns), "frame_id": frame, "data": data, "format": "png"}
 
 
-def decode(schema: str, data: bytes) -> Sample:
+def parse_json(data: bytes) -> Json:
+    """The object in a message.
+
+    Raises `RecordingError` for what is no JSON object, for NaN and infinity, a field twice.
+    """
+    if len(data) > MAX_MESSAGE:
+        raise RecordingError(f"a JSON message of {len(data)} bytes, the limit is {MAX_MESSAGE}")
+    try:
+        message = json.loads(
+            data.decode("utf-8"), parse_constant=_no_constant, object_pairs_hook=_once
+        )
+    except (ValueError, RecursionError) as error:  # no JSON, no UTF-8, or nested without end
+        raise RecordingError(f"no readable JSON ({error})") from None
+    if not isinstance(message, dict):
+        raise RecordingError(f"JSON {type(message).__name__}, expected an object")
+    return message
+
+
+def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
     """The sample in a message of one of our schemas.
 
-    Raises `RecordingError` for what is no JSON object, for NaN and infinity, for a field that is
-    missing, of a wrong type or of another length than its neighbours.
+    Raises `RecordingError` for what `parse` refuses, for a field that is missing, of a wrong type
+    or of another length than its neighbours.
     """
-    message = _parse(data)
+    message = parse(data)
     if schema == IMAGE:
         return _image(message)
     names: tuple[str, ...] = ()
@@ -201,26 +222,18 @@ def _number(message: Json, name: str) -> float:
 def _image(message: Json) -> Sample:
     if _text(message, "format") != "png":
         raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
+    ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
+    return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(_picture(message)))
+
+
+def _picture(message: Json) -> bytes:
+    data = _field(message, "data")
+    if isinstance(data, bytes):  # of Protobuf
+        return data
     try:
-        data = base64.b64decode(_text(message, "data"), validate=True)
+        return base64.b64decode(_text(message, "data"), validate=True)
     except (binascii.Error, ValueError) as error:
         raise RecordingError(f"field 'data' is no base64 ({error})") from None
-    ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
-    return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(data))
-
-
-def _parse(data: bytes) -> Json:
-    if len(data) > MAX_MESSAGE:
-        raise RecordingError(f"a JSON message of {len(data)} bytes, the limit is {MAX_MESSAGE}")
-    try:
-        message = json.loads(
-            data.decode("utf-8"), parse_constant=_no_constant, object_pairs_hook=_once
-        )
-    except (ValueError, RecursionError) as error:  # no JSON, no UTF-8, or nested without end
-        raise RecordingError(f"no readable JSON ({error})") from None
-    if not isinstance(message, dict):
-        raise RecordingError(f"JSON {type(message).__name__}, expected an object")
-    return message
 
 
 def _no_constant(token: str) -> float:
@@ -269,7 +282,10 @@ def _numbers(message: Json, name: str, *, null: bool = False) -> Floats:
     values = _field(message, name)
     if not isinstance(values, list):
         raise RecordingError(f"field '{name}' is {type(values).__name__}, expected a list")
-    return _array(name, values, {int, float, type(None)} if null else {int, float})
+    array = _array(name, values, {int, float, type(None)} if null else {int, float})
+    if not null and np.isnan(array).any():  # Protobuf's; JSON has none
+        raise RecordingError(f"field '{name}' holds NaN, expected numbers")
+    return array
 
 
 def _array(name: str, values: list[Any], allowed: set[type]) -> Floats:

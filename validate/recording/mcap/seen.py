@@ -24,11 +24,11 @@ from validate.recording.mcap.streams import (
     is_ours,
     like_first,
     own_of,
+    parser_of,
     require_all_stamped,
     require_forward,
     require_same,
     stream_of,
-    wrong_encoding,
 )
 from validate.recording.types import Record, Stream
 
@@ -41,7 +41,8 @@ class ChannelSeen:
 
     def __init__(self, channel: Channel, schema: Schema) -> None:
         self.channel, self.schema = channel, schema.name
-        self.error = wrong_encoding(channel, schema)  # the first message that cannot be read
+        # What reads a message, and the first that cannot be read.
+        self.parse, self.error = parser_of(channel, schema)
         self.first: Sample | None = None
         self.count = self.numbers = 0
         self._stamps: array[int] = array("q")
@@ -97,7 +98,7 @@ class ChannelSeen:
             if self.error:
                 return
             try:
-                self._add(decode(self.schema, data))
+                self._add(decode(self.schema, data, self.parse))
             except RecordingError as error:
                 self.error = f"{self.channel.topic!r} message {self.count}: {error}"
 

@@ -13,18 +13,21 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
+from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.metadata import CALIBRATION, FOUND_IN, POSE, pose_of, scale_of
 from validate.recording.mcap.records import Channel, Message, Schema
 from validate.recording.mcap.schemas import (
     CONTOUR,
     IMAGE,
+    JSON_SCHEMA,
     MARKERS,
-    MESSAGE_ENCODING,
     MIRROR_OF,
-    SCHEMA_ENCODING,
+    PROTOBUF,
     SIGNAL,
+    Parse,
     Sample,
     decode,
+    parse_json,
 )
 from validate.recording.mcap.verified import Verified
 from validate.recording.types import Contours, Frames, Markers, Record, Signal, Stream
@@ -43,13 +46,14 @@ class Collected:
     log_ns: Ints
     samples: list[Sample] = field(default_factory=list)
     error: str = ""
+    parse: Parse = parse_json
 
     def add(self, message: Message) -> int:
         """Decode and keep one message; returns how many numbers it held."""
         if self.error:
             return 0
         try:
-            self.samples.append(decode(self.schema, message.data))
+            self.samples.append(decode(self.schema, message.data, self.parse))
         except RecordingError as error:
             self.error = f"{self.channel.topic!r} message {len(self.samples)}: {error}"
             return 0
@@ -84,8 +88,8 @@ def ours(verified: Verified) -> dict[int, Collected]:
     found: dict[int, Collected] = {}
     for number, (channel, schema) in our_channels(verified).items():
         log, publish = verified.log_ns[number], verified.publish_ns[number]
-        error = wrong_encoding(channel, schema)
-        found[number] = Collected(channel, schema.name, publish, log, error=error)
+        parse, error = parser_of(channel, schema)
+        found[number] = Collected(channel, schema.name, publish, log, error=error, parse=parse)
     return found
 
 
@@ -104,14 +108,30 @@ def is_ours(channel: Channel, schema: Schema | None, records: Set[str]) -> bool:
     return schema.name in OURS or calibrated
 
 
-def wrong_encoding(channel: Channel, schema: Schema) -> str:
-    """What is wrong with the encodings of a channel of ours; "" for nothing."""
-    if (schema.encoding, channel.encoding) == (SCHEMA_ENCODING, MESSAGE_ENCODING):
-        return ""
-    return (
-        f"{channel.topic!r}: {schema.name} in '{schema.encoding}/{channel.encoding}', "
-        f"expected '{SCHEMA_ENCODING}/{MESSAGE_ENCODING}'"
+def parser_of(channel: Channel, schema: Schema) -> tuple[Parse, str]:
+    """What parses the messages of a channel of ours, and what is wrong with it; "" for nothing."""
+    encodings = f"{schema.encoding}/{channel.encoding}"
+    if encodings == f"{JSON_SCHEMA}/json":
+        return parse_json, ""
+    if encodings == f"{PROTOBUF}/protobuf":
+        found = decoder_of(schema, channel)
+        if isinstance(found, str):
+            return parse_json, f"{channel.topic!r}: {found}"
+        return _null_of_none(found), ""
+    return parse_json, (
+        f"{channel.topic!r}: {schema.name} in '{encodings}', expected '{JSON_SCHEMA}/json' or "
+        f"'{PROTOBUF}/protobuf'"
     )
+
+
+def _null_of_none(parse: Parse) -> Parse:
+    """A list of no z is what JSON writes as null: points in a plane."""
+
+    def parsed(data: bytes) -> dict[str, Any]:
+        message = parse(data)
+        return {**message, "z": message.get("z") or None}
+
+    return parsed
 
 
 def not_ours(verified: Verified) -> dict[str, str]:

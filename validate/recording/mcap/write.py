@@ -14,7 +14,13 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.mcap import schemas
-from validate.recording.mcap.channels import JsonChannel, JsonMessage, write_channels
+from validate.recording.mcap.channels import (
+    MessageSchema,
+    WrittenChannel,
+    WrittenMessage,
+    json_schema,
+    write_channels,
+)
 from validate.recording.mcap.metadata import all_records
 from validate.recording.mcap.schemas import (
     CONTOUR,
@@ -25,6 +31,7 @@ from validate.recording.mcap.schemas import (
     SCHEMAS,
     SIGNAL,
     Json,
+    to_bytes,
 )
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Stream
 
@@ -35,7 +42,7 @@ _SCHEMA_OF = {Markers: MARKERS, Signal: SIGNAL, Contours: CONTOUR, Frames: IMAGE
 class _Written:
     """One channel with its stamps (n,) ns and the message of sample i at a stamp."""
 
-    channel: JsonChannel
+    channel: WrittenChannel
     stamps: Ints
     message: Callable[[int, int], Json]
 
@@ -55,14 +62,17 @@ def write_recording(recording: Recording, path: Path) -> None:
 def _parts(topic: str, stream: Stream, t0_ns: int) -> list[_Written]:
     """The channel of a stream, and the mirror of markers that viewers know."""
     ns = stamps_ns(t0_ns, stream.t, topic)
-    schema = _SCHEMA_OF[type(stream)]
-    own = JsonChannel(topic, schema, SCHEMAS[schema])
+    own = WrittenChannel(topic, _schema(_SCHEMA_OF[type(stream)]))
     parts = [_Written(own, ns, lambda i, at: _message(stream, i, at))]
     if isinstance(stream, Markers):
         frame, x = stream.frame, stream.x
-        seen = JsonChannel(f"{topic}/foxglove", MIRROR, SCHEMAS[MIRROR], {MIRROR_OF: topic})
+        seen = WrittenChannel(f"{topic}/foxglove", _schema(MIRROR), {MIRROR_OF: topic})
         parts.append(_Written(seen, ns, lambda i, at: schemas.mirror_message(at, frame, x[i])))
     return parts
+
+
+def _schema(name: str) -> MessageSchema:
+    return json_schema(name, SCHEMAS[name])
 
 
 def _message(stream: Stream, i: int, ns: int) -> Json:
@@ -81,14 +91,15 @@ def _message(stream: Stream, i: int, ns: int) -> Json:
     return schemas.image_message(ns, stream.frame, stream.images[i])
 
 
-def _messages(parts: list[_Written]) -> Iterator[JsonMessage]:
+def _messages(parts: list[_Written]) -> Iterator[WrittenMessage]:
     """All samples in order of time, channels in their order when equal."""
     ns = np.concatenate([p.stamps for p in parts])
     which = np.repeat(np.arange(len(parts)), [len(p.stamps) for p in parts])
     sample = np.concatenate([np.arange(len(p.stamps)) for p in parts])
     for k in np.argsort(ns, kind="stable"):
         part, at = parts[which[k]], int(ns[k])
-        yield JsonMessage(part.channel.topic, at, part.message(int(sample[k]), at))
+        data = to_bytes(part.message(int(sample[k]), at))
+        yield WrittenMessage(part.channel.topic, at, data)
 
 
 def stamps_ns(t0_ns: int, t: Floats, topic: str) -> Ints:
