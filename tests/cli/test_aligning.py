@@ -82,6 +82,62 @@ def test_a_drift_is_said_enters_the_sd_and_is_taken_out_on_demand(tmp_path: Path
     assert float(found.record("clock_offset/markers")["sd"]) < blunt / 3
 
 
+def third(folder: Path, late: float, noise: float) -> str:
+    """A laser's displacement of 100 Hz of the same motion, on a third clock."""
+    rng, own = np.random.default_rng(2), np.arange(0, 40, 0.01)
+    y = 2e-3 * motion(own + late) + 2e-3 * noise * rng.normal(size=len(own))
+    laser = Signal(own, y[:, None], "m", 1e-5, "bench")
+    write_recording(recording("laser", signals={"laser": laser}), folder / "laser.mcap")
+    return str(folder / "laser.mcap")
+
+
+@pytest.mark.parametrize("late", [7.25, -3.5])  # a clock that began after the first, or before
+def test_three_files_come_onto_the_first_clock(tmp_path: Path, late: float) -> None:
+    out = tmp_path / "all.mcap"
+    given = (*files(tmp_path), third(tmp_path, late, 0.02), *BY, "--by", "force=laser")
+    code, said, err = here("align", *given, "-o", str(out))
+    assert (code, err) == (0, "")
+    told = " ".join(said.split())
+    assert "seen.mcap: offset: +0.73" in told
+    assert "laser.mcap: offset: " in told
+    assert all(float(share.split()[0]) > 0.99 for share in told.split("they correlate by ")[1:])
+    found = read_recording(out)
+    begin = found.signals["force"].t[0]
+    for topic, stream, offset in (("markers", found.markers["markers"], OFFSET),
+                                  ("laser", found.signals["laser"], late)):  # fmt: skip
+        record = found.record(f"clock_offset/{topic}")
+        assert abs(float(record["seconds"]) - offset) < 4 * float(record["sd"])
+        assert stream.t[0] - begin == pytest.approx(float(record["seconds"]), abs=1e-6)
+    names = sorted(p.name for p in tmp_path.glob("*.png"))
+    assert names == ["all-laser-aligned.png", "all-seen-aligned.png"]
+
+
+def test_one_file_that_does_not_follow_is_named_and_nothing_is_written(tmp_path: Path) -> None:
+    out = str(tmp_path / "x.mcap")
+    given = (*files(tmp_path), third(tmp_path, 7.25, 30.0), *BY, "--by", "force=laser")
+    code, said, why = here("align", *given, "-o", out)
+    assert code == 2
+    assert "seen.mcap: offset" in said
+    assert "laser.mcap: stream: flat" in why
+    assert "seen.mcap" not in why
+    assert not Path(out).exists()
+    assert "--by: 1 given for 2 further files" in refused("align", *given[:3], *BY, "-o", out)
+    assert "1 file, at least 2" in refused("align", given[0], *BY, "-o", out)
+
+
+def test_what_is_enough_is_the_users(tmp_path: Path) -> None:
+    given = (*files(tmp_path, noise=0.8), *BY, "-o", str(tmp_path / "x.mcap"))
+    why = refused("align", *given, "--correlation", "0.9")
+    assert "at least 0.9 is needed" in why
+    code, said, _ = here("align", *given)
+    assert code == 0
+    assert "they correlate by 0." in " ".join(said.split())
+    pair = (files(tmp_path)[0], third(tmp_path, 35.0, 0.01), "--by", "force=laser")
+    for share, code in (("0.5", 0), ("0.9", 2)):
+        out = str(tmp_path / f"{share}.mcap")
+        assert here("align", *pair, "--coverage", share, "-o", out)[0] == code
+
+
 def test_a_flash_marks_images(tmp_path: Path) -> None:
     t = np.arange(100) / 20
     images = tuple(np.full((16, 16), 200 if x >= 2 else 20, np.uint8) for x in t)
@@ -106,7 +162,7 @@ def test_what_does_not_tell_an_offset_is_one_line(tmp_path: Path) -> None:
     assert "no channel 'forse'; there are force" in refused(
         "align", log, seen, "--by", "forse=markers.tip.z", "-o", out
     )
-    assert "both have ['force']" in refused("align", log, log, *BY, "-o", out)
+    assert "more than one file has ['force']" in refused("align", log, log, *BY, "-o", out)
     assert "correlate by" in refused("align", log, seen, "--by", "force=markers.tip.z", "-o", out)
     assert "flat" in refused("align", log, seen, "--by", "force=markers.base.z", "-o", out)
     t = np.arange(0, 30, 0.02)

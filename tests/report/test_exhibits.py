@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 from report_samples import small_result
 from tracking_samples import AT, STEPS, WHY, T, failed_result, swing, tracking_result
@@ -202,6 +203,25 @@ def test_tables_and_charts_as_csv(folder: Path) -> None:
     assert list(rows[0]) == ["series", "style", "x: time / s", "y: u_x / mm", "upper: u_x / mm"]
     reference = [float(r["y: u_x / mm"]) for r in rows if r["series"] == "reference (twin)"]
     np.testing.assert_array_equal(reference, 1e3 * swing(T))
+
+
+def test_every_table_and_curve_opens_in_pandas(folder: Path, made: dict[str, DrawnExhibit]) -> None:
+    """Columns have names, numbers are numbers; every chart of the page has its curves."""
+    files = {path.stem: pd.read_csv(path) for path in (folder / "tables").glob("*.csv")}
+    assert len(files) > 8
+    for name, frame in files.items():
+        assert len(frame.columns) > 1, name
+        assert not any("Unnamed" in str(c) for c in frame.columns), name
+        numbers = frame.select_dtypes("number").to_numpy()
+        assert not np.isinf(numbers).any(), name
+    charts = {chart.name: chart for d in made.values() for chart in d.exhibit.charts}
+    assert charts
+    assert {f"chart_{name}" for name in charts} <= set(files)
+    for name, chart in charts.items():
+        frame = files[f"chart_{name}"]
+        curves = {series.label: len(series.x) for series in chart.series}
+        levels = {label: 1 for label, _ in chart.levels}
+        assert frame.groupby("series", sort=False).size().to_dict() == curves | levels, name
 
 
 def test_names_must_differ(result: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from tracking_samples import tracking_result
+from tracking_samples import SIDE, tracking_result
 
 from validate.report.observed import markers_seen
 from validate.report.paraview import MOST, write_series
@@ -44,9 +44,27 @@ def test_bodies_hold_displacement_strain_and_stress(folder: Path) -> None:
     u = ours.point_data["displacement [m]"]
     assert np.abs(u - method.run.u[-1]).max() < 1e-15
     assert np.abs(theirs.point_data["displacement [m]"] - u).max() < 1e-15
-    assert ours.cell_data["strain [1]"].shape == (len(scene.mesh.cells), 6)
-    assert np.isfinite(ours.cell_data["von Mises [Pa]"]).all()
-    assert ours.compute_cell_sizes()["Volume"].sum() > 0
+    assert ours.compute_cell_sizes()["Volume"].sum() == pytest.approx(SIDE**3, rel=1e-12)
+    # A shear of the whole body: e_xz is half the angle, s_xz = 2 mu e_xz, von Mises sqrt(3) s_xz.
+    angle = u[np.abs(u[:, 0]).argmax(), 0] / SIDE
+    mu = scene.material.E / (2 * (1 + scene.material.nu))
+    for read in (ours.cell_data, {k: np.vstack(v) for k, v in theirs.cell_data.items()}):
+        strain, stress = np.zeros((2, len(scene.mesh.cells), 6))
+        strain[:, 5] = angle / 2
+        stress[:, 5] = mu * angle
+        assert np.abs(read["strain [1]"] - strain).max() < 1e-12
+        assert np.abs(read["stress [Pa]"] - stress).max() < 1e-9 * mu
+        mises = np.ravel(read["von Mises [Pa]"])
+        assert mises == pytest.approx(np.sqrt(3) * mu * abs(angle), rel=1e-9)
+
+
+def test_meshio_finds_the_same_cells(folder: Path) -> None:
+    scene = next(m for m in tracking_result().methods if m.accepted).scene
+    theirs = meshio.read(sorted(folder.glob("*/body_*.vtu"))[0])
+    ((kind, cells),) = ((block.type, block.data) for block in theirs.cells)
+    assert kind == {"tet4": "tetra", "hex8": "hexahedron"}[scene.mesh.kind]
+    assert np.array_equal(cells, scene.mesh.cells)
+    assert np.array_equal(theirs.points, scene.mesh.nodes)
 
 
 def test_markers_are_where_they_were_measured_with_what_the_run_is_off_by(folder: Path) -> None:

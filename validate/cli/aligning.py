@@ -1,5 +1,7 @@
-"""`validate align`: two files of one test, whose clocks know nothing of each other."""
+"""`validate align`: files of one test, whose clocks know nothing of each other."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,10 +15,12 @@ from validate.places import try_file
 from validate.recording.alignment import Offset, offset_by_correlation
 from validate.recording.channels import channel
 from validate.recording.events import offset_by_event
+from validate.recording.lag import correlation_at
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.recording.together import (
     ClockDrift,
+    Moved,
     drift_of,
     require_other_topics,
     stretched_signal,
@@ -27,72 +31,129 @@ from validate.recording.types import Signal
 from validate.report.aligned import aligned
 from validate.report.encode import png
 
-Event = Literal["onset", "step"]
+
+@dataclass(frozen=True)
+class HowAligned:
+    """How files are aligned: by an `event` or by correlation `within` s (None: whatever they last).
+
+    At least `correlation` (-1..1), and the share `coverage` of samples that meet, are needed;
+    `straighten` takes a drift out.
+    """
+
+    event: Literal["onset", "step"] | None
+    within: float | None
+    correlation: float
+    coverage: float
+    straighten: bool
 
 
-def align(
-    files: tuple[Path, Path],
-    out: Path,
-    by: str,
-    event: Event | None,
-    within: float | None,
-    *,
-    straighten: bool,
-) -> None:
-    """Moves the streams of the second file onto the clock of the first and writes both."""
+@dataclass(frozen=True)
+class _Pair:
+    """One channel of the first file and one of a further file, with their names."""
+
+    file: Path
+    names: tuple[str, str]
+    reference: Signal
+    stream: Signal
+
+
+def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligned) -> None:
+    """Moves the streams of all further files onto the clock of the first and writes them all.
+
+    Every file is tried; where one cannot be aligned, nothing is written.
+    """
     try_file(out)
-    one, other = (read_recording(file) for file in files)
-    require_other_topics(one, other)
-    ((known, moved),) = _single(by)
-    reference, stream = channel(one, known), channel(other, moved)
-    offset = _offset(reference, stream, event, within)
-    drift = None if event else _drift(reference, stream, offset)
-    _told(offset, drift, straighten=straighten)
-    if straighten and drift is not None:
-        offset = _offset(reference, stretched_signal(stream, drift), event, within)
-    else:
-        offset, drift = with_drift(offset, drift), None
-    found = together(one, other, offset, drift, out.stem)
-    write_recording(found, out)
-    picture = out.with_name(f"{out.stem}-aligned.png")
-    picture.write_bytes(png(aligned(reference, stream, (known, moved), offset.seconds)))
-    say(f"{picture}: both channels on one clock: look at it", indent="  ")
-    written(found, out)
+    named = _by(files, by)
+    first, *others = (read_recording(file) for file in files)
+    require_other_topics([first, *others])
+    found, refused = list[Moved](), list[str]()
+    taken = list[_Pair]()
+    for file, other, names in zip(files[1:], others, named, strict=True):
+        pair = _Pair(file, names, channel(first, names[0]), channel(other, names[1]))
+        try:
+            offset, drift = _aligned(pair, wanted, several=len(others) > 1)
+        except RecordingError as error:
+            refused.append(f"{file.name}: {error}" if len(others) > 1 else str(error))
+            continue
+        found.append(Moved(other, offset, drift))
+        taken.append(pair)
+    if refused:
+        raise RecordingError("; ".join(refused))
+    whole = together(first, found, out.stem)
+    write_recording(whole, out)
+    for pair, one in zip(taken, found, strict=True):
+        _drawn(pair, one.offset, out, several=len(others) > 1)
+    written(whole, out)
 
 
-def _single(by: str) -> list[tuple[str, str]]:
-    found = list(pairs((by,), "--by").items())
-    if not found[0][1]:
-        raise UsageError(f"--by {by}: expected CHANNEL=CHANNEL, of the first and the second file")
+def _by(files: Sequence[Path], by: Sequence[str]) -> list[tuple[str, str]]:
+    """What moves alike in the first file and each further one."""
+    if len(files) < 2:
+        raise UsageError(f"align: {len(files)} file, at least 2 are needed")
+    if len(by) != len(files) - 1:
+        raise UsageError(
+            f"--by: {len(by)} given for {len(files) - 1} further files; give one for each, in "
+            "their order"
+        )
+    found = [next(iter(pairs((one,), "--by").items())) for one in by]
+    for one, (_, moved) in zip(by, found, strict=True):
+        if not moved:
+            raise UsageError(
+                f"--by {one}: expected CHANNEL=CHANNEL, of the first and a further file"
+            )
     return found
 
 
-def _offset(reference: Signal, stream: Signal, event: Event | None, within: float | None) -> Offset:
-    if event:
-        return offset_by_event(reference, stream, event)
+def _aligned(pair: _Pair, wanted: HowAligned, *, several: bool) -> tuple[Offset, ClockDrift | None]:
+    """The offset of a file, and the drift to be taken out; both are told."""
+    offset = _offset(pair.reference, pair.stream, wanted)
+    prefix = f"{pair.file.name}: " if several else ""
+    _tell_offset(pair, offset, prefix)
+    drift = None if wanted.event else _drift(pair, offset, prefix)
+    if drift is None:
+        return offset, None
+    say(f"{prefix}drift: {1e6 * drift.rate:+.4g} ppm, sd {1e6 * drift.sd:.2g} ppm", indent="  ")
+    if wanted.straighten:
+        return _offset(pair.reference, stretched_signal(pair.stream, drift), wanted), drift
+    if drift.seen:
+        complain(
+            f"{prefix}the clocks run apart by {1e3 * drift.apart:.3g} ms over {drift.span:.4g} s, "
+            "which stands in the offset's sd; --drift takes it out"
+        )
+    return with_drift(offset, drift), None
+
+
+def _offset(reference: Signal, stream: Signal, wanted: HowAligned) -> Offset:
+    if wanted.event:
+        return offset_by_event(reference, stream, wanted.event, min_coverage=wanted.coverage)
     longest = float(max(np.ptp(reference.t), np.ptp(stream.t)))
-    return offset_by_correlation(reference, stream, within or longest)
+    within = wanted.within or longest
+    return offset_by_correlation(reference, stream, within, wanted.coverage, wanted.correlation)
 
 
-def _drift(reference: Signal, stream: Signal, offset: Offset) -> ClockDrift | None:
+def _tell_offset(pair: _Pair, offset: Offset, prefix: str) -> None:
+    together = correlation_at(pair.reference, pair.stream, offset.seconds)
+    say(
+        f"{prefix}offset: {offset.seconds:+.6g} s, sd {offset.sd:.2g} s, by {offset.method}; "
+        f"{offset.count} samples meet the first file, {100 * offset.coverage:.0f} % of them; "
+        f"they correlate by {together:.3f}",
+        indent="  ",
+    )
+
+
+def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:
     try:
-        return drift_of(reference, stream, offset)
+        return drift_of(pair.reference, pair.stream, offset)
     except RecordingError as error:
-        say(f"drift: not known, half of the recording does not tell it ({error})", indent="  ")
+        why = f"not known, half of the recording does not tell it ({error})"
+        say(f"{prefix}drift: {why}", indent="  ")
         return None
 
 
-def _told(offset: Offset, drift: ClockDrift | None, *, straighten: bool) -> None:
-    say(
-        f"offset: {offset.seconds:+.6g} s, sd {offset.sd:.2g} s, by {offset.method}; "
-        f"{offset.count} samples meet the first file, {100 * offset.coverage:.0f} % of them",
-        indent="  ",
-    )
-    if drift is None:
-        return
-    say(f"drift: {1e6 * drift.rate:+.4g} ppm, sd {1e6 * drift.sd:.2g} ppm", indent="  ")
-    if drift.seen and not straighten:
-        complain(
-            f"the clocks run apart by {1e3 * drift.apart:.3g} ms over {drift.span:.4g} s, which "
-            "stands in the offset's sd; --drift takes it out"
-        )
+def _drawn(pair: _Pair, offset: Offset, out: Path, *, several: bool) -> None:
+    """The picture of both channels on one clock, beside what was written."""
+    own = f"-{pair.file.stem}" if several else ""
+    picture = out.with_name(f"{out.stem}{own}-aligned.png")
+    drawing = aligned(pair.reference, pair.stream, pair.names, offset.seconds)
+    picture.write_bytes(png(drawing))
+    say(f"{picture}: both channels on one clock: look at it", indent="  ")

@@ -116,18 +116,24 @@ def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
 
 
 @click.command()
-@click.argument("files", nargs=2, type=FILE)
-@click.option("--by", required=True, metavar="CHANNEL=CHANNEL",
-              help="What moves alike in both, as force=-markers.tip.z.")  # fmt: skip
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--by", required=True, multiple=True, metavar="CHANNEL=CHANNEL",
+              help="What moves alike in the first file and a further one, as "
+              "force=-markers.tip.z; one for each further file, in their order.")  # fmt: skip
 @click.option("--event", type=click.Choice(["onset", "step"]), help="Not by correlation.")
 @click.option("--within", type=float, metavar="SECONDS", help="The largest offset searched.")
-@click.option("--drift", "straighten", is_flag=True, help="Stretch the second file's clock.")
+@click.option("--correlation", type=click.FloatRange(0.0, 1.0, min_open=True), default=0.5,
+              show_default=True, metavar="SHARE", help="Less is refused.")  # fmt: skip
+@click.option("--coverage", type=click.FloatRange(0.0, 1.0, min_open=True), default=0.5,
+              show_default=True, metavar="SHARE",
+              help="Of a file's samples that meet the first file; less is refused.")  # fmt: skip
+@click.option("--drift", "straighten", is_flag=True, help="Stretch the further files' clocks.")
 @click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
-def align(files: tuple[Path, Path], out: Path, by: str, **options: Any) -> None:
-    """Put two files of one test on the clock of the first, and say how sure that is."""
+def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: Any) -> None:
+    """Put files of one test on the clock of the first, and say how sure that is."""
     from validate.cli import aligning
 
-    aligning.align(files, out, by, **options)
+    aligning.align(files, out, by, aligning.HowAligned(**options))
 
 
 @click.command()

@@ -14,7 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.errors import RecordingError
-from validate.recording.lag import MIN_MATCHED, coarse_lag, met, noise_of, refined_lag, step_of
+from validate.recording.lag import (
+    MIN_CORRELATION,
+    MIN_MATCHED,
+    coarse_lag,
+    met,
+    noise_of,
+    refined_lag,
+    step_of,
+)
 from validate.recording.types import Recording, Signal, Stream, by_kind
 
 RECORD = "clock_offset/"  # metadata record RECORD + topic of every stream that was moved
@@ -36,7 +44,11 @@ class Offset:
 
 
 def offset_by_correlation(
-    reference: Signal, stream: Signal, within: float, min_coverage: float = MIN_COVERAGE
+    reference: Signal,
+    stream: Signal,
+    within: float,
+    min_coverage: float = MIN_COVERAGE,
+    min_correlation: float = MIN_CORRELATION,
 ) -> Offset:
     """The offset |tau| <= `within` (s) at which the stream follows the reference, up to scale.
 
@@ -49,7 +61,7 @@ def offset_by_correlation(
     if not within > 0:
         raise RecordingError(f"offset within {within} s: expected a range above 0")
     step = min(step_of(reference.t), step_of(stream.t))
-    coarse = coarse_lag(reference, stream, step, within, min_coverage)
+    coarse = coarse_lag(reference, stream, step, within, min_coverage, min_correlation)
     seconds, sd = offset_near(reference, stream, coarse)
     return matched(reference, stream, Offset(seconds, sd, "correlation", 0, 0), min_coverage)
 

@@ -27,7 +27,12 @@ Bools = NDArray[np.bool_]
 
 
 def coarse_lag(
-    reference: Signal, stream: Signal, step: float, within: float, min_coverage: float
+    reference: Signal,
+    stream: Signal,
+    step: float,
+    within: float,
+    min_coverage: float,
+    min_correlation: float = MIN_CORRELATION,
 ) -> float:
     """The lag (s) of the highest correlation on a grid of `step` s, when it is the only one."""
     a, a_seen = _on_grid(reference, step)
@@ -44,16 +49,16 @@ def coarse_lag(
             f"within {within:g} s the streams overlap by {best:.0f} % at most, at least "
             f"{100 * min_coverage:.0f} % are needed; widen the search or record longer together"
         )
-    return _only_peak(tau[usable], correlation[usable], within)
+    return _only_peak(tau[usable], correlation[usable], within, min_correlation)
 
 
-def _only_peak(tau: Floats, correlation: Floats, within: float) -> float:
+def _only_peak(tau: Floats, correlation: Floats, within: float, least: float) -> float:
     peak = int(np.argmax(correlation))
     best = float(correlation[peak])
-    if best < MIN_CORRELATION:
+    if best < least:
         raise RecordingError(
             f"the streams correlate by {best:.2f} at most (at {tau[peak]:+.4g} s), at least "
-            f"{MIN_CORRELATION} is needed; align them by a marked event"
+            f"{least:g} is needed; align them by a marked event, or state what is enough"
         )
     rivals = 1 - correlation**2 <= AMBIGUITY * (1 - best**2) + 1e-9
     rivals &= correlation > 0
@@ -156,6 +161,20 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
         f"no best offset near {start:+.4g} s: the streams do not follow each other there; align "
         "them by a marked event"
     )
+
+
+def correlation_at(reference: Signal, stream: Signal, seconds: float) -> float:
+    """How the stream (nt, 1), moved by `seconds` s, correlates with the reference where they meet.
+
+    The faster of both is interpolated at the samples of the slower one.
+    """
+    known, seen, moved = reference, stream, seconds
+    if step_of(reference.t) > step_of(stream.t):
+        known, seen, moved = stream, reference, -seconds
+    t = seen.t + moved
+    there = met(known.t, t)
+    values = np.interp(t[there], *_distinct(known))
+    return float(np.corrcoef(values, seen.y[there, 0])[0, 1])
 
 
 def _without(along: Floats, x: Floats) -> Floats:

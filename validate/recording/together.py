@@ -1,10 +1,12 @@
-"""Two files of one test with clocks of their own become one recording on the clock of the first.
+"""Files of one test with clocks of their own become one recording on the clock of the first.
 
-The second file's streams share one clock, so one offset moves all of them. Whether that clock also
-runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1), over
-the distance of the halves' middles.
+The streams of a further file share one clock, so one offset moves all of them. Whether that clock
+also runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1),
+over the distance of the halves' middles.
 """
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,28 +86,42 @@ def stretched(recording: Recording, drift: ClockDrift) -> Recording:
     return replace(recording, **by_kind(streams))
 
 
-def together(
-    reference: Recording, other: Recording, offset: Offset, drift: ClockDrift | None, name: str
-) -> Recording:
-    """One recording; `offset` counts from both files' own zeros, `drift` is taken out where given.
+@dataclass(frozen=True)
+class Moved:
+    """A further recording: its offset from the first, both counted from their own zeros, and the
+    drift of its clock that is taken out, None for none."""
 
-    Every stream of `other` keeps the offset as a record. Raises `RecordingError` for topics that
-    both have, and for a stream that was moved before.
+    recording: Recording
+    offset: Offset
+    drift: ClockDrift | None
+
+
+def together(reference: Recording, others: Sequence[Moved], name: str) -> Recording:
+    """One recording; every stream of the others keeps its offset as a record.
+
+    Raises `RecordingError` for topics that two of them have, and for a stream moved before.
     """
-    straight = other if drift is None else stretched(other, drift)
-    found = merge([reference, replace(straight, t0_ns=reference.t0_ns)], name)
-    for topic in other.streams:
-        found = shift(found, topic, offset)
-    if drift is None:
-        return found
-    record = {"rate": repr(drift.rate), "sd": repr(drift.sd), "about_s": repr(drift.middle)}
-    return replace(found, metadata={**found.metadata, f"clock_drift/{other.name}": record})
+    straight = [m.recording if m.drift is None else stretched(m.recording, m.drift) for m in others]
+    found = merge([reference, *(replace(r, t0_ns=reference.t0_ns) for r in straight)], name)
+    for one in others:
+        for topic in one.recording.streams:
+            found = shift(found, topic, one.offset)
+    return replace(found, metadata={**found.metadata, **_drift_records(others)})
 
 
-def require_other_topics(reference: Recording, other: Recording) -> None:
-    """Raises `RecordingError` for topics that both recordings have."""
-    both = sorted(reference.streams.keys() & other.streams.keys())
+def _drift_records(others: Sequence[Moved]) -> dict[str, dict[str, str]]:
+    found = {f"clock_drift/{one.recording.name}": one.drift for one in others if one.drift}
+    return {
+        name: {"rate": repr(drift.rate), "sd": repr(drift.sd), "about_s": repr(drift.middle)}
+        for name, drift in found.items()
+    }
+
+
+def require_other_topics(recordings: Sequence[Recording]) -> None:
+    """Raises `RecordingError` for topics that two of the recordings have."""
+    counts = Counter(topic for r in recordings for topic in r.streams)
+    both = sorted(topic for topic, n in counts.items() if n > 1)
     if both:
         raise RecordingError(
-            f"both have {both}: import one of them again under another topic (--topic)"
+            f"more than one file has {both}: import one of them again under another topic (--topic)"
         )

@@ -8,6 +8,7 @@ from validate.report.plain import Json
 
 _FAILS = ("differs", "cannot decide")
 _EVIDENCE = ("agrees", *_FAILS)
+_COUNTED = {"tests": "", "failures": "failure", "errors": "error", "skipped": "skipped"}
 _TEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
     "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -16,43 +17,77 @@ _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 
 
 def junit(content: Json) -> str:
-    """A test suite for each method: its checks, then, as a suite of their own, printed figures.
+    """A suite for the verdict over all checks, one a method, one for printed figures.
 
-    What is no evidence (fitted, repeats itself) is skipped with its reason; an experiment that
-    compared nothing has one failing case that says so.
+    It fails where `validate run` does: a check that differs by itself but not after Holm's
+    correction passes and says so. What is no evidence (fitted, repeats itself) is skipped with its
+    reason; an accepted method that did not finish is an error; nothing compared is a failure.
     """
-    root = ElementTree.Element("testsuites", name=str(content["experiment"]))
-    for method in content["methods"]:
-        cases = [_check(content, method, c) for c in method["checks"]]
+    name = str(content["experiment"])
+    root = ElementTree.Element("testsuites", name=name)
+    suites = [(f"{name}.verdict", [_verdict(content)])]
+    suites += [(f"{name}.{m['name']}", _cases(content, m)) for m in content["methods"]]
+    suites += [(f"{name}.published", [_figure(p) for p in content["published"]])]
+    for suite, cases in suites:
         if cases:
-            _suite(root, f"{content['experiment']}.{method['name']}", cases)
-    figures = [_figure(p) for p in content["published"]]
-    if figures:
-        _suite(root, f"{content['experiment']}.published", figures)
-    if not len(root):
-        empty = ElementTree.Element("testcase", name="checks", classname="nothing compared")
-        ElementTree.SubElement(empty, "failure", message="0 checks: nothing was compared")
-        _suite(root, str(content["experiment"]), [empty])
+            _suite(root, suite, cases, content["created"])
+    for key in _COUNTED:
+        root.set(key, str(sum(int(suite.get(key, 0)) for suite in root)))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _suite(root: ElementTree.Element, name: str, cases: list[ElementTree.Element]) -> None:
-    told = {"name": name, "tests": str(len(cases))}
-    for key, tag in (("failures", "failure"), ("skipped", "skipped")):
-        told[key] = str(sum(case.find(tag) is not None for case in cases))
-    ElementTree.SubElement(root, "testsuite", told).extend(cases)
+def _suite(
+    root: ElementTree.Element, name: str, cases: list[ElementTree.Element], created: str
+) -> None:
+    counts = {key: sum(case.find(tag) is not None for case in cases)
+              for key, tag in _COUNTED.items() if tag}  # fmt: skip
+    told = {"tests": len(cases), **counts}
+    suite = ElementTree.SubElement(root, "testsuite", name=name, timestamp=created)
+    suite.attrib.update({key: str(value) for key, value in told.items()})
+    suite.extend(cases)
+
+
+def _verdict(content: Json) -> ElementTree.Element:
+    case = ElementTree.Element("testcase", name="all checks", classname=content["experiment"])
+    overall = content["overall"]
+    said = _clean(f"{overall['verdict']}, {overall['evidence']} of {overall['checks']} checks are "
+                  f"evidence; {' '.join(content['sentence'].split())}")  # fmt: skip
+    if content["passed"]:
+        ElementTree.SubElement(case, "system-out").text = said
+    else:
+        ElementTree.SubElement(case, "failure", message=said, type=overall["verdict"])
+    return case
+
+
+def _cases(content: Json, method: Json) -> list[ElementTree.Element]:
+    """The checks of a method, after its end where it did not finish."""
+    cases = [_check(content, method, c) for c in method["checks"]]
+    outcome = method["outcome"]
+    if outcome["state"] != "finished":
+        end = _case(content, method, "finished")
+        kind = "error" if method["accepted"] else "skipped"
+        said = _clean(f"{outcome['state']} at step {outcome['step']}: {outcome['why']}")
+        ElementTree.SubElement(end, kind, message=said)
+        cases.insert(0, end)
+    return cases
+
+
+def _case(content: Json, method: Json, name: str) -> ElementTree.Element:
+    classname = f"{content['experiment']}.{method['name']}"
+    return ElementTree.Element("testcase", name=name, classname=classname)
 
 
 def _check(content: Json, method: Json, check: Json) -> ElementTree.Element:
-    name = f"{content['experiment']}.{method['name']}"
-    case = ElementTree.Element("testcase", name=check["name"], classname=name)
-    verdict = check["verdict"]
-    said = _clean(f"{verdict}: E {_value(check, 'value')}, u_val {_value(check, 'u_val')}, "
+    case = _case(content, method, check["name"])
+    verdict, overall = check["verdict"], content["overall"]
+    alone = verdict == "differs" and check["name"] not in overall["differs"]
+    words = "differs by itself, not after Holm's correction" if alone else verdict
+    said = _clean(f"{words}: E {_value(check, 'value')}, u_val {_value(check, 'u_val')}, "
                   f"{check['count']} values; {check['why']}")  # fmt: skip
     if verdict not in _EVIDENCE:
         ElementTree.SubElement(case, "skipped", message=said)
-    elif verdict in _FAILS and method["accepted"]:
+    elif verdict in _FAILS and method["accepted"] and not alone:
         ElementTree.SubElement(case, "failure", message=said, type=verdict)
     else:
         ElementTree.SubElement(case, "system-out").text = said
