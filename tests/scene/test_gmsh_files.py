@@ -38,7 +38,7 @@ def test_what_stands_beside_a_solid_is_told_and_names_facets() -> None:
 def test_a_shell_on_a_solid_is_no_facet(tmp_path: Path) -> None:
     text = (FILES / "all.inp").read_text("utf-8").replace("type=CPS3", "type=S3")
     (tmp_path / "shell.inp").write_text(text, "utf-8")
-    with pytest.raises(SceneError, match="its elements are 60 triangle, 60 tetra"):
+    with pytest.raises(SceneError, match="its elements are 60 S3, 60 tetra"):
         read_foreign(tmp_path / "shell.inp", "mm")
 
 

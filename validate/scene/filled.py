@@ -18,9 +18,10 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
     """The body inside a surface with lengths in `unit`, of edges of about `edge` m (0: a twentieth
     of its diagonal).
 
-    Its surface lies within a thousandth of the diagonal of the given one; both volumes are told.
-    Raises `SceneError` for a surface that is open, damaged or too large, `UsageError` without the
-    library.
+    Its surface lies within a thousandth of the diagonal of the given one; both volumes are told,
+    and how many triangles were the wrong way round. Two fillings of one surface are two meshes.
+    Raises `SceneError` for a surface that is open, cuts itself, is damaged or too large,
+    `UsageError` without the library.
     """
     factor = metres(path.name, unit)
     if not (np.isfinite(edge) and edge >= 0):
@@ -35,10 +36,16 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
     if cell_volumes(mesh).sum() < 0:
         mesh = Mesh(mesh.nodes, mesh.cells[:, _TURN], "tet4")
     require_positive_cells(mesh)
-    enclosed = factor**3 * float(found["enclosed"])
-    told = {
-        "surface": f"{int(found['triangles'])} triangles around {1e6 * enclosed:.4g} cm3",
-        "filled": f"{1e6 * cell_volumes(mesh).sum():.4g} cm3 "
-        f"({100 * (cell_volumes(mesh).sum() / enclosed - 1):+.2f} %)",
-    }
-    return ForeignBody(mesh, told)
+    volume, enclosed, may = (
+        float(cell_volumes(mesh).sum()), *(factor**3 * float(found[k]) for k in
+                                           ("enclosed", "may_differ")),
+    )  # fmt: skip
+    share = f"{1e6 * volume:.4g} cm3 ({100 * (volume / enclosed - 1):+.2f} %)"
+    around = f"{int(found['triangles'])} triangles around {1e6 * enclosed:.4g} cm3"
+    if abs(volume - enclosed) > may:
+        raise SceneError(
+            f"{path.name}: {around}, filled are {share}, where {100 * may / enclosed:.2g} % may "
+            "differ: it cuts itself, or parts of it overlap; unite them first"
+        )
+    turned = f"{int(found['turned'])} of {int(found['triangles'])} triangles"
+    return ForeignBody(mesh, {"surface": around, "turned": turned, "filled": share})

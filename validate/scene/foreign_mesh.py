@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, SceneError
 from validate.recording.formats.apart import decoded
+from validate.scene.abaqus_arrays import arrays as abaqus_arrays
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic, require_positive_cells
 from validate.scene.shape_functions import EDGES
 from validate.units import in_si
@@ -69,11 +70,22 @@ def read_foreign(path: Path, unit: str) -> ForeignBody:
     """
     factor = metres(path.name, unit)
     require_readable(path)
+    abaqus = path.suffix.lower() == ".inp"
+    return _body(path.name, (_abaqus if abaqus else _others)(path), factor, turn=not abaqus)
+
+
+def _abaqus(path: Path) -> dict[str, NDArray[Any]]:
     try:
-        found = decoded("validate.scene.meshio_arrays", path, EXTRA)
+        return abaqus_arrays(path)
+    except (SceneError, OSError) as error:
+        raise SceneError(f"{path.name}: {error}") from None
+
+
+def _others(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        return decoded("validate.scene.meshio_arrays", path, EXTRA)
     except RecordingError as error:
         raise SceneError(str(error)) from None
-    return _body(path.name, found, factor, turn=path.suffix.lower() != ".inp")
 
 
 def _body(
@@ -82,7 +94,10 @@ def _body(
     shapes = {k.removeprefix(_CELLS): v for k, v in found.items() if k.startswith(_CELLS)}
     if len(shapes) != 1 or next(iter(shapes)) not in _KINDS:
         listed = ", ".join(f"{len(v)} {k}" for k, v in shapes.items()) or "none"
-        raise SceneError(f"{name}: its elements are {listed}; one of {', '.join(_KINDS)} is taken")
+        raise SceneError(
+            f"{name}: its elements are {listed}; one of {', '.join(_KINDS)} alone is taken: export "
+            "them split into tetrahedra"
+        )
     ((shape, cells),) = shapes.items()
     kind, points = _KINDS[shape], factor * found["points"]
     unused = len(points) - len(np.unique(cells))
@@ -102,6 +117,8 @@ def _body(
     }
     if "beside" in found:
         told["left out"] = f"{found['beside']} beside the solid; their sets name its facets"
+    if "placed" in found:
+        told["moved"] = f"to where its instance '{found['placed']}' stands"
     mesh = replace(mesh, facets=_facets(mesh, used, found))
     return ForeignBody(quadratic(mesh) if shape == "tetra10" else mesh, told)
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import SceneError
-from validate.scene.meshio_arrays import read_quietly
 
 _SAME = 1e-7  # of the body's size: corners of triangles that are one point
 _MOST = 2_000_000  # triangles
+_ENVELOPE = 1e-3  # of the diagonal: how far the filled body's surface may lie off
 _SECONDS = 4  # for reading, and one more for each MB
 
 
@@ -33,6 +33,7 @@ def arrays(path: Path, edge: float = 0.0) -> dict[str, NDArray[Any]]:
             f"{loose} open or doubled edges in {len(triangles)} triangles: the surface is not "
             "closed; repair it first"
         )
+    triangles, turned = _oriented(points, triangles)
     with TemporaryDirectory(prefix="validate-") as folder, chdir(folder):  # it leaves files there
         nodes, cells = tetrahedralize(
             points, triangles.astype(np.int32), edge_length_abs=edge or None, num_threads=1,
@@ -42,22 +43,27 @@ def arrays(path: Path, edge: float = 0.0) -> dict[str, NDArray[Any]]:
         "points": np.asarray(nodes, dtype=np.float64),
         "cells.tetra": np.asarray(cells, dtype=np.int64),
         "triangles": np.array(len(triangles)),
-        "enclosed": np.array(_enclosed(points, triangles)),
+        "turned": np.array(turned),
+        "enclosed": np.array(_signed_volume(points, triangles)),
+        "may_differ": np.array(_area(points, triangles) * _ENVELOPE * _diagonal(points)),
     }
 
 
 def _surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Corners and triangles, as the file has them; what it says of looks is left out."""
+    import trimesh
+
     with _within(_SECONDS + path.stat().st_size // 2**20):
-        mesh = read_quietly(path, path.name)
-    found = [np.asarray(b.data) for b in mesh.cells if b.type == "triangle"]
-    found += [np.vstack([b.data[:, [0, 1, 2]], b.data[:, [0, 2, 3]]])
-              for b in mesh.cells if b.type == "quad"]  # fmt: skip
-    if not found:
+        mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
+    triangles = np.asarray(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
+    if not len(triangles):
         raise SceneError("no triangles in it: no surface")
-    triangles = np.vstack(found).astype(np.int64)
     if len(triangles) > _MOST:
         raise SceneError(f"{len(triangles)} triangles, the limit is {_MOST}; simplify it")
-    return np.asarray(mesh.points, dtype=np.float64), triangles
+    points = np.asarray(mesh.vertices, dtype=np.float64)
+    if not np.isfinite(points).all():
+        raise SceneError(f"{int((~np.isfinite(points)).sum())} coordinates are no numbers; damaged")
+    return points, triangles
 
 
 @contextmanager
@@ -94,7 +100,55 @@ def _open_edges(triangles: NDArray[np.int64]) -> int:
     return int((counts != 2).sum())
 
 
-def _enclosed(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
-    """Volume inside the surface, by the divergence theorem."""
+def _oriented(
+    points: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], int]:
+    """Triangles of a closed surface all the same way round, the outside out, and how many were not.
+
+    Neighbours run along their common edge in opposite ways. Of each shell the greater part stays as
+    it is, so that the walls of a void still point into it.
+    """
+    wrong = _other_way(triangles)
+    if _signed_volume(points, _turned(triangles, wrong)) < 0:
+        wrong = ~wrong
+    return _turned(triangles, wrong), int(wrong.sum())
+
+
+def _turned(triangles: NDArray[np.int64], which: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.where(which[:, None], triangles[:, ::-1], triangles)
+
+
+def _other_way(triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which triangles (t,) run against the greater part of their shell."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    order = np.lexsort(np.sort(edges, axis=1).T).reshape(-1, 2)  # every edge has two triangles
+    ends, (one, other) = edges[order, 0], (order // 3).T
+    against = ends[:, 0] == ends[:, 1]
+    # Each triangle twice, one way and the other: what can be reached is the same way round.
+    n = len(triangles)
+    to = np.where(against, other + n, other), np.where(against, other, other + n)
+    rows, columns = np.concatenate([one, one + n]), np.concatenate(to)
+    reach = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * n, 2 * n))
+    _, labels = connected_components(reach, directed=False)
+    first = np.minimum(labels[:n], labels[n:])  # a shell's name
+    wrong = labels[:n] != first
+    share = np.bincount(first, wrong) / np.maximum(np.bincount(first), 1)
+    return np.asarray(np.where(share[first] > 0.5, ~wrong, wrong))
+
+
+def _area(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
     a, b, c = np.moveaxis(points[triangles], 1, 0)
-    return float(abs(np.einsum("ij,ij->", a, np.cross(b, c))) / 6)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+
+
+def _diagonal(points: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _signed_volume(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
+    """Volume inside the surface, by the divergence theorem; below 0 where the inside is out."""
+    a, b, c = np.moveaxis(points[triangles] - points[0], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)

@@ -1,0 +1,143 @@
+"""Closed surfaces of others: what is inside does not depend on how a program writes triangles."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import vtk
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.scene.body_facts import quality
+from validate.scene.box import grid
+from validate.scene.filled import filled
+from validate.scene.foreign_mesh import read_foreign
+from validate.scene.mesh import cell_volumes
+from validate.scene.surface_arrays import _oriented, _signed_volume, _surface
+
+BOX = trimesh.creation.box((10.0, 20.0, 30.0))
+X, T = np.array(BOX.vertices), np.array(BOX.faces)
+QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+CUBE = np.array([[x, y, z] for x in (0, 10) for y in (0, 20) for z in (0, 30)], dtype=float)
+
+
+def stl(path: Path, points: Floats, triangles: Ints) -> Path:
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in points[t])
+        + "endloop\nendfacet\n"
+        for t in triangles
+    )
+    path.write_text(f"solid x\n{facets}endsolid x\n")
+    return path
+
+
+def obj(vertex: str, corner: str, more: str = "") -> str:
+    """A box of quads, corners written as a program does: i counts from 1, or from the end."""
+    lines = [vertex.format(*x) for x in CUBE]
+    for quad in QUADS:
+        lines.append("f " + " ".join(corner.format(i=i + 1, n=i - len(CUBE)) for i in quad))
+    return "\n".join([more, *lines]) + "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        obj("v {} {} {}", "{i}"),
+        obj("v {} {} {} 0.2 0.4 0.6", "{n}"),
+        obj(
+            "v {} {} {}",
+            "{i}/1/1",
+            "mtllib a.mtl\no box\nvt 0 0\nvt 1 0\nvn 0 0 1\nusemtl a\ns off",
+        ),
+        obj("v {} {} {}", "{i}//1", "vn 0 0 1\ng one two"),
+    ],
+    ids=["plain", "colours, from the end", "textures", "normals"],
+)
+def test_an_obj_is_its_corners_and_faces(text: str, tmp_path: Path) -> None:
+    (tmp_path / "x.obj").write_text(text)
+    points, triangles = _surface(tmp_path / "x.obj")
+    assert triangles.shape == (12, 3)
+    assert abs(_signed_volume(points, triangles)) == pytest.approx(6000)
+
+
+def test_triangles_are_turned_the_same_way_round_and_out() -> None:
+    """Whatever the order they come in; the outside is out, as told by the volume's sign."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        wrong = rng.random(len(T)) < 0.5
+        given = np.where(wrong[:, None], T[:, ::-1], T)
+        found, turned = _oriented(X, given)
+        assert _signed_volume(X, found) == pytest.approx(6000)
+        assert turned == wrong.sum()
+    assert _oriented(X, T[:, ::-1])[1] == len(T)
+    assert _oriented(X, T)[1] == 0
+
+
+def test_a_void_stays_a_void_though_some_of_its_walls_are_wrong() -> None:
+    points = np.vstack([X, 0.5 * X])
+    given = np.vstack([T, len(X) + T[:, ::-1]])
+    given[-2:] = given[-2:, ::-1]
+    found, turned = _oriented(points, given)
+    assert turned == 2
+    assert _signed_volume(points, found) == pytest.approx(6000 * (1 - 0.125))
+
+
+@pytest.mark.slow
+def test_a_surface_with_mixed_normals_is_filled_and_told(tmp_path: Path) -> None:
+    given = T.copy()
+    given[::3] = given[::3, ::-1]
+    body = filled(stl(tmp_path / "x.stl", X, given), "mm", 6e-3)
+    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-6, rel=1e-3)
+    assert body.told["turned"] == "4 of 12 triangles"
+    assert quality(body.mesh).min() > 0.05
+
+
+@pytest.mark.slow
+def test_a_surface_with_a_void_is_filled_around_it(tmp_path: Path) -> None:
+    points, both = np.vstack([X, 0.5 * X]), np.vstack([T, len(X) + T[:, ::-1]])
+    body = filled(stl(tmp_path / "x.stl", points, both), "mm", 4e-3)
+    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-6 * (1 - 0.125), rel=0.01)
+
+
+@pytest.mark.slow
+def test_bodies_that_overlap_are_refused_with_both_volumes(tmp_path: Path) -> None:
+    points, both = np.vstack([X, X + 5]), np.vstack([T, len(X) + T])
+    with pytest.raises(
+        SceneError, match=r"24 triangles around 12 cm3, filled are 10\.\d+ cm3 .*unite"
+    ):
+        filled(stl(tmp_path / "x.stl", points, both), "mm", 6e-3)
+
+
+def test_a_coordinate_that_is_no_number_is_one_line(tmp_path: Path) -> None:
+    path = stl(tmp_path / "x.stl", X, T)
+    path.write_text(path.read_text().replace("vertex -5 ", "vertex nan ", 1))
+    with pytest.raises(SceneError, match=r"^x\.stl: "):
+        filled(path, "mm")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["None", "ZLib", "LZMA", "LZ4"])
+@pytest.mark.parametrize("mode", ["Ascii", "Binary", "Appended"])
+def test_vtk_packed_as_it_offers(kind: str, mode: str, tmp_path: Path) -> None:
+    mesh = grid((0.01, 0.02, 0.03), (1, 2, 2))
+    points = vtk.vtkPoints()
+    for x in 1e3 * mesh.nodes:
+        points.InsertNextPoint(x)
+    body = vtk.vtkUnstructuredGrid()
+    body.SetPoints(points)
+    for cell in mesh.cells:
+        body.InsertNextCell(vtk.VTK_HEXAHEDRON, len(cell), cell.tolist())
+    writer = vtk.vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(body)
+    getattr(writer, f"SetDataModeTo{mode}")()
+    getattr(writer, f"SetCompressorTypeTo{kind}")()
+    writer.SetFileName(str(tmp_path / "x.vtu"))
+    writer.Write()
+    if kind == "LZ4":
+        with pytest.raises(SceneError, match="packed by LZ4, which is not unpacked; save it with"):
+            read_foreign(tmp_path / "x.vtu", "mm")
+        return
+    found = read_foreign(tmp_path / "x.vtu", "mm").mesh
+    assert cell_volumes(found).sum() == pytest.approx(6e-6, rel=1e-6)

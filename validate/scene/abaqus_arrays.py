@@ -1,0 +1,279 @@
+"""An Abaqus .inp as plain arrays: the one part with solid elements, as its instance stands.
+
+Node sets, surfaces (by element and face) and what Gmsh writes of faces become sets by name.
+Materials, steps and loads are not taken, nor is what stands beside the solid: it is counted.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.scene.abaqus_text import NOWHERE, KeywordBlock, Home, blocks_of
+
+_SOLID = re.compile(r"C3D(4|5|6|8|10|15|20)[A-Z]*$")
+_SHAPES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15",
+           20: "hexahedron20"}  # fmt: skip
+# Of elements beside a solid: the corners of a face by type; none for what has no face.
+_FACE = re.compile(r"(?:CPS|CPE|SFM3D|R3D)([3468])R?$")
+_NO_FACE = re.compile(r"(?:T3D|T2D|MASS|ROTARYI|SPRING|DASHPOT|CONN|DCOUP)")
+_CORNERS = {3: 3, 4: 4, 6: 3, 8: 4}
+# Corners of the faces S1, S2, ... of the elements that surfaces name (Abaqus' own numbering).
+_TET = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
+_HEX = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+_FACES = {4: _TET, 10: _TET, 8: _HEX}
+Elements = dict[int, tuple[int, ...]]  # nodes by the element's number
+
+
+def arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Points (n, 3), solid cells by their shape, node sets and facets by name, what was left out.
+
+    Raises `SceneError` for no or several parts with solids, several instances of it, a number that
+    is none, a node or set that is not there.
+    """
+    blocks = blocks_of(path.read_bytes().decode("utf-8", "replace"))
+    home, beside = _solid_home(blocks)
+    instance = _instance(blocks, home)
+    own = [b for b in blocks if _belongs(b, home, instance)]
+    numbers, points = _nodes(own)
+    solids = _solids(own)
+    sets = _Sets(own, {n: i for i, n in enumerate(numbers)}, solids)
+    found = {
+        "points": points if instance is None else _placed(points, instance),
+        **_cells(own, sets.place),
+        **{f"nset.{name}": at for name, at in sets.nodes().items()},
+        **{f"facet.{name}": at for name, at in _facets(own, sets).items()},
+    }
+    beside += [f"{n} {kind}" for kind, n in _beside(own).items()]
+    if beside:
+        found["beside"] = np.array(", ".join(beside))
+    if instance is not None and any(instance.rows):
+        found["placed"] = np.array(instance.given.get("NAME", ""))
+    return found
+
+
+def _is_solid(block: KeywordBlock) -> bool:
+    return block.keyword == "ELEMENT" and bool(_SOLID.match(_type(block)))
+
+
+def _type(block: KeywordBlock) -> str:
+    return block.given.get("TYPE", "").upper()
+
+
+def _solid_home(blocks: Sequence[KeywordBlock]) -> tuple[Home, list[str]]:
+    """The one part or instance with solid elements, and what the others are."""
+    homes = list(dict.fromkeys(b.home for b in blocks if b.keyword == "ELEMENT"))
+    solid = [h for h in homes if any(_is_solid(b) for b in blocks if b.home == h)]
+    if len(solid) > 1:
+        listed = ", ".join(f"'{name}'" for _, name in solid)
+        raise SceneError(f"{len(solid)} parts with solids ({listed}): one is read; export it alone")
+    if not homes:
+        raise SceneError("no elements: no Abaqus input file, or one without a body")
+    mine = solid[0] if solid else homes[0]
+    return mine, [f"'{name}'" for kind, name in homes if (kind, name) != mine and name]
+
+
+def _instance(blocks: Sequence[KeywordBlock], home: Home) -> KeywordBlock | None:
+    """Where the body stands; none for a flat file and a part that stands nowhere."""
+    kind, name = home
+    key = {"PART": "PART", "INSTANCE": "NAME"}.get(kind)
+    found = [b for b in blocks if b.keyword == "INSTANCE" and key and b.given.get(key) == name]
+    if len(found) > 1:
+        names = ", ".join(f"'{b.given.get('NAME', '')}'" for b in found)
+        raise SceneError(
+            f"part '{name}' stands {len(found)} times ({names}): one body is read; export one alone"
+        )
+    return found[0] if found else None
+
+
+def _belongs(block: KeywordBlock, home: Home, instance: KeywordBlock | None) -> bool:
+    """Whether a block is of the body, or of the assembly and about its instance."""
+    if block.home == home:
+        return True
+    of_assembly = block.home == NOWHERE and block.keyword in ("NSET", "ELSET", "SURFACE")
+    own = instance.given.get("NAME") if instance else None
+    return of_assembly and block.given.get("INSTANCE") in (None, own)
+
+
+def _nodes(own: Sequence[KeywordBlock]) -> tuple[list[int], Floats]:
+    """Numbers and places (n, 3) of all nodes, each number once."""
+    at: dict[int, list[float]] = {}
+    for block in own:
+        if block.keyword != "NODE":
+            continue
+        for row in block.rows:
+            number, *x = block.floats(row)
+            if not number.is_integer() or len(x) not in (2, 3):
+                raise block.wrong(f"'{row[:40]}' is no number of a node with x, y, z")
+            if at.setdefault(int(number), x) != x:
+                raise block.wrong(f"node {int(number)} has two places; export one part")
+    if not at:
+        raise SceneError("no nodes in the part that has solid elements")
+    return list(at), np.array([[*x, 0.0][:3] for x in at.values()], dtype=np.float64)
+
+
+def _rows_of(block: KeywordBlock, size: int) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """Elements' numbers with their nodes; rows may go on in the next line."""
+    numbers = block.wholes
+    if len(numbers) % (size + 1):
+        raise block.wrong(f"{len(numbers)} numbers, not {size + 1} for each {_type(block)}")
+    for k in range(0, len(numbers), size + 1):
+        yield numbers[k], tuple(numbers[k + 1 : k + 1 + size])
+
+
+def _size(block: KeywordBlock) -> int:
+    """Nodes of a solid element or a face; 0 for others."""
+    found = _SOLID.match(_type(block)) or _FACE.match(_type(block))
+    return int(found[1]) if found else 0
+
+
+def _solids(own: Sequence[KeywordBlock]) -> Elements:
+    return {n: nodes for b in own if _is_solid(b) for n, nodes in _rows_of(b, _size(b))}
+
+
+def _cells(own: Sequence[KeywordBlock], place: Mapping[int, int]) -> dict[str, NDArray[Any]]:
+    """Solid cells by shape, and what is neither solid nor beside one, by its type."""
+    found: dict[str, list[list[int]]] = {}
+    for block in own:
+        kind = _type(block)
+        if block.keyword != "ELEMENT" or _FACE.match(kind) or _NO_FACE.match(kind):
+            continue
+        if not _is_solid(block):
+            found.setdefault(kind or "untyped", []).extend([[0]] * len(block.rows))
+            continue
+        try:
+            cells = [[place[n] for n in nodes] for _, nodes in _rows_of(block, _size(block))]
+        except KeyError as missing:
+            raise block.wrong(f"there is no node {missing}") from None
+        found.setdefault(_SHAPES[_size(block)], []).extend(cells)
+    return {f"cells.{kind}": np.array(cells, dtype=np.int64) for kind, cells in found.items()}
+
+
+def _beside(own: Sequence[KeywordBlock]) -> Counter[str]:
+    counted: Counter[str] = Counter()
+    for block in own:
+        kind = _type(block)
+        if block.keyword == "ELEMENT" and _FACE.match(kind):
+            counted[kind] += sum(1 for _ in _rows_of(block, _size(block)))
+        elif block.keyword == "ELEMENT" and _NO_FACE.match(kind):
+            counted[kind] += len(block.rows)
+    return counted
+
+
+class _Sets:
+    """Node and element sets of a part by name; a name may stand in several blocks."""
+
+    def __init__(
+        self, own: Sequence[KeywordBlock], place: Mapping[int, int], solids: Elements
+    ) -> None:
+        self.place, self.solids = place, solids
+        self._nodes: dict[str, list[int]] = {}
+        self._elements: dict[str, list[int]] = {}
+        for block in own:
+            name = block.given.get(block.keyword if block.keyword in ("NSET", "ELSET") else "", "")
+            if block.keyword == "ELEMENT" and "ELSET" in block.given and _size(block):
+                numbers = [n for n, _ in _rows_of(block, _size(block))]
+                self._elements.setdefault(block.given["ELSET"], []).extend(numbers)
+            elif block.keyword == "NODE" and "NSET" in block.given:
+                numbers = [int(block.floats(row)[0]) for row in block.rows]
+                self._nodes.setdefault(block.given["NSET"], []).extend(numbers)
+            elif block.keyword == "ELSET" and name:
+                self._elements.setdefault(name, []).extend(_listed(block, self._elements))
+            elif block.keyword == "NSET" and name:
+                self._nodes.setdefault(name, []).extend(self._nodes_of(block))
+
+    def _nodes_of(self, block: KeywordBlock) -> list[int]:
+        of = block.given.get("ELSET")
+        if of is None:
+            return _listed(block, self._nodes)
+        elements = self.elements(of, block)
+        return [n for e in elements for n in self.solids.get(e, ())]
+
+    def elements(self, name: str, block: KeywordBlock) -> list[int]:
+        if name not in self._elements:
+            raise block.wrong(f"there is no element set '{name}'")
+        return self._elements[name]
+
+    def nodes(self) -> dict[str, Ints]:
+        """Indices of the nodes of every set that has any here."""
+        found = {k: sorted({self.place[n] for n in v if n in self.place})
+                 for k, v in self._nodes.items()}  # fmt: skip
+        return {name: np.array(at, dtype=np.int64) for name, at in found.items() if at}
+
+
+def _listed(block: KeywordBlock, known: Mapping[str, Sequence[int]]) -> list[int]:
+    """Numbers, ranges, and names of sets before it; an instance's name before a number is cut."""
+    if "GENERATE" in block.given:
+        found = list[int]()
+        for row in block.rows:
+            first, last, *step = (int(x) for x in block.floats(row))
+            found.extend(range(first, last + 1, max(1, step[0] if step else 1)))
+        return found
+    found = []
+    for word in block.words():
+        number = word.rpartition(".")[2]
+        if number.isascii() and number.isdigit():
+            found.append(int(number))
+        elif word in known:
+            found.extend(known[word])
+        else:
+            raise block.wrong(f"there is no set '{word[:40]}' before it")
+    return found
+
+
+def _facets(own: Sequence[KeywordBlock], sets: _Sets) -> dict[str, Ints]:
+    """Corners (f, m) of the faces of every surface by element, and of faces beside the solid."""
+    found: dict[str, list[tuple[int, ...]]] = {}
+    for block in own:
+        name = block.given.get("NAME", "")
+        if block.keyword == "SURFACE" and block.given.get("TYPE", "ELEMENT").upper() == "ELEMENT":
+            found.setdefault(name, []).extend(_surface(block, sets))
+        elif block.keyword == "ELEMENT" and _FACE.match(_type(block)) and "ELSET" in block.given:
+            corners = _CORNERS[_size(block)]
+            rows = [nodes[:corners] for _, nodes in _rows_of(block, _size(block))]
+            found.setdefault(block.given["ELSET"], []).extend(rows)
+    return {
+        name: np.array([[sets.place[n] for n in row] for row in rows], dtype=np.int64)
+        for name, rows in found.items()
+        if name and rows and len({len(row) for row in rows}) == 1
+        and all(n in sets.place for row in rows for n in row)
+    }  # fmt: skip
+
+
+def _surface(block: KeywordBlock, sets: _Sets) -> Iterator[tuple[int, ...]]:
+    """Corners, in nodes' numbers, of the faces that the rows name; whole sets have none."""
+    for row in block.rows:
+        of, _, face = (part.strip() for part in row.partition(","))
+        if not re.fullmatch(r"[Ss][1-6]", face):
+            continue
+        own = of.rpartition(".")[2]
+        elements = [int(own)] if own.isascii() and own.isdigit() else sets.elements(of, block)
+        for element in elements:
+            nodes = sets.solids.get(element, ())
+            faces = _FACES.get(len(nodes), ())
+            if int(face[1]) > len(faces):
+                raise block.wrong(f"element {element} has no face {face}")
+            yield tuple(nodes[k] for k in faces[int(face[1]) - 1])
+
+
+def _placed(points: Floats, instance: KeywordBlock) -> Floats:
+    """Points where the instance stands: shifted, then turned about an axis by degrees."""
+    rows = [instance.floats(row) for row in instance.rows]
+    if [len(row) for row in rows] not in ([], [3], [3, 7]):
+        raise instance.wrong("expected a shift x, y, z, and a turn about two points by degrees")
+    moved = points + np.array(rows[0]) if rows else points
+    if len(rows) < 2:
+        return moved
+    a, b = np.array(rows[1][:3]), np.array(rows[1][3:6])
+    if not np.linalg.norm(b - a) > 0:
+        raise instance.wrong("turned about two points that are one")
+    axis = (b - a) / np.linalg.norm(b - a)
+    turn = Rotation.from_rotvec(np.deg2rad(rows[1][6]) * axis)
+    return np.asarray(turn.apply(moved - a) + a)
