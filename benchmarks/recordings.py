@@ -4,7 +4,8 @@ python benchmarks/recordings.py [SAMPLES FRAMES IMAGES]    default 1000000 50000
 
 The files are made in a temporary folder: samples of one number and frames of 20 markers in one,
 images of some 50 kB a message in another. Every reading is a process of its own, in turns; least
-seconds of the processor without imports and largest memory of the process, of three. "Bare" is
+seconds of the wall and of the processor (hashing has a thread of its own), without imports, and
+largest memory of the process, of three. "Bare" is
 `NonSeekingReader` of the `mcap` package, which parses no message. Linux: `ru_maxrss` of a child
 would begin at its parent's, so the peak is the kernel's VmHWM.
 """
@@ -26,13 +27,13 @@ MARKERS = 20
 _MEASURE = """
 import json, sys
 from pathlib import Path
-from time import process_time
+from time import perf_counter, process_time
 {load}
-path, start = Path(sys.argv[1]), process_time()
+path, begin, start = Path(sys.argv[1]), perf_counter(), process_time()
 count = {count}
 status = Path("/proc/self/status").read_text()
 peak = int(status.split("VmHWM:")[1].split()[0]) / 1e3
-print(json.dumps([process_time() - start, peak, count]))
+print(json.dumps([perf_counter() - begin, process_time() - start, peak, count]))
 """
 KINDS = {
     "bare": _MEASURE.format(
@@ -72,9 +73,9 @@ def pictures(path: Path, images: int) -> None:
     write_recording(Recording("images", source, 10**18, frames={"/us": frames}), path)
 
 
-def measured(path: Path) -> dict[str, tuple[float, float, int]]:
-    """Seconds, MB and messages by kind."""
-    found: dict[str, list[tuple[float, float, int]]] = {kind: [] for kind in KINDS}
+def measured(path: Path) -> dict[str, tuple[float, float, float, int]]:
+    """Seconds of the wall and of the processor, MB and messages by kind."""
+    found: dict[str, list[tuple[float, float, float, int]]] = {kind: [] for kind in KINDS}
     for _ in range(TURNS):
         for kind, code in KINDS.items():
             said = subprocess.run(
@@ -82,23 +83,24 @@ def measured(path: Path) -> dict[str, tuple[float, float, int]]:
             )
             found[kind].append(tuple(json.loads(said.stdout)))
     return {
-        kind: (min(s for s, _, _ in own), max(mb for _, mb, _ in own), own[0][2])
+        kind: (min(o[0] for o in own), min(o[1] for o in own), max(o[2] for o in own), own[0][3])
         for kind, own in found.items()
     }
 
 
 def main(samples: int, frames: int, images: int) -> None:
-    print("| file | MB | messages | what | s | of bare | peak MB |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print("| file | MB | messages | what | wall / s | of bare | CPU / s | of bare | peak / MB |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     with TemporaryDirectory() as folder:
         files = {name: Path(folder) / f"{name}.mcap" for name in ("long", "images")}
         long(files["long"], samples, frames)
         pictures(files["images"], images)
         for name, path in files.items():
             found, size = measured(path), path.stat().st_size / 1e6
-            for kind, (seconds, peak, _) in found.items():
-                times = seconds / found["bare"][0]
-                row = f"{found['bare'][2]} | {kind} | {seconds:.2f} | {times:.2f} | {peak:.0f}"
+            wall, own = found["bare"][:2]
+            for kind, (seconds, cpu, peak, _) in found.items():
+                times = f"{seconds:.2f} | {seconds / wall:.2f} | {cpu:.2f} | {cpu / own:.2f}"
+                row = f"{found['bare'][3]} | {kind} | {times} | {peak:.0f}"
                 print(f"| {name} | {size:.0f} | {row} |", flush=True)
 
 

@@ -4,11 +4,11 @@ A decoder in a process apart costs 0.3 s a call: its readers get a twentieth of 
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pytest
+from attacks import damaged
 from click.testing import CliRunner
 from test_readers import EACH, MAKE, files_of, make_c3d, make_metaimage, make_vicon, sample
 
@@ -23,8 +23,6 @@ IN_PROCESS = pytest.mark.parametrize(
     "reader", [r for r in READERS if r.name not in APART], ids=lambda r: r.name
 )
 SPARSE = 4 * 2**30  # bytes
-TOKENS = (b"\xff\xff\xff\xff", bytes(4), b"nan", b"1e400", b"-1", b"\n", b"\t", b",", b'"',
-          b"99999999", b"\x7f\xff", "é".encode())  # fmt: skip
 
 
 def attacked(reader: Reader, path: Path, options: Mapping[str, str], name: str) -> None:
@@ -35,22 +33,6 @@ def attacked(reader: Reader, path: Path, options: Mapping[str, str], name: str) 
         said = str(error)
         assert said.isprintable()
         assert name in said or "out.mcap" in said
-
-
-def damaged(whole: bytes, cuts: int, flips: int) -> Iterator[bytes]:
-    """Cuts over the whole length, single bits turned, and numbers and texts forged."""
-    for at in np.unique(np.linspace(0, len(whole) - 1, cuts).astype(int)):
-        yield whole[:at]
-    rng = np.random.default_rng(7)
-    for k in range(flips + flips // 2):
-        data = bytearray(whole)
-        if k < flips:
-            bit = int(rng.integers(8 * len(data)))
-            data[bit // 8] ^= 1 << bit % 8
-        else:
-            at, token = int(rng.integers(len(data))), TOKENS[int(rng.integers(len(TOKENS)))]
-            data[at : at + len(token)] = token
-        yield bytes(data)
 
 
 def under_attack(reader: Reader, folder: Path, cuts: int, flips: int) -> None:

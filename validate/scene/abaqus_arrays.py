@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.scene.abaqus_text import NOWHERE, KeywordBlock, Home, blocks_of
+from validate.scene.abaqus_text import NOWHERE, Home, KeywordBlock, blocks_of
 
 _SOLID = re.compile(r"C3D(4|5|6|8|10|15|20)[A-Z]*$")
 _SHAPES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15",
@@ -29,6 +29,7 @@ _CORNERS = {3: 3, 4: 4, 6: 3, 8: 4}
 _TET = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _HEX = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 _FACES = {4: _TET, 10: _TET, 8: _HEX}
+_MOST = 10_000_000  # numbers of nodes and elements
 Elements = dict[int, tuple[int, ...]]  # nodes by the element's number
 
 
@@ -109,7 +110,7 @@ def _nodes(own: Sequence[KeywordBlock]) -> tuple[list[int], Floats]:
         if block.keyword != "NODE":
             continue
         for row in block.rows:
-            number, *x = block.floats(row)
+            number, *x = block.floats(row) or [0.5]
             if not number.is_integer() or len(x) not in (2, 3):
                 raise block.wrong(f"'{row[:40]}' is no number of a node with x, y, z")
             if at.setdefault(int(number), x) != x:
@@ -213,8 +214,7 @@ def _listed(block: KeywordBlock, known: Mapping[str, Sequence[int]]) -> list[int
     if "GENERATE" in block.given:
         found = list[int]()
         for row in block.rows:
-            first, last, *step = (int(x) for x in block.floats(row))
-            found.extend(range(first, last + 1, max(1, step[0] if step else 1)))
+            found.extend(_range(block, row))
         return found
     found = []
     for word in block.words():
@@ -226,6 +226,15 @@ def _listed(block: KeywordBlock, known: Mapping[str, Sequence[int]]) -> list[int
         else:
             raise block.wrong(f"there is no set '{word[:40]}' before it")
     return found
+
+
+def _range(block: KeywordBlock, row: str) -> range:
+    """The numbers from the first to the last by a step, as a row states them."""
+    said = block.floats(row)
+    if len(said) not in (2, 3) or not all(x.is_integer() and 0 < x < _MOST for x in said):
+        raise block.wrong(f"'{row[:40]}' is no first, last and step")
+    first, last, *step = (int(x) for x in said)
+    return range(first, last + 1, *step)
 
 
 def _facets(own: Sequence[KeywordBlock], sets: _Sets) -> dict[str, Ints]:

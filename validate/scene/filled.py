@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, SceneError
 from validate.recording.formats.apart import decoded
 from validate.scene.foreign_mesh import ForeignBody, metres, require_readable
@@ -32,10 +33,10 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
                         {"edge": edge / factor}, _SECONDS)  # fmt: skip
     except RecordingError as error:
         raise SceneError(str(error)) from None
-    mesh = Mesh(factor * found["points"], found["cells.tetra"], "tet4")
-    if cell_volumes(mesh).sum() < 0:
-        mesh = Mesh(mesh.nodes, mesh.cells[:, _TURN], "tet4")
-    require_positive_cells(mesh)
+    try:
+        mesh = _mesh(factor * found["points"], found["cells.tetra"])
+    except SceneError as error:
+        raise SceneError(f"{path.name}: {error}") from error
     volume, enclosed, may = (
         float(cell_volumes(mesh).sum()), *(factor**3 * float(found[k]) for k in
                                            ("enclosed", "may_differ")),
@@ -49,3 +50,11 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
         )
     turned = f"{int(found['turned'])} of {int(found['triangles'])} triangles"
     return ForeignBody(mesh, {"surface": around, "turned": turned, "filled": share})
+
+
+def _mesh(nodes: Floats, cells: Ints) -> Mesh:
+    mesh = Mesh(nodes, cells, "tet4")
+    if cell_volumes(mesh).sum() < 0:
+        mesh = Mesh(mesh.nodes, mesh.cells[:, _TURN], "tet4")
+    require_positive_cells(mesh)
+    return mesh

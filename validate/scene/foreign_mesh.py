@@ -100,14 +100,18 @@ def _body(
         )
     ((shape, cells),) = shapes.items()
     kind, points = _KINDS[shape], factor * found["points"]
+    if cells.min() < 0 or cells.max() >= len(points):
+        raise SceneError(
+            f"{name}: its elements name nodes {cells.min()} to {cells.max()} of {len(points)}; damaged"
+        )
     unused = len(points) - len(np.unique(cells))
     if kind == "tet10":
         _require_straight(name, points[cells])
         kind, cells = "tet4", cells[:, :4]
     used, at = np.unique(cells, return_inverse=True)
-    mesh = Mesh(points[used], at.reshape(cells.shape), kind)
-    mesh, turned = _turned(mesh) if turn else (mesh, 0)
     try:
+        mesh = Mesh(points[used], at.reshape(cells.shape), kind)
+        mesh, turned = _turned(mesh) if turn else (mesh, 0)
         require_positive_cells(mesh)
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from validate.errors import SceneError
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.foreign_mesh import read_foreign
+from validate.scene.foreign_mesh import read_foreign, require_readable
 from validate.scene.mesh import Kind, Mesh, require_positive_cells
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
@@ -56,6 +56,7 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
             f"{path.name}: a surface; fill it first: validate body {path.name} --unit mm "
             "-o body.npz"
         )
+    require_readable(path)
     try:
         mesh = _mesh(_arrays(path))
         require_positive_cells(mesh)
@@ -63,7 +64,7 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
     except SceneError as error:
         raise SceneError(f"{path.name}: {error}") from error
     except OSError as error:
-        raise SceneError(f"cannot read mesh {path.name}: {error.strerror or error}") from error
+        raise SceneError(f"{path.name}: cannot be read ({error.strerror or error})") from error
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:

@@ -8,7 +8,6 @@ of 0 means "none": the file is read, and its integrity is called not provable. A
 messages it wants on the way, so that a file is inspected in the same pass.
 """
 
-import hashlib
 import os
 import zlib
 from array import array
@@ -23,6 +22,7 @@ import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError
+from validate.recording.mcap.hashing import Hashing
 from validate.recording.mcap.records import (
     HEAD,
     MAGIC,
@@ -101,7 +101,7 @@ class _Walk:
         self._kept: dict[int, list[bytes] | None] = {}  # None: nobody wants them
         self._at = self._crc = 0
         self._attachments: list[Attachment] = []
-        self._sha = hashlib.sha256()
+        self._sha = Hashing()
         self._header: Header | None = None
         self._data_crc: int | None = None  # None: still in the data section
         self._data = (0, 0)  # bytes and CRC of the data section, once it has ended
@@ -147,7 +147,7 @@ class _Walk:
         data, crc = self._data if ended else (self.record_at, self._crc)
         self._cut = Cut(self.record_at, data, crc, ended)
         self._stream.seek(0)
-        self._sha = hashlib.sha256()
+        self._sha = Hashing()
         while block := self._stream.read(_BLOCK):
             self._sha.update(block)
         return True
