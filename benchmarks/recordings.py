@@ -1,6 +1,6 @@
 """Inspection of long recordings of ours beside a bare reader of the same file, both checking CRCs.
 
-python benchmarks/recordings.py [SAMPLES FRAMES IMAGES]    default 1000000 50000 1000
+python benchmarks/recordings.py [SAMPLES FRAMES IMAGES]    default 1000000 50000 5000
 
 The files are made in a temporary folder: samples of one number and frames of 20 markers in one,
 images of some 50 kB a message in another. Every reading is a process of its own, in turns; least
@@ -22,15 +22,16 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Markers, Recording, Signal, Source
 
 TURNS = 3
-SIDE = 220  # px: noise of 6 grey levels packs to some 50 kB
+SIDE = 276  # px: noise of 6 grey levels packs to some 50 kB
 MARKERS = 20
 _MEASURE = """
 import json, sys
 from pathlib import Path
 from time import perf_counter, process_time
 {load}
-path, begin, start = Path(sys.argv[1]), perf_counter(), process_time()
-count = {count}
+for name in reversed(sys.argv[1:]):  # a small file first, which loads what is loaded late
+    path, begin, start = Path(name), perf_counter(), process_time()
+    count = {count}
 status = Path("/proc/self/status").read_text()
 peak = int(status.split("VmHWM:")[1].split()[0]) / 1e3
 print(json.dumps([perf_counter() - begin, process_time() - start, peak, count]))
@@ -73,13 +74,16 @@ def pictures(path: Path, images: int) -> None:
     write_recording(Recording("images", source, 10**18, frames={"/us": frames}), path)
 
 
-def measured(path: Path) -> dict[str, tuple[float, float, float, int]]:
+def measured(path: Path, small: Path) -> dict[str, tuple[float, float, float, int]]:
     """Seconds of the wall and of the processor, MB and messages by kind."""
     found: dict[str, list[tuple[float, float, float, int]]] = {kind: [] for kind in KINDS}
     for _ in range(TURNS):
         for kind, code in KINDS.items():
             said = subprocess.run(
-                [sys.executable, "-c", code, str(path)], check=True, capture_output=True, text=True
+                [sys.executable, "-c", code, str(path), str(small)],
+                check=True,
+                capture_output=True,
+                text=True,
             )
             found[kind].append(tuple(json.loads(said.stdout)))
     return {
@@ -95,8 +99,11 @@ def main(samples: int, frames: int, images: int) -> None:
         files = {name: Path(folder) / f"{name}.mcap" for name in ("long", "images")}
         long(files["long"], samples, frames)
         pictures(files["images"], images)
+        smalls = {name: Path(folder) / f"{name}-small.mcap" for name in files}
+        long(smalls["long"], 1000, 100)
+        pictures(smalls["images"], 10)
         for name, path in files.items():
-            found, size = measured(path), path.stat().st_size / 1e6
+            found, size = measured(path, smalls[name]), path.stat().st_size / 1e6
             wall, own = found["bare"][:2]
             for kind, (seconds, cpu, peak, _) in found.items():
                 times = f"{seconds:.2f} | {seconds / wall:.2f} | {cpu:.2f} | {cpu / own:.2f}"
@@ -105,4 +112,4 @@ def main(samples: int, frames: int, images: int) -> None:
 
 
 if __name__ == "__main__":
-    main(*(map(int, sys.argv[1:4]) if len(sys.argv) > 3 else (1_000_000, 50_000, 1000)))
+    main(*(map(int, sys.argv[1:4]) if len(sys.argv) > 3 else (1_000_000, 50_000, 5000)))

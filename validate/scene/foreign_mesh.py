@@ -100,9 +100,12 @@ def _body(
         )
     ((shape, cells),) = shapes.items()
     kind, points = _KINDS[shape], factor * found["points"]
+    if not len(cells):
+        raise SceneError(f"{name}: its {shape} elements are none; damaged, or cut")
     if cells.min() < 0 or cells.max() >= len(points):
         raise SceneError(
-            f"{name}: its elements name nodes {cells.min()} to {cells.max()} of {len(points)}; damaged"
+            f"{name}: its elements name nodes {cells.min()} to {cells.max()} of "
+            f"{len(points)}; damaged"
         )
     unused = len(points) - len(np.unique(cells))
     if kind == "tet10":

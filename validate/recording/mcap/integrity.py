@@ -22,7 +22,6 @@ import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError
-from validate.recording.mcap.hashing import Hashing
 from validate.recording.mcap.records import (
     HEAD,
     MAGIC,
@@ -40,6 +39,7 @@ from validate.recording.mcap.records import (
     records_in,
     statistics_messages,
 )
+from validate.recording.mcap.sums import Sums
 from validate.recording.mcap.verified import Cut, Span, Verified
 from validate.recording.types import Source
 
@@ -99,9 +99,9 @@ class _Walk:
         self._stream = stream
         self._taker = taker
         self._kept: dict[int, list[bytes] | None] = {}  # None: nobody wants them
-        self._at = self._crc = 0
+        self._at = 0
         self._attachments: list[Attachment] = []
-        self._sha = Hashing()
+        self._sums = Sums()
         self._header: Header | None = None
         self._data_crc: int | None = None  # None: still in the data section
         self._data = (0, 0)  # bytes and CRC of the data section, once it has ended
@@ -135,7 +135,6 @@ class _Walk:
         if len(got) < count:
             raise _ShortError(f"the file ends {count - len(got)} bytes too early")
         self._at += count
-        self._sha.update(got)
         return got
 
     def stops_short(self) -> bool:
@@ -144,12 +143,12 @@ class _Walk:
         if self._header is None or self._stream.read() == MAGIC:
             return False
         ended = self._data_crc is not None
-        data, crc = self._data if ended else (self.record_at, self._crc)
+        data, crc = self._data if ended else (self.record_at, self._sums.crc())
         self._cut = Cut(self.record_at, data, crc, ended)
         self._stream.seek(0)
-        self._sha = Hashing()
+        self._sums = Sums()
         while block := self._stream.read(_BLOCK):
-            self._sha.update(block)
+            self._sums.update(block)
         return True
 
     def _magic(self, which: str) -> None:
@@ -157,7 +156,7 @@ class _Walk:
         if got != MAGIC:
             kind = _ShortError if which == "last" and MAGIC.startswith(got) else RecordingError
             raise kind(f"the {which} 8 bytes are no MCAP magic ({got.hex()})")
-        self._crc = zlib.crc32(got)
+        self._sums.update(got)
 
     def _record(self) -> int:
         self.record_at = self._at
@@ -171,6 +170,10 @@ class _Walk:
             raise RecordingError(f"a record of {length} bytes, the limit is {MAX_RECORD}")
         content = self._read(length)
         self._take(opcode, head, content)
+        self._sums.update(head)
+        self._sums.update(content)
+        if opcode == Op.DATA_END:
+            self._sums.restart()
         return int(opcode)
 
     def _take(self, opcode: int, head: bytes, content: bytes) -> None:
@@ -181,7 +184,6 @@ class _Walk:
         elif opcode == Op.FOOTER:
             self._footer(head, content)
         else:
-            self._crc = zlib.crc32(content, zlib.crc32(head, self._crc))
             self._dispatch(opcode, content)
 
     def _dispatch(self, opcode: int, content: bytes) -> None:
@@ -283,18 +285,18 @@ class _Walk:
     def _data_end(self, content: bytes) -> None:
         if self._data_crc is not None:
             raise RecordingError("a second end of the data section")
-        declared = int.from_bytes(content[:4], "little")
-        if len(content) < 4 or declared not in (0, self._crc):
-            raise RecordingError(f"data section CRC {self._crc:#010x}, declared {declared:#010x}")
+        declared, actual = int.from_bytes(content[:4], "little"), self._sums.crc()
+        if len(content) < 4 or declared not in (0, actual):
+            raise RecordingError(f"data section CRC {actual:#010x}, declared {declared:#010x}")
         self._data_crc = declared
-        self._data = (self.record_at, self._crc)
-        self._summary_at, self._crc = self._at, 0
+        self._data = (self.record_at, actual)
+        self._summary_at = self._at
 
     def _footer(self, head: bytes, content: bytes) -> None:
         footer = Footer.read(content)
         if self._data_crc is None:
             raise RecordingError("a footer without an end of the data section before it")
-        actual = zlib.crc32(content[:16], zlib.crc32(head, self._crc))
+        actual = zlib.crc32(content[:16], zlib.crc32(head, self._sums.crc()))
         if footer.summary_crc not in (0, actual):
             raise RecordingError(f"summary CRC {actual:#010x}, declared {footer.summary_crc:#010x}")
         empty = self._summary_at == self.record_at
@@ -312,7 +314,7 @@ class _Walk:
         if self._cut is not None:
             integrity = f"whole up to byte {self._cut.at} of {self.size}"
         return Verified(
-            source=Source(path.name, self._sha.hexdigest(), self.size, integrity),
+            source=Source(path.name, self._sums.hexdigest(), self.size, integrity),
             header=self._header,
             schemas=MappingProxyType(self._schemas),
             channels=MappingProxyType(self._channels),
