@@ -1,5 +1,6 @@
 """C3D: what another program wrote is read as it was meant; damage costs a line."""
 
+import struct
 import sys
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats import apart
-from validate.recording.formats.c3d import read_c3d
+from validate.recording.formats.c3d import _require_whole, read_c3d
 
 GRAVITY = Path("markers/silicone-beam/beam_gravity_V2_b.c3d")
 
@@ -142,4 +143,39 @@ def test_a_forged_number_of_values_is_told_before_any_library_reads_it(
     path.write_bytes(raw)
     monkeypatch.setattr("validate.recording.formats.c3d.decoded", None)
     with pytest.raises(RecordingError, match=rf"'{name.decode()}' tells of 7\.01e\+16 values"):
+        read_c3d(path, {})
+
+
+def test_events_of_a_trial_are_told(tmp_path: Path) -> None:
+    file = ezc3d.c3d(str(written(tmp_path / "x.c3d")))
+    file.add_parameter("EVENT", "LABELS", ["contact", "lift"])
+    file.add_parameter("EVENT", "TIMES", np.array([[0.0, 1.0], [0.05, 2.5]]))
+    file.write(str(tmp_path / "y.c3d"))
+    told = read_c3d(tmp_path / "y.c3d", {}).metadata["provenance"]
+    assert told["events"].startswith("contact 0.05 s; lift 62.5 s")
+    assert told["first_frame"].startswith("1 of the trial")
+
+
+@pytest.mark.parametrize(("processor", "scale"), [(84, "cdcc4c3d"), (85, "4c3ecdcc")])
+def test_a_file_of_whole_numbers_is_as_long_as_its_own_processor_says(
+    tmp_path: Path, processor: int, scale: str
+) -> None:
+    """A scale of 0.05 in Intel's order and in DEC's, whose last byte holds no sign: coordinates
+    are integers of two bytes, and three frames of two points end the file."""
+    head = struct.pack("<BBHHHHH", 2, 80, 2, 0, 1, 3, 10) + bytes.fromhex(scale)
+    head += struct.pack("<HHf", 3, 0, 50.0)
+    path = tmp_path / "x.c3d"
+    whole = head.ljust(512, b"\0") + bytes([1, 80, 1, processor]).ljust(512, b"\0")
+    path.write_bytes(whole + bytes(3 * 2 * 4 * 2))
+    _require_whole(path)
+    path.write_bytes(whole + bytes(3 * 2 * 4 * 2 - 1))
+    with pytest.raises(RecordingError, match="1072 bytes; cut"):
+        _require_whole(path)
+
+
+def test_a_file_of_sgi_is_not_called_damaged(tmp_path: Path) -> None:
+    head = struct.pack(">BBHHHHHfHHf", 2, 80, 1, 0, 1, 2, 10, -0.1, 3, 0, 50.0)
+    path = tmp_path / "x.c3d"
+    path.write_bytes(head.ljust(512, b"\0") + bytes([1, 80, 1, 86]).ljust(512, b"\0") + bytes(512))
+    with pytest.raises(RecordingError, match="byte order of SGI"):
         read_c3d(path, {})

@@ -330,3 +330,29 @@ def test_every_reader_is_in_the_tuple_and_has_a_sample(project_root: Path) -> No
 def test_a_standard_deviation_below_zero_or_none_is_refused(sd: float) -> None:
     with pytest.raises(RecordingError, match="is not a number >= 0"):
         Signal(np.zeros(1), np.zeros((1, 1)), "N", sd, "cell")
+
+
+@pytest.mark.parametrize(
+    ("first", "said"),
+    [
+        (b"#ROSBAG V2.0\n", "a ROS 1 bag.*rosbags-convert --src x.dat"),
+        (b"SQLite format 3\0", "an SQLite database.*rosbags-convert --src test_"),
+        (b"GIF89a", "a GIF.*ffmpeg -i x.dat"),
+        (b"TDSm", "LabVIEW.*CSV"),
+    ],
+)
+def test_a_file_that_is_known_but_not_read_is_called_so(
+    tmp_path: Path, first: bytes, said: str
+) -> None:
+    (tmp_path / "x.dat").write_bytes(first + bytes(64))
+    with pytest.raises(UsageError, match=said):
+        recognised(tmp_path / "x.dat")
+
+
+def test_a_folder_of_rosbag2_names_the_recording_in_it(tmp_path: Path) -> None:
+    (tmp_path / "x_0.db3").touch()
+    with pytest.raises(UsageError, match=r"ROS 2 bag.*rosbags-convert"):
+        recognised(tmp_path)
+    (tmp_path / "x_0.mcap").touch()
+    with pytest.raises(UsageError, match=r"name one: validate import .*/x_0\.mcap"):
+        recognised(tmp_path)

@@ -38,7 +38,9 @@ def film(
     return path
 
 
-@pytest.mark.parametrize(("name", "codec"), [("x.mp4", "mpeg4"), ("x.mov", "mjpeg")])
+@pytest.mark.parametrize(
+    ("name", "codec"), [("x.mp4", "mpeg4"), ("x.mov", "mjpeg"), ("x.mkv", "mpeg4")]
+)
 def test_uneven_stamps_of_the_container_are_the_times(
     name: str, codec: str, tmp_path: Path
 ) -> None:
@@ -97,3 +99,15 @@ def test_frames_that_are_small_packed_are_counted_before_they_are_decoded(
     with pytest.raises(RecordingError, match="it declares 7 frames of 64 x 48, beyond 9216 bytes"):
         video_arrays.arrays(path)
     assert len(video_arrays.arrays(path, every=3)["images"]) == 3
+
+
+def test_a_matroska_file_that_was_cut_is_refused(tmp_path: Path) -> None:
+    path = film(tmp_path / "x.mkv")
+    whole = path.read_bytes()
+    assert VIDEO.recognises(path)
+    path.write_bytes(whole[:-100])
+    with pytest.raises(RecordingError, match=rf"its parts need {len(whole)}: cut"):
+        read_video(path, SCALE)
+    path.write_bytes(whole[:40])
+    with pytest.raises(RecordingError, match="cut"):
+        read_video(path, SCALE)

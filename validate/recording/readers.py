@@ -17,6 +17,7 @@ from validate.recording.formats.optitrack import OPTITRACK
 from validate.recording.formats.qualisys import QUALISYS
 from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.formats.trc import TRC
+from validate.recording.formats.unread import known_unread
 from validate.recording.formats.vicon import VICON
 from validate.recording.formats.video import VIDEO
 from validate.recording.images.image_stack import IMAGE_STACK
@@ -74,8 +75,11 @@ def named(kind: str) -> Reader:
 
 
 def recognised(path: Path) -> Reader:
-    """The first reader that recognises the path; raises `UsageError` where none does."""
+    """The first reader that recognises the path; raises `UsageError` where none does, with what to
+    do where it is of a kind that is known but not read."""
     for reader in READERS:
+        if reader is INSTRON and (said := known_unread(path)):
+            raise UsageError(said)
         if reader.recognises(path):
             return reader
     kinds = ", ".join(f"{r.name} ({r.doc})" for r in READERS)

@@ -23,6 +23,7 @@ from validate.recording.types import Markers, Record, Recording, Signal
 MARKERS = "markers"
 _BLOCK = 512  # bytes
 _BIG = 86  # the processor whose numbers stand the other way round
+_DEC = 85  # the one whose floats stand so by halves
 _KEY = 80  # the second byte of every C3D file
 _OPTIONS = ("unit", "sd", "frame")
 
@@ -57,8 +58,11 @@ def _require_whole(path: Path) -> None:
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
     if len(first) < _BLOCK or first[1] != _KEY:
         raise RecordingError(f"{path.name}: no C3D file, or one cut in its first {_BLOCK} bytes")
-    points, analog, begin, end, _, scale, start = struct.unpack("<HHHHHfH", first[2:18])
-    each = 4 if scale < 0 else 2
+    processor = _processor(path, first)
+    order = ">" if processor == _BIG else "<"
+    points, analog, begin, end = struct.unpack(f"{order}4H", first[2:10])
+    (start,) = struct.unpack(f"{order}H", first[16:18])
+    each = 4 if _negative(processor, first) else 2
     frames = end - begin + 1
     needs = _BLOCK * (start - 1) + frames * each * (4 * points + analog)
     size = path.stat().st_size
@@ -67,7 +71,24 @@ def _require_whole(path: Path) -> None:
             f"{path.name}: {size} bytes, its header tells of {frames} frames of {points} points "
             f"and {analog} analog numbers: {needs} bytes; cut or damaged"
         )
+    if processor == _BIG:
+        raise RecordingError(
+            f"{path.name}: a whole C3D file in the byte order of SGI, which ezc3d does not read; "
+            "write it anew as Intel's by another program, as Mokka or Vicon's, or export it as TRC"
+        )
     _require_parameters(path, head(path, _BLOCK * (start - 1)), _BLOCK * max(first[0] - 1, 1))
+
+
+def _processor(path: Path, first: bytes) -> int:
+    """Whose numbers the whole file is in, as its parameters state: 84 Intel, 85 DEC, 86 SGI."""
+    begin = _BLOCK * (max(first[0], 2) - 1)
+    return (head(path, begin + 4)[begin + 3 :] or b"\0")[0]
+
+
+def _negative(processor: int, first: bytes) -> bool:
+    """Whether the header's scale is below 0: coordinates are floats, not integers."""
+    sign = {_BIG: 0, _DEC: 1}.get(processor, 3)  # the byte of its highest bits
+    return first[12 + sign] >= 128
 
 
 def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
@@ -134,7 +155,17 @@ def _told(
         "analog_rate_hz": repr(analog),
         "points_not_seen": f"{missing} of {markers.x[..., 0].size}",
         "residual_median_m": residual,
+        "first_frame": f"{int(found['first_frame'])} of the trial, time 0 here",
+        **_events(found),
     }
+
+
+def _events(found: dict[str, Any]) -> dict[str, str]:
+    """Events as the file states them; its times count as the trial's, which may begin earlier."""
+    times = 60 * found["event_times"][0] + found["event_times"][1]
+    names = distinct(found["events"], len(times))
+    told = "; ".join(f"{name} {t:.6g} s" for name, t in zip(names, times, strict=True))
+    return {"events": f"{told} (of the trial; told, no stream)"} if told else {}
 
 
 C3D = Reader(

@@ -24,7 +24,17 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         "analog": np.asarray(analog.T, dtype=np.float64),
         "channels": _words(parameters, "ANALOG", "LABELS"),
         "channel_units": _words(parameters, "ANALOG", "UNITS"),
+        "first_frame": np.array(found["header"]["points"]["first_frame"] + 1),
+        "events": _words(parameters, "EVENT", "LABELS"),
+        "event_times": _event_times(parameters),
     }
+
+
+def _event_times(parameters: Any) -> NDArray[np.float64]:
+    """Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise."""
+    group = parameters.get("EVENT", {})
+    times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
+    return times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0))
 
 
 def _rate(parameters: Any, analog: NDArray[np.float64]) -> float:
@@ -35,5 +45,6 @@ def _rate(parameters: Any, analog: NDArray[np.float64]) -> float:
 def _words(parameters: Any, group: str, name: str) -> NDArray[Any]:
     """A list of words, and those of NAME2, NAME3, ...: one parameter holds 255 at most."""
     names = [name, *(f"{name}{i}" for i in range(2, 10))]
-    found = [w for n in names if n in parameters[group] for w in parameters[group][n]["value"]]
+    held = parameters.get(group, {})
+    found = [w for n in names if n in held for w in held[n]["value"]]
     return np.array([str(w).strip() for w in found], dtype=str)

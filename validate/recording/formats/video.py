@@ -1,4 +1,4 @@
-"""Videos (MP4, MOV, AVI) as images: grey, on the container's own times, with a scale that is said.
+"""Videos (MP4, MOV, AVI, Matroska) as images: grey, on the container's own times, at a scale said.
 
 A container states no size of a pixel; a camera that is not calibrated has none that holds over the
 whole image. Its end is checked by its own account of lengths.
@@ -19,6 +19,7 @@ from validate.recording.types import Frames, Recording
 
 _OPTIONS = ("m_per_px", "rate", "every", "topic", "frame")
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # an MP4 or MOV begins with one
+_EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"  # Matroska and WebM (RFC 9559)
 _STILLS = (b"heic", b"heix", b"mif1", b"avif")  # photographs in the same container
 _LARGEST = 2**30
 _EVEN = 2.0  # ms by which even frames differ: containers count in coarse ticks
@@ -39,7 +40,7 @@ def read_video(path: Path, options: Options) -> Recording:
     side, every = length(options, "m_per_px", "0.1mm"), _every(options)
     found = decoded("video_arrays", path, "all", {"every": every}, _SECONDS)
     declared, count = int(found["declared"]), int(found["decoded"])
-    if count < declared:
+    if count < declared and not _matroska(path):  # which declares a duration, no count
         raise RecordingError(
             f"{path.name}: {count} frames can be decoded, {declared} are declared: damaged"
         )
@@ -86,13 +87,41 @@ def _require_whole(path: Path) -> None:
     if not path.is_file():
         raise RecordingError(f"{path.name}: no file")
     size, first = path.stat().st_size, head(path, 12)
-    at = _riff_end(first) if first.startswith(b"RIFF") else _last_box(path, size)
+    if _matroska(path):
+        at = _segment_end(path, size)
+    else:
+        at = _riff_end(first) if first.startswith(b"RIFF") else _last_box(path, size)
     if at > size:
         raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: cut")
 
 
 def _riff_end(first: bytes) -> int:
     return 8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8
+
+
+def _matroska(path: Path) -> bool:
+    return head(path, 4) == _EBML
+
+
+def _segment_end(path: Path, size: int) -> int:
+    """Where a Matroska file's segment ends by its own account; `size` where it tells none, as of a
+    live stream. Raises `RecordingError` where no segment follows the head."""
+    first = head(path)
+    end, begin = _sized(first, 4)
+    at = begin + (end or 0)
+    if first[at : at + 4] != _SEGMENT:
+        raise RecordingError(f"{path.name}: a head of Matroska without its segment: cut or damaged")
+    count, begin = _sized(first, at + 4)
+    return size if count is None else begin + count
+
+
+def _sized(data: bytes, at: int) -> tuple[int | None, int]:
+    """A size of EBML (RFC 8794, section 4; None: unknown), and where what it counts begins."""
+    lead = data[at] if at < len(data) else 0
+    more = 8 - lead.bit_length()
+    bits = 7 * (more + 1)
+    value = int.from_bytes(data[at : at + more + 1], "big") & ((1 << bits) - 1)
+    return (None if value == (1 << bits) - 1 else value), at + more + 1
 
 
 def _last_box(path: Path, size: int) -> int:
@@ -118,15 +147,15 @@ def _last_box(path: Path, size: int) -> int:
 def _recognises(path: Path) -> bool:
     first = head(path, 12)
     moving = first[4:8] in _BOXES and first[8:] not in _STILLS
-    return moving or (first[:4] == b"RIFF" and first[8:12] == b"AVI ")
+    return moving or first[:4] == _EBML or (first[:4] == b"RIFF" and first[8:12] == b"AVI ")
 
 
 _SECONDS = 60  # of decoding, and one more for each MB
 VIDEO = Reader(
     "video",
-    "a video (MP4, MOV, AVI)",
+    "a video (MP4, MOV, AVI, Matroska)",
     _recognises,
     read_video,
-    "its first bytes are those of MP4, MOV or AVI",
+    "its first bytes are those of MP4, MOV, AVI or Matroska",
     _LARGEST,
 )
