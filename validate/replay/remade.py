@@ -4,11 +4,12 @@ A user who changes a material asks what a wrong model does, so the truth must st
 changes the twin asks for another recording, so it is made anew in memory.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+from validate.compare.result import Kind
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
@@ -30,6 +31,17 @@ def synthetic(recording: Recording) -> bool:
 def computed(recording: Recording) -> bool:
     """Whether a recording says of itself that a code of others computed it."""
     return _told(recording) == "reference"
+
+
+def kind_of_recordings(
+    recordings: Sequence[Recording], *, same_model: bool, remade: bool = False
+) -> Kind:
+    """What recordings are: measured, a twin's, the judged model's own, or computed by others."""
+    if recordings and all(computed(r) for r in recordings):
+        return "reference"
+    if not remade and not any(synthetic(r) for r in recordings):
+        return "measured"
+    return "same model" if same_model else "twin"
 
 
 def _told(recording: Recording) -> str:

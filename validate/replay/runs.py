@@ -16,7 +16,7 @@ from validate.replay.followed import MAIN, Followed, Truth
 from validate.replay.method import Limited, Method
 from validate.replay.options import Report, folder_of
 from validate.replay.pace import Pace
-from validate.replay.remade import computed, made_by, require_known, synthetic
+from validate.replay.remade import kind_of_recordings, made_by, require_known
 from validate.replay.solved import solve
 from validate.scene.meshless import Meshless
 
@@ -97,11 +97,8 @@ class Road:
     @property
     def kind(self) -> Kind:
         """What the recordings are: measured, a twin's, the judged model's own, or computed."""
-        if all(computed(r) for r in self.recordings):
-            return "reference"
-        if not self.remade and not any(synthetic(r) for r in self.recordings):
-            return "measured"
-        return "same model" if self.experiment.same_model else "twin"
+        same = self.experiment.same_model
+        return kind_of_recordings(self.recordings, same_model=same, remade=self.remade)
 
     def tell(self, what: str) -> None:
         if self._report:

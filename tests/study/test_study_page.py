@@ -1,0 +1,21 @@
+"""A study's folder says what the experiment's recordings are."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from validate.replay.find import load_file
+from validate.study.study_page import Findings, write_study
+
+KINDS = {"hanging_bar": "reference", "fluid_phantom": "twin", "ecoflex_cylinder": "measured"}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_kind_is_that_of_the_recordings(name: str, project_root: Path, tmp_path: Path) -> None:
+    experiment = load_file(project_root / "experiments" / f"{name}.py")
+    told = Findings(
+        "Trade: a title", "One cell.", (), {"kind": "tradeoff"}, (("a",), ((1.0,),)), True
+    )
+    page = write_study(experiment, told, tmp_path / "study")
+    assert json.loads((page.parent / "results.json").read_text("utf-8"))["kind"] == KINDS[name]
