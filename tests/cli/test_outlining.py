@@ -79,6 +79,7 @@ def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
     assert here("outline", str(moving))[0] == 0  # again: its own stream is made anew
 
 
+@pytest.mark.slow
 def test_the_sd_says_that_it_is_widened_to_distances_from_experts_lines(
     moving: Path, tmp_path: Path
 ) -> None:
@@ -123,6 +124,7 @@ def test_a_rival_that_leaves_too_little_confidence_refuses(two: Path, tmp_path: 
     assert here("outline", str(two), "-o", str(out), "--confidence", "0.56")[0] == 0
 
 
+@pytest.mark.slow
 def test_an_image_without_an_outline_is_left_out_and_said(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     disc = (*CENTRE, RADIUS)

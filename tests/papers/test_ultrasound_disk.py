@@ -34,9 +34,8 @@ def run(path: Path, **values: str) -> Result:
     return compare(load("ultrasound_disk"), {"recording": str(path), **values}, quick=True)
 
 
-@pytest.mark.parametrize(
-    ("diameter", "side"), [pytest.param(16.0, 0.2, marks=pytest.mark.slow), (7.0, 0.1)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("diameter", "side"), [(16.0, 0.2), (7.0, 0.1)])
 def test_other_disks_are_measured_by_their_own_pixels(
     tmp_path: Path, diameter: float, side: float
 ) -> None:

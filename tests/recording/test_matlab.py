@@ -51,6 +51,7 @@ def test_what_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     assert len(read_matlab(single, {"m_per_px": "1mm"}).frame("I").images) == 1
 
 
+@pytest.mark.slow
 def test_what_is_neither_points_nor_images_is_listed(tmp_path: Path) -> None:
     other = {"note": "a text", "s": {"a": 1.0}, "plane": np.ones((4, 5)), "c": np.ones((4, 2)) * 1j}
     got = read_matlab(written(tmp_path / "x.mat", P=np.ones((4, 2)), **other), {"unit": "m"})

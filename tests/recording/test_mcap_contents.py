@@ -146,6 +146,7 @@ def plain(value: Any) -> Any:
     return value
 
 
+@pytest.mark.slow
 def test_messages_of_ros2_are_what_another_decoder_finds(shared_data: Path) -> None:
     compared = refused = 0
     for path in recordings(shared_data):

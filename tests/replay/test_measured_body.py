@@ -156,6 +156,7 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
         compare(experiment(tmp_path, short, seen, "marker"))
 
 
+@pytest.mark.slow
 def test_outlines_of_a_section(tmp_path: Path) -> None:
     """The side of a pressed block: its width grows, its height falls."""
 

@@ -131,6 +131,7 @@ def test_an_unwritable_place(tmp_path: Path) -> None:
         write_report(small_result(), tmp_path / "file" / "cube", created=CREATED)
 
 
+@pytest.mark.slow
 def test_what_draws_is_imported_when_something_is_drawn() -> None:
     heavy = ("matplotlib", "jinja2", "vtk", "pyvista", "PIL")
     code = (

@@ -117,7 +117,11 @@ def test_what_is_no_file_or_much_too_large_is_one_line(name: str, tmp_path: Path
         assert case.name in str(raised.value)
 
 
-@pytest.mark.parametrize("suffix", [*FOREIGN, *SURFACES, ".npz"])
+@pytest.mark.parametrize(
+    "suffix",
+    [".inp", ".npz",
+     *(pytest.param(s, marks=pytest.mark.slow) for s in (*FOREIGN, *SURFACES) if s != ".inp")],
+)  # fmt: skip
 def test_the_command_leaves_nothing_of_a_body_that_cannot_be_read(
     suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -147,9 +147,9 @@ def test_the_beam_of_others_is_filled(shared_data: Path) -> None:
                 ("x.vtu", "<VTKFile>", "x.vtu: "),
                 ("x.obj", "v 0 0 0\n", "x.obj: "),
                 ("x.stl", "solid x\nendsolid x\n", "x.stl: "),
+                ("x.ply", "ply\nformat ascii 1.0\n", "x.ply: "),
             )
         ),
-        ("x.ply", "ply\nformat ascii 1.0\n", "x.ply: "),
     ],
 )
 def test_a_reader_that_ends_the_interpreter_costs_a_line(
