@@ -191,6 +191,19 @@ def test_streams_that_are_not_used_are_named(tmp_path: Path) -> None:
     assert "not used" not in in_folder(tmp_path, "new", "other", "--from", "alone.mcap")[1]
 
 
+def test_logs_of_repeats_are_used_by_their_mean(tmp_path: Path) -> None:
+    """Not one of them is named; what is no repeat still is."""
+    whole = log(**SIZES)
+    force, moved = whole.signals["force"], whole.signals["displacement"]
+    kept = {"force": force, "displacement": moved, "force/sd": force, "force/A1": force,
+            "displacement/A1": moved, "other/A1": force}  # fmt: skip
+    repeated = replace(whole, signals=kept, metadata={**whole.metadata, "repeats": {"n": "2"}})
+    write_recording(repeated, tmp_path / "all.mcap")
+    _, said = in_folder(tmp_path, "new", "my_gel", "--from", "all.mcap")
+    assert said.count("is not used by") == 1
+    assert "'other/A1' is not used" in " ".join(said.split())
+
+
 def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path) -> None:
     write_recording(log(), tmp_path / "gel.mcap")
     arguments = ("new", "mine", "--from", "gel.mcap", "-o", "mine.py")

@@ -6,7 +6,7 @@ ends, never as code.
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from string import Template
@@ -57,9 +57,15 @@ def new(
     write_whole(path, text)
     for line in kind.assumed(recording, found):
         complain(line)
-    for topic in [t for t in topics(recording) if t not in kind.used(recording, found)]:
+    for topic in _unused(recording, kind.used(recording, found)):
         complain(f"'{topic}' is not used by the experiment that was written")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
+
+
+def _unused(recording: Recording, used: Collection[str]) -> list[str]:
+    """The topics that an experiment leaves out; logs of repeats are in their mean and scatter."""
+    mean = used if "repeats" in recording.metadata else ()
+    return [t for t in topics(recording) if t not in used and t.split("/")[0] not in mean]
 
 
 def _checked_path(name: str, out: Path | None) -> Path:
