@@ -103,7 +103,11 @@ def test_every_export_holds_the_same_points(name: str, tmp_path: Path) -> None:
     if name.startswith("optitrack"):
         quaternion = "angles" not in name
         assert ("Box/rotation" in got.signals) == quaternion
-        assert got.unread == ({} if quaternion else {"Box": "its rotation is no quaternion"})
+        assert got.unread == (
+            {}
+            if quaternion
+            else {"Box": "its rotation is no quaternion; export it as Rotation Type Quaternion"}
+        )
 
 
 @pytest.mark.parametrize("name", ["vicon blank", "qualisys 2 NULL", "optitrack 1.24 cm"])
@@ -129,7 +133,8 @@ def test_zeros_that_were_taken_as_not_seen_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (qualisys("blank", 2).replace("\t3D", "\t6D"), "data of kind '6D'; only 3D is read"),
+        (qualisys("blank", 2).replace("\t3D", "\tAnalog"), "data of kind 'Analog'; 3D and 6D are"),
+        (qualisys("blank", 2).replace("\t3D", "\t6D"), "8 columns for 2 bodies; expected 16 each"),
         ("Objects\n100\n,,Box\nFrame,Sub Frame,RX\n,,rad\n1,0,0.1\n", "it has Objects"),
         (vicon(";", "blank").replace("1.5", "1,5"), "'1,5' is no number"),
     ],

@@ -177,7 +177,7 @@ def test_three_zeros_of_qualisys_are_not_seen(tmp_path: Path) -> None:
     assert markers.x[0, 1] == pytest.approx([0.694169, -0.183362, 0.097003])
     assert np.isnan(markers.x[1, 1]).all()
     (tmp_path / "six.tsv").write_text(QUALISYS.replace("\t3D", "\t6D"), "utf-8")
-    with pytest.raises(RecordingError, match="data of kind '6D'; only 3D is read: export 3D"):
+    with pytest.raises(RecordingError, match="8 columns for 2 bodies; expected 16 each"):
         read_qualisys(tmp_path / "six.tsv", {})
 
 
@@ -254,3 +254,66 @@ def test_a_trc_without_unit_or_with_other_points_than_stated_is_refused(tmp_path
     path.write_text(head.format(2) + body)
     with pytest.raises(RecordingError, match="line 4 names 1 points, line 3 states 2"):
         read_trc(path, {"unit": "mm"})
+
+
+LINES_OF_TOOLS = """time,tool_id,status,q0,qx,qy,qz,tx,ty,tz
+0.00,A,OK,1,0,0,0,1,2,3
+0.00,B,OK,1,0,0,0,4,5,6
+0.02,A,MISSING,1,0,0,0,1,2,9
+0.02,B,OK,1,0,0,0,4,5,7
+"""
+
+
+def test_lines_of_several_tools_are_told_apart_by_the_column_that_names_them(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(LINES_OF_TOOLS)
+    got = read_ndi(path, {})
+    assert got.signal("B/translation", "m").y.tolist() == pytest.approx(
+        np.array([[4, 5, 6], [4, 5, 7]]) * 1e-3
+    )
+    assert got.signal("B/translation", "m").t.tolist() == [0.0, 0.02]
+    assert len(got.signal("A/translation", "m").t) == 1  # its status is not OK at the second
+    path.write_text(LINES_OF_TOOLS.replace("time,", "n,"))
+    assert read_ndi(path, {"rate": "50"}).signal("B/rotation", "1").t.tolist() == [0.0, 0.02]
+    path.write_text(LINES_OF_TOOLS.replace("time,", "n,") + "0.04,B,OK,1,0,0,0,4,5,8\n")
+    with pytest.raises(RecordingError, match="no rate tells their times"):
+        read_ndi(path, {"rate": "50"})
+
+
+def test_a_body_alone_with_the_mean_error_of_its_markers_is_read(tmp_path: Path) -> None:
+    """Motive names that column in the line above, and leaves its axis blank."""
+    path = tmp_path / "x.csv"
+    path.write_text(
+        "Format Version,1.23,Rotation Type,Quaternion,Length Units,Meters\n\n"
+        f",Type{8 * ',Rigid Body'}\n,Name{8 * ',Tool'}\n,ID{8 * ',1'}\n"
+        f",{4 * ',Rotation'}{3 * ',Position'},Mean Marker Error\n"
+        "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,\n"
+        "0,0.00,0,0,0,1,0.1,0.2,0.3,0.0001\n1,0.01,0,0,0,1,0.1,0.2,0.4,0.0001\n"
+    )
+    got = read_optitrack(path, {})
+    assert got.signal("Tool/translation", "m").y[1].tolist() == pytest.approx([0.1, 0.2, 0.4])
+
+
+def test_qualisys_bodies_are_read_by_their_matrix_column_by_column(tmp_path: Path) -> None:
+    """As IMUSim reads such files: Rot[0..2] is the first column, a residual of -1 is not seen."""
+    turn = "0 1 0 -1 0 0 0 0 1"  # of the body's x to the room's y
+    rows = [
+        f"100 200 300 9 9 9 0.1 {turn}",
+        "0 0 0 0 0 0 -1 0 0 0 0 0 0 0 0 0",
+        f"100 200 400 9 9 9 0.1 {turn}",
+    ]
+    head = "NO_OF_FRAMES 3|NO_OF_BODIES 1|FREQUENCY 100|DATA_INCLUDED 6D|BODY_NAMES Tool"
+    names = "X Y Z Roll Pitch Yaw Residual " + " ".join(f"Rot[{i}]" for i in range(9))
+    text = "\n".join([*head.split("|"), names, *rows]).replace(" ", "\t") + "\n"
+    path = tmp_path / "x.tsv"
+    path.write_text(text)
+    got = read_qualisys(path, {})
+    assert got.signal("Tool/translation", "m").y.tolist() == [[0.1, 0.2, 0.3], [0.1, 0.2, 0.4]]
+    assert got.signal("Tool/translation", "m").t.tolist() == [0.0, 0.02]
+    R = got.signal("Tool/rotation", "1").y[0].reshape(3, 3)
+    assert (R @ [1, 0, 0]).tolist() == [0, 1, 0]
+    path.write_text(text.replace("-1\t0\t0\t0\t0\t1\n", "-1\t0\t0\t0\t0\t2\n"))
+    with pytest.raises(RecordingError, match="Tool: sample 1 is no rotation"):
+        read_qualisys(path, {})

@@ -6,6 +6,7 @@ cells, or another state than OK: no sample.
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.poses import pose_signals, rotations
@@ -25,6 +26,10 @@ from validate.recording.types import Recording, Stream
 _POSITION = re.compile(r"t?([xyz])(.*)")
 _TURN = re.compile(r"q([0owxyz])(.*)")
 _PORT = re.compile(r"(port|tool|sensor)[\W_]*(\d\w*)")
+# A column that says of which tool a line is, where each tool has lines of its own.
+_WHOSE = re.compile(
+    r"(tool|sensor|port|marker|body|handle)?\W*_?(id|name|handle|number|no|serial)?"
+)
 _IN_NAME = re.compile(r"\(mm\)|\[mm\]|\W|_")
 _CLOCK = {
     **dict.fromkeys(("hour", "hours"), 3600.0), **dict.fromkeys(("minute", "minutes"), 60.0),
@@ -35,6 +40,7 @@ _TIME = re.compile(r"time ?(?:stamp)?\W*(ms|s|sec|seconds)?\W*")
 _OPTIONS = ("unit", "rate", "frame")
 _OK = ("", "ok")
 _DAY = 86400.0  # s
+_MOST_TOOLS = 64
 
 
 @dataclass(frozen=True)
@@ -63,19 +69,39 @@ def read_ndi(path: Path, options: Options) -> Recording:
     body = [r for r in held.rows if r.line > header.line and any(r.cells)]
     columns = [*(i for tool in tools for i in (*tool.position, *tool.turn)), *(i for i, _ in clock)]
     values, rows, left = numbers(held, body, len(header.cells), columns)
-    t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options)
+    whose = _whose(header, rows, tools)
+    t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options, whose)
     factor = length({"unit": "mm", **options}, "unit", "mm")
     frame = options.get("frame", "tracker")
     streams: dict[str, Stream] = {}
     told = {}
-    for k, tool in enumerate(tools):
-        pose = values[:, 7 * k : 7 * k + 7]
-        seen = _seen(pose, tool, rows)
-        told[tool.name] = f"{int((~seen).sum())} of {len(seen)}"
+    for name, k, own in _tracks(tools, whose):
+        pose = values[own, 7 * k : 7 * k + 7]
+        seen = _seen(pose, tools[k], [rows[i] for i in own])
+        told[name] = f"{int((~seen).sum())} of {len(seen)}"
         if seen.any():
-            R = rotations(pose[seen, 3:], f"{path.name}: {tool.name}")
-            streams |= pose_signals(tool.name, t[seen], R, factor * pose[seen, :3], frame)
+            R = rotations(pose[seen, 3:], f"{path.name}: {name}")
+            streams |= pose_signals(name, t[own][seen], R, factor * pose[seen, :3], frame)
     return _recording(path, streams, told, left)
+
+
+def _whose(header: TextRow, rows: Sequence[TextRow], tools: Sequence[Tool]) -> list[str]:
+    """The tool of every line, where one group of columns holds lines of several; else no names."""
+    taken = {i for tool in tools for i in (*tool.position, *tool.turn, tool.state)}
+    for i, cell in enumerate(header.cells):
+        if len(tools) == 1 and i not in taken and cell and _WHOSE.fullmatch(cell.lower()):
+            names = [row.cell(i) for row in rows]
+            if 1 < len(set(names)) <= _MOST_TOOLS:
+                return names
+    return [""] * len(rows)
+
+
+def _tracks(tools: Sequence[Tool], whose: Sequence[str]) -> list[tuple[str, int, Ints]]:
+    """Name, group of columns and numbers of the lines of each tool."""
+    every = np.array(whose)
+    if len(names := dict.fromkeys(whose)) > 1:
+        return [(name or "unnamed", 0, np.flatnonzero(every == name)) for name in names]
+    return [(tool.name, k, np.arange(len(whose))) for k, tool in enumerate(tools)]
 
 
 def _recording(
@@ -115,7 +141,7 @@ def _tools(header: TextRow) -> tuple[Tool, ...]:
             continue
         position, turn, suffix = group
         between = range(after, i)
-        state = next((j for j in between if cells[j] == "state"), None)
+        state = next((j for j in between if cells[j] in ("state", "status")), None)
         port = next((m for j in between if (m := _PORT.fullmatch(cells[j]))), None)
         names.append(suffix or (f"{port[1]}{port[2]}" if port else f"tool{len(found) + 1}"))
         found.append((tuple(i + j for j in position), tuple(i + j for j in turn), state))
@@ -157,10 +183,24 @@ def _clock(header: TextRow) -> list[tuple[int, float]]:
     return []
 
 
-def _times(held: TextRows, values: Floats, factors: Sequence[float], options: Options) -> Floats:
-    """Seconds, of a clock that may pass midnight."""
+def _times(
+    held: TextRows,
+    values: Floats,
+    factors: Sequence[float],
+    options: Options,
+    whose: Sequence[str],
+) -> Floats:
+    """Seconds, of a clock that may pass midnight; by a rate, every tool's lines are counted."""
     if "rate" in options:
-        return np.arange(len(values)) / above_zero(options, "rate")
+        count = Counter(whose)
+        if len(set(count.values())) > 1:
+            raise RecordingError(f"{held.name}: tools of {dict(count)} lines: no rate tells their "
+                                 "times; export a column of time")  # fmt: skip
+        names = np.array(whose)
+        nth = np.empty(len(values))
+        for name in count:
+            nth[names == name] = np.arange(count[name])
+        return nth / above_zero(options, "rate")
     if not factors:
         raise UsageError(f"{held.name}: no column is a time; say --map rate=HZ")
     t = values @ np.array(factors)

@@ -110,7 +110,8 @@ def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
     if len(above) < 3:
         raise RecordingError(f"{held.name}: no lines of types and names above Frame; damaged")
     parts, axes = above[-1], held.rows[at]
-    width = max(i + 1 for i, c in enumerate(axes.cells) if c)
+    # The mean error of a body's markers has a name above, none in the line of axes.
+    width = max(i + 1 for row in (*above, axes) for i, c in enumerate(row.cells) if c)
     kept = [_TIME, *(i for i in range(2, width) if parts.cell(i) in ("Position", "Rotation"))]
     below = [r for r in held.rows[at + 1 :] if any(r.cells)]
     found, rows, left = numbers(held, below, width, kept)
@@ -143,7 +144,7 @@ def _poses(
         pose = table.values[:, [*at, *q]]
         seen = ~np.isnan(pose).any(axis=1)
         if not q:
-            unread[name] = "its rotation is no quaternion"
+            unread[name] = "its rotation is no quaternion; export it as Rotation Type Quaternion"
         elif not seen.any():
             unread[name] = "never seen"
         else:

@@ -1,12 +1,18 @@
-"""Qualisys Track Manager's text: keys and values, then a row a frame of coordinates in mm."""
+"""Qualisys Track Manager's text: keys and values, then a row a frame of coordinates in mm.
+
+Of bodies (6D) it has 16 columns each: X Y Z, three angles whose convention is a setting of the
+program, the residual (-1: not seen), and the rotation column by column, which alone is read.
+"""
 
 from pathlib import Path
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.formats.options import length, spread
-from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.poses import pose_signals
+from validate.recording.formats.recorded import begun, distinct, recorded
 from validate.recording.formats.text_rows import (
     ABSENT,
     TextRow,
@@ -19,10 +25,14 @@ from validate.recording.formats.text_rows import (
     without_zeros,
 )
 from validate.recording.reader import Options, Reader, head, require_known, source_of
-from validate.recording.types import Markers, Recording
+from validate.recording.types import Markers, Recording, Stream
 
 _MAGIC = (b"NO_OF_FRAMES", b"FILE_VERSION")  # the latter since its version 2.0.0
-_NAMES = "MARKER_NAMES"
+_NAMES = ("MARKER_NAMES", "BODY_NAMES")
+_COUNTS = ("NO_OF_MARKERS", "NO_OF_BODIES")
+_SIX = "6D"
+_WIDE, _RESIDUAL, _TURN = 16, 6, 7  # columns of a body, and where two of them begin
+_ROUND = 0.02  # by which a rotation may miss being one: exports have few decimals
 _OPTIONS = ("unit", "sd", "frame")
 
 
@@ -30,14 +40,18 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     """Points as `markers` (nt, k, 3) m; blank cells and three zeros are "not seen", as that program
     exports either.
 
+    Of a file of 6D each body's pose as `<body>/rotation` (nt, 9) and `/translation` (nt, 3) m.
+
     Options: `unit` in place of its mm, `sd` of a coordinate (0: not stated), `frame` (default
-    capture). Raises `RecordingError` for a file of other data than 3D, without a frequency, with
-    other points than it states, or damaged.
+    capture). Raises `RecordingError` for a file of other data than 3D and 6D, without a frequency,
+    with other points or bodies than it states, or damaged.
     """
     require_known(options, _OPTIONS)
     held = text_rows(path)
     header, names, body = _parts(held)
     rate = _rate(held, header)
+    if header.get("DATA_INCLUDED") == _SIX:
+        return _bodies(path, held, header, names, body, rate, options)
     before = _before(body, len(names))
     values, rows, left = numbers(held, body, before + 3 * len(names))
     x = values[:, before:].reshape(len(values), -1, 3)
@@ -60,23 +74,80 @@ def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRo
     if not held.rows or held.rows[0].cell(0).encode() not in _MAGIC:
         raise RecordingError(f"{held.name}: no Qualisys text: its first cell is not NO_OF_FRAMES")
     keys = [r for r in held.rows if r.cell(0).isupper() and r.cell(0) not in ABSENT]
-    header = {r.cell(0): r.cell(1) for r in keys if r.cell(0) != _NAMES}
-    if header.get("DATA_INCLUDED", "3D") != "3D":
+    header = {r.cell(0): r.cell(1) for r in keys if r.cell(0) not in _NAMES}
+    if header.get("DATA_INCLUDED", "3D") not in ("3D", _SIX):
         raise RecordingError(
-            f"{held.name}: data of kind '{header['DATA_INCLUDED']}'; only 3D is read: export 3D"
+            f"{held.name}: data of kind '{header['DATA_INCLUDED']}'; 3D and 6D are read: export one"
         )
-    named = next(([c for c in r.cells[1:] if c] for r in keys if r.cell(0) == _NAMES), [])
-    stated = header.get("NO_OF_MARKERS", "")
+    named = next(([c for c in r.cells[1:] if c] for r in keys if r.cell(0) in _NAMES), [])
+    stated = next((header[k] for k in _COUNTS if k in header), "")
     if not named or (stated.isdecimal() and int(stated) != len(named)):
         raise RecordingError(
-            f"{held.name}: {len(named)} names of points, the header states {stated or 'none'}; "
-            "damaged"
+            f"{held.name}: {len(named)} names of points or bodies, the header states "
+            f"{stated or 'none'}; damaged"
         )
     last = max(r.line for r in keys)
     rows = [r for r in held.rows if r.line > last and any(r.cells)]
     if rows and not any(as_number(c) is not None for c in rows[0].cells):
         rows = rows[1:]  # a line of column names
     return header, distinct(named, len(named)), rows
+
+
+def _bodies(
+    path: Path,
+    held: TextRows,
+    header: dict[str, str],
+    names: tuple[str, ...],
+    body: list[TextRow],
+    rate: float,
+    options: Options,
+) -> Recording:
+    """Poses of bodies where they were seen; the frame is that of the measurement."""
+    most = max((len([c for c in r.cells if c]) for r in body), default=0)
+    before = most - _WIDE * len(names)
+    if before not in (0, 2):
+        raise RecordingError(
+            f"{path.name}: {most} columns for {len(names)} bodies; expected {_WIDE} each "
+            "(position, angles, residual, rotation matrix), after frame and time or not; "
+            "export the matrix"
+        )
+    values, _, left = numbers(held, body, most)
+    t = np.arange(len(values)) / rate
+    factor = length({"unit": "mm", **options}, "unit", "mm")
+    frame = options.get("frame", "capture")
+    streams: dict[str, Stream] = {}
+    told = {}
+    for k, name in enumerate(names):
+        one = values[:, before + _WIDE * k :][:, :_WIDE]
+        seen = ~np.isnan(one).any(axis=1) & (one[:, _RESIDUAL] >= 0) & one[:, _TURN:].any(axis=1)
+        told[name] = f"{int((~seen).sum())} of {len(seen)}"
+        if seen.any():
+            R = _turned(f"{path.name}: {name}", one[seen, _TURN:])
+            streams |= pose_signals(name, t[seen], R, factor * one[seen, :3], frame)
+    if not streams:
+        raise RecordingError(f"{path.name}: no body was seen: {told}")
+    unread = {n: "never seen" for n in names if f"{n}/rotation" not in streams}
+    record = {
+        "kind": "motion capture (Qualisys TSV, 6D)",
+        "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
+        "not_seen": "; ".join(f"{name}: {count}" for name, count in told.items()),
+        **told_left(left),
+    }
+    source = source_of(path, "text file: integrity not provable")
+    return recorded(path.stem, source, begun(streams), record, unread)
+
+
+def _turned(what: str, columns: Floats) -> Floats:
+    """Rotations (n, 3, 3) that stand column by column; raises `RecordingError` for others."""
+    R = np.swapaxes(columns.reshape(-1, 3, 3), 1, 2)
+    off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    bad = (off > _ROUND) | (np.linalg.det(R) < 0)
+    if bad.any():
+        raise RecordingError(
+            f"{what}: sample {int(bad.argmax()) + 1} is no rotation (off by "
+            f"{off[bad.argmax()]:.3g}); other columns than Qualisys' 6D has, or damaged"
+        )
+    return np.asarray(R)
 
 
 def _rate(held: TextRows, header: dict[str, str]) -> float:

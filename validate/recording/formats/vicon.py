@@ -81,7 +81,8 @@ def read_vicon(path: Path, options: Options) -> Recording:
         told |= more
     if not streams:
         raise RecordingError(
-            f"{path.name}: neither trajectories nor devices; it has {', '.join(blocks) or 'none'}"
+            f"{path.name}: neither trajectories nor devices; it has "
+            f"{', '.join(blocks) or 'none'}; export those two as well"
         )
     unread = {
         title: f"a block of {len(b.rows)} rows that is not read"
