@@ -78,6 +78,7 @@ def test_what_is_not_stated_is_asked_for() -> None:
         (DATA / "JPGLosslessP14SV1_1s_1f_8b.dcm", "'JPEG Lossless, .* make it uncompressed first"),
         (BESIDE / "rtplan.dcm", "no image in it"),
         (BESIDE / "CT_small.dcm", "pixels of int16; only 8-bit images are read"),
+        (BESIDE / "JPEG-lossy.dcm", "are in .JPEG Extended.*make it uncompressed first"),
     ],
 )
 def test_what_is_no_readable_image_says_why(path: Path, why: str) -> None:

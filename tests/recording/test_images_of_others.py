@@ -144,3 +144,32 @@ def test_a_bomb_or_a_cut_image_costs_a_line(tmp_path: Path, kind: str) -> None:
     Image.new("L", (20000, 20000)).save(file)
     with pytest.raises(RecordingError):
         read_image_stack(tmp_path, SAID)
+
+
+@pytest.mark.parametrize(
+    ("name", "dots", "said"),
+    [
+        ("x.tif", 2540, "states 2540 dots an inch: where they are .* --m-per-px 0.01mm$"),
+        ("x.tif", 96, "states 96 dots an inch, as printers and screens have them: no scale$"),
+        ("png/1.png", 2540, "states 2540 dots an inch: where they are .* --m-per-px 0.01mm$"),
+        ("png/1.png", 72, "as printers and screens have them: no scale$"),
+        ("jpg/1.jpg", 508, "--m-per-px 0.05mm$"),
+        ("png/1.png", None, "e.g. 1e-4 and 10$"),
+    ],
+)
+def test_dots_an_inch_are_offered_and_never_believed(
+    tmp_path: Path, name: str, dots: int | None, said: str
+) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    image = Image.fromarray(np.full((8, 9), 7, np.uint8))
+    if dots is None:
+        image.save(path)
+    else:
+        image.save(path, dpi=(dots, dots))
+    whole = path if path.suffix == ".tif" else path.parent
+    reader = recognised(whole)
+    with pytest.raises(UsageError, match=said):
+        reader.read(whole, {})
+    got = reader.read(whole, {"m_per_px": "0.2mm", "rate": "1"})
+    assert got.frame("images").m_per_px == (2e-4, 2e-4)

@@ -16,6 +16,7 @@ from pydicom.pixels.utils import iter_pixels
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.sequence import MAX_PIXELS
 
+_LACKS = ("missing dependencies", "does not support")  # as a codec says that it is none for these
 _LUMA = np.array([0.299, 0.587, 0.114])
 _CM = 3  # PS3.3 C.8.5.5.1.15: physical units, cm
 _CONFIG = pydicom.config
@@ -67,7 +68,8 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
     try:
         yield from iter_pixels(ds)
     except (NotImplementedError, RuntimeError) as error:
-        if "missing dependencies" in str(error) or isinstance(error, NotImplementedError):
+        lacks = any(words in str(error) for words in _LACKS)
+        if lacks or isinstance(error, NotImplementedError):
             raise UsageError(
                 f"its pixels are in '{name}', which no permissively licensed library here decodes; "
                 "make it uncompressed first, as by `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
@@ -79,7 +81,10 @@ def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[np.uint8]:
     if ds.PhotometricInterpretation == "PALETTE COLOR":
         image = _eight_bits(ds, apply_color_lut(image, ds))
     if image.dtype != np.uint8:
-        raise RecordingError(f"pixels of {image.dtype}; only 8-bit images are read")
+        raise RecordingError(
+            f"pixels of {image.dtype}; only 8-bit images are read; export "
+            "it as PNG or TIFF of 16 bits, which come in as image-stack"
+        )
     if image.ndim == 3:
         image = np.rint(image @ _LUMA).astype(np.uint8)
     return 255 - image if ds.PhotometricInterpretation == "MONOCHROME1" else image

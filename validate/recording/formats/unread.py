@@ -21,6 +21,7 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
     (b"\0\0\1\xb3", "a video (MPEG)", _FFMPEG),
     (b"FLV\1", "a video (Flash)", _FFMPEG),
     (b"\x1f\x8b", "packed by gzip", "gunzip -k {name}"),
+    (b"PK\3\4", "a ZIP archive", "unzip {name} -d {stem}, then name the folder or a file in it"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and name the file or folder in it"),
     (b"Rar!", "a RAR archive", "unpack it and name the file or folder in it"),
     (b"%PDF", "a PDF", "export the numbers as CSV from the program that drew it"),
@@ -30,7 +31,7 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
 def known_unread(path: Path) -> str:
     """What a path is that no reader takes, and what to do; empty where nothing shows."""
     if path.is_dir():
-        return _bag(path)
+        return _folder(path)
     first = head(path, 16)
     where = path.resolve().parent.name if first.startswith(b"SQLite") else path.name
     return next(
@@ -44,12 +45,16 @@ def known_unread(path: Path) -> str:
     )
 
 
-def _bag(folder: Path) -> str:
-    """A folder as rosbag2 writes it."""
+def _folder(folder: Path) -> str:
+    """A folder as rosbag2 writes it, or of scans."""
     name = folder.resolve().name
     if mcap := sorted(p.name for p in folder.glob("*.mcap")):
         return (
             f"{name} is a folder of recordings (MCAP); name one: validate import {name}/{mcap[0]}"
+        )
+    if dicom := sorted(p.name for p in folder.glob("*.dcm")):
+        return (
+            f"{name} is a folder of DICOM files, read one by one: validate import {name}/{dicom[0]}"
         )
     if any(folder.glob("*.db3")):
         how = _BAG.format(where=name, stem=name)

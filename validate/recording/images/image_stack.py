@@ -13,7 +13,7 @@ from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
 from validate.recording.images.levels import shallow
 from validate.recording.images.numbered import pictures
-from validate.recording.images.png_stack import by_size
+from validate.recording.images.png_stack import by_size, offered
 from validate.recording.images.stack_arrays import SUFFIXES
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Frames, Recording, Source
@@ -68,7 +68,7 @@ def _sides(
     if factor is None:
         raise UsageError(
             f"{path.name}: states no scale{f' (unit {unit})' if unit else ''}; say it: "
-            "--m-per-px 0.1mm"
+            f"--m-per-px 0.1mm{offered(found['dots']) if 'dots' in found else ''}"
         )
     x, y = (factor * float(side) for side in found["side"])
     return (x, y), f"{found['side'][0]:.6g} {unit} a pixel (stated by ImageJ)"

@@ -1,22 +1,41 @@
 """A folder of PNG images as a recording."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Ints
+from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import above_zero
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.images.numbered import numbered, pictures
-from validate.recording.reader import Options, Reader, require_known
+from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.scales import odd_pixel
 from validate.recording.types import Frames, Recording, Source
 from validate.units import in_si, split
 
 MAX_STACK = 400 * 2**20  # bytes of all images of one stack
 MAX_FILE = 64 * 2**20  # bytes of one PNG
+_PRINTERS = (
+    1,
+    72,
+    75,
+    90,
+    96,
+    100,
+    120,
+    144,
+    150,
+    200,
+    240,
+    300,
+    360,
+    400,
+    600,
+    1200,
+)  # dots an inch
 _OPTIONS = ("m_per_px", "rate", "topic")
 
 
@@ -30,7 +49,8 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     """
     require_known(options, _OPTIONS)
     if not {"m_per_px", "rate"} <= options.keys():
-        raise UsageError("png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10")
+        said = offered(_dots(folder)) if folder.is_dir() and "m_per_px" not in options else ""
+        raise UsageError(f"png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10{said}")
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder of PNG images")
     side, rate = _pixel(options["m_per_px"]), above_zero(options, "rate")
@@ -52,6 +72,26 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         clock={name: clock_of(name, None, ns[at], ns[at]) for name, at in streams.items()},
         metadata={"provenance": made},
     )
+
+
+def offered(dots: Floats) -> str:
+    """What dots (x, y) an inch would mean as a scale, for the user to confirm: programs write them
+    for printers and screens too; empty where they are none or not the same both ways."""
+    if len(dots) != 2 or not (np.isfinite(dots).all() and dots[0] > 0 and dots[0] == dots[1]):
+        return ""
+    stated = f"; the file states {dots[0]:.6g} dots an inch"
+    if np.isclose(dots[0], _PRINTERS, atol=0.05).any():
+        return f"{stated}, as printers and screens have them: no scale"
+    return f"{stated}: where they are of the instrument, --m-per-px {25.4 / dots[0]:.6g}mm"
+
+
+def _dots(folder: Path) -> Floats:
+    """Dots an inch of the first image (PNG specification, pHYs); none where it states none."""
+    first = head(numbered(folder)[0])
+    at = first.find(b"pHYs")
+    if at < 0 or len(first) < at + 13 or first[at + 12] != 1:
+        return np.empty(0)
+    return np.array(struct.unpack(">II", first[at + 4 : at + 12])) * 0.0254
 
 
 def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:

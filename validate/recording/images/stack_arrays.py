@@ -20,7 +20,8 @@ _GREY = ("1", "L", "LA", "I;16", "I;16B", "I;16L", "I", "F")
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """`image.0` (h, w), `image.1`, ... in their own depth, uint8, uint16 or float64; whether any
-    was in `colour`; of ImageJ's TIFF `side` (2,) in its `unit` and `interval` s, where stated.
+    was in `colour`; of ImageJ's TIFF `side` (2,) in its `unit` and `interval` s, of others
+    `dots` (2,) an inch, where stated.
 
     Raises `RecordingError` for images beyond `MOST` bytes, and what Pillow finds damaged.
     """
@@ -83,14 +84,15 @@ def _depth(pixels: NDArray[Any]) -> Any:
 
 
 def _stated(file: Path) -> dict[str, NDArray[Any]]:
-    """Scale and interval of ImageJ; dots an inch of others are those of a printer."""
+    """Scale and interval of ImageJ; `dots` (2,) an inch of others, which may be a printer's."""
     from PIL import Image
 
     with Image.open(file) as opened:
         tags: Any = getattr(opened, "tag_v2", {})
         text = str(tags.get(_DESCRIPTION, ""))
         if not text.startswith("ImageJ"):
-            return {}
+            dots = opened.info.get("dpi")
+            return {"dots": np.array(dots, dtype=np.float64)} if dots else {}
         lines = dict(re.findall(r"(?m)^(\w+)=(.*)$", text))
         sides = [1 / float(tags[k]) for k in (_X_RESOLUTION, _Y_RESOLUTION) if tags.get(k)]
     found: dict[str, NDArray[Any]] = {}
