@@ -173,3 +173,13 @@ def test_dots_an_inch_are_offered_and_never_believed(
         reader.read(whole, {})
     got = reader.read(whole, {"m_per_px": "0.2mm", "rate": "1"})
     assert got.frame("images").m_per_px == (2e-4, 2e-4)
+
+
+def test_import_prints_the_level_by_which_deep_images_became_8_bits(tmp_path: Path) -> None:
+    Image.fromarray(np.array([[0, 500], [1000, 250]], np.uint16)).save(tmp_path / "x.tif")
+    Image.fromarray(np.full((8, 9), 7, np.uint8)).save(tmp_path / "y.tif")
+    line = ["import", str(tmp_path / "x.tif"), "--m-per-px", "1mm", "-o", str(tmp_path / "x.mcap")]
+    said = CliRunner().invoke(cli, line).output
+    assert "levels: 16 bits made 8: 0 to 1000 (the largest) became 0 to 255" in said
+    line[1] = str(tmp_path / "y.tif")
+    assert "levels" not in CliRunner().invoke(cli, line).output

@@ -354,5 +354,6 @@ def test_a_folder_of_rosbag2_names_the_recording_in_it(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"ROS 2 bag.*rosbags-convert"):
         recognised(tmp_path)
     (tmp_path / "x_0.mcap").touch()
+    (tmp_path / "metadata.yaml").touch()
     with pytest.raises(UsageError, match=r"name one: validate import .*/x_0\.mcap"):
         recognised(tmp_path)

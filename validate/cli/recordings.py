@@ -13,6 +13,8 @@ from validate.recording.alignment import declared_offset, shift
 from validate.recording.chain import require_chain
 from validate.recording.exports.every import ALL, every_specimen
 from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
+from validate.recording.formats.unread import known_unread
+from validate.recording.images.levels import AS_IT_IS
 from validate.recording.mcap.recover import recover
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
@@ -52,7 +54,7 @@ def _logs(files: tuple[Path, ...], kind: str | None) -> list[Path]:
     """The files, and of a folder that is no format of its own those in it, in their order."""
     if len(files) > 1 or not files[0].is_dir() or kind:
         return list(files)
-    if any(reader.recognises(files[0]) for reader in READERS):
+    if known_unread(files[0]) or any(reader.recognises(files[0]) for reader in READERS):
         return list(files)
     inside = sorted(p for p in files[0].iterdir() if p.is_file() and p.name[0] != ".")
     return inside or list(files)
@@ -71,8 +73,13 @@ def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recordi
 
 
 def _tell(recording: Recording) -> None:
+    """What was assumed, how deep images became 8 bits, and events, of which none is a stream."""
     for key, text in recording.metadata.get(ASSUMED, {}).items():
         say(f"{key}: {text}", indent="  ")
+    made = recording.metadata.get("provenance", {})
+    for key in ("levels", "events"):
+        if made.get(key, AS_IT_IS) != AS_IT_IS:
+            say(f"{key}: {made[key]}", indent="  ")
 
 
 def recover_file(

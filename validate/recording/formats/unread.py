@@ -48,7 +48,8 @@ def known_unread(path: Path) -> str:
 def _folder(folder: Path) -> str:
     """A folder as rosbag2 writes it, or of scans."""
     name = folder.resolve().name
-    if mcap := sorted(p.name for p in folder.glob("*.mcap")):
+    mcap = sorted(p.name for p in folder.glob("*.mcap"))
+    if mcap and (folder / "metadata.yaml").is_file():  # else logs beside what became of them
         return (
             f"{name} is a folder of recordings (MCAP); name one: validate import {name}/{mcap[0]}"
         )

@@ -11,6 +11,8 @@ from validate.recording.formats.options import above_zero
 from validate.recording.images.image import MAX_SIDE, Pixels
 from validate.recording.reader import Options
 
+AS_IT_IS = "8 bits as recorded"
+
 
 def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixels, ...], str]:
     """The images (h, w) in 8 bits, and in words how they became so: the level `white` of the
@@ -24,7 +26,7 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
             raise RecordingError(f"an image of {image.shape[1]} x {image.shape[0]} px, the limit "
                                  f"is {MAX_SIDE} a side")  # fmt: skip
     if all(image.dtype == np.uint8 for image in deep):
-        return tuple(np.ascontiguousarray(image) for image in deep), "8 bits as recorded"
+        return tuple(np.ascontiguousarray(image) for image in deep), AS_IT_IS
     low, top = _range(deep)
     if low < 0 or not np.isfinite(top):
         raise RecordingError(f"levels from {low:g} to {top:g}; save them from 0 on")
