@@ -280,6 +280,8 @@ def test_lines_of_several_tools_are_told_apart_by_the_column_that_names_them(
     path.write_text(LINES_OF_TOOLS.replace("time,", "n,") + "0.04,B,OK,1,0,0,0,4,5,8\n")
     with pytest.raises(RecordingError, match="no rate tells their times"):
         read_ndi(path, {"rate": "50"})
+    path.write_text("time,no,qw,qx,qy,qz,x,y,z\n0,1,1,0,0,0,1,2,3\n0.1,2,1,0,0,0,1,2,4\n")
+    assert len(read_ndi(path, {}).signals) == 2  # a column that numbers the lines names no tools
 
 
 def test_a_body_alone_with_the_mean_error_of_its_markers_is_read(tmp_path: Path) -> None:

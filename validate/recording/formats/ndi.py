@@ -91,7 +91,8 @@ def _whose(header: TextRow, rows: Sequence[TextRow], tools: Sequence[Tool]) -> l
     for i, cell in enumerate(header.cells):
         if len(tools) == 1 and i not in taken and cell and _WHOSE.fullmatch(cell.lower()):
             names = [row.cell(i) for row in rows]
-            if 1 < len(set(names)) <= _MOST_TOOLS:
+            # One that numbers the lines has no value twice.
+            if 1 < len(set(names)) <= min(_MOST_TOOLS, len(names) // 2):
                 return names
     return [""] * len(rows)
 
