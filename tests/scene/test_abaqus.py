@@ -153,6 +153,21 @@ def test_a_part_stands_where_its_instance_stands(meshed_on: str, tmp_path: Path)
     assert "RP" not in got.mesh.facets  # the reference point has the number of a node
 
 
+def test_names_are_the_same_in_capitals_and_small_letters(tmp_path: Path) -> None:
+    """Else the instance is another's, and the body is silently left where its part stands."""
+    whole, path = body("tet4"), tmp_path / "cae.inp"
+    more = "*Elset, elset=One, instance=GEL-1\n1\n*Nset, nset=Again\nBOTTOM\n"
+    faces = "".join(f"ONE, s{k}\n" for k in (1, 2, 3, 4))
+    text = cae(whole, "5., 0., 0.", f"{more}*Surface, name=front\n{faces}")
+    path.write_text(
+        text.replace("part=Gel", "part=GEL").replace("instance=Gel-1", "instance=gel-1")
+    )
+    got = read_foreign(path, "mm").mesh
+    np.testing.assert_allclose(got.nodes, whole.nodes + [5e-3, 0, 0], atol=1e-12)
+    assert {"bottom", "Again", "front"} <= set(got.facets)
+    np.testing.assert_array_equal(got.facets["Again"], got.facets["bottom"])
+
+
 @pytest.mark.parametrize("kind", SHAPES)
 @pytest.mark.parametrize("face", [1, 2, 3, 4, 5, 6])
 def test_a_surface_is_the_faces_it_names(kind: str, face: int, tmp_path: Path) -> None:

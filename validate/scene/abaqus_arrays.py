@@ -6,7 +6,7 @@ Materials, steps and loads are not taken, nor is what stands beside the solid: i
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +85,7 @@ def _instance(blocks: Sequence[KeywordBlock], home: Home) -> KeywordBlock | None
     """Where the body stands; none for a flat file and a part that stands nowhere."""
     kind, name = home
     key = {"PART": "PART", "INSTANCE": "NAME"}.get(kind)
-    found = [b for b in blocks if b.keyword == "INSTANCE" and key and b.given.get(key) == name]
+    found = [b for b in blocks if b.keyword == "INSTANCE" and key and _same(b.given.get(key), name)]
     if len(found) > 1:
         names = ", ".join(f"'{b.given.get('NAME', '')}'" for b in found)
         raise SceneError(
@@ -100,7 +100,12 @@ def _belongs(block: KeywordBlock, home: Home, instance: KeywordBlock | None) -> 
         return True
     of_assembly = block.home == NOWHERE and block.keyword in ("NSET", "ELSET", "SURFACE")
     own = instance.given.get("NAME") if instance else None
-    return of_assembly and block.given.get("INSTANCE") in (None, own)
+    return of_assembly and ("INSTANCE" not in block.given or _same(block.given["INSTANCE"], own))
+
+
+def _same(one: str | None, other: str | None) -> bool:
+    """Whether two names are one: Abaqus takes capitals and small letters for the same."""
+    return (one or "").upper() == (other or "").upper()
 
 
 def _nodes(own: Sequence[KeywordBlock]) -> tuple[list[int], Floats]:
@@ -169,35 +174,46 @@ def _beside(own: Sequence[KeywordBlock]) -> Counter[str]:
 
 
 class _Sets:
-    """Node and element sets of a part by name; a name may stand in several blocks."""
+    """Node and element sets of a part by name, in whatever case, as first written; a name may stand
+    in several blocks."""
 
     def __init__(
         self, own: Sequence[KeywordBlock], place: Mapping[int, int], solids: Elements
     ) -> None:
         self.place, self.solids = place, solids
+        self._written: dict[str, str] = {}
         self._nodes: dict[str, list[int]] = {}
         self._elements: dict[str, list[int]] = {}
         for block in own:
-            name = block.given.get(block.keyword if block.keyword in ("NSET", "ELSET") else "", "")
+            key = block.keyword if block.keyword in ("NSET", "ELSET") else ""
+            name = self.written(block.given.get(key, ""))
             if block.keyword == "ELEMENT" and "ELSET" in block.given and _size(block):
                 numbers = [n for n, _ in _rows_of(block, _size(block))]
-                self._elements.setdefault(block.given["ELSET"], []).extend(numbers)
+                self._elements.setdefault(self.written(block.given["ELSET"]), []).extend(numbers)
             elif block.keyword == "NODE" and "NSET" in block.given:
                 numbers = [int(block.floats(row)[0]) for row in block.rows]
-                self._nodes.setdefault(block.given["NSET"], []).extend(numbers)
+                self._nodes.setdefault(self.written(block.given["NSET"]), []).extend(numbers)
             elif block.keyword == "ELSET" and name:
-                self._elements.setdefault(name, []).extend(_listed(block, self._elements))
+                self._elements.setdefault(name, []).extend(self._listed(block, self._elements))
             elif block.keyword == "NSET" and name:
                 self._nodes.setdefault(name, []).extend(self._nodes_of(block))
 
     def _nodes_of(self, block: KeywordBlock) -> list[int]:
         of = block.given.get("ELSET")
         if of is None:
-            return _listed(block, self._nodes)
+            return self._listed(block, self._nodes)
         elements = self.elements(of, block)
         return [n for e in elements for n in self.solids.get(e, ())]
 
+    def written(self, name: str) -> str:
+        """The name as it was written first."""
+        return self._written.setdefault(name.upper(), name)
+
+    def _listed(self, block: KeywordBlock, known: Mapping[str, Sequence[int]]) -> list[int]:
+        return _listed(block, lambda name: known.get(self.written(name)))
+
     def elements(self, name: str, block: KeywordBlock) -> list[int]:
+        name = self.written(name)
         if name not in self._elements:
             raise block.wrong(f"there is no element set '{name}'")
         return self._elements[name]
@@ -209,7 +225,7 @@ class _Sets:
         return {name: np.array(at, dtype=np.int64) for name, at in found.items() if at}
 
 
-def _listed(block: KeywordBlock, known: Mapping[str, Sequence[int]]) -> list[int]:
+def _listed(block: KeywordBlock, known: Callable[[str], Sequence[int] | None]) -> list[int]:
     """Numbers, ranges, and names of sets before it; an instance's name before a number is cut."""
     if "GENERATE" in block.given:
         found = list[int]()
@@ -221,8 +237,8 @@ def _listed(block: KeywordBlock, known: Mapping[str, Sequence[int]]) -> list[int
         number = word.rpartition(".")[2]
         if number.isascii() and number.isdigit():
             found.append(int(number))
-        elif word in known:
-            found.extend(known[word])
+        elif (members := known(word)) is not None:
+            found.extend(members)
         else:
             raise block.wrong(f"there is no set '{word[:40]}' before it")
     return found
@@ -247,7 +263,7 @@ def _facets(own: Sequence[KeywordBlock], sets: _Sets) -> dict[str, Ints]:
         elif block.keyword == "ELEMENT" and _FACE.match(_type(block)) and "ELSET" in block.given:
             corners = _CORNERS[_size(block)]
             rows = [nodes[:corners] for _, nodes in _rows_of(block, _size(block))]
-            found.setdefault(block.given["ELSET"], []).extend(rows)
+            found.setdefault(sets.written(block.given["ELSET"]), []).extend(rows)
     return {
         name: np.array([[sets.place[n] for n in row] for row in rows], dtype=np.int64)
         for name, rows in found.items()
