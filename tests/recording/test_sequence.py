@@ -1,5 +1,6 @@
 """Tracked sequences: transforms frame by frame, images, and what is not OK left out."""
 
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -131,3 +132,17 @@ def test_two_formats_of_one_sequence_are_equal(shared_data: Path) -> None:
     pairs = zip(one.frame("images").images, other.frame("images").images, strict=True)
     assert all(np.array_equal(a, b) for a, b in pairs)
     assert one.unread == {"StylusToTracker": "never seen"}
+
+
+@pytest.mark.parametrize(("sizes", "says"), [
+    ("1024 1024 1024", "1073741824 pixels, limit 419430400"),
+    ("5 4 3", "over 480 bytes unpacked, more than its sizes hold"),
+])  # fmt: skip
+def test_an_nrrd_bomb_is_refused_before_it_is_unpacked(
+    tmp_path: Path, sizes: str, says: str
+) -> None:
+    packer = zlib.compressobj(9, zlib.DEFLATED, 31)
+    packed = packer.compress(bytes(2**24)) + packer.flush()
+    head = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: {sizes}\nencoding: gzip\n\n"
+    with pytest.raises(RecordingError, match=rf"^x\.nrrd: {says}"):
+        read_nrrd(written(tmp_path, head.encode() + packed, "x.nrrd"), {})
