@@ -80,9 +80,10 @@ def test_the_liver(shared_data: Path) -> None:
         (inp(body("tet4")).replace("*Nset", "*Nset, elset=none"), "no element set 'none'"),
         (inp(body("tet4")).replace("*Nset, nset=lost\n7", "*Nset, nset=x\ny"), "no set 'y' before"),
         (inp(body("tet4")).replace("\n12, 0", "\n1200, 0"), "there is no node 12"),
+        (inp(body("tet4")).replace("\n2, ", "\n1, "), r"line \d+: element 1 stands twice"),
     ],
     ids=["empty", "text", "include", "ngen", "system", "cylindrical", "input", "twice", "wedge",
-         "shell", "unknown", "brick", "number", "elset", "nset", "node"],
+         "shell", "unknown", "brick", "number", "elset", "nset", "node", "element"],
 )  # fmt: skip
 def test_what_is_no_body_is_one_line(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "body.inp"

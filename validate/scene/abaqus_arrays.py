@@ -141,7 +141,12 @@ def _size(block: KeywordBlock) -> int:
 
 
 def _solids(own: Sequence[KeywordBlock]) -> Elements:
-    return {n: nodes for b in own if _is_solid(b) for n, nodes in _rows_of(b, _size(b))}
+    found: Elements = {}
+    for block in filter(_is_solid, own):
+        for number, nodes in _rows_of(block, _size(block)):
+            if found.setdefault(number, nodes) is not nodes:
+                raise block.wrong(f"element {number} stands twice; export one part")
+    return found
 
 
 def _cells(own: Sequence[KeywordBlock], place: Mapping[int, int]) -> dict[str, NDArray[Any]]:
