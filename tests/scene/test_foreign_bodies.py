@@ -172,6 +172,19 @@ def test_quality_of_a_regular_tetrahedron_and_of_a_cube_is_one() -> None:
     assert "1 tet4, 4 nodes" in facts(regular)["elements"]
 
 
+def test_two_bodies_without_a_common_node_are_told(tmp_path: Path) -> None:
+    one = linear()
+    both = Mesh(
+        np.vstack([one.nodes, one.nodes + [0.05, 0, 0]]),
+        np.vstack([one.cells, one.cells + len(one.nodes)]), "tet4",
+    )  # fmt: skip
+    assert (facts(one)["bodies"], facts(both)["bodies"]) == ("1", "2")
+    path = gmsh2(tmp_path / "x.msh", both)
+    shown = CliRunner().invoke(cli, ["body", str(path), "--unit", "mm"])
+    assert shown.exit_code == 0
+    assert "x.msh: 2 bodies without a common node" in shown.output
+
+
 def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path: Path) -> None:
     path = gmsh2(tmp_path / "x.msh", linear())
     run = CliRunner()

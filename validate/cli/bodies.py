@@ -8,7 +8,7 @@ from validate.cli.arguments import complain, pairs
 from validate.cli.display import say, table
 from validate.errors import UsageError
 from validate.places import try_file
-from validate.scene.body_facts import POOR, facts, quality
+from validate.scene.body_facts import POOR, facts, pieces, quality
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
@@ -42,6 +42,11 @@ def body(
         complain(
             f"{file.name}: {int((worst < POOR).sum())} elements of a quality below {POOR:g}, down "
             f"to {worst.min():.2g}: they shorten explicit steps; mesh it again"
+        )
+    if (separate := pieces(mesh)) > 1:
+        complain(
+            f"{file.name}: {separate} bodies without a common node; whatever holds one does not "
+            "hold the others: export one, or join them"
         )
     if out is not None:
         told = "; ".join(f"{k} {v}" for k, v in found.told.items())
