@@ -4,12 +4,17 @@ A library in a process apart costs 0.3 s a call, filling a surface two: those fo
 and a two-hundredth of the attacks.
 """
 
+import base64
 import os
+import re
+import resource
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 import meshio
+import numpy as np
 import pytest
 import trimesh
 from attacks import damaged
@@ -145,6 +150,24 @@ def test_a_bomb_of_npz_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
         SceneError, match=r"bomb\.npz: 256\d+ bytes unpacked, the limit is 64000000"
     ):
         read_mesh(path)
+
+
+@pytest.mark.slow
+def test_a_bomb_of_vtu_is_refused_in_the_memory_of_its_file(tmp_path: Path) -> None:
+    """256 MB of zeros behind a head of zlib that declares them: the children's peak tells."""
+    path = tmp_path / "bomb.vtu"
+    MAKE["x.vtu"](path)
+    text, block, count = path.read_text(), 2**24, 16
+    packed = zlib.compress(bytes(block), 9)
+    head = np.array([count, block, block, *[len(packed)] * count], np.uint32).tobytes()
+    whole = base64.b64encode(head) + base64.b64encode(packed * count)
+    first = re.search(r"(<Points>.*?<DataArray[^>]*>)(.*?)(</DataArray>)", text, re.DOTALL)
+    assert first is not None
+    path.write_text(text[: first.start(2)] + whole.decode() + text[first.end(2) :])
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    with pytest.raises(SceneError, match=r"bomb\.vtu: "):
+        read(path)
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < before + 150_000  # kB
 
 
 @pytest.mark.parametrize(("old", "new"), [("10, 0.0", "10, nan"), ("10, 0.0", "10, 1e400")])

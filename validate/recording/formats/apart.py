@@ -24,7 +24,8 @@ Arrays = Mapping[str, NDArray[Any]]
 
 _HOME = "validate.recording.formats"
 _SAID, _MISSING = 3, 4  # exit codes of the process: a known error, a library that is not installed
-_MEMORY = 2**30  # bytes beyond 40 times the file's
+_MEMORY, _TIMES = 2**30, 40  # bytes beyond so many times the file's
+_BEYOND = 2**26  # the same, beyond what a module's LIBRARIES take once they are loaded
 _SECONDS, _RATE = 20, 2**20  # s, and bytes a second of the file beside
 _RUN = (sys.executable, "-m", f"{_HOME}.apart")
 _OURS = "="  # before every name: savez has arguments called file and allow_pickle
@@ -67,7 +68,7 @@ def _ended(
     size = path.stat().st_size
     seconds = least + size // _RATE
     more = [json.dumps(dict(given))] if given else []
-    limit = _MEMORY + 40 * size
+    limit = _MEMORY + _TIMES * size
     try:
         return subprocess.run(
             [*_RUN, decoder, str(path), str(out), str(limit), *more],
@@ -89,6 +90,7 @@ def _decode(decoder: str, path: Path, out: Path, limit: int, given: str = "{}") 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
         module = import_module(decoder if "." in decoder else f"{_HOME}.{decoder}")
+        limit = _lowered(module, path, limit)
         arrays: Arrays = module.arrays(path, **json.loads(given))
     except ImportError as missing:
         print(f"the library '{missing.name}' that reads this format is not installed")
@@ -104,6 +106,21 @@ def _decode(decoder: str, path: Path, out: Path, limit: int, given: str = "{}") 
         return _SAID
     np.savez(out, allow_pickle=False, **{f"{_OURS}{name}": a for name, a in arrays.items()})
     return 0
+
+
+def _lowered(module: Any, path: Path, limit: int) -> int:
+    """The limit of a module that names its LIBRARIES: what is taken once they are loaded, and so
+    much more as its file may need. Elsewhere, and where the kernel does not tell, as it was."""
+    libraries, taken = getattr(module, "LIBRARIES", ()), Path("/proc/self/statm")
+    if not libraries or not taken.is_file():
+        return limit
+    for name in libraries:
+        import_module(name)
+    pages = int(taken.read_text().split()[0])
+    more = _BEYOND + _TIMES * path.stat().st_size
+    limit = min(limit, pages * resource.getpagesize() + more)
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    return limit
 
 
 if __name__ == "__main__":
