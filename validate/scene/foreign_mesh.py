@@ -115,7 +115,7 @@ def _body(
     try:
         mesh = Mesh(points[used], at.reshape(cells.shape), kind)
         mesh, turned = _turned(mesh) if turn else (mesh, 0)
-        require_positive_cells(mesh)
+        require_positive_cells(mesh, "write their nodes the other way round, or mesh it again")
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
     told = {

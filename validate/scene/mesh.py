@@ -156,7 +156,9 @@ def cell_volumes(mesh: Mesh) -> Floats:
     return np.asarray(np.linalg.det(x[:, 1:] - x[:, :1]) / size)
 
 
-def require_positive_cells(mesh: Mesh) -> None:
+def require_positive_cells(
+    mesh: Mesh, advice: str = "refine the mesh or move the inclusion"
+) -> None:
     """Raises `SceneError` naming the worst cell when any volume is not clearly positive."""
     volumes = _least_volumes(mesh)
     bad = volumes <= 1e-9 * np.abs(volumes).mean()
@@ -166,8 +168,7 @@ def require_positive_cells(mesh: Mesh) -> None:
         at = ", ".join(f"{1e3 * c:.2f}" for c in centre)
         raise SceneError(
             f"{int(bad.sum())} of {len(volumes)} elements inverted or flat, worst element {worst} "
-            f"with {1e9 * volumes[worst]:.4g} mm3 at ({at}) mm; refine the mesh or move the "
-            "inclusion"
+            f"with {1e9 * volumes[worst]:.4g} mm3 at ({at}) mm; {advice}"
         )
 
 
