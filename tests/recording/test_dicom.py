@@ -1,6 +1,7 @@
 """DICOM ultrasound that scanners wrote: the files of the package pydicom-data."""
 
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +102,26 @@ def test_luma_is_what_an_operator_sees() -> None:
     frames = read_dicom(DATA / "SC_rgb.dcm", {"m_per_px": "1mm"}).frame("images")
     values = set(np.unique(frames.images[0]).tolist())
     assert {76, 150, 29, 0, 255} <= values
+
+
+def deflated(path: Path, body: bytes | None) -> Path:
+    """An image packed as a whole, its packed part replaced where one is given."""
+    ds = pydicom.dcmread(DATA / "OBXXXX1A_2frame.dcm")
+    ds.file_meta.TransferSyntaxUID = pydicom.uid.DeflatedExplicitVRLittleEndian
+    ds.save_as(path, enforce_file_format=True)
+    if body is not None:
+        meta = pydicom.filereader.read_file_meta_info(path)
+        start = 144 + int(meta.FileMetaInformationGroupLength)
+        path.write_bytes(path.read_bytes()[:start] + body)
+    return path
+
+
+@pytest.mark.slow
+def test_a_file_packed_as_a_whole_is_read_unless_it_is_a_bomb(tmp_path: Path) -> None:
+    plain = read_dicom(DATA / "OBXXXX1A_2frame.dcm", {"rate": "20"}).frame("images")
+    also = read_dicom(deflated(tmp_path / "x.dcm", None), {"rate": "20"}).frame("images")
+    assert all((a == b).all() for a, b in zip(plain.images, also.images, strict=True))
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    body = b"".join(packer.compress(bytes(2**24)) for _ in range(17)) + packer.flush()
+    with pytest.raises(RecordingError, match=r"y\.dcm: it unpacks to over 268435456 bytes"):
+        read_dicom(deflated(tmp_path / "y.dcm", body), {"rate": "20"})

@@ -1,5 +1,7 @@
 """MATLAB 5: points and images as they were meant; units are asked for, damage costs a line."""
 
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +84,22 @@ def test_one_wrong_byte_of_a_packed_variable_fails_its_checksum(tmp_path: Path) 
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
         with pytest.raises(RecordingError, match=r"x\.mat: the variable at byte 136 fails"):
             read_matlab(path, {"unit": "m"})
+
+
+@pytest.mark.parametrize(
+    ("stated", "held", "said"),
+    [(2**30, 100, "a variable of 1073741832 bytes unpacked, the limit is 536870912"),
+     (100, 2**24, "the variable at byte 136 fails its checksum")],
+)  # fmt: skip
+def test_a_bomb_is_one_line_before_it_is_unpacked(
+    stated: int, held: int, said: str, tmp_path: Path
+) -> None:
+    """A variable that states too much, and one that holds more than it states."""
+    path = written(tmp_path / "x.mat", True, P=np.ones((4, 3)))
+    body = zlib.compress(struct.pack("<II", 14, stated) + bytes(held), 9)
+    path.write_bytes(path.read_bytes()[:128] + struct.pack("<II", 15, len(body)) + body)
+    with pytest.raises(RecordingError, match=rf"x\.mat: {said}"):
+        read_matlab(path, {"unit": "m"})
 
 
 @pytest.mark.parametrize("packed", [True, False])

@@ -288,3 +288,14 @@ def test_a_record_over_the_limit_is_refused(
     got = _read(whole, tmp_path / "a.mcap")
     assert isinstance(got, str)
     assert "bytes, the limit is 100" in got
+
+
+def test_a_chunk_that_is_a_bomb_is_refused_before_it_is_unpacked() -> None:
+    """A megabyte of zeros is one: an image may be black."""
+    size = 128 * 2**20
+    packed = zstandard.compress(bytes(size))
+    with pytest.raises(
+        RecordingError, match=f"chunk of {size} bytes unpacked from {len(packed)}, "
+    ):
+        unpack("zstd", packed, size)
+    assert unpack("zstd", zstandard.compress(bytes(2**20)), 2**20) == bytes(2**20)

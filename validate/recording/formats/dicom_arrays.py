@@ -3,6 +3,7 @@
 Colour is made grey by ITU-R BT.601's luma, as a screen's operator sees it.
 """
 
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,15 @@ import pydicom
 from numpy.typing import NDArray
 from pydicom.pixels.processing import apply_color_lut
 from pydicom.pixels.utils import iter_pixels
+from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.sequence import MAX_PIXELS
 
 _LACKS = ("missing dependencies", "does not support")  # as a codec says that it is none for these
 _LUMA = np.array([0.299, 0.587, 0.114])
+_META = 144  # bytes before the group of meta information that states its length, and of that
+_PACKED = 2**28  # bytes of a file that is packed as a whole
 _CM = 3  # PS3.3 C.8.5.5.1.15: physical units, cm
 _CONFIG = pydicom.config
 _CONFIG.settings.reading_validation_mode = _CONFIG.IGNORE
@@ -30,6 +34,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     A region is left, top, right, bottom (px), the sides of a pixel x, y (m, NaN: no length), its
     spatial format and data type. Raises `RecordingError` for what is no 8-bit image.
     """
+    _require_few_bytes(path)
     ds = pydicom.dcmread(path)
     if "PixelData" not in ds:
         raise RecordingError(f"no image in it: {ds.get('SOPClassUID', 'no class')}")
@@ -43,6 +48,21 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         "spacing": np.array(list(ds.get("PixelSpacing") or ())[::-1], dtype=np.float64),
         "told": np.array([f"{k}: {ds.get(k)}" for k in _TOLD if ds.get(k) not in (None, "")]),
     }
+
+
+def _require_few_bytes(path: Path) -> None:
+    """Raises `RecordingError` for a file that is packed as a whole and unpacks to too much: its
+    library unpacks it before it looks at it."""
+    meta = pydicom.filereader.read_file_meta_info(path)
+    if meta.get("TransferSyntaxUID") != DeflatedExplicitVRLittleEndian:
+        return
+    packed = path.read_bytes()[_META + int(meta.get("FileMetaInformationGroupLength", 0)) :]
+    unpack, size = zlib.decompressobj(-zlib.MAX_WBITS), 0
+    while packed and not unpack.eof and size <= _PACKED:
+        size += len(unpack.decompress(packed, 2**20))
+        packed = unpack.unconsumed_tail
+    if size > _PACKED:
+        raise RecordingError(f"it unpacks to over {_PACKED} bytes; save it without deflate")
 
 
 _TOLD = ("Modality", "Manufacturer", "ManufacturerModelName", "TransducerData", "NumberOfFrames",

@@ -14,8 +14,10 @@ from validate.errors import RecordingError
 
 MAGIC = b"MATLAB 5.0 MAT-file"
 HEADER = 128  # bytes
+_ORDERS = {b"IM": "<", b"MI": ">"}  # of bytes, by the header's last two
 MATRIX, COMPRESSED = 14, 15  # types of what may stand behind the header
 _CHUNK = 2**20  # bytes unpacked at once
+MOST = 2**29  # bytes of one variable, unpacked
 
 
 def elements(path: Path) -> list[tuple[int, int, int]]:
@@ -26,7 +28,7 @@ def elements(path: Path) -> list[tuple[int, int, int]]:
     size, found, at = path.stat().st_size, [], HEADER
     with path.open("rb") as file:
         first = file.read(HEADER)
-        order = {b"IM": "<", b"MI": ">"}.get(first[-2:])
+        order = _ORDERS.get(first[-2:])
         if len(first) < HEADER or not first.startswith(MAGIC) or order is None:
             raise RecordingError(f"no MATLAB 5 file, or one cut in its first {HEADER} bytes")
         while at < size:
@@ -90,22 +92,44 @@ def _word(value: Any, dtype: np.dtype[Any]) -> str:
 
 
 def _require_sums(path: Path) -> None:
+    """Every packed variable unpacks to the size that it states itself, and to its checksum."""
+    parts = elements(path)
     with path.open("rb") as file:
-        for kind, at, count in elements(path):
+        order = _ORDERS[file.read(HEADER)[-2:]]
+        for kind, at, count in parts:
             file.seek(at)
-            if kind == COMPRESSED and not _unpacks(file.read(count)):
+            if kind == COMPRESSED and not _unpacks(file.read(count), order):
                 raise RecordingError(f"the variable at byte {at} fails its checksum; damaged")
 
 
-def _unpacks(packed: bytes) -> bool:
-    """Whether the packed bytes end where their own checksum (Adler-32) holds."""
+def _unpacks(packed: bytes, order: str) -> bool:
+    """Whether the packed bytes end where their own size and checksum (Adler-32) hold.
+
+    Raises `RecordingError` for a size beyond `MOST`, before that much is unpacked.
+    """
     unpack = zlib.decompressobj()
+    size, stated = 0, 8
     while not unpack.eof:
         try:
-            some = unpack.decompress(packed, _CHUNK)
+            some = unpack.decompress(packed, _CHUNK if size else stated)
         except zlib.error:
             return False
         if not some and len(unpack.unconsumed_tail) == len(packed):
             return False  # nothing more comes
+        if not size:
+            stated = _stated(some, order)
+        size += len(some)
+        if size > stated + 8:  # with what fills its last eight
+            return False
         packed = unpack.unconsumed_tail
     return not unpack.unused_data
+
+
+def _stated(tag: bytes, order: str) -> int:
+    """Bytes that a variable states, its tag of 8 among them."""
+    if len(tag) < 8:
+        return 8
+    count = 8 + int(struct.unpack(f"{order}II", tag)[1])
+    if count > MOST:
+        raise RecordingError(f"a variable of {count} bytes unpacked, the limit is {MOST}")
+    return count

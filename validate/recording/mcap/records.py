@@ -22,6 +22,7 @@ MAGIC = bytes.fromhex("894d434150300d0a")
 HEAD = struct.Struct("<BQ")  # opcode, length
 MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 MAX_RECORD = 512 * 2**20  # bytes of one record, or of one chunk unpacked
+_PLENTY, _TIMES = 64 * 2**20, 256  # bytes of a chunk, else times its packed size, that are believed
 
 
 class Op(IntEnum):
@@ -219,6 +220,11 @@ def unpack(compression: str, data: bytes, size: int) -> bytes:
     """The `size` bytes packed in `data`; refuses sizes over `MAX_RECORD` before allocating."""
     if size > MAX_RECORD:
         raise RecordingError(f"a chunk of {size} bytes unpacked, the limit is {MAX_RECORD}")
+    if size > max(_PLENTY, _TIMES * len(data)):
+        raise RecordingError(
+            f"a chunk of {size} bytes unpacked from {len(data)}, over {_TIMES} times as much; "
+            "damaged, or made to fill memory"
+        )
     unpackers = {"": _stored, "zstd": _zstd, "lz4": _lz4}
     if compression not in unpackers:
         raise RecordingError(f"chunk compression {compression!r}, readable: none, zstd, lz4")

@@ -1,14 +1,15 @@
 """SHA-256 and CRC-32 of bytes that come one after another, taken by a thread beside the reading.
 
-Both cost more than half of what a bare reader takes, and let other threads run. One block waits at
-most, so memory stays bounded; a file below one block is summed at once, without a thread.
+Both cost more than half of what a bare reader takes, and let other threads run. A few blocks wait
+at most, so memory stays bounded; a file below one block is summed at once, without a thread.
 """
 
 import hashlib
 import zlib
+from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 
-_BLOCK = 2**20  # bytes handed over at once
+_BLOCK, _AHEAD = 2**20, 4  # bytes handed over at once, and how many blocks may wait
 
 
 class Sums:
@@ -20,7 +21,7 @@ class Sums:
         self._waiting: list[bytes] = []
         self._size = 0
         self._thread: ThreadPoolExecutor | None = None
-        self._last: Future[None] | None = None
+        self._handed: deque[Future[None]] = deque()
 
     def update(self, data: bytes) -> None:
         """Adds bytes behind the others."""
@@ -47,17 +48,17 @@ class Sums:
         return self._sha.hexdigest()
 
     def _settle(self) -> None:
-        if self._last is not None:
-            self._last.result()
+        while self._handed:
+            self._handed.popleft().result()
         self._take(self._waiting)
         self._waiting, self._size = [], 0
 
     def _hand_over(self) -> None:
-        if self._last is not None:
-            self._last.result()
+        if len(self._handed) >= _AHEAD:
+            self._handed.popleft().result()
         if self._thread is None:
             self._thread = ThreadPoolExecutor(1, "sums")
-        self._last = self._thread.submit(self._take, self._waiting)
+        self._handed.append(self._thread.submit(self._take, self._waiting))
         self._waiting, self._size = [], 0
 
     def _take(self, parts: list[bytes]) -> None:
