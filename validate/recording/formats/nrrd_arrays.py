@@ -20,7 +20,8 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Pixels (w, h, n), the texts of all keys, and the sides (2,) of a pixel as stated."""
     import nrrd
 
-    header = nrrd.read_header(str(path))
+    with path.open("rb") as lines:  # a name with a line break is taken for the header itself
+        header = nrrd.read_header(lines)
     count = prod(map(int, header["sizes"]))
     if count > MAX_PIXELS:
         raise RecordingError(f"{count} pixels, limit {MAX_PIXELS}; split it")
