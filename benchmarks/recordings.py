@@ -5,7 +5,7 @@ python benchmarks/recordings.py [SAMPLES FRAMES IMAGES]    default 1000000 50000
 The files are made in a temporary folder: samples of one number and frames of 20 markers in one,
 images of some 50 kB a message in another. Every reading is a process of its own, in turns; least
 seconds of the wall and of the processor (hashing has a thread of its own), without imports, and
-largest memory of the process, of three. "Bare" is
+largest memory of the process, of five. "Bare" is
 `NonSeekingReader` of the `mcap` package, which parses no message. Linux: `ru_maxrss` of a child
 would begin at its parent's, so the peak is the kernel's VmHWM.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Markers, Recording, Signal, Source
 
-TURNS = 3
+TURNS = 5
 SIDE = 276  # px: noise of 6 grey levels packs to some 50 kB
 MARKERS = 20
 _MEASURE = """

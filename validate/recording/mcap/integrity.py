@@ -226,15 +226,16 @@ class _Walk:
             raise RecordingError(f"channel {channel.id} declared twice, differently")
 
     def _take_message(self, content: bytes) -> None:
-        channel = self._count(content)
+        channel = self._count(content, 0, len(content))
         at = self._at - len(content)
         self._spans.append(Span(at, len(content), False, frozenset([channel])))
         self._hand_on()
 
-    def _count(self, content: bytes) -> int:
-        if len(content) < MESSAGE_HEAD.size:
-            raise RecordingError(f"a message record of {len(content)} bytes, at least 22 needed")
-        channel, _, log, publish = MESSAGE_HEAD.unpack_from(content)
+    def _count(self, data: bytes, at: int, end: int) -> int:
+        """The channel of the message that stands there in a chunk, or in a record of its own."""
+        if end - at < MESSAGE_HEAD.size:
+            raise RecordingError(f"a message record of {end - at} bytes, at least 22 needed")
+        channel, _, log, publish = MESSAGE_HEAD.unpack_from(data, at)
         if channel not in self._kept:
             self._first_of(channel)
         if self.messages >= MAX_MESSAGES:
@@ -244,7 +245,7 @@ class _Walk:
         self.messages += 1
         kept = self._kept[channel]
         if kept is not None:
-            kept.append(content[MESSAGE_HEAD.size :])
+            kept.append(data[at + MESSAGE_HEAD.size : end])
         return int(channel)
 
     def _first_of(self, number: int) -> None:
@@ -266,13 +267,13 @@ class _Walk:
     def _take_chunk(self, content: bytes) -> None:
         chunk = Chunk.read(content)
         channels: set[int] = set()
-        for opcode, body in records_in(chunk.data):
+        for opcode, at, end in records_in(chunk.data):
             if opcode == _MESSAGE:
-                channels.add(self._count(body))
+                channels.add(self._count(chunk.data, at, end))
             elif opcode == Op.SCHEMA:
-                self._take_schema(body)
+                self._take_schema(chunk.data[at:end])
             elif opcode == Op.CHANNEL:
-                self._take_channel(body)
+                self._take_channel(chunk.data[at:end])
             elif opcode in _KNOWN:
                 raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
         self._hand_on()

@@ -51,11 +51,20 @@ class Cursor:
         self.at = 0
 
     def take(self, count: int) -> bytes:
+        self._require(count)
+        self.at += count
+        return self._content[self.at - count : self.at]
+
+    def view(self, count: int) -> memoryview:
+        """As `take`, without a copy."""
+        self._require(count)
+        self.at += count
+        return memoryview(self._content)[self.at - count : self.at]
+
+    def _require(self, count: int) -> None:
         left = len(self._content) - self.at
         if count > left:
             raise RecordingError(f"a field of {count} bytes where its record has {left} left")
-        self.at += count
-        return self._content[self.at - count : self.at]
 
     def integer(self, width: int) -> int:
         return int.from_bytes(self.take(width), "little")
@@ -129,11 +138,12 @@ class Message:
     data: bytes
 
     @staticmethod
-    def read(content: bytes) -> "Message":
-        if len(content) < MESSAGE_HEAD.size:
-            raise RecordingError(f"a message record of {len(content)} bytes, at least 22 needed")
-        channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(content)
-        return Message(channel, sequence, log, publish, content[MESSAGE_HEAD.size :])
+    def read(data: bytes, at: int, end: int) -> "Message":
+        """The message that stands there in a chunk, or in a record of its own."""
+        if end - at < MESSAGE_HEAD.size:
+            raise RecordingError(f"a message record of {end - at} bytes, at least 22 needed")
+        channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(data, at)
+        return Message(channel, sequence, log, publish, data[at + MESSAGE_HEAD.size : end])
 
 
 @dataclass(frozen=True)
@@ -171,7 +181,7 @@ class Chunk:
         fields = Cursor(content)
         fields.take(16)  # first and last log time: repeated in the messages
         size, crc, compression = fields.integer(8), fields.integer(4), fields.text()
-        data = unpack(compression, fields.take(fields.integer(8)), size)
+        data = unpack(compression, fields.view(fields.integer(8)), size)
         if crc and zlib.crc32(data) != crc:
             raise RecordingError(f"chunk CRC {zlib.crc32(data):#010x}, declared {crc:#010x}")
         return Chunk(compression, data)
@@ -216,7 +226,7 @@ def chunk_index_place(content: bytes) -> tuple[int, int]:
     return fields.integer(8), fields.integer(8)
 
 
-def unpack(compression: str, data: bytes, size: int) -> bytes:
+def unpack(compression: str, data: memoryview, size: int) -> bytes:
     """The `size` bytes packed in `data`; refuses sizes over `MAX_RECORD` before allocating."""
     if size > MAX_RECORD:
         raise RecordingError(f"a chunk of {size} bytes unpacked, the limit is {MAX_RECORD}")
@@ -234,11 +244,11 @@ def unpack(compression: str, data: bytes, size: int) -> bytes:
     return plain
 
 
-def _stored(data: bytes, size: int) -> bytes:
-    return data
+def _stored(data: memoryview, size: int) -> bytes:
+    return bytes(data)
 
 
-def _zstd(data: bytes, size: int) -> bytes:
+def _zstd(data: memoryview, size: int) -> bytes:
     try:
         # A frame that names its own size is unpacked to that size, whatever limit is given.
         framed = zstandard.frame_content_size(data)
@@ -251,7 +261,7 @@ def _zstd(data: bytes, size: int) -> bytes:
         raise RecordingError(f"chunk is no valid zstd ({error})") from None
 
 
-def _lz4(data: bytes, size: int) -> bytes:
+def _lz4(data: memoryview, size: int) -> bytes:
     unpacker = lz4.frame.LZ4FrameDecompressor()
     try:
         plain: bytes = unpacker.decompress(data, max_length=size + 1)
@@ -260,15 +270,15 @@ def _lz4(data: bytes, size: int) -> bytes:
     return plain
 
 
-def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and content of every record inside an unpacked chunk."""
-    at = 0
-    while at < len(data):
-        if at + HEAD.size > len(data):
-            raise RecordingError(f"{len(data) - at} stray bytes at the end of a chunk")
+def records_in(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Opcode, first byte and end of the content of every record inside an unpacked chunk."""
+    at, size = 0, len(data)
+    while at < size:
+        if at + HEAD.size > size:
+            raise RecordingError(f"{size - at} stray bytes at the end of a chunk")
         opcode, length = HEAD.unpack_from(data, at)
         at += HEAD.size
-        if length > len(data) - at:
-            raise RecordingError(f"a record of {length} bytes where its chunk has {len(data) - at}")
-        yield opcode, data[at : at + length]
+        if length > size - at:
+            raise RecordingError(f"a record of {length} bytes where its chunk has {size - at}")
+        yield opcode, at, at + length
         at += length

@@ -92,8 +92,9 @@ def messages_of(stream: BinaryIO, verified: Verified, wanted: Set[int]) -> Itera
 
 def _messages(content: bytes, chunked: bool) -> Iterator[Message]:
     if not chunked:
-        yield Message.read(content)
+        yield Message.read(content, 0, len(content))
         return
-    for opcode, inner in records_in(Chunk.read(content).data):
+    data = Chunk.read(content).data
+    for opcode, at, end in records_in(data):
         if opcode == Op.MESSAGE:
-            yield Message.read(inner)
+            yield Message.read(data, at, end)
