@@ -102,6 +102,7 @@ def test_a_cut_file_is_told_with_its_bytes_before_any_library_reads_it(tmp_path:
         ("import sys; sys.exit(7)", "ended with code 7"),
         ("raise ValueError('odd\\nblock')", r"damaged \(odd block\)"),
         ("bytearray(2**33)", "wants more than"),
+        ("any(iter(int, 1))", "took over 1 s for 1 bytes and was ended"),
     ],
 )
 def test_a_library_that_crashes_costs_one_line(
@@ -120,9 +121,9 @@ import sys; sys.path.insert(0, {!r})
 from pathlib import Path
 from validate.recording.formats import apart
 apart._HOME = ""
-decoder, path, out, limit = sys.argv[1:]
+decoder, path, out, *limits = sys.argv[1:]
 apart.import_module = lambda name: __import__(name.lstrip("."))
-raise SystemExit(apart._decode(decoder, Path(path), Path(out), int(limit)))
+raise SystemExit(apart._decode(decoder, Path(path), Path(out), *limits))
 """
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from validate.errors import SceneError
 
-LIBRARIES = ("meshio",)  # loaded before memory is limited
+LIBRARIES, MEMORY = ("meshio",), 2**26  # bytes beyond it and the file's
 _READ = ("2", "2.1", "2.2", "4.1")  # of Gmsh's formats
 _NSET, _CELLS, _FACET = "nset.", "cells.", "facet."
 _FLAT = {"triangle": 3, "quad": 4, "triangle6": 3, "quad8": 4, "quad9": 4}  # corners of a facet

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from validate.errors import SceneError
 
+LIBRARIES = ("pytetwild.pytetwild", "trimesh")
 _SAME = 1e-7  # of the body's size: corners of triangles that are one point
 _MOST = 2_000_000  # triangles
 _ENVELOPE = 1e-3  # of the diagonal: how far the filled body's surface may lie off

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from validate.errors import SceneError
 from validate.scene.meshio_arrays import read_quietly
 
+LIBRARIES = ("meshio",)
 DISPLACEMENTS = ("displacement", "Displacement", "displacements", "u", "U", "DISP")
 REACTIONS = ("reaction", "Reaction", "reactions", "RF", "reaction_forces")
 _NAME = re.compile(r"[\w.-]{1,200}")  # of a file beside the list: no folder, no way out of it

@@ -7,6 +7,7 @@ costs one line. What it found comes back as plain arrays, read without pickle.
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -25,8 +26,8 @@ Arrays = Mapping[str, NDArray[Any]]
 _HOME = "validate.recording.formats"
 _SAID, _MISSING = 3, 4  # exit codes of the process: a known error, a library that is not installed
 _MEMORY, _TIMES = 2**30, 40  # bytes beyond so many times the file's
-_BEYOND = 2**26  # the same, beyond what a module's LIBRARIES take once they are loaded
-_SECONDS, _RATE = 20, 2**20  # s, and bytes a second of the file beside
+_SECONDS, _RATE = 1, 2**18  # s of the processor once it is loaded, and bytes a second beside
+_LOADING, _SHARED = 20, 5  # s of the wall, and times the processor's on a busy machine
 _RUN = (sys.executable, "-m", f"{_HOME}.apart")
 _OURS = "="  # before every name: savez has arguments called file and allow_pickle
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -40,7 +41,10 @@ def decoded(
     seconds: int = _SECONDS,
 ) -> dict[str, NDArray[Any]]:
     """What `arrays(path, **given)` of the module `decoder` gives, one beside this file or named in
-    full, within `seconds` s and one more for each MB.
+    full, within `seconds` s of the processor and four more for each MB.
+
+    Libraries that the module names in LIBRARIES are loaded before that time begins, and before
+    memory is limited to its MEMORY bytes beyond them and the file's, where it names that.
 
     Raises `UsageError` with what to install where the library of the `extra` is absent, else
     `RecordingError` naming the file: what the decoder said, or how its process ended.
@@ -53,6 +57,8 @@ def decoded(
             raise UsageError(f"{path.name}: {line}; pip install 'validate-tissue[{extra}]'")
         if done.returncode == _SAID:
             raise RecordingError(f"{path.name}: {line}")
+        if done.returncode == -signal.SIGPROF:
+            raise RecordingError(f"{path.name}: {_late(_allowed(path, seconds), path)}")
         if done.returncode or not out.is_file():
             how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
             raise RecordingError(
@@ -62,35 +68,43 @@ def decoded(
             return {name.removeprefix(_OURS): found[name] for name in found.files}
 
 
+def _allowed(path: Path, least: int) -> float:
+    return least + path.stat().st_size / _RATE
+
+
+def _late(seconds: float, path: Path) -> str:
+    size = path.stat().st_size
+    return f"its reader took over {seconds:.0f} s for {size} bytes and was ended; damaged?"
+
+
 def _ended(
     decoder: str, path: Path, out: Path, given: Mapping[str, float], least: int
 ) -> subprocess.CompletedProcess[bytes]:
-    size = path.stat().st_size
-    seconds = least + size // _RATE
-    more = [json.dumps(dict(given))] if given else []
-    limit = _MEMORY + _TIMES * size
+    seconds = _allowed(path, least)
+    limits = _MEMORY + _TIMES * path.stat().st_size, seconds
+    wall = _LOADING + _SHARED * seconds
     try:
         return subprocess.run(
-            [*_RUN, decoder, str(path), str(out), str(limit), *more],
+            [*_RUN, decoder, str(path), str(out), json.dumps(limits), json.dumps(dict(given))],
             env={**os.environ, **dict.fromkeys(_THREADS, "1")},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            timeout=seconds,
+            timeout=wall,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise RecordingError(
-            f"{path.name}: its reader took over {seconds} s for {size} bytes and was ended"
-        ) from None
+        raise RecordingError(f"{path.name}: {_late(wall, path)}") from None
 
 
-def _decode(decoder: str, path: Path, out: Path, limit: int, given: str = "{}") -> int:
+def _decode(decoder: str, path: Path, out: Path, limits: str, given: str) -> int:
+    limit, seconds = json.loads(limits)
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
         module = import_module(decoder if "." in decoder else f"{_HOME}.{decoder}")
-        limit = _lowered(module, path, limit)
+        limit = _loaded(module, path, limit)
+        signal.setitimer(signal.ITIMER_PROF, seconds)  # its signal ends what is in C, too
         arrays: Arrays = module.arrays(path, **json.loads(given))
     except ImportError as missing:
         print(f"the library '{missing.name}' that reads this format is not installed")
@@ -104,25 +118,26 @@ def _decode(decoder: str, path: Path, out: Path, limit: int, given: str = "{}") 
     except Exception as error:  # whatever a library raises on damage is damage
         print(f"damaged ({' '.join(str(error).split())[:200] or type(error).__name__})")
         return _SAID
+    signal.setitimer(signal.ITIMER_PROF, 0)
     np.savez(out, allow_pickle=False, **{f"{_OURS}{name}": a for name, a in arrays.items()})
     return 0
 
 
-def _lowered(module: Any, path: Path, limit: int) -> int:
-    """The limit of a module that names its LIBRARIES: what is taken once they are loaded, and so
-    much more as its file may need. Elsewhere, and where the kernel does not tell, as it was."""
-    libraries, taken = getattr(module, "LIBRARIES", ()), Path("/proc/self/statm")
-    if not libraries or not taken.is_file():
-        return limit
-    for name in libraries:
+def _loaded(module: Any, path: Path, limit: int) -> int:
+    """Loads its LIBRARIES, and gives the limit of memory: a module that names its MEMORY may take
+    that and so much as its file may need beyond what is taken now, where the kernel tells."""
+    for name in getattr(module, "LIBRARIES", ()):
         import_module(name)
+    more, taken = getattr(module, "MEMORY", None), Path("/proc/self/statm")
+    if more is None or not taken.is_file():
+        return limit
     pages = int(taken.read_text().split()[0])
-    more = _BEYOND + _TIMES * path.stat().st_size
+    more += _TIMES * path.stat().st_size
     limit = min(limit, pages * resource.getpagesize() + more)
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     return limit
 
 
 if __name__ == "__main__":
-    decoder, path, out, limit, *given = sys.argv[1:]
-    raise SystemExit(_decode(decoder, Path(path), Path(out), int(limit), *given))
+    decoder, path, out, limits, given = sys.argv[1:]
+    raise SystemExit(_decode(decoder, Path(path), Path(out), limits, given))

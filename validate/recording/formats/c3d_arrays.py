@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+LIBRARIES = ("ezc3d",)
+
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Points (nt, n, 3) and residuals (nt, n) in the file's unit, analog (nt a, c), and words."""

@@ -19,6 +19,7 @@ _MAGIC, _AT = b"DICM", 128
 _PLANE = 1  # PS3.3 C.8.5.5.1.1: spatial format, a plane
 _TISSUE = (1.0, 2.0)  # C.8.5.5.1.2: data type, tissue or colour flow
 _OPTIONS = ("m_per_px", "rate", "frame")
+_SECONDS = 5  # of the processor: black images pack to little
 _Box = tuple[int, int, int, int]
 
 
@@ -34,7 +35,7 @@ def read_dicom(path: Path, options: Options) -> Recording:
     require_known(options, _OPTIONS)
     if head(path, _AT + 4)[_AT:] != _MAGIC:
         raise RecordingError(f"{path.name}: no DICOM file, or one cut in its first 132 bytes")
-    found = decoded("dicom_arrays", path, "dicom")
+    found = decoded("dicom_arrays", path, "dicom", None, _SECONDS)
     images = found["images"]
     t = _times(path, found, options)
     frame = options.get("frame", "image")

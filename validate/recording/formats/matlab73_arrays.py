@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 
+LIBRARIES = ("h5py",)
 MOST = 2**28  # numbers of all arrays
 _DEPTH = 16  # structs in structs
 _INTEGERS = tuple(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 
+LIBRARIES = ("scipy.io",)
 MAGIC = b"MATLAB 5.0 MAT-file"
 HEADER = 128  # bytes
 _ORDERS = {b"IM": "<", b"MI": ">"}  # of bytes, by the header's last two

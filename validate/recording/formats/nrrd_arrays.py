@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from validate.errors import RecordingError
 from validate.recording.formats.sequence import MAX_PIXELS
 
+LIBRARIES = ("nrrd",)
 _GZIP = 31  # of zlib: with its header and its checksum
 _CHUNK = 2**20  # bytes
 _WIDEST = 8  # bytes of a number

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from validate.errors import RecordingError
 from validate.recording.formats.xlsx_arrays import require_unpacked, sheet_text
 
+LIBRARIES = ("python_calamine",)
 _SECTOR = 512  # bytes: an old Excel file is a container of whole sectors
 
 

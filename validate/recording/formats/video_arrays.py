@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 
+LIBRARIES = ("cv2",)
 MOST = 400 * 2**20  # bytes of all frames together
 
 

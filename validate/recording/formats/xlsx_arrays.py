@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 
+LIBRARIES = ("openpyxl",)
 MOST_BYTES = 512 * 2**20  # unpacked
 MOST_CELLS = 20_000_000
 
