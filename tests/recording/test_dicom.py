@@ -78,7 +78,10 @@ def test_what_is_not_stated_is_asked_for() -> None:
     [
         (DATA / "JPGLosslessP14SV1_1s_1f_8b.dcm", "'JPEG Lossless, .* make it uncompressed first"),
         (BESIDE / "rtplan.dcm", "no image in it"),
-        (BESIDE / "CT_small.dcm", "pixels of int16; only 8-bit images are read"),
+        (DATA / "SC_rgb_32bit.dcm", "pixels of uint32; those of 8 and 16 bits are read"),
+        (BESIDE / "dicomdirtests/98892003/MR700", "7 images of 7 places: slices of a volume"),
+        (BESIDE / "dicomdirtests/98892003/MR1", r"3 series in one folder, of \[1, 1, 1\] files"),
+        (BESIDE / "dicomdirtests", r"1 of 7 files are no DICOM \(README.txt\); take them out"),
         (BESIDE / "JPEG-lossy.dcm", "are in .JPEG Extended.*make it uncompressed first"),
     ],
 )
@@ -95,6 +98,62 @@ def test_without_the_library_the_line_says_what_to_install(
     monkeypatch.setattr(apart, "_RUN", run)
     with pytest.raises(UsageError, match=r"'pydicom'.*pip install 'validate-tissue\[dicom\]'"):
         read_dicom(DATA / "US1_UNCR.dcm", {"m_per_px": "1mm"})
+
+
+def test_16_bits_become_8_by_a_level_that_is_told() -> None:
+    deep = pydicom.dcmread(BESIDE / "CT_small.dcm").pixel_array
+    for options, white in (({}, deep.max()), ({"white": "3000"}, 3000)):
+        got = read_dicom(BESIDE / "CT_small.dcm", options)
+        expected = np.rint(np.clip(deep * (255 / white), 0, 255))
+        assert (got.frame("images").images[0] == expected).all()
+        told = got.metadata["provenance"]
+        assert f"16 bits made 8: 0 to {white} (" in told["levels"]
+        assert told["scale"] == "0.661468 x 0.661468 mm a pixel (PixelSpacing)"
+
+
+def series(folder: Path, **changed: dict[int, object]) -> Path:
+    """Four images of one series, each as dark as its number, in files named backwards."""
+    folder.mkdir()
+    for i in range(4):
+        ds = pydicom.dcmread(DATA / "OBXXXX1A.dcm")
+        ds.PixelData = bytes([10 * i]) * (ds.Rows * ds.Columns)
+        ds.InstanceNumber = i + 1
+        ds.PhotometricInterpretation = "MONOCHROME2"
+        ds.ContentTime = ("125959.00", "125959.25", "130002", "130003")[i]
+        for name, values in changed.items():
+            setattr(ds, name, values.get(i, getattr(ds, name, None)))
+        ds.save_as(folder / f"{9 - i}.dcm")
+    return folder
+
+
+def test_a_folder_of_one_series_is_one_sequence(tmp_path: Path) -> None:
+    path = series(tmp_path / "loop")
+    assert recognised(path).name == "dicom"
+    got = read_dicom(path, {})
+    frames = got.frame("images")
+    assert [int(image[0, 0]) for image in frames.images] == [0, 10, 20, 30]
+    assert frames.t == pytest.approx([0.0, 0.25, 3.0, 4.0])
+    assert frames.m_per_px == pytest.approx((2.622878766e-4, 2.622878766e-4), rel=1e-9)
+    told = got.metadata["provenance"]
+    assert told["times"] == "ContentTime"
+    assert told["scale"].endswith("mm a pixel (SequenceOfUltrasoundRegions)")
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"InstanceNumber": {2: 1}}, "3 instance numbers of 4 files"),
+        ({"NumberOfFrames": {2: 2}}, "1 files of several images each; import them one by one"),
+        ({"ContentTime": {2: "125959.10"}}, "4 images without times; say --map rate=HZ"),
+        ({"SeriesInstanceUID": {0: "1.2.3"}}, r"2 series in one folder, of \[1, 3\] files"),
+    ],
+)
+def test_what_is_no_one_series_says_why(
+    changed: dict[str, dict[int, object]], why: str, tmp_path: Path
+) -> None:
+    path = series(tmp_path / "loop", **changed)
+    with pytest.raises((RecordingError, UsageError), match=why):
+        read_dicom(path, {})
 
 
 def test_luma_is_what_an_operator_sees() -> None:

@@ -167,6 +167,47 @@ def test_an_image_is_its_luma_and_needs_a_scale(encoding: str, tmp_path: Path) -
     assert frames.m_per_px == pytest.approx((2e-4, 2e-4))
 
 
+@pytest.mark.parametrize(("encoding", "big"), [("mono16", 0), ("16UC1", 1)])
+def test_16_bits_become_8_by_a_level_that_is_told(encoding: str, big: int, tmp_path: Path) -> None:
+    deep = np.random.default_rng(0).integers(0, 4001, (4, 6)).astype(np.uint16)
+    deep[0, 0] = 4000
+    stored = deep.astype(">u2" if big else "<u2").view(np.uint8)
+    message = {**raw(encoding, stored), "width": 6, "is_bigendian": big}
+    path = ros(tmp_path / "x.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE, [message])
+    for options, white, said in (({}, 4000, "the largest"), ({"white": "4095"}, 4095, "entered")):
+        got = read_all(path, {"m_per_px": "1mm", **options})
+        assert (got.frame("/x").images[0] == np.rint(deep * (255 / white))).all()
+        told = got.metadata["provenance"]["/x"]
+        assert told == f"16 bits made 8: 0 to {white} ({said}) became 0 to 255"
+
+
+def test_a_mosaic_is_its_luma_and_pairs_are_their_brightness(tmp_path: Path) -> None:
+    """Of one colour: red .299, green .587, blue .114 of it in every pixel."""
+    colour = np.array([200, 100, 40])
+    at = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "gbrg": (1, 2, 0, 1), "grbg": (1, 0, 2, 1)}
+    stored = {f"bayer_{name}8": np.tile(colour[list(order)].reshape(2, 2), (4, 4)).astype(np.uint8)
+              for name, order in at.items()}  # fmt: skip
+    for i, (name, pixels) in enumerate(stored.items()):
+        path = ros(tmp_path / f"{i}.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE,
+                   [raw(name, pixels)])  # fmt: skip
+        got = read_all(path, {"m_per_px": "1mm"}).frame("/x").images[0].astype(int)
+        assert np.abs(got - 123).max() <= 1
+    grey = np.random.default_rng(0).integers(0, 255, (4, 6)).astype(np.uint8)
+    for first, name in enumerate(("yuv422_yuy2", "yuv422")):
+        pairs = np.full((4, 6, 2), 128, np.uint8)
+        pairs[..., first] = grey
+        path = ros(tmp_path / f"{name}.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE,
+                   [raw(name, pairs.reshape(4, 12)) | {"width": 6}])  # fmt: skip
+        assert (read_all(path, {"m_per_px": "1mm"}).frame("/x").images[0] == grey).all()
+
+
+def test_distances_are_no_image(tmp_path: Path) -> None:
+    path = ros(tmp_path / "x.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE,
+               [raw("32FC1", np.zeros((4, 24), np.uint8)) | {"width": 6}])  # fmt: skip
+    with pytest.raises(RecordingError, match=r"encoding '32FC1'; read are grey, colour and bayer"):
+        read_all(path, {"m_per_px": "1mm"})
+
+
 def jpeg(image: np.ndarray) -> bytes:
     packed = io.BytesIO()
     Image.fromarray(image).save(packed, "JPEG", quality=95)
@@ -181,6 +222,12 @@ def test_a_packed_image_is_what_another_library_unpacks(tmp_path: Path) -> None:
     got = read_all(path, {"m_per_px": "1mm"}).frame("/x").images[0]
     theirs = cv2.imdecode(np.frombuffer(message["data"], np.uint8), cv2.IMREAD_GRAYSCALE)
     assert np.abs(got.astype(int) - theirs).max() <= 1
+    deep = (image.astype(np.uint16) * 100)[..., None]
+    packed = cv2.imencode(".png", deep)[1].tobytes()
+    path = ros(tmp_path / "z.mcap", "sensor_msgs/msg/CompressedImage",
+               HEADER + "string format\nuint8[] data", [message | {"data": packed}])  # fmt: skip
+    got = read_all(path, {"m_per_px": "1mm", "white": "25500"}).frame("/x").images[0]
+    assert (got == image).all()
     cut = {**message, "data": message["data"][:-40]}
     path = ros(tmp_path / "y.mcap", "sensor_msgs/msg/CompressedImage",
                HEADER + "string format\nuint8[] data", [cut])  # fmt: skip

@@ -68,12 +68,18 @@ def decoded(
             return {name.removeprefix(_OURS): found[name] for name in found.files}
 
 
+def _bytes(path: Path) -> int:
+    """Of a file, or of all files of a folder."""
+    files = path.iterdir() if path.is_dir() else (path,)
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
 def _allowed(path: Path, least: int) -> float:
-    return least + path.stat().st_size / _RATE
+    return least + _bytes(path) / _RATE
 
 
 def _late(seconds: float, path: Path) -> str:
-    size = path.stat().st_size
+    size = _bytes(path)
     return f"its reader took over {seconds:.0f} s for {size} bytes and was ended; damaged?"
 
 
@@ -81,7 +87,7 @@ def _ended(
     decoder: str, path: Path, out: Path, given: Mapping[str, float], least: int
 ) -> subprocess.CompletedProcess[bytes]:
     seconds = _allowed(path, least)
-    limits = _MEMORY + _TIMES * path.stat().st_size, seconds
+    limits = _MEMORY + _TIMES * _bytes(path), seconds
     wall = _LOADING + _SHARED * seconds
     try:
         return subprocess.run(
@@ -132,7 +138,7 @@ def _loaded(module: Any, path: Path, limit: int) -> int:
     if more is None or not taken.is_file():
         return limit
     pages = int(taken.read_text().split()[0])
-    more += _TIMES * path.stat().st_size
+    more += _TIMES * _bytes(path)
     limit = min(limit, pages * resource.getpagesize() + more)
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     return limit

@@ -9,16 +9,17 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
+from validate.recording.formats.dicom_files import begins_as_dicom, is_dicom
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
-from validate.recording.reader import Options, Reader, head, require_known, source_of
-from validate.recording.types import Frames, Recording, Stream
+from validate.recording.images.levels import shallow
+from validate.recording.reader import Options, Reader, require_known, source_of
+from validate.recording.types import Frames, Recording, Source, Stream
 
 IMAGES = "images"
-_MAGIC, _AT = b"DICM", 128
 _PLANE = 1  # PS3.3 C.8.5.5.1.1: spatial format, a plane
 _TISSUE = (1.0, 2.0)  # C.8.5.5.1.2: data type, tissue or colour flow
-_OPTIONS = ("m_per_px", "rate", "frame")
+_OPTIONS = ("m_per_px", "rate", "frame", "white")
 _SECONDS = 5  # of the processor: black images pack to little
 _Box = tuple[int, int, int, int]
 
@@ -27,19 +28,21 @@ def read_dicom(path: Path, options: Options) -> Recording:
     """Images (h, w) grey of every region of tissue, cut out, with the sides of its pixels in m:
     `images`, or `images/1`, `images/2` from the left where there are several.
 
-    Without regions the whole image, with the stated spacing. Options: `m_per_px` (then the whole
-    image, with that scale), `rate` (Hz) in place of the file's times, `frame` (default image).
+    Without regions the whole image, with the stated spacing. A folder is one series, a file an
+    image. Options: `m_per_px` (then the whole image, with that scale), `rate` (Hz) in place of the
+    file's times, `frame` (default image), `white`: the level of 16 bits that becomes 255.
     Raises `UsageError` where scale or times are stated nowhere, or the regions are those of an
     image of another size, `RecordingError` for a file that is cut, damaged or holds no such image.
     """
     require_known(options, _OPTIONS)
-    if head(path, _AT + 4)[_AT:] != _MAGIC:
+    if not (path.is_dir() or is_dicom(path)):
         raise RecordingError(f"{path.name}: no DICOM file, or one cut in its first 132 bytes")
     found = decoded("dicom_arrays", path, "dicom", None, _SECONDS)
-    images = found["images"]
+    images, levels = shallow(list(found["images"]), options)
+    height, width = images[0].shape
     t = _times(path, found, options)
     frame = options.get("frame", "image")
-    regions = _regions(path, found, options)
+    regions, scale = _regions(path, found, options)
     streams: dict[str, Stream] = {}
     told = dict(text.split(": ", 1) for text in found["told"].tolist())
     for i, (box, sides) in enumerate(regions, start=1):
@@ -47,11 +50,13 @@ def read_dicom(path: Path, options: Options) -> Recording:
         left, top, right, bottom = box
         cut = tuple(np.ascontiguousarray(image[top:bottom, left:right]) for image in images)
         streams[topic] = Frames(t, cut, sides, np.eye(4), frame)
-        told[f"{topic} px"] = f"{left}..{right} x {top}..{bottom} of {images.shape[2]} x " \
-                              f"{images.shape[1]}"  # fmt: skip
-    told |= {"kind": "images (DICOM)", "times": _timed(found, options)}
-    source = source_of(path, "DICOM keeps no checksum: integrity not provable")
-    return recorded(path.stem, source, streams, told)
+        told[f"{topic} px"] = f"{left}..{right} x {top}..{bottom} of {width} x {height}"
+    told |= {"kind": "images (DICOM)", "times": _timed(found, options), "levels": levels,
+             "scale": scale}  # fmt: skip
+    whole = "DICOM keeps no checksum: integrity not provable"
+    name = path.resolve().name if path.is_dir() else path.stem
+    source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
+    return recorded(name, source, streams, told)
 
 
 def _times(path: Path, found: Mapping[str, Any], options: Options) -> Floats:
@@ -69,21 +74,24 @@ def _timed(found: Mapping[str, Any], options: Options) -> str:
 
 def _regions(
     path: Path, found: Mapping[str, Any], options: Options
-) -> list[tuple[_Box, tuple[float, float]]]:
-    """Where each stream lies in the image, px, and the sides of its pixels, m."""
+) -> tuple[list[tuple[_Box, tuple[float, float]]], str]:
+    """Where each stream lies in the image, px, and the sides of its pixels, m; what states them."""
     _, height, width = found["images"].shape
     whole = (0, 0, width, height)
     if "m_per_px" in options:
         side = length(options, "m_per_px", "0.1mm")
-        return [(whole, (side, side))]
+        return [(whole, (side, side))], f"{options['m_per_px']} a pixel (entered)"
     planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
               and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
     if not planes:
-        return [(whole, _spacing(path, found["spacing"]))]
-    return [
+        x, y = _spacing(path, found["spacing"])
+        return [(whole, (x, y))], f"{1e3 * x:.6g} x {1e3 * y:.6g} mm a pixel (PixelSpacing)"
+    boxes = [
         (_box(path, r, width, height), (float(r[4]), float(r[5])))
         for r in sorted(planes, key=lambda r: (float(r[0]), float(r[1])))
     ]
+    sides = ", ".join(f"{1e3 * x:.6g} x {1e3 * y:.6g}" for _, (x, y) in boxes)
+    return boxes, f"{sides} mm a pixel (SequenceOfUltrasoundRegions)"
 
 
 def _spacing(path: Path, spacing: Floats) -> tuple[float, float]:
@@ -112,7 +120,7 @@ def _box(path: Path, region: Floats, width: int, height: int) -> _Box:
 DICOM = Reader(
     "dicom",
     "ultrasound and other images (DICOM)",
-    lambda p: head(p, _AT + 4)[_AT:] == _MAGIC,
+    begins_as_dicom,
     read_dicom,
-    "DICM stands at byte 128",
+    "DICM stands at byte 128, in a folder of its first file",
 )

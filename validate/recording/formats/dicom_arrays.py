@@ -4,6 +4,7 @@ Colour is made grey by ITU-R BT.601's luma, as a screen's operator sees it.
 """
 
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from pydicom.pixels.utils import iter_pixels
 from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.formats.dicom_files import files_of
 from validate.recording.formats.sequence import MAX_PIXELS
 
 _LACKS = ("missing dependencies", "does not support")  # as a codec says that it is none for these
@@ -28,26 +30,83 @@ _CONFIG.settings.reading_validation_mode = _CONFIG.IGNORE
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """`images` (n, h, w) uint8, `t` (n,) s or none, `timed` by what, `regions` (k, 8), `spacing`
-    (x, y) mm or none, `told` texts key by key.
+    """`images` (n, h, w) in grey of 8 or 16 bits, `t` (n,) s or none, `timed` by what, `regions`
+    (k, 8), `spacing` (x, y) mm or none, `told` texts key by key; of a folder its one series.
 
     A region is left, top, right, bottom (px), the sides of a pixel x, y (m, NaN: no length), its
-    spatial format and data type. Raises `RecordingError` for what is no 8-bit image.
+    spatial format and data type. Raises `RecordingError` for what is no such image, or no series.
     """
-    _require_few_bytes(path)
-    ds = pydicom.dcmread(path)
-    if "PixelData" not in ds:
-        raise RecordingError(f"no image in it: {ds.get('SOPClassUID', 'no class')}")
-    images = _images(ds)
-    t, timed = _times(ds, len(images))
+    sets = _series(path) if path.is_dir() else [_read(path)]
+    images = _images(sets)
+    t, timed = _moments(sets) if len(sets) > 1 else _times(sets[0], len(images))
+    ds = sets[0]
     return {
         "images": images,
         "t": t,
         "timed": np.array(timed),
         "regions": np.array([_region(r) for r in ds.get("SequenceOfUltrasoundRegions", ())]),
-        "spacing": np.array(list(ds.get("PixelSpacing") or ())[::-1], dtype=np.float64),
+        "spacing": np.array(list(_spacing(ds) or ())[::-1], dtype=np.float64),
         "told": np.array([f"{k}: {ds.get(k)}" for k in _TOLD if ds.get(k) not in (None, "")]),
     }
+
+
+def _read(path: Path) -> pydicom.Dataset:
+    _require_few_bytes(path)
+    ds = pydicom.dcmread(path)
+    if "PixelData" not in ds:
+        raise RecordingError(f"no image in it: {ds.get('SOPClassUID', 'no class')}")
+    return ds
+
+
+def _series(folder: Path) -> list[pydicom.Dataset]:
+    """The files of a folder in the order of their instance numbers, one image each, all of one
+    series and of one place."""
+    sets = [_read(file) for file in files_of(folder)]
+    series = Counter(str(ds.get("SeriesInstanceUID")) for ds in sets)
+    if len(series) > 1:
+        raise RecordingError(
+            f"{len(series)} series in one folder, of {sorted(series.values())} files; a folder each"
+        )
+    many = sum(int(ds.get("NumberOfFrames") or 1) > 1 for ds in sets)
+    if many and len(sets) > 1:
+        raise RecordingError(f"{many} files of several images each; import them one by one")
+    places = {str(ds.get("ImagePositionPatient")) for ds in sets}
+    if len(places) > 1:
+        raise RecordingError(
+            f"{len(sets)} images of {len(places)} places: slices of a volume, no images over time"
+        )
+    numbers = [ds.get("InstanceNumber") for ds in sets]
+    if None in numbers or len(set(numbers)) < len(sets):
+        raise RecordingError(f"{len(set(numbers))} instance numbers of {len(sets)} files")
+    return sorted(sets, key=lambda ds: int(ds.InstanceNumber))
+
+
+def _moments(sets: list[pydicom.Dataset]) -> tuple[NDArray[np.float64], str]:
+    """Seconds (n,) of one image each, by the first field that all have and that goes forward."""
+    for field in ("AcquisitionDateTime", "AcquisitionTime", "ContentTime"):
+        try:
+            t = np.array([_second(str(ds[field].value)) for ds in sets])
+        except (KeyError, ValueError):
+            continue
+        if (np.diff(t) > 0).all():
+            return t - t[0], field
+    return np.zeros(0), "nothing"
+
+
+def _second(text: str) -> float:
+    """Of a time HHMMSS.F, or of a date before it, in its day (PS3.5 6.2, TM and DT)."""
+    clock = text.partition("+")[0].partition(".")
+    digits = clock[0][-6:]
+    seconds = int(digits[:2]) * 3600 + int(digits[2:4]) * 60 + int(digits[4:6])
+    return seconds + float(f"0.{clock[2] or 0}")
+
+
+def _spacing(ds: pydicom.Dataset) -> Any:
+    """Between rows and columns, mm: of the image, or of all its frames alike."""
+    for shared in ds.get("SharedFunctionalGroupsSequence", ()):
+        for measures in shared.get("PixelMeasuresSequence", ()):
+            return measures.get("PixelSpacing")
+    return ds.get("PixelSpacing")
 
 
 def _require_few_bytes(path: Path) -> None:
@@ -69,15 +128,20 @@ _TOLD = ("Modality", "Manufacturer", "ManufacturerModelName", "TransducerData", 
          "PhotometricInterpretation")  # fmt: skip
 
 
-def _images(ds: pydicom.Dataset) -> NDArray[np.uint8]:
-    count = int(ds.get("NumberOfFrames") or 1)
-    shape = (count, int(ds.Rows), int(ds.Columns))
+def _images(sets: list[pydicom.Dataset]) -> NDArray[Any]:
+    count = sum(int(ds.get("NumberOfFrames") or 1) for ds in sets)
+    shape = (count, int(sets[0].Rows), int(sets[0].Columns))
     if int(np.prod(shape)) > MAX_PIXELS:
         raise RecordingError(f"{shape} pixels, the limit is {MAX_PIXELS}; split the sequence")
+    sizes = {(int(ds.Rows), int(ds.Columns)) for ds in sets}
+    if len(sizes) > 1:
+        raise RecordingError(f"images of different sizes {sorted(sizes)}")
     out = np.empty(shape, np.uint8)
     made = 0
-    for made, image in enumerate(_frames(ds), start=1):
-        out[made - 1] = _grey(ds, image)
+    for made, image in enumerate((_grey(ds, i) for ds in sets for i in _frames(ds)), start=1):
+        if made == 1:
+            out = out.astype(image.dtype)
+        out[made - 1] = image
     if made != count:
         raise RecordingError(f"{made} of {count} images can be read: cut or damaged")
     return out
@@ -97,17 +161,16 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
         raise
 
 
-def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[np.uint8]:
+def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
     if ds.PhotometricInterpretation == "PALETTE COLOR":
         image = _eight_bits(ds, apply_color_lut(image, ds))
-    if image.dtype != np.uint8:
-        raise RecordingError(
-            f"pixels of {image.dtype}; only 8-bit images are read; export "
-            "it as PNG or TIFF of 16 bits, which come in as image-stack"
-        )
+    if image.dtype not in (np.uint8, np.uint16, np.int16):
+        raise RecordingError(f"pixels of {image.dtype}; those of 8 and 16 bits are read")
     if image.ndim == 3:
-        image = np.rint(image @ _LUMA).astype(np.uint8)
-    return 255 - image if ds.PhotometricInterpretation == "MONOCHROME1" else image
+        image = np.rint(image @ _LUMA).astype(image.dtype)
+    if ds.PhotometricInterpretation == "MONOCHROME1":
+        return np.asarray(2 ** int(ds.BitsStored) - 1 - image, dtype=image.dtype)
+    return image
 
 
 def _eight_bits(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:

@@ -10,6 +10,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ Pixels = NDArray[np.uint8]
 MAX_SIDE = 4096  # px
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _CHANNELS = {0: 1, 2: 3, 4: 2, 6: 4}  # PNG colour type -> samples a pixel
+_MOSAIC = 4  # px a side
 
 
 @dataclass(frozen=True)
@@ -211,3 +213,13 @@ def ellipse_through(points: Floats) -> tuple[Floats, Floats, float]:
     (x, y), axes, degrees = cv2.fitEllipseDirect(plain)
     centre = middle + scale * np.array([x, y])
     return centre, scale * np.array(axes) / 2, float(np.deg2rad(degrees))
+
+
+def demosaiced(mosaic: NDArray[Any], order: str) -> NDArray[Any]:
+    """The luma (h, w) of an image behind colour filters, uint8 or uint16, whose first two rows
+    begin with the colours of `order` ("RGGB"); raises `RecordingError` below 4 px a side."""
+    import cv2
+
+    if min(mosaic.shape) < _MOSAIC:
+        raise RecordingError(f"a mosaic of {mosaic.shape}, at least {_MOSAIC} px a side")
+    return np.asarray(cv2.cvtColor(mosaic, getattr(cv2, f"COLOR_Bayer{order}2GRAY")))

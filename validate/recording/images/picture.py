@@ -5,27 +5,32 @@ For images of others: ours are PNG, grey, and checked chunk by chunk in `image`.
 
 import io
 import warnings
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from validate.errors import RecordingError
-from validate.recording.images.image import MAX_SIDE, Pixels
+from validate.recording.images.image import MAX_SIDE
 
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
+_DEEP = "I;16"  # Pillow's mode, in either order of bytes
 
 
-def decode_picture(data: bytes) -> Pixels:
-    """The image (h, w) uint8, colour by ITU-R BT.601's luma.
+def decode_picture(data: bytes) -> NDArray[Any]:
+    """The image (h, w) uint8, colour by ITU-R BT.601's luma; uint16 of grey so deep.
 
-    Raises `RecordingError` for a picture of another format, over `MAX_SIDE`, of more than 8 bits a
-    sample, cut or damaged.
+    Raises `RecordingError` for a picture of another format, over `MAX_SIDE`, deeper, cut or
+    damaged.
     """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # of bombs and of broken tags
             with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
                 _require_small(opened)
+                if opened.mode.startswith(_DEEP):
+                    return np.asarray(opened).astype(np.uint16)
                 return np.asarray(opened.convert("L"), dtype=np.uint8).copy()
     except UnidentifiedImageError:
         raise RecordingError(f"no picture of {', '.join(FORMATS)} in {len(data)} bytes") from None
@@ -39,5 +44,5 @@ def _require_small(picture: Image.Image) -> None:
     width, height = picture.size
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} a side")
-    if picture.mode.startswith(("I", "F")):
-        raise RecordingError(f"a picture of mode {picture.mode}: more than 8 bits; save 8-bit grey")
+    if picture.mode in ("I", "F"):
+        raise RecordingError(f"a picture of mode {picture.mode}: over 16 bits; save 16-bit grey")

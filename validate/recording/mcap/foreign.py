@@ -6,7 +6,7 @@ put in the order of their stamps; how many were not is told. What is no stream i
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import length
+from validate.recording.images.levels import shallow
 from validate.recording.mcap.decoders import Plain, decoder_of
 from validate.recording.mcap.known_messages import MessagePart, parts_of
 from validate.recording.mcap.records import Channel, Message, Schema
@@ -24,7 +25,7 @@ from validate.recording.mcap.verified import Verified
 from validate.recording.reader import Options
 from validate.recording.types import Clock, Frames, Markers, Signal, Stream
 
-SCALE = "m_per_px"
+SCALE, WHITE = "m_per_px", "white"
 
 
 Sample = tuple[MessagePart, int, int]  # and when it was published and logged, ns
@@ -48,7 +49,7 @@ class Gathered:
             for part in self.parts(message.data):
                 times = (message.publish_ns, message.log_ns)
                 self.samples.setdefault(part.name, []).append((part, *times))
-                size += part.values.size + (0 if part.image is None else -(-part.image.size // 8))
+                size += part.values.size + (0 if part.image is None else -(-part.image.nbytes // 8))
         except (RecordingError, KeyError, TypeError, ValueError, AttributeError) as error:
             why = f"no {error}" if isinstance(error, KeyError) else str(error)
             self.error = f"a message cannot be read: {' '.join(why.split())[:160]}"
@@ -60,7 +61,7 @@ def gatherers(verified: Verified, options: Options) -> tuple[dict[int, Gathered]
 
     Raises `UsageError` for a field asked for of a topic that the file does not have.
     """
-    fields = {key: unit for key, unit in options.items() if key != SCALE}
+    fields = {key: unit for key, unit in options.items() if key not in (SCALE, WHITE)}
     own = ours(verified)
     _require_topics(verified, fields)
     found: dict[int, Gathered] = {}
@@ -82,8 +83,8 @@ def _require_topics(verified: Verified, fields: Mapping[str, str]) -> None:
     for key in fields:
         if not any(key.startswith(f"{topic}.") for topic in topics):
             listed = ", ".join(topics) or "none"
-            raise UsageError(f"--map {key}=...: no such key; known: {SCALE}, TOPIC.FIELD of the "
-                             f"topics {listed}")  # fmt: skip
+            raise UsageError(f"--map {key}=...: no such key; known: {SCALE}, {WHITE}, TOPIC.FIELD "
+                             f"of the topics {listed}")  # fmt: skip
 
 
 def _parts(
@@ -182,9 +183,14 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
             times = np.array([p if part.ns is None else part.ns for part, p, _ in samples])
             order = np.argsort(times, kind="stable")
             moved = int((order != np.arange(len(order))).sum())
-            if moved:
-                told[topic] = f"{moved} of {len(order)} samples were not in order of their stamps"
-            parts = [samples[i][0] for i in order]
+            try:
+                parts, levels = _shallow([samples[i][0] for i in order], options)
+            except RecordingError as error:
+                never[topic] = str(error)
+                continue
+            late = f"{moved} of {len(order)} samples were not in order of their stamps"
+            if levels or moved:
+                told[topic] = "; ".join(filter(None, (levels, late if moved else "")))
             ns[topic] = times[order].astype(np.int64)
             make[topic] = _maker(parts, ns[topic], side)
             clocks[topic] = clock_of(
@@ -192,6 +198,15 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
                                     for k in (1, 2)),
             )  # fmt: skip
     return ForeignStreams(make, ns, clocks, told, never)
+
+
+def _shallow(parts: list[MessagePart], options: Options) -> tuple[list[MessagePart], str]:
+    """Images in 8 bits, and how they became so; nothing of what is so deep, or no image."""
+    deep = [part.image for part in parts if part.image is not None]
+    if all(image.dtype == np.uint8 for image in deep):
+        return parts, ""
+    images, levels = shallow(deep, options)
+    return [replace(p, image=image) for p, image in zip(parts, images, strict=True)], levels
 
 
 def _by_size(

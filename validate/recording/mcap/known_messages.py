@@ -9,26 +9,25 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.formats.poses import ROTATION, TRANSLATION, rotations
-from validate.recording.images.image import Pixels
 from validate.recording.images.picture import decode_picture
+from validate.recording.images.raw import RawImage, grey
 from validate.recording.mcap.decoders import Plain, binary
 
 NOT_STATED = "not stated"
 MAX_POINTS = 100_000  # of one cloud
-_LUMA = np.array([0.299, 0.587, 0.114])
 _FLOATS = {7: "f4", 8: "f8"}  # sensor_msgs/PointField, foxglove.PackedElementField alike
-_CHANNELS = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
 
 
 @dataclass(frozen=True)
 class MessagePart:
     """A sample of the stream `<topic><name>`, measured at `ns` (none: when it was published).
 
-    Points (k, 3) m of `names`, or numbers (c,) in `unit`, or an `image`.
+    Points (k, 3) m of `names`, or numbers (c,) in `unit`, or a grey `image` (h, w) of any depth.
     """
 
     name: str
@@ -37,7 +36,7 @@ class MessagePart:
     values: Floats = field(default_factory=lambda: np.empty(0))
     names: tuple[str, ...] = ()
     unit: str = ""
-    image: Pixels | None = None
+    image: NDArray[Any] | None = None
 
 
 Parts = Callable[[Plain], Sequence[MessagePart]]
@@ -177,21 +176,10 @@ def _foxglove_image(m: Plain) -> Sequence[MessagePart]:
     return [MessagePart("", ns, frame, image=_raw(m))]
 
 
-def _raw(m: Plain) -> Pixels:
+def _raw(m: Plain) -> NDArray[Any]:
     height, width, step = int(m["height"]), int(m["width"]), int(m["step"])
-    encoding = str(m["encoding"])
-    channels = _CHANNELS.get(encoding)
-    data = binary(m["data"])
-    if channels is None:
-        raise RecordingError(f"encoding '{encoding}'; read are {', '.join(_CHANNELS)}")
-    if step < width * channels or len(data) < height * step or min(height, width) < 1:
-        raise RecordingError(f"{len(data)} bytes for {width} x {height} px of {channels}; cut")
-    rows = np.frombuffer(data, np.uint8, height * step).reshape(height, step)
-    pixels = rows[:, : width * channels].reshape(height, width, channels)
-    if channels == 1:
-        return pixels[..., 0].copy()
-    colour = pixels[..., 2::-1] if encoding.startswith("b") else pixels[..., :3]
-    return np.asarray(np.rint(colour @ _LUMA), dtype=np.uint8)
+    big = bool(m.get("is_bigendian", 0))
+    return grey(RawImage(str(m["encoding"]), height, width, step, binary(m["data"]), big))
 
 
 def _ros_picture(m: Plain) -> Sequence[MessagePart]:
