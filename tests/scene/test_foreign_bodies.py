@@ -1,5 +1,6 @@
 """Bodies of Gmsh, VTK and of closed surfaces, as libraries of others write them."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -194,10 +195,27 @@ def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path
     assert shown.exit_code == 0, shown.output
     assert "10 x 20 x 30 mm" in shown.output
     assert set(read_mesh(tmp_path / "b.npz").facets) == {"plate", "label 8"}
-    with pytest.raises(SceneError, match=r"states no unit of length; .* specimen.mesh_unit=mm"):
+    with pytest.raises(SceneError, match=r"no unit of length; .*mesh_unit or body.unit=mm"):
         read_mesh(path)
     pv.Icosphere().save(tmp_path / "s.stl")
+    odd = run.invoke(cli, ["body", str(path), "--unit", "mm", "--edge", "2mm"])
+    assert "only a surface (.stl, .obj, .ply) is filled" in str(odd.exception)
+    assert run.invoke(cli, ["body", str(tmp_path / "b.npz"), "--unit", "m"]).exit_code == 0
+    again = run.invoke(cli, ["body", str(tmp_path / "b.npz"), "--unit", "mm"])
+    assert "b.npz: npz is in metres, not in mm; leave the unit away" in str(again.exception)
     with pytest.raises(
         SceneError, match=r"a surface; fill it first: validate body s.stl --unit mm"
     ):
         read_mesh(tmp_path / "s.stl", "mm")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp"])
+def test_a_surface_of_vtk_is_told_how_to_come_in(suffix: str, tmp_path: Path) -> None:
+    """And the way that is told is one."""
+    ball = pv.Icosphere(radius=10, nsub=2)
+    ball.save(tmp_path / f"s{suffix}")
+    run = CliRunner()
+    refused = run.invoke(cli, ["body", str(tmp_path / f"s{suffix}"), "--unit", "mm"])
+    assert re.search(r"s\.vt[kp]: a surface of VTK .* mesh.save", str(refused.exception))
+    ball.save(tmp_path / "FILE.stl")
+    assert run.invoke(cli, ["body", str(tmp_path / "FILE.stl"), "--unit", "mm"]).exit_code == 0

@@ -15,6 +15,7 @@ from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.foreign_mesh import ForeignBody, read_foreign
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.mesh_file import read_mesh, write_mesh
+from validate.scene.meshio_arrays import SURFACE
 from validate.scene.named_place import place_of
 from validate.scene.select import facets_of
 from validate.units import in_si, split
@@ -62,13 +63,20 @@ def _named(mesh: Mesh, faces: Mapping[str, str]) -> Mesh:
 
 def _read(file: Path, unit: str | None, edge: str | None) -> ForeignBody:
     suffix = file.suffix.lower()
+    if suffix == ".vtp":
+        raise UsageError(f"{file.name}: {SURFACE}")
     if suffix not in (*FOREIGN, *SURFACES, ".npz"):
         raise UsageError(
             f"{file.name}: no body that is read; one of npz, {', '.join((*FOREIGN, *SURFACES))}: "
             "export it as one of these, as Gmsh and meshio do"
         )
+    if edge is not None and suffix not in SURFACES:
+        raise UsageError(
+            f"{file.name}: --edge {edge}: only a surface ({', '.join(SURFACES)}) is filled with "
+            "elements of an edge; leave it away"
+        )
     if suffix == ".npz":
-        return ForeignBody(read_mesh(file), {})
+        return ForeignBody(read_mesh(file, unit), {})
     if unit is None:
         raise UsageError(f"{file.name}: a file of this kind states no unit; say it: --unit mm")
     if suffix in FOREIGN:

@@ -189,7 +189,7 @@ def new(
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--unit", metavar="UNIT", help="Of its lengths, as mm: such files state none.")
+@click.option("--unit", metavar="UNIT", help="Of its lengths, as mm; not of npz (m).")
 @click.option("--edge", metavar="LENGTH", help="Of the elements that fill a surface, as 2mm.")
 @click.option(
     "--face", "faces", multiple=True, metavar="NAME=WORDS",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from validate.errors import SceneError
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.foreign_mesh import read_foreign, require_readable
+from validate.scene.foreign_mesh import metres, read_foreign, require_readable
 from validate.scene.mesh import Kind, Mesh, require_positive_cells
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
@@ -44,11 +44,14 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
     `unit`.
 
     Raises `SceneError`, one line that names the file, for one that is missing, damaged, too large
-    or no such mesh, for inverted elements, without a unit that it needs, and for a surface.
+    or no such mesh, for inverted elements, without a unit that it needs, with one that it does not
+    have (npz is in metres), and for a surface.
     """
     suffix = path.suffix.lower()
     if suffix in FOREIGN and unit is None:
-        raise SceneError(f"{path.name}: states no unit of length; say it: specimen.mesh_unit=mm")
+        raise SceneError(
+            f"{path.name}: no unit of length; say it: specimen.mesh_unit or body.unit=mm"
+        )
     if suffix in FOREIGN:
         return read_foreign(path, unit or "").mesh
     if suffix in SURFACES:
@@ -57,6 +60,8 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
             "-o body.npz"
         )
     require_readable(path)
+    if unit is not None and metres(path.name, unit) != 1.0:
+        raise SceneError(f"{path.name}: npz is in metres, not in {unit}; leave the unit away")
     try:
         mesh = _mesh(_arrays(path))
         require_positive_cells(mesh)
@@ -83,7 +88,10 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
 def _mesh(arrays: dict[str, NDArray[Any]]) -> Mesh:
     missing = [name for name in ("kind", "nodes", "cells") if name not in arrays]
     if missing:
-        raise SceneError(f"no {missing} among its arrays {sorted(arrays)[:8]}: not a mesh file")
+        raise SceneError(
+            f"no {missing} among its arrays {sorted(arrays)[:8]}; write them: np.savez(FILE, "
+            "kind='tet4', nodes=(n, 3) floats in metres, cells=(e, 4) whole numbers from 0)"
+        )
     facets = {k.removeprefix(_FACETS): v for k, v in arrays.items() if k.startswith(_FACETS)}
     for name, a in {"cells": arrays["cells"], **facets}.items():
         if a.dtype.kind not in "iu":

@@ -16,6 +16,10 @@ _NSET, _CELLS, _FACET = "nset.", "cells.", "facet."
 _FLAT = {"triangle": 3, "quad": 4, "triangle6": 3, "quad8": 4, "quad9": 4}  # corners of a facet
 _NOT_SOLID = {*_FLAT, "line", "line3", "vertex"}
 _LABEL = "gmsh:physical"
+SURFACE = (
+    "a surface of VTK (PolyData); a closed one is filled from STL: save it as one (ParaView: File, "
+    "Save Data; pyvista: mesh.save('FILE.stl')), then validate body FILE.stl --unit mm"
+)
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -54,8 +58,11 @@ def read_quietly(path: Path, name: str) -> Any:
     import meshio
 
     with path.open("rb") as file:
-        if b"vtkLZ4DataCompressor" in file.read(4096):
-            raise SceneError("packed by LZ4, which is not unpacked; save it with zlib or unpacked")
+        head = file.read(4096)
+    if b"vtkLZ4DataCompressor" in head:
+        raise SceneError("packed by LZ4, which is not unpacked; save it with zlib or unpacked")
+    if b"DATASET POLYDATA" in head.upper():
+        raise SceneError(SURFACE)
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
