@@ -1,5 +1,6 @@
 """Abaqus .inp: a body's nodes, elements and node sets, read by a library in a process apart."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -66,11 +67,17 @@ def test_the_liver(shared_data: Path) -> None:
     [
         ("", "0 bytes"),
         ("no mesh at all\n", "no elements: no Abaqus input file"),
-        (inp(body("tet4"), extra="*Include, input=/etc/passwd"), r"\*Include in line .* is not"),
+        (inp(body("tet4"), extra="*Include, input=/etc/passwd"), r"only names from the deck's"),
+        (inp(body("tet4"), extra="*Include, input=../x.inp"), "is outside the deck's folder; copy"),
+        (inp(body("tet4"), extra="*Include, input=body.inp"), "'body.inp' in line 36 includes its"),
+        (inp(body("tet4"), extra="*Include, input=a.inp, password=b"), "locked; export it open"),
+        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "only names from the deck's"),
+        (inp(body("tet4"), extra=f"*Include, input={300 * 'a'}"), "no file in the deck's folder"),
         (inp(body("tet4")).replace("*Part", "*Ngen\n1, 5\n*Part"), r"\*Ngen in line 3: is not"),
-        (inp(body("tet4")).replace("*Part", "*System\n1., 0, 0\n*Part"), r"\*System in line 3"),
+        (inp(body("tet4")).replace("*Node", "*System\n1., 0\n*Node"), r"\*System in line 4: exp"),
+        (inp(body("tet4")).replace("*Node", "*System\n1,0,0,1,0,0\n*Node"), "one, or on a line"),
         (inp(body("tet4")).replace("*Node", "*Node, system=C"), "that are not rectangular"),
-        (inp(body("tet4")).replace("*Node", "*Node, input=n.txt"), "rows are in another file"),
+        (inp(body("tet4")).replace("*Node", "*Node, input=n.txt"), "'n.txt' in line 4 is no file"),
         (inp(body("tet4")).replace("*End Part", "*Node\n10, 0., 0., 9."), "node 10 has two places"),
         (inp(body("tet4"), "C3D6"), r"60 numbers, not 7 for each C3D6"),
         (inp(body("tet4"), "S4"), "12 S4; one of tetra"),
@@ -82,7 +89,8 @@ def test_the_liver(shared_data: Path) -> None:
         (inp(body("tet4")).replace("\n12, 0", "\n1200, 0"), "there is no node 12"),
         (inp(body("tet4")).replace("\n2, ", "\n1, "), r"line \d+: element 1 stands twice"),
     ],
-    ids=["empty", "text", "include", "ngen", "system", "cylindrical", "input", "twice", "wedge",
+    ids=["empty", "text", "passwd", "above", "itself", "locked", "zero", "long", "ngen", "system",
+         "one point", "cylindrical", "input", "twice", "wedge",
          "shell", "unknown", "brick", "number", "elset", "nset", "node", "element"],
 )  # fmt: skip
 def test_what_is_no_body_is_one_line(tmp_path: Path, text: str, said: str) -> None:
@@ -91,6 +99,96 @@ def test_what_is_no_body_is_one_line(tmp_path: Path, text: str, said: str) -> No
     with pytest.raises(SceneError, match=said) as raised:
         read_foreign(path, "m")
     assert "\n" not in str(raised.value)
+
+
+def test_what_a_deck_includes_stands_in_its_place(tmp_path: Path) -> None:
+    """Nodes by input=, elements by a file that includes another, in a folder, written as Windows
+    writes names."""
+    text, path = inp(body("tet4")), tmp_path / "body.inp"
+    path.write_text(text)
+    whole = read_foreign(path, "m")
+    assert "included" not in whole.told
+    head, _, rest = text.partition("*Node\n")
+    rows, keyword, more = rest.partition("*Element")
+    cells, _, last = more.partition("*Nset, nset=lower_plate\n")
+    sets, end, _ = last.partition("*Nset, nset=lost")
+    (tmp_path / "mesh").mkdir()
+    (tmp_path / "mesh" / "nodes.txt").write_text(rows)
+    (tmp_path / "mesh" / "Cells.inp").write_text(f"{keyword}{cells}*Include,\n input=low.inp\n")
+    (tmp_path / "low.inp").write_text("*Nset, nset=lower_plate, input=low.txt")
+    (tmp_path / "low.txt").write_text(sets)
+    path.write_text(f"{head}*Node, input=mesh/nodes.txt\n"
+                    f"*INCLUDE, INPUT=mesh\\Cells.inp\n{end}\n7\n*End Part\n")  # fmt: skip
+    got = read_foreign(path, "m")
+    np.testing.assert_array_equal(got.mesh.nodes, whole.mesh.nodes)
+    np.testing.assert_array_equal(got.mesh.cells, whole.mesh.cells)
+    np.testing.assert_array_equal(got.mesh.facets["lower_plate"], whole.mesh.facets["lower_plate"])
+    assert got.told["included"] == r"mesh/nodes.txt, mesh\Cells.inp, low.inp, low.txt"
+    (tmp_path / "low.txt").write_text("12, x\n")
+    with pytest.raises(SceneError, match=r"\*Nset in line 1 of 'low.inp': there is no set 'x'"):
+        read_foreign(path, "m")
+    (tmp_path / "low.txt").write_text("*Nset\n")
+    with pytest.raises(SceneError, match=r"'\*Nset' in line 1 of 'low.txt'; rows alone are taken"):
+        read_foreign(path, "m")
+    (tmp_path / "low.txt").unlink()
+    (tmp_path / "low.txt").symlink_to("/etc/passwd")
+    with pytest.raises(SceneError, match=r"outside the deck's folder"):
+        read_foreign(path, "m")
+
+
+def test_inclusions_in_a_loop_or_without_end_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "body.inp"
+    path.write_text(inp(body("tet4"), extra="*Include, input=a.inp"))
+    (tmp_path / "a.inp").write_text("*Include, input=b.inp\n")
+    (tmp_path / "b.inp").write_text("*Include, input=a.inp\n")
+    with pytest.raises(SceneError, match=r"'a.inp' in line 1 of 'b.inp' includes itself"):
+        read_foreign(path, "m")
+    for k in range(30):  # each twice the next: a thousand million lines
+        (tmp_path / f"n{k}.inp").write_text(2 * f"*Include, input=n{k + 1}.inp\n")
+    (tmp_path / "n30.inp").write_text("")
+    (tmp_path / "a.inp").write_text("*Include, input=n0.inp\n")
+    with pytest.raises(SceneError, match=r"more than 200 inclusions, at 'n"):
+        read_foreign(path, "m")
+    (tmp_path / "a.inp").unlink()
+    (tmp_path / "a.inp").symlink_to("a.inp")
+    with pytest.raises(SceneError, match=r"is no file in the deck's folder"):
+        read_foreign(path, "m")
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ("1., 2., 3.", lambda x, y, z: (x + 1, y + 2, z + 3)),
+        # x shown along y (what it rises is left out), z as it is
+        ("1., 2., 3., 1., 9., 8.", lambda x, y, z: (1 - y, 2 + x, 3 + z)),
+        # x along z, y along x: so that z is along y
+        ("1., 2., 3., 1., 2., 5.\n4., 2., 9.", lambda x, y, z: (1 + y, 2 + z, 3 + x)),
+    ],
+)
+def test_nodes_in_a_system_of_their_own(
+    rows: str, expected: Callable[..., tuple[float, ...]], tmp_path: Path
+) -> None:
+    """By hand, for *System's three forms; an empty one, and the end of the part, end it."""
+    text, path = inp(body("tet4")), tmp_path / "body.inp"
+    path.write_text(text)
+    whole = read_foreign(path, "m").mesh
+    path.write_text(text.replace("*Node", f"*System\n{rows}\n*Node"))
+    got = read_foreign(path, "m").mesh
+    moved = np.array([expected(*x) for x in whole.nodes.tolist()])
+    np.testing.assert_allclose(got.nodes, moved, atol=1e-12)
+    for ended in (f"*System\n{rows}\n*System\n*Node", f"*System\n{rows}\n*Part, name=b\n*Node"):
+        path.write_text(text.replace("*Node", ended))
+        np.testing.assert_array_equal(read_foreign(path, "m").mesh.nodes, whole.nodes)
+
+
+def test_an_empty_place_between_commas_is_a_zero(tmp_path: Path) -> None:
+    """Left out, a height became a breadth."""
+    text, path = inp(body("tet4")), tmp_path / "body.inp"
+    path.write_text(text)
+    whole = read_foreign(path, "m").mesh
+    path.write_text(text.replace(" 0.0, 0.0, 0.03", " , , 0.03"))
+    assert ", , , 0.03" in path.read_text()
+    np.testing.assert_array_equal(read_foreign(path, "m").mesh.nodes, whole.nodes)
 
 
 def test_elements_inside_out_and_curved_ones_are_refused(tmp_path: Path) -> None:

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Ints
 from validate.errors import SceneError
+from validate.scene.abaqus_lines import Deck
+from validate.scene.abaqus_nodes import nodes_of, placed
 from validate.scene.abaqus_text import NOWHERE, Home, KeywordBlock, blocks_of
 
 _SOLID = re.compile(r"C3D(4|5|6|8|10|15|20)[A-Z]*$")
@@ -39,15 +40,16 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises `SceneError` for no or several parts with solids, several instances of it, a number that
     is none, a node or set that is not there.
     """
-    blocks = blocks_of(path.read_bytes().decode("utf-8", "replace"))
+    deck = Deck(path)
+    blocks = blocks_of(deck)
     home, beside = _solid_home(blocks)
     instance = _instance(blocks, home)
     own = [b for b in blocks if _belongs(b, home, instance)]
-    numbers, points = _nodes(own)
+    numbers, points = nodes_of(own)
     solids = _solids(own)
     sets = _Sets(own, {n: i for i, n in enumerate(numbers)}, solids)
     found = {
-        "points": points if instance is None else _placed(points, instance),
+        "points": points if instance is None else placed(points, instance),
         **_cells(own, sets.place),
         **{f"nset.{name}": at for name, at in sets.nodes().items()},
         **{f"facet.{name}": at for name, at in _facets(own, sets).items()},
@@ -55,6 +57,8 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     beside += [f"{n} {kind}" for kind, n in _beside(own).items()]
     if beside:
         found["beside"] = np.array(", ".join(beside))
+    if deck.included:
+        found["included"] = np.array(", ".join(deck.included))
     if instance is not None and any(instance.rows):
         found["placed"] = np.array(instance.given.get("NAME", ""))
     return found
@@ -106,23 +110,6 @@ def _belongs(block: KeywordBlock, home: Home, instance: KeywordBlock | None) -> 
 def _same(one: str | None, other: str | None) -> bool:
     """Whether two names are one: Abaqus takes capitals and small letters for the same."""
     return (one or "").upper() == (other or "").upper()
-
-
-def _nodes(own: Sequence[KeywordBlock]) -> tuple[list[int], Floats]:
-    """Numbers and places (n, 3) of all nodes, each number once."""
-    at: dict[int, list[float]] = {}
-    for block in own:
-        if block.keyword != "NODE":
-            continue
-        for row in block.rows:
-            number, *x = block.floats(row) or [0.5]
-            if not number.is_integer() or len(x) not in (2, 3):
-                raise block.wrong(f"'{row[:40]}' is no number of a node with x, y, z")
-            if at.setdefault(int(number), x) != x:
-                raise block.wrong(f"node {int(number)} has two places; export one part")
-    if not at:
-        raise SceneError("no nodes in the part that has solid elements")
-    return list(at), np.array([[*x, 0.0][:3] for x in at.values()], dtype=np.float64)
 
 
 def _rows_of(block: KeywordBlock, size: int) -> Iterator[tuple[int, tuple[int, ...]]]:
@@ -291,19 +278,3 @@ def _surface(block: KeywordBlock, sets: _Sets) -> Iterator[tuple[int, ...]]:
             if int(face[1]) > len(faces):
                 raise block.wrong(f"element {element} has no face {face}")
             yield tuple(nodes[k] for k in faces[int(face[1]) - 1])
-
-
-def _placed(points: Floats, instance: KeywordBlock) -> Floats:
-    """Points where the instance stands: shifted, then turned about an axis by degrees."""
-    rows = [instance.floats(row) for row in instance.rows]
-    if [len(row) for row in rows] not in ([], [3], [3, 7]):
-        raise instance.wrong("expected a shift x, y, z, and a turn about two points by degrees")
-    moved = points + np.array(rows[0]) if rows else points
-    if len(rows) < 2:
-        return moved
-    a, b = np.array(rows[1][:3]), np.array(rows[1][3:6])
-    if not np.linalg.norm(b - a) > 0:
-        raise instance.wrong("turned about two points that are one")
-    axis = (b - a) / np.linalg.norm(b - a)
-    turn = Rotation.from_rotvec(np.deg2rad(rows[1][6]) * axis)
-    return np.asarray(turn.apply(moved - a) + a)

@@ -126,6 +126,8 @@ def _body(
         told["left out"] = f"{found['beside']} beside the solid; their sets name its facets"
     if "placed" in found:
         told["moved"] = f"to where its instance '{found['placed']}' stands"
+    if "included" in found:
+        told["included"] = str(found["included"])
     mesh = replace(mesh, facets=_facets(mesh, used, found))
     return ForeignBody(quadratic(mesh) if shape == "tetra10" else mesh, told)
 
