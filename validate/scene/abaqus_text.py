@@ -39,7 +39,7 @@ class KeywordBlock:
 
     def words(self) -> list[str]:
         """What stands between the commas of all rows, empty places left out."""
-        return [word for row in self.rows for word in map(str.strip, row.rstrip(", \t").split(","))ord]
+        return [word for row in self.rows for word in map(str.strip, row.split(",")) if word]
 
     @cached_property
     def wholes(self) -> list[int]:
