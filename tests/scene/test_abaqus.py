@@ -302,16 +302,44 @@ def test_a_rigid_punch_beside_the_body_is_left_out_and_told(tmp_path: Path) -> N
     assert got.told["left out"].startswith("'Punch' beside the solid")
 
 
-def test_two_bodies_and_a_body_that_stands_twice_are_refused(tmp_path: Path) -> None:
+def test_of_two_bodies_and_of_one_that_stands_twice_one_is_chosen(tmp_path: Path) -> None:
     text, path = cae(body("tet4"), ""), tmp_path / "cae.inp"
     path.write_text(text.replace("*End Instance", "*End Instance\n*Instance, name=Gel-2, part=Gel\n"
                                  "50., 0., 0.\n*End Instance"))  # fmt: skip
-    with pytest.raises(SceneError, match=r"'Gel' stands 2 times \('Gel-1', 'Gel-2'\): one body is"):
+    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\): .* --part Gel-1 -o"):
         read_foreign(path, "mm")
+    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\): one is read; choose it"):
+        read_foreign(path, "mm", "Gel")
+    for name, at in (("Gel-1", 0.0), ("gel-2", 0.05)):
+        got = read_foreign(path, "mm", name)
+        np.testing.assert_allclose(got.mesh.nodes, body("tet4").nodes + [at, 0, 0], atol=1e-12)
+        assert got.told["part"] == f"{name}: 12 of 12 elements"
+        assert ("bottom" in got.mesh.facets) == (name == "Gel-1")
     part = text[text.index("*Part") : text.index("*Assembly")]
     path.write_text(text.replace("*Assembly", part.replace("Gel", "Plate") + "*Assembly", 1))
-    with pytest.raises(SceneError, match=r"2 parts with solids \('Gel', 'Plate'\): one is read"):
+    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Plate'\): one is read"):
         read_foreign(path, "mm")
+    assert "'Gel'" in read_foreign(path, "mm", "PLATE").told["left out"]
+    assert "'Plate'" in read_foreign(path, "mm", "Gel").told["left out"]
+
+
+def test_a_set_of_elements_is_a_part(tmp_path: Path) -> None:
+    """With what it shares with the rest as a facet set, which the whole has inside."""
+    whole, path = body("hex8"), tmp_path / "x.inp"
+    middle = np.flatnonzero(np.abs(whole.nodes[:, 2] - 0.015) < 1e-9)
+    rows = (
+        f"*Elset, elset=Upper\n2\n*Nset, nset=joint\n{', '.join(str(10 + 2 * i) for i in middle)}"
+    )
+    path.write_text(inp(whole, extra=rows))
+    assert "joint" not in read_foreign(path, "m").mesh.facets
+    got = read_foreign(path, "m", "upper")
+    assert cell_volumes(got.mesh).sum() == pytest.approx(3e-6)
+    assert got.mesh.nodes[:, 2].min() == 0.015
+    assert got.mesh.nodes[got.mesh.facet_nodes("joint"), 2].max() == 0.015
+    with pytest.raises(
+        SceneError, match=r"no part 'x'; there are .*'Upper', .*by size 1, the whole"
+    ):
+        read_foreign(path, "m", "x")
 
 
 def test_sets_by_range_by_other_sets_and_by_elements(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -17,7 +18,7 @@ from validate.scene.box import grid
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import read_foreign
 from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
-from validate.scene.mesh_file import read_mesh
+from validate.scene.mesh_file import read_mesh, write_mesh
 
 SIZE = (0.01, 0.02, 0.03)
 
@@ -184,6 +185,52 @@ def test_two_bodies_without_a_common_node_are_told(tmp_path: Path) -> None:
     shown = CliRunner().invoke(cli, ["body", str(path), "--unit", "mm"])
     assert shown.exit_code == 0
     assert "x.msh: 2 bodies without a common node" in shown.output
+    assert "--part 1 (the largest)" in shown.output
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".npz", ".stl"])
+def test_one_of_two_bodies_is_chosen_by_size_and_by_label(suffix: str, tmp_path: Path) -> None:
+    """The smaller, which stands first in the file; its facet set comes with it."""
+    path, run = tmp_path / f"x{suffix}", CliRunner()
+    if suffix == ".stl":
+        small, large = pv.Box((0, 10, 0, 20, 0, 30)), pv.Box((50, 70, 0, 20, 0, 30))
+        small.merge(large).triangulate().save(path)
+    else:
+        one = linear()
+        nodes = np.vstack([one.nodes, one.nodes * [2, 1, 1] + [0.05, 0, 0]])
+        both = Mesh(nodes, np.vstack([one.cells, one.cells + len(one.nodes)]), "tet4")
+        gmsh2(path.with_suffix(".msh"), both)
+        write_mesh(replace(both, facets={"plate": facets_at(both, 0.0)}), tmp_path / "x.npz")
+    unit = [] if suffix == ".npz" else ["--unit", "mm"]
+    unit += ["--edge", "10mm"] if suffix == ".stl" else []
+    for part, volume in (("1", 12e-6), ("2", 6e-6))[suffix == ".stl" :]:
+        out = tmp_path / f"{part}.npz"
+        done = run.invoke(cli, ["body", str(path), *unit, "--part", part, "-o", str(out)])
+        assert done.exit_code == 0, done.output
+        got = read_mesh(out)
+        assert cell_volumes(got).sum() == pytest.approx(volume, rel=1e-3)
+        assert got.nodes[:, 0].min() == pytest.approx(0.05 if part == "1" else 0.0, abs=1e-4)
+        if suffix != ".stl":
+            low = got.facets["plate"]
+            assert (len(low), got.nodes[low][..., 2].max()) == (4, 0.0)
+    if suffix == ".npz":
+        odd = run.invoke(cli, ["body", str(path), "--part", "3"])
+        assert re.search(r"x.npz: no part '3'; .* 1 \(the largest\) to 2", str(odd.exception))
+
+
+def test_a_label_of_gmsh_is_a_part(tmp_path: Path) -> None:
+    """Two that share nodes: the lower half of a body."""
+    mesh, path = linear(), tmp_path / "x.msh"
+    upper = mesh.nodes[mesh.cells][..., 2].mean(axis=1) > SIZE[2] / 2
+    meshio.Mesh(
+        1e3 * mesh.nodes, [("tetra", mesh.cells)],
+        cell_data={k: [np.where(upper, 5, 4)] for k in ("gmsh:physical", "gmsh:geometrical")},
+        field_data={"fat": np.array([4, 3])},
+    ).write(path, file_format="gmsh22", binary=False)  # fmt: skip
+    fat, other = (read_foreign(path, "mm", part).mesh for part in ("fat", "label 5"))
+    for half, low in ((fat, 0.0), (other, SIZE[2] / 2)):
+        assert cell_volumes(half).sum() == pytest.approx(np.prod(SIZE) / 2)
+        assert half.nodes[:, 2].min() == low
 
 
 def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path: Path) -> None:
@@ -209,13 +256,9 @@ def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path
         read_mesh(tmp_path / "s.stl", "mm")
 
 
-@pytest.mark.parametrize("suffix", [".vtk", ".vtp"])
-def test_a_surface_of_vtk_is_told_how_to_come_in(suffix: str, tmp_path: Path) -> None:
-    """And the way that is told is one."""
-    ball = pv.Icosphere(radius=10, nsub=2)
-    ball.save(tmp_path / f"s{suffix}")
-    run = CliRunner()
-    refused = run.invoke(cli, ["body", str(tmp_path / f"s{suffix}"), "--unit", "mm"])
-    assert re.search(r"s\.vt[kp]: a surface of VTK .* mesh.save", str(refused.exception))
-    ball.save(tmp_path / "FILE.stl")
-    assert run.invoke(cli, ["body", str(tmp_path / "FILE.stl"), "--unit", "mm"]).exit_code == 0
+def test_a_surface_of_vtk_is_told_how_to_come_in(tmp_path: Path) -> None:
+    whole, run = pv.Box((0, 10, 0, 10, 0, 10)).triangulate(), CliRunner()
+    for name in ("s.vtk", "s.vtp"):
+        whole.save(tmp_path / name)
+        refused = run.invoke(cli, ["body", str(tmp_path / name), "--unit", "mm"])
+        assert re.search(rf"{name}: a surface of VTK .* mesh.save", str(refused.exception))

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from validate.cli.arguments import complain, pairs
 from validate.cli.display import say, table
-from validate.errors import UsageError
+from validate.errors import SceneError, UsageError
 from validate.places import try_file
-from validate.scene.body_facts import POOR, facts, pieces, quality
+from validate.scene.body_facts import POOR, facts, quality
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
@@ -17,6 +17,7 @@ from validate.scene.mesh import Mesh, quadratic
 from validate.scene.mesh_file import read_mesh, write_mesh
 from validate.scene.meshio_arrays import SURFACE
 from validate.scene.named_place import place_of
+from validate.scene.part_of_body import cells_of, only, pieces
 from validate.scene.select import facets_of
 from validate.units import in_si, split
 
@@ -25,6 +26,7 @@ def body(
     file: Path,
     unit: str | None,
     edge: str | None,
+    part: str | None,
     faces: tuple[str, ...],
     out: Path | None,
     *,
@@ -33,7 +35,7 @@ def body(
     """Reads the body in `file`, names its `faces`, says what it is like, writes it to `out`."""
     if out is not None:
         try_file(out)
-    found = _read(file, unit, edge)
+    found = _read(file, unit, edge, part)
     mesh = _named(found.mesh, pairs(faces, "--face"))
     mesh = quadratic(mesh) if curved else mesh
     say(str(file), "bold")
@@ -44,10 +46,10 @@ def body(
             f"{file.name}: {int((worst < POOR).sum())} elements of a quality below {POOR:g}, down "
             f"to {worst.min():.2g}: they shorten explicit steps; mesh it again"
         )
-    if (separate := pieces(mesh)) > 1:
+    if (separate := pieces(mesh).max()) > 1:
         complain(
             f"{file.name}: {separate} bodies without a common node; whatever holds one does not "
-            "hold the others: export one, or join them"
+            "hold the others: choose one, --part 1 (the largest), or join them in what made them"
         )
     if out is not None:
         told = "; ".join(f"{k} {v}" for k, v in found.told.items())
@@ -61,7 +63,7 @@ def _named(mesh: Mesh, faces: Mapping[str, str]) -> Mesh:
     return replace(mesh, facets={**mesh.facets, **chosen})
 
 
-def _read(file: Path, unit: str | None, edge: str | None) -> ForeignBody:
+def _read(file: Path, unit: str | None, edge: str | None, part: str | None) -> ForeignBody:
     suffix = file.suffix.lower()
     if suffix == ".vtp":
         raise UsageError(f"{file.name}: {SURFACE}")
@@ -76,12 +78,24 @@ def _read(file: Path, unit: str | None, edge: str | None) -> ForeignBody:
             "elements of an edge; leave it away"
         )
     if suffix == ".npz":
-        return ForeignBody(read_mesh(file, unit), {})
+        return _part(file, ForeignBody(read_mesh(file, unit), {}), part)
     if unit is None:
         raise UsageError(f"{file.name}: a file of this kind states no unit; say it: --unit mm")
     if suffix in FOREIGN:
-        return read_foreign(file, unit)
-    return filled(file, unit, _metres(edge) if edge else 0.0)
+        return read_foreign(file, unit, part)
+    return _part(file, filled(file, unit, _metres(edge) if edge else 0.0), part)
+
+
+def _part(file: Path, found: ForeignBody, part: str | None) -> ForeignBody:
+    """The part of a file that has no names for its parts."""
+    if part is None:
+        return found
+    try:
+        chosen = cells_of(found.mesh, part, {})
+    except SceneError as error:
+        raise SceneError(f"{file.name}: {error}") from None
+    told = {"part": f"{part}: {chosen.sum()} of {len(chosen)} elements"}
+    return ForeignBody(only(found.mesh, chosen), {**found.told, **told})
 
 
 def _metres(text: str) -> float:

@@ -191,6 +191,7 @@ def new(
 @click.argument("file", type=FILE)
 @click.option("--unit", metavar="UNIT", help="Of its lengths, as mm; not of npz (m).")
 @click.option("--edge", metavar="LENGTH", help="Of the elements that fill a surface, as 2mm.")
+@click.option("--part", metavar="PART", help="One of several: its name there, or 1 (the largest).")
 @click.option(
     "--face", "faces", multiple=True, metavar="NAME=WORDS",
     help="A facet set by place: top=zmax, side=x=20mm, or box A to B, near P (docs/new.md).",

@@ -34,16 +34,16 @@ _MOST = 10_000_000  # numbers of nodes and elements
 Elements = dict[int, tuple[int, ...]]  # nodes by the element's number
 
 
-def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Points (n, 3), solid cells by their shape, node sets and facets by name, what was left out.
+def arrays(path: Path, part: str | None = None) -> dict[str, NDArray[Any]]:
+    """Points (n, 3), solid cells by their shape, node sets, facets and sets of solids (the numbers
+    of their cells) by name, what was left out; of several parts or instances the one named `part`.
 
-    Raises `SceneError` for no or several parts with solids, several instances of it, a number that
-    is none, a node or set that is not there.
+    Raises `SceneError` for no part with solids, several of which none is named, a number that is
+    none, a node or set that is not there.
     """
     deck = Deck(path)
     blocks = blocks_of(deck)
-    home, beside = _solid_home(blocks)
-    instance = _instance(blocks, home)
+    (home, instance), beside = _body(blocks, part)
     own = [b for b in blocks if _belongs(b, home, instance)]
     numbers, points = nodes_of(own)
     solids = _solids(own)
@@ -53,7 +53,10 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         **_cells(own, sets.place),
         **{f"nset.{name}": at for name, at in sets.nodes().items()},
         **{f"facet.{name}": at for name, at in _facets(own, sets).items()},
+        **{f"part.{name}": at for name, at in sets.solid_sets().items()},
     }
+    whole = np.arange(len(solids))
+    found |= {f"part.{name}": whole for name in _names((home, instance)) if name}
     beside += [f"{n} {kind}" for kind, n in _beside(own).items()]
     if beside:
         found["beside"] = np.array(", ".join(beside))
@@ -72,30 +75,45 @@ def _type(block: KeywordBlock) -> str:
     return block.given.get("TYPE", "").upper()
 
 
-def _solid_home(blocks: Sequence[KeywordBlock]) -> tuple[Home, list[str]]:
-    """The one part or instance with solid elements, and what the others are."""
+_Body = tuple[Home, KeywordBlock | None]  # and the instance by which it stands somewhere
+
+
+def _body(blocks: Sequence[KeywordBlock], part: str | None) -> tuple[_Body, list[str]]:
+    """The one body with solid elements, and what the others are."""
     homes = list(dict.fromkeys(b.home for b in blocks if b.keyword == "ELEMENT"))
-    solid = [h for h in homes if any(_is_solid(b) for b in blocks if b.home == h)]
-    if len(solid) > 1:
-        listed = ", ".join(f"'{name}'" for _, name in solid)
-        raise SceneError(f"{len(solid)} parts with solids ({listed}): one is read; export it alone")
     if not homes:
         raise SceneError("no elements: no Abaqus input file, or one without a body")
-    mine = solid[0] if solid else homes[0]
-    return mine, [f"'{name}'" for kind, name in homes if (kind, name) != mine and name]
+    solid = [h for h in homes if any(_is_solid(b) for b in blocks if b.home == h)] or homes[:1]
+    bodies = [(home, at) for home in solid for at in _instances(blocks, home)]
+    found = _chosen(bodies, part)
+    return found, [f"'{name}'" for kind, name in homes if (kind, name) != found[0] and name]
 
 
-def _instance(blocks: Sequence[KeywordBlock], home: Home) -> KeywordBlock | None:
+def _chosen(bodies: Sequence[_Body], part: str | None) -> _Body:
+    """The only body, or the one of several of which the part or instance has that name."""
+    named = [b for b in bodies if any(_same(part, name) for name in _names(b))]
+    if len(bodies) == 1 or len(named) == 1:
+        return (named or bodies)[0]
+    listed = ", ".join(f"'{_names(b)[-1]}'" for b in (named or bodies)[:12])
+    first = _names((named or bodies)[0])[-1]
+    raise SceneError(
+        f"{len(named or bodies)} bodies ({listed}): one is read; choose it: validate body FILE "
+        f"--unit mm --part {first} -o body.npz"
+    )
+
+
+def _names(body: _Body) -> list[str]:
+    """Of the part, and of the instance; what is told of a body is the last."""
+    (_, name), instance = body
+    return [name] if instance is None else [name, instance.given.get("NAME", "")]
+
+
+def _instances(blocks: Sequence[KeywordBlock], home: Home) -> list[KeywordBlock | None]:
     """Where the body stands; none for a flat file and a part that stands nowhere."""
     kind, name = home
     key = {"PART": "PART", "INSTANCE": "NAME"}.get(kind)
     found = [b for b in blocks if b.keyword == "INSTANCE" and key and _same(b.given.get(key), name)]
-    if len(found) > 1:
-        names = ", ".join(f"'{b.given.get('NAME', '')}'" for b in found)
-        raise SceneError(
-            f"part '{name}' stands {len(found)} times ({names}): one body is read; export one alone"
-        )
-    return found[0] if found else None
+    return [*found] or [None]
 
 
 def _belongs(block: KeywordBlock, home: Home, instance: KeywordBlock | None) -> bool:
@@ -209,6 +227,12 @@ class _Sets:
         if name not in self._elements:
             raise block.wrong(f"there is no element set '{name}'")
         return self._elements[name]
+
+    def solid_sets(self) -> dict[str, Ints]:
+        """Of every set of solids their numbers, counted as they are read."""
+        at = {element: i for i, element in enumerate(self.solids)}
+        found = {k: [at[e] for e in v if e in at] for k, v in self._elements.items()}
+        return {name: np.array(rows, dtype=np.int64) for name, rows in found.items() if rows}
 
     def nodes(self) -> dict[str, Ints]:
         """Indices of the nodes of every set that has any here."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.part_of_body import pieces
 from validate.scene.shape_functions import CORNERS, brick_rule
 
 POOR = 0.1  # elements below such a quality shorten steps and spoil answers
@@ -30,18 +31,6 @@ def quality(mesh: Mesh) -> Floats:
     return np.asarray(12 * (3 * size) ** (2 / 3) / squares)
 
 
-def pieces(mesh: Mesh) -> int:
-    """How many bodies the mesh is: parts without a common node."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
-    n = len(mesh.nodes)
-    joined = coo_matrix((np.ones(len(first)), (first, mesh.cells.ravel())), shape=(n, n))
-    _, labels = connected_components(joined, directed=False)
-    return len(np.unique(labels[mesh.cells[:, 0]]))
-
-
 def facts(mesh: Mesh) -> Mapping[str, str]:
     """Counts, box, volume, quality and facet sets, in words with units."""
     volumes, q = cell_volumes(mesh), quality(mesh)
@@ -54,7 +43,7 @@ def facts(mesh: Mesh) -> Mapping[str, str]:
     sets = ", ".join(f"{name} ({len(f)} facets)" for name, f in sorted(mesh.facets.items()))
     return {
         "elements": f"{len(mesh.cells)} {mesh.kind}, {len(mesh.nodes)} nodes",
-        "bodies": str(pieces(mesh)),
+        "bodies": str(pieces(mesh).max()),
         "box": f"{box} mm, from ({at}) mm",
         "volume" if mesh.dimension == 3 else "area": size,
         "quality": f"worst {q.min():.3g} (element {int(q.argmin())}), median {np.median(q):.3g}; "

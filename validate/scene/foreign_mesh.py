@@ -19,13 +19,14 @@ from validate.errors import RecordingError, SceneError
 from validate.recording.formats.apart import decoded
 from validate.scene.abaqus_arrays import arrays as abaqus_arrays
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic, require_positive_cells
+from validate.scene.part_of_body import cells_of, only
 from validate.scene.shape_functions import EDGES
 from validate.units import in_si
 
 SUFFIXES = (".inp", ".msh", ".vtu", ".vtk")
 EXTRA = "meshes"
 _KINDS: Mapping[str, Kind] = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8"}
-_CELLS, _NSET, _FACET = "cells.", "nset.", "facet."
+_CELLS, _NSET, _FACET, _PART = "cells.", "nset.", "facet.", "part."
 _MOST = 64 * 2**20  # bytes: some 500 000 tetrahedra
 _STRAIGHT = 1e-3  # of an edge: how far its middle node may lie off
 _TURNED: Mapping[Kind, tuple[int, ...]] = {
@@ -60,23 +61,25 @@ def require_readable(path: Path) -> None:
         raise SceneError(f"{path.name}: {why}")
 
 
-def read_foreign(path: Path, unit: str) -> ForeignBody:
-    """The body, lengths in `unit`; nodes that no element has are left out.
+def read_foreign(path: Path, unit: str, part: str | None = None) -> ForeignBody:
+    """The body, lengths in `unit`; of several the `part` of that name or number (1: the largest);
+    nodes that no element has are left out.
 
     Elements whose nodes are told the other way round are turned, but in .inp, whose order has a
-    meaning. Raises `SceneError` for a file that is missing, too large or damaged, more than one
-    part, shapes other than linear and straight quadratic tetrahedra and linear hexahedra or several
-    of them; `UsageError` without the library.
+    meaning. Raises `SceneError` for a file that is missing, too large or damaged, several parts of
+    .inp of which none is chosen, a part that is not there, shapes other than linear and straight
+    quadratic tetrahedra and linear hexahedra or several of them; `UsageError` without the library.
     """
     factor = metres(path.name, unit)
     require_readable(path)
     abaqus = path.suffix.lower() == ".inp"
-    return _body(path.name, (_abaqus if abaqus else _others)(path), factor, turn=not abaqus)
+    found = _abaqus(path, part) if abaqus else _others(path)
+    return _body(path.name, found, factor, part, turn=not abaqus)
 
 
-def _abaqus(path: Path) -> dict[str, NDArray[Any]]:
+def _abaqus(path: Path, part: str | None) -> dict[str, NDArray[Any]]:
     try:
-        return abaqus_arrays(path)
+        return abaqus_arrays(path, part)
     except (SceneError, OSError) as error:
         raise SceneError(f"{path.name}: {error}") from None
 
@@ -89,7 +92,7 @@ def _others(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _body(
-    name: str, found: Mapping[str, NDArray[Any]], factor: float, *, turn: bool
+    name: str, found: Mapping[str, NDArray[Any]], factor: float, part: str | None, *, turn: bool
 ) -> ForeignBody:
     shapes = {k.removeprefix(_CELLS): v for k, v in found.items() if k.startswith(_CELLS)}
     if len(shapes) != 1 or next(iter(shapes)) not in _KINDS:
@@ -114,14 +117,19 @@ def _body(
     used, at = np.unique(cells, return_inverse=True)
     try:
         mesh = Mesh(points[used], at.reshape(cells.shape), kind)
+        if part is not None:
+            chosen = cells_of(mesh, part, _named(found))
+            used, mesh = used[np.unique(mesh.cells[chosen])], only(mesh, chosen)
         mesh, turned = _turned(mesh) if turn else (mesh, 0)
         require_positive_cells(mesh, "write their nodes the other way round, or mesh it again")
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
     told = {
-        "turned": f"{turned} of {len(cells)} elements",
+        "turned": f"{turned} of {len(mesh.cells)} elements",
         "not used": f"{unused} of {len(points)} nodes",
     }
+    if part is not None:
+        told["part"] = f"{part}: {len(mesh.cells)} of {len(cells)} elements"
     if "beside" in found:
         told["left out"] = f"{found['beside']} beside the solid; their sets name its facets"
     if "placed" in found:
@@ -130,6 +138,10 @@ def _body(
         told["included"] = str(found["included"])
     mesh = replace(mesh, facets=_facets(mesh, used, found))
     return ForeignBody(quadratic(mesh) if shape == "tetra10" else mesh, told)
+
+
+def _named(found: Mapping[str, NDArray[Any]]) -> dict[str, Ints]:
+    return {k.removeprefix(_PART): v for k, v in found.items() if k.startswith(_PART)}
 
 
 def _turned(mesh: Mesh) -> tuple[Mesh, int]:

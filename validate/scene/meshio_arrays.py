@@ -12,7 +12,7 @@ from validate.errors import SceneError
 
 LIBRARIES, MEMORY = ("meshio",), 2**26  # bytes beyond it and the file's
 _READ = ("2", "2.1", "2.2", "4.1")  # of Gmsh's formats
-_NSET, _CELLS, _FACET = "nset.", "cells.", "facet."
+_NSET, _CELLS, _FACET, _PART = "nset.", "cells.", "facet.", "part."
 _FLAT = {"triangle": 3, "quad": 4, "triangle6": 3, "quad8": 4, "quad9": 4}  # corners of a facet
 _NOT_SOLID = {*_FLAT, "line", "line3", "vertex"}
 _LABEL = "gmsh:physical"
@@ -23,8 +23,8 @@ SURFACE = (
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Points (n, 3), solid cells by meshio's names of their shapes, node sets and labelled facets
-    by name."""
+    """Points (n, 3), solid cells by meshio's names of their shapes, node sets, labelled facets and
+    labelled cells (their numbers, where all have one shape) by name."""
     if path.suffix.lower() == ".msh":
         _require_version(path)
     mesh = read_quietly(path, path.name)
@@ -37,6 +37,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         **{f"{_CELLS}{kind}": np.vstack(found) for kind, found in cells.items()},
         **{f"{_NSET}{name}": np.asarray(at) for name, at in mesh.point_sets.items()},
         **{f"{_FACET}{name}": at for name, at in _labelled(mesh).items()},
+        **{f"{_PART}{name}": at for name, at in _parts(mesh).items() if len(cells) == 1},
     }
 
 
@@ -51,6 +52,21 @@ def _labelled(mesh: Any) -> dict[str, NDArray[Any]]:
                 corners = block.data[labels == label][:, : _FLAT[block.type]]
                 found.setdefault(name, []).append(corners)
     return {k: np.vstack(v) for k, v in found.items() if len({a.shape[1] for a in v}) == 1}
+
+
+def _parts(mesh: Any) -> dict[str, NDArray[Any]]:
+    """Numbers of the solid cells with a label, by its name in Gmsh, else by its number."""
+    names = {(int(v[0]), int(v[1])): k for k, v in mesh.field_data.items()}
+    solid = [
+        labels
+        for block, labels in zip(mesh.cells, mesh.cell_data.get(_LABEL, ()), strict=False)
+        if block.type not in _NOT_SOLID
+    ]
+    labels = np.concatenate(solid) if solid else np.zeros(0)
+    return {
+        names.get((int(label), 3), f"label {int(label)}"): np.flatnonzero(labels == label)
+        for label in np.unique(labels[labels != 0])
+    }
 
 
 def read_quietly(path: Path, name: str) -> Any:
