@@ -112,6 +112,32 @@ def test_a_wrong_answer_is_named(here: Path, line: str, why: str) -> None:
     assert (code, why in said) == (2, True), said
 
 
+@pytest.mark.parametrize(("line", "why"), [
+    ('moved.markers = "A, B, C"', ""),
+    ('moved.markers = "A, B"', "2 markers, at least 3 are needed"),
+    ('moved.markers = "A, B, tip"', "tip not among A, B, C, D"),
+    ('material.E = "unknown"', "material.E = unknown: it is identified on a force that is judged"),
+])  # fmt: skip
+def test_what_markers_on_a_face_move_is_asked_before_it_runs(
+    here: Path, line: str, why: str
+) -> None:
+    write_recording(recording(markers=markers()), here / "m.mcap")
+    key, value = line.split(" = ")
+    said = {"body.shape": "block", "body.block": "40mm,30mm,50mm", "material.E": "20kPa",
+            "material.nu": "0.3", "held.all": "zmin", "moved.by": "markers", "moved.place": "zmax",
+            "moved.markers": "A,B,C", "seen.layout": "as seen", "accept.marker": "1mm",
+            "ranges.E": "0", "ranges.nu": "0", "ranges.load": "0"}  # fmt: skip
+    said[key] = value.strip('"')
+    if said["material.E"] == "unknown":
+        del said["ranges.E"]
+    (here / "m.toml").write_text("\n".join(f'{k} = "{v}"' for k, v in said.items()), "utf-8")
+    code, told = called("new", "mine", "--from", "m.mcap", "--answers", "m.toml")
+    assert (code, why in told) == (2 if why else 0, True), told
+    if not why:
+        parameters = load_file(here / "experiments" / "mine.py").parameters
+        assert parameters.moved.markers == ("A", "B", "C")
+
+
 def test_questions_are_a_file_of_answers(here: Path) -> None:
     code, listing = called("new", "mine", "--from", "all.mcap", "--questions", "--answers",
                            "a.toml")  # fmt: skip
@@ -147,6 +173,7 @@ def test_outlines_without_a_pose_are_asked_where_they_lie(here: Path) -> None:
     write_recording(recording(signals=log(), contours={"o": contours}), here / "o.mcap")
     listing = called("new", "mine", "--from", "o.mcap", "--questions", "--answers", "a.toml")[1]
     assert 'seen.pose = ""' in listing
+    assert "# answers to no question, left out: seen.layout, seen.still, accept.marker" in listing
     assert "open: nothing tells it" in listing
 
 

@@ -119,6 +119,21 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
     assert rms["marker.rms@high"] < 1.5 * np.sqrt(3) * SD  # of a length
 
 
+@pytest.mark.parametrize("places", [
+    {"A": (0.04, 0.03, 0.05), "B": (0.0, 0.03, 0.04), "C": (0.04, 0.0, 0.02), "D": (0, 0, 0.01)},
+    {"A": (0.04, 0.03, 0.05), "B": (0.04, 0.01, 0.04), "C": (0.04, 0.0, 0.02),
+     "D": (0.04, 0.02, 0.01)},
+], ids=["in space", "on a side"])  # fmt: skip
+def test_markers_as_seen_may_stand_anywhere(
+    places: dict[str, tuple[float, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{__name__}.PLACES", places)
+    p = replace(BASE, seen=replace(BASE.seen, markers="markers"))
+    found = recording(signals=log(), markers={"markers": tracked(stretched)})
+    result = compare(experiment(tmp_path, p, found, "marker"))
+    assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"agrees"}
+
+
 def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
     """u_z = -rho g (h z - z^2/2) / E on rollers, without contraction."""
 

@@ -127,13 +127,20 @@ def test_finished_cells_are_not_run_again(block: Path, tmp_path: Path) -> None:
     assert first.low < 20e3 < first.high
 
 
+def _heeds_ctrl_c() -> None:
+    """A shell that starts the tests in the background has them ignore it, and theirs too."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
 def test_what_is_stopped_goes_on_where_it_was(
     block: Path, tmp_path: Path, by: signal.Signals, code: int
 ) -> None:
     command = [sys.executable, "-m", "validate", "identify", str(block), "--workers", "0"]
-    stopped = subprocess.Popen([*command, "--out", str(tmp_path)], stderr=subprocess.PIPE)
+    stopped = subprocess.Popen(
+        [*command, "--out", str(tmp_path)], stderr=subprocess.PIPE, preexec_fn=_heeds_ctrl_c
+    )
     cells = tmp_path / "identified_block" / "study-identify" / "cells"
     end = time.monotonic() + 100
     while len(kept := list(cells.glob("*.json"))) < 2:

@@ -125,7 +125,8 @@ def on_a_terminal() -> bool:
 
 
 def listed(asks: Asks, given: Answers) -> str:
-    """The questions as a file of answers: those known so far, the given ones answered."""
+    """The questions as a file of answers: those known so far, the given ones answered, and which
+    were answers to none."""
     found: dict[str, str] = {}
     lines = []
     for _ in range(_MOST):
@@ -137,6 +138,8 @@ def listed(asks: Asks, given: Answers) -> str:
         found[question.key] = answer
         lines += [f"# {line}" for line in _explained(question)]
         lines.append(f'{question.key} = "{answer}"')
+    if odd := [key for key in given if key not in found]:
+        lines.append(f"# answers to no question, left out: {', '.join(odd)}")
     lines.append("# further questions may follow from these answers: list them with --answers")
     return "\n".join(lines)
 

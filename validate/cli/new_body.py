@@ -17,7 +17,7 @@ from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.measured_body import body_of
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_seen import AS_SEEN
+from validate.replay.measured_seen import AS_SEEN, FEWEST
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import GRAMMAR, axis_of, place_of
@@ -44,18 +44,12 @@ def _fits(recording: Recording) -> bool:
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
     asked = _of_the_body(found)
     mesh = _mesh_of(found)
-    asked += [
-        _path("material.E", f"Young's modulus, Pa or as 15kPa; {_UNKNOWN}: identified on the lower "
-              "part of the load", skip=_UNKNOWN),
-        _path("material.nu", "Poisson ratio"),
-        Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
-                 "beside it", choices=tuple(_LAWS)),
-    ]  # fmt: skip
     asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
     if forces and _unit(recording, found.get("moved.by", "")) == "m":
         asked.append(_topics("seen.force", "force on the moved place that is judged", forces))
+    asked += _of_the_material(found)
     return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
 
 
@@ -74,6 +68,19 @@ def _of_the_body(found: Answers) -> list[Question]:
     return asked
 
 
+def _of_the_material(found: Answers) -> list[Question]:
+    """The modulus is open only under a displacement with a force that is judged."""
+    sought = found.get("seen.force", _NONE) != _NONE
+    way = f"; {_UNKNOWN}: identified on the lower part of the load" if sought else ""
+    return [
+        Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
+                 check=_parsed("material.E", _UNKNOWN) if sought else _a_known_modulus),
+        _path("material.nu", "Poisson ratio"),
+        Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
+                 "beside it", choices=tuple(_LAWS)),
+    ]  # fmt: skip
+
+
 def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> list[Question]:
     by = found.get("moved.by")
     asked = [Question("moved.by", "what loads the body", open=True, choices=_movers(recording))]
@@ -87,7 +94,8 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
     asked.append(_place("moved.place", "place that is moved or pulled", mesh, is_open=True))
     if by == "markers":
         names = [n for m in recording.markers.values() for n in m.names]
-        asked.append(_path("moved.markers", f"markers on it, three or more, of {', '.join(names)}"))
+        text = f"markers on it, three or more, of {', '.join(names)}"
+        asked.append(Question("moved.markers", text, open=True, check=_three_of(names)))
     elif _unit(recording, by) == "m":
         asked.append(Question("moved.sideways", "whether the moved place is held across its "
                               "direction (glued, gripped), or slides", open=True,
@@ -181,12 +189,19 @@ def _judged(found: Answers) -> set[str]:
 # --- kinds of questions ---------------------------------------------------------------------------
 
 
-def _path(path: str, text: str, default: str = "", why: str = "", *, skip: str = "") -> Question:
+def _path(path: str, text: str, default: str = "", why: str = "") -> Question:
     """A parameter's value as --set takes it."""
-    return Question(path, text, default, why, open=not default, check=_parsed(path, skip))
+    return Question(path, text, default, why, open=not default, check=_parsed(path))
 
 
-def _parsed(path: str, skip: str) -> Callable[[str], Any]:
+def _a_known_modulus(text: str) -> None:
+    if text == _UNKNOWN:
+        raise UsageError("it is identified on a force that is judged under a displacement "
+                         "(seen.force, moved.by a signal in m), which is not here")  # fmt: skip
+    _parsed("material.E")(text)
+
+
+def _parsed(path: str, skip: str = "") -> Callable[[str], Any]:
     return lambda text: None if text == skip else with_values(MeasuredBody(), {path: text})
 
 
@@ -202,6 +217,17 @@ def _place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> 
 
 def _topics(key: str, text: str, topics: list[str]) -> Question:
     return Question(key, text, topics[0], "the first recorded", choices=(*topics, _NONE))
+
+
+def _three_of(names: Sequence[str]) -> Callable[[str], Any]:
+    def check(text: str) -> None:
+        chosen = [part.strip() for part in text.split(",")]
+        if absent := [n for n in chosen if n not in names]:
+            raise UsageError(f"{', '.join(absent)} not among {', '.join(names)}")
+        if len(set(chosen)) < FEWEST:
+            raise UsageError(f"{len(set(chosen))} markers, at least {FEWEST} are needed")
+
+    return check
 
 
 def _there(text: str) -> None:

@@ -18,6 +18,7 @@ from validate.register.markers import MarkerObservation, Together, observe_marke
 from validate.register.observation import Observation, Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
+from validate.register.two_step import fit_plane
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_outline import observed_outline
 from validate.scene.mesh import Mesh
@@ -32,7 +33,7 @@ Kind = Literal["weighs", "pulls", "moves", "follows"]
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
 _At = tuple[Mesh, Path]  # the body's mesh, and the experiment's folder
 _AGAINST = 0.2  # of the farthest marker's way: so far back the mean of all may go
-_FEWEST = 3  # markers on a place that follows them
+FEWEST = 3  # markers on a place that follows them
 
 
 def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
@@ -146,7 +147,7 @@ def prescribed(recording: Recording, p: MeasuredBody, where: Place, at: _At) -> 
     markers, or names that are none."""
     markers = recording.marker(_topic(recording, p))
     absent = [n for n in p.moved.markers if n not in markers.names]
-    if absent or len(p.moved.markers) < _FEWEST:
+    if absent or len(p.moved.markers) < FEWEST:
         raise UsageError(
             f"moved.markers = {','.join(p.moved.markers) or 'none'}: "
             f"{f'{absent} are not recorded' if absent else 'three or more are needed'}; the "
@@ -259,12 +260,21 @@ def _registered(recording: Recording, p: MeasuredBody, at: _At) -> MarkerObserva
         markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
         sd=noise(markers),
     )  # fmt: skip
-    up = np.array([0.0, 0.0, 1.0])
-    same = (up, up) if p.seen.layout == AS_SEEN else None
+    same = _side(markers.x[0]) if p.seen.layout == AS_SEEN else None
     return observe_markers(
         markers, layout, mesh, how=p.seen.registration, up=same, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
     )  # fmt: skip
+
+
+def _side(x: Floats) -> tuple[Floats, Floats] | None:
+    """The normal of planar markers (k, 3) m, which are in one frame twice: it tells them from their
+    mirror image. None for others, whose shape does."""
+    try:
+        normal = fit_plane(x).axes[:, 2]
+    except RegistrationError:
+        return None
+    return normal, normal
 
 
 def layout_of(recording: Recording, text: str, folder: Path) -> dict[str, Floats]:
@@ -309,9 +319,9 @@ def _selections(p: MeasuredBody, drive: SignalObservation, kind: Kind) -> tuple[
 
 
 def _window(label: str, t: Floats, words: str) -> Selection:
-    if len(t) < _FEWEST:
+    if len(t) < FEWEST:
         raise ComparisonError(
-            f"window '{label}': {len(t)} {words}, {_FEWEST} are needed; set seen.fit_to or "
+            f"window '{label}': {len(t)} {words}, {FEWEST} are needed; set seen.fit_to or "
             "seen.states"
         )
     return Selection(label, t, words)
