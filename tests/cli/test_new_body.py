@@ -1,5 +1,6 @@
 """`validate new` by questions: from markers, outlines or forces and any body to a verdict."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -9,7 +10,7 @@ from click.testing import CliRunner
 
 from validate.cli.asking import Question, answered, listed, read_answers
 from validate.cli.main import cli
-from validate.errors import UsageError
+from validate.errors import RegistrationError, UsageError
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
 from validate.replay import compare
@@ -205,3 +206,31 @@ def test_a_file_of_answers_is_toml(tmp_path: Path) -> None:
     for path in (file, tmp_path / "none.toml"):
         with pytest.raises(UsageError):
             read_answers(path)
+
+
+def test_markers_that_the_layout_calls_otherwise_are_named(here: Path) -> None:
+    """They were "0 names, 0 different ones" where none is called alike, and left out in silence."""
+    head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
+    head += "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+    seen = markers()["m"]
+    fifth = np.concatenate([seen.x, seen.x[:, :2].mean(axis=1, keepdims=True)], axis=1)
+    five = replace(seen, names=(*seen.names, "E"), x=fifth)
+    write_recording(recording(signals=log(), markers={"m": five}), here / "all.mcap")
+    x = 1e3 * fifth[0]
+    (here / "a.toml").write_text(PRESSED.replace("as seen", "own.fcsv"), "utf-8")
+
+    def laid(names: str) -> None:
+        rows = (
+            f"1,{p[0]},{p[1]},{p[2]},0,0,0,1,1,1,0,{n},,\n" for n, p in zip(names, x, strict=True)
+        )
+        (here / "own.fcsv").write_text(head + "".join(rows), "utf-8")
+
+    laid("abcde")
+    called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
+    experiment = load_file(here / "experiments" / "mine.py")
+    with pytest.raises(
+        RegistrationError, match="has 'a', 'b', 'c', 'd', 'e'; the recording has 'A', "
+    ):
+        compare(experiment)
+    laid("ABCDX")
+    assert "markers not in the layout are left out: 'E'" in compare(experiment).notes

@@ -1,5 +1,6 @@
 """A measured body's recording, registered: what moves it, what is compared, at which instants."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -224,7 +225,9 @@ def _markers(
         rest=whole.rest[kept], tre=whole.tre[kept],
     )  # fmt: skip
     found = since_rest(part, at[0], noise(source), samples, p.seen.stands)
-    said = (f"markers not seen at rest are left out: {', '.join(unseen)}",) if unseen else ()
+    bare = [n for n in source.names if n not in whole.names]
+    left = (("not seen at rest", unseen), ("not in the layout", bare))
+    said = tuple(f"markers {why} are left out: {_shown(names)}" for why, names in left if names)
     return replace(found, together=_TOGETHER), said
 
 
@@ -256,6 +259,11 @@ def _registered(recording: Recording, p: MeasuredBody, at: _At) -> MarkerObserva
     if p.seen.layout != AS_SEEN:
         layout = layout_of(recording, p.seen.layout, folder)
     kept = [i for i, n in enumerate(markers.names) if n in layout]
+    if not kept:
+        raise RegistrationError(
+            f"seen.layout = {p.seen.layout} has {_shown(layout)}; the recording has "
+            f"{_shown(markers.names)}: no marker's name is in both; spell them as recorded"
+        )
     markers = replace(
         markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
         sd=noise(markers),
@@ -265,6 +273,11 @@ def _registered(recording: Recording, p: MeasuredBody, at: _At) -> MarkerObserva
         markers, layout, mesh, how=p.seen.registration, up=same, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
     )  # fmt: skip
+
+
+def _shown(names: Iterable[str]) -> str:
+    found = [repr(name) for name in names]
+    return ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
 
 
 def _side(x: Floats) -> tuple[Floats, Floats] | None:
