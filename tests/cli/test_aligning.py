@@ -73,8 +73,13 @@ def test_a_drift_is_said_enters_the_sd_and_is_taken_out_on_demand(tmp_path: Path
     assert "--drift takes it out" in err
     blunt = float(read_recording(out).record("clock_offset/markers")["sd"])
     assert blunt > drift * 55 / np.sqrt(12) * 0.9
-    assert here("align", *given, *BY, "--drift", "-o", str(out))[0] == 0
+    assert f"sd {blunt:.2g} s" in " ".join(said.split())
+    code, said, err = here("align", *given, *BY, "--drift", "-o", str(out))
+    assert (code, err) == (0, "")
     found = read_recording(out)
+    record = found.record("clock_offset/markers")
+    written = f"offset: {float(record['seconds']):+.6g} s, sd {float(record['sd']):.2g} s"
+    assert written in " ".join(said.split())  # of the straightened clock, not of what it was
     assert float(found.record("clock_drift/seen")["rate"]) == pytest.approx(drift, rel=0.03)
     t = found.markers["markers"].t - found.signals["force"].t[0]
     own = np.arange(0, 55, 0.04)
@@ -99,6 +104,8 @@ def test_three_files_come_onto_the_first_clock(tmp_path: Path, late: float) -> N
     assert (code, err) == (0, "")
     told = " ".join(said.split())
     assert "seen.mcap: offset: +0.73" in told
+    record = read_recording(out).record("clock_offset/markers")
+    assert f"seen.mcap: offset: {float(record['seconds']):+.6g} s" in told
     assert "laser.mcap: offset: " in told
     assert all(float(share.split()[0]) > 0.99 for share in told.split("they correlate by ")[1:])
     found = read_recording(out)
@@ -122,6 +129,10 @@ def test_one_file_that_does_not_follow_is_named_and_nothing_is_written(tmp_path:
     assert "seen.mcap" not in why
     assert not Path(out).exists()
     assert "--by: 1 given for 2 further files" in refused("align", *given[:3], *BY, "-o", out)
+    for odd in ("force", "=laser", "force="):
+        assert f"--by {odd}: expected CHANNEL=CHANNEL" in refused(
+            "align", *given[:2], "--by", odd, "-o", out
+        )
     assert "1 file, at least 2" in refused("align", given[0], *BY, "-o", out)
 
 
@@ -151,6 +162,9 @@ def test_a_flash_marks_images(tmp_path: Path) -> None:
     pair = (str(tmp_path / "lamp.mcap"), str(tmp_path / "us.mcap"))
     code, _, _ = here("align", *pair, *by, "-o", str(out))
     assert code == 0
+    for ignored in (("--drift",), ("--within", "3"), ("--correlation", "0.9")):
+        why = refused("align", *pair, *by, *ignored, "-o", str(tmp_path / "x.mcap"))
+        assert f"--event step: {ignored[0]} is of the correlation; leave it away" in why
     record = read_recording(out).record("clock_offset/images")
     assert float(record["seconds"]) == pytest.approx(1.0, abs=0.03)
     assert float(record["sd"]) == pytest.approx(0.05 / np.sqrt(12), rel=0.2)

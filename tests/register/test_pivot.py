@@ -124,6 +124,10 @@ def test_the_command_tells_the_tip_and_writes_its_path(reference: bool, tmp_path
 def test_what_the_command_cannot_use_is_told(tmp_path: Path) -> None:
     x, out = recording(tmp_path), str(tmp_path / "y.mcap")
     assert "there are Stylus" in refused("calibrate", str(x), "--pivot", "Pen", "-o", out)
+    both = refused("calibrate", str(x), "--pivot", "Stylus", "--unit", "mm", "-o", out)
+    assert "--unit: of an image plane, not of --pivot Stylus" in both
+    lone = refused("calibrate", str(x), "--tip", "1mm,2mm,3mm", "-o", out)
+    assert "--reference and --tip are of --pivot TOOL" in lone
     odd = ("calibrate", str(x), "--pivot", "Stylus", "-o", out, "--tip")
     assert "expected three lengths" in refused(*odd, "1mm")
     assert "never stands" in refused(*odd, "500mm,0mm,0mm")

@@ -1,7 +1,7 @@
 """`validate align`: files of one test, whose clocks know nothing of each other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,7 +15,7 @@ from validate.places import try_file
 from validate.recording.alignment import Offset, offset_by_correlation
 from validate.recording.channels import channel
 from validate.recording.events import offset_by_event
-from validate.recording.lag import correlation_at
+from validate.recording.lag import MIN_CORRELATION, correlation_at
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.recording.together import (
@@ -62,6 +62,7 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
 
     Every file is tried; where one cannot be aligned, nothing is written.
     """
+    _require_of_the_event(wanted)
     try_file(out)
     named = _by(files, by)
     first, *others = (read_recording(file) for file in files)
@@ -71,7 +72,7 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
     for file, other, names in zip(files[1:], others, named, strict=True):
         pair = _Pair(file, names, channel(first, names[0]), channel(other, names[1]))
         try:
-            offset, drift = _aligned(pair, wanted, several=len(others) > 1)
+            pair, offset, drift = _aligned(pair, wanted, several=len(others) > 1)
         except RecordingError as error:
             refused.append(f"{file.name}: {error}" if len(others) > 1 else str(error))
             continue
@@ -86,6 +87,15 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
     written(whole, out)
 
 
+def _require_of_the_event(wanted: HowAligned) -> None:
+    """What only a correlation has is refused beside an event, which would not look at it."""
+    given = {"--within": wanted.within is not None, "--drift": wanted.straighten,
+             "--correlation": wanted.correlation != MIN_CORRELATION}  # fmt: skip
+    if wanted.event and any(given.values()):
+        said = ", ".join(name for name, is_given in given.items() if is_given)
+        raise UsageError(f"--event {wanted.event}: {said} is of the correlation; leave it away")
+
+
 def _by(files: Sequence[Path], by: Sequence[str]) -> list[tuple[str, str]]:
     """What moves alike in the first file and each further one."""
     if len(files) < 2:
@@ -95,32 +105,32 @@ def _by(files: Sequence[Path], by: Sequence[str]) -> list[tuple[str, str]]:
             f"--by: {len(by)} given for {len(files) - 1} further files; give one for each, in "
             "their order"
         )
-    found = [next(iter(pairs((one,), "--by").items())) for one in by]
-    for one, (_, moved) in zip(by, found, strict=True):
-        if not moved:
+    for one in by:
+        if not all(map(str.strip, one.partition("="))):
             raise UsageError(
                 f"--by {one}: expected CHANNEL=CHANNEL, of the first and a further file"
             )
-    return found
+    return [next(iter(pairs((one,), "--by").items())) for one in by]
 
 
-def _aligned(pair: _Pair, wanted: HowAligned, *, several: bool) -> tuple[Offset, ClockDrift | None]:
-    """The offset of a file, and the drift to be taken out; both are told."""
+def _aligned(
+    pair: _Pair, wanted: HowAligned, *, several: bool
+) -> tuple[_Pair, Offset, ClockDrift | None]:
+    """The pair as it is written, its offset, and the drift that is taken out; all are told."""
     offset = _offset(pair.reference, pair.stream, wanted)
     prefix = f"{pair.file.name}: " if several else ""
-    _tell_offset(pair, offset, prefix)
     drift = None if wanted.event else _drift(pair, offset, prefix)
-    if drift is None:
-        return offset, None
-    say(f"{prefix}drift: {1e6 * drift.rate:+.4g} ppm, sd {1e6 * drift.sd:.2g} ppm", indent="  ")
-    if wanted.straighten:
-        return _offset(pair.reference, stretched_signal(pair.stream, drift), wanted), drift
-    if drift.seen:
+    if drift is not None and wanted.straighten:
+        pair = replace(pair, stream=stretched_signal(pair.stream, drift))
+        offset = _offset(pair.reference, pair.stream, wanted)
+    elif drift is not None and drift.seen:
+        offset = with_drift(offset, drift)
         complain(
             f"{prefix}the clocks run apart by {1e3 * drift.apart:.3g} ms over {drift.span:.4g} s, "
             "which stands in the offset's sd; --drift takes it out"
         )
-    return with_drift(offset, drift), None
+    _tell_offset(pair, offset, prefix)
+    return pair, offset, drift if wanted.straighten else None
 
 
 def _offset(reference: Signal, stream: Signal, wanted: HowAligned) -> Offset:
@@ -143,7 +153,10 @@ def _tell_offset(pair: _Pair, offset: Offset, prefix: str) -> None:
 
 def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:
     try:
-        return drift_of(pair.reference, pair.stream, offset)
+        drift = drift_of(pair.reference, pair.stream, offset)
+        told = f"{1e6 * drift.rate:+.4g} ppm, sd {1e6 * drift.sd:.2g} ppm"
+        say(f"{prefix}drift: {told}", indent="  ")
+        return drift
     except RecordingError as error:
         why = f"not known, half of the recording does not tell it ({error})"
         say(f"{prefix}drift: {why}", indent="  ")

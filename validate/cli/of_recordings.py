@@ -156,6 +156,11 @@ def calibrate(
 
     With --pivot: where the tip of a tracked tool is.
     """
+    images = [f"--{name}" for name in ("points", "targets", "unit", "probe") if given[name]]
+    if tool is not None and images:
+        raise click.UsageError(f"{', '.join(images)}: of an image plane, not of --pivot {tool}.")
+    if tool is None and (reference or rough):
+        raise click.UsageError("--reference and --tip are of --pivot TOOL; say it.")
     if tool is not None:
         from validate.cli import pivoting
 

@@ -47,7 +47,8 @@ def coarse_lag(
         best = 100 * float(overlap[np.abs(tau) <= within + step].max(initial=0)) / b_seen.sum()
         raise RecordingError(
             f"within {within:g} s the streams overlap by {best:.0f} % at most, at least "
-            f"{100 * min_coverage:.0f} % are needed; widen the search or record longer together"
+            f"{100 * min_coverage:.0f} % are needed; widen the search (--within) or record "
+            "longer together"
         )
     return _only_peak(tau[usable], correlation[usable], within, min_correlation)
 
@@ -58,7 +59,8 @@ def _only_peak(tau: Floats, correlation: Floats, within: float, least: float) ->
     if best < least:
         raise RecordingError(
             f"the streams correlate by {best:.2f} at most (at {tau[peak]:+.4g} s), at least "
-            f"{least:g} is needed; align them by a marked event, or state what is enough"
+            f"{least:g} is needed; widen the search (--within), align them by a "
+            "marked event (--event), or state what is enough (--correlation)"
         )
     rivals = 1 - correlation**2 <= AMBIGUITY * (1 - best**2) + 1e-9
     rivals &= correlation > 0
@@ -66,15 +68,15 @@ def _only_peak(tau: Floats, correlation: Floats, within: float, least: float) ->
         raise RecordingError(
             f"ambiguous: correlation {best:.3f} at {tau[peak]:+.4g} s goes on to the edge of the "
             f"search ({tau[0]:+.4g}..{tau[-1]:+.4g} s), as ramps do or an offset beyond {within:g} "
-            "s; widen the search or align by a marked event"
+            "s; widen the search (--within) or align by a marked event (--event)"
         )
     at = np.flatnonzero(rivals)
     if (np.diff(at) > 1).any():
         other = at[np.argmax(np.where(_far(at, peak), correlation[at], -1))]
         raise RecordingError(
             f"ambiguous: correlation {best:.3f} at {tau[peak]:+.4g} s and {correlation[other]:.3f} "
-            f"at {tau[other]:+.4g} s, as in periodic signals; narrow the search or align by a "
-            "marked event"
+            f"at {tau[other]:+.4g} s, as in periodic signals; narrow the search (--within) or "
+            "align by a marked event (--event)"
         )
     return float(tau[peak])
 

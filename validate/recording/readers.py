@@ -76,12 +76,13 @@ def named(kind: str) -> Reader:
 
 def recognised(path: Path) -> Reader:
     """The first reader that recognises the path; raises `UsageError` where none does, with what to
-    do where it is of a kind that is known but not read."""
+    do where it is of a kind that is known but not read, and where there is no such file."""
+    if not path.exists():
+        raise UsageError(f"{path}: no such file or folder")
     for reader in READERS:
         if reader is INSTRON and (said := known_unread(path)):
             raise UsageError(said)
         if reader.recognises(path):
             return reader
     kinds = ", ".join(f"{r.name} ({r.doc})" for r in READERS)
-    missing = "" if path.exists() else "no such file or folder; "
-    raise UsageError(f"{path}: {missing}not recognised as any of {kinds}; say which with --as KIND")
+    raise UsageError(f"{path}: not recognised as any of {kinds}; say which with --as KIND")
