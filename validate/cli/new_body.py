@@ -25,7 +25,7 @@ from validate.scene.named_place import GRAMMAR, axis_of, place_of
 _UNKNOWN, _NONE, _RECORDED = "unknown", "none", "recorded"
 _LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "linear"}
 _SHAPES = ("file", "block", "cylinder")
-_FEW = 600  # cells of a mesh file whose quadratic ones can be halved twice in a minute
+_FEW = 150  # cells of a mesh file whose quadratic ones are halved twice in some minutes
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
              "contour": ("m", "distance of the outlines, as 0.5mm")}  # fmt: skip
 _PATHS = {p.path for p in describe(MeasuredBody())}
