@@ -268,7 +268,7 @@ def _parse(hint: Any, path: str, text: str, unit: str) -> Any:
         return choices[text]
     if get_origin(hint) is tuple:
         parts = text.split(",") if text else []
-        if len({bool(found[1]) for found in map(split, parts) if found}) > 1:
+        if len({bool(found[1]) for found in map(split, parts) if found and found[0]}) > 1:
             raise UsageError(f"{path}={text}: all in {unit} without unit, or each with its own")
         return tuple(_parse(get_args(hint)[0], path, part.strip(), unit) for part in parts)
     if hint is bool:

@@ -139,6 +139,28 @@ def test_what_markers_on_a_face_move_is_asked_before_it_runs(
         assert parameters.moved.markers == ("A", "B", "C")
 
 
+def test_images_alone_lead_to_an_experiment_by_what_was_noted(here: Path) -> None:
+    ring = np.array([(0.01, 0.01), (0.03, 0.01), (0.03, 0.04), (0.01, 0.04)])
+    t = T[::20]
+    seen = Contours(t, tuple(ring for _ in t), 1e-5, np.eye(4), "image", images="us")
+    frames = Frames(t, tuple(np.zeros((9, 9), np.uint8) for _ in t), (1e-3, 1e-3), np.eye(4), "i")
+    write_recording(recording(frames={"us": frames}), here / "us.mcap")
+    assert "validate outline" in called("new", "mine", "--from", "us.mcap", "--questions")[1]
+    write_recording(recording(frames={"us": frames}, contours={"o": seen}), here / "o.mcap")
+    said = {"body.shape": "block", "body.block": "40mm,30mm,50mm", "material.E": "20kPa",
+            "material.nu": "0.3", "held.all": "zmin", "moved.by": "noted", "moved.place": "zmax",
+            "moved.along": "-z", "moved.noted": "0, 1mm", "moved.sideways": "false",
+            "seen.pose": "fitted", "seen.image_x": "+x", "seen.image_y": "+z",
+            "accept.contour": "1mm", "ranges.E": "0", "ranges.nu": "0", "ranges.load": "5%",
+            }  # fmt: skip
+    (here / "o.toml").write_text("\n".join(f'{k} = "{v}"' for k, v in said.items()), "utf-8")
+    code, told = called("new", "mine", "--from", "o.mcap", "--answers", "o.toml")
+    assert (code, "not used" in told) == (0, False), told
+    text = (here / "experiments" / "mine.py").read_text("utf-8")
+    assert len(text.splitlines()) <= 60
+    assert load_file(here / "experiments" / "mine.py").parameters.moved.noted == (0.0, 1e-3)
+
+
 def test_questions_are_a_file_of_answers(here: Path) -> None:
     code, listing = called("new", "mine", "--from", "all.mcap", "--questions", "--answers",
                            "a.toml")  # fmt: skip

@@ -172,16 +172,16 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def outline(share: float) -> Any:
+    """The side of a block pressed by a share of 1 mm: its width grows, its height falls."""
+    w, h = SIZE[0] * (1 + NU * 0.02 * share), SIZE[2] * (1 - 0.02 * share)
+    s = np.linspace(0, 1, 30, endpoint=False)[:, None]
+    corners = np.array([[0, 0], [w, 0], [w, h], [0, h]])
+    return np.vstack([a + s * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0),
+                                                      strict=True)])  # fmt: skip
+
+
 def test_outlines_of_a_section(tmp_path: Path) -> None:
-    """The side of a pressed block: its width grows, its height falls."""
-
-    def outline(share: float) -> Any:
-        w, h = SIZE[0] * (1 + NU * 0.02 * share), SIZE[2] * (1 - 0.02 * share)
-        s = np.linspace(0, 1, 30, endpoint=False)[:, None]
-        corners = np.array([[0, 0], [w, 0], [w, h], [0, h]])
-        return np.vstack([a + s * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0),
-                                                          strict=True)])  # fmt: skip
-
     t = T[::16]
     shapes = tuple(outline(float(v)) for v in np.clip((t - 0.5) / 3.0, 0, 1))
     contours = Contours(t, shapes, 2e-5, np.eye(4), "image")
@@ -198,6 +198,24 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
     assert any("was fitted" in note for note in fitted.notes)
     with pytest.raises(UsageError, match="two directions at right angles"):
         compare(experiment(tmp_path, replace(p, seen=replace(p.seen, image_y="+x")), seen))
+
+
+def test_a_motion_that_was_only_noted_is_judged_by_outlines(tmp_path: Path) -> None:
+    """Pressed by .4 mm in half of the time, by 1 mm at the end; as if by 2 mm it differs."""
+    t = np.linspace(0.0, 2.0, 11)
+    shapes = tuple(outline(float(v)) for v in np.interp(t, [0, 1, 2], [0, 0.4, 1.0]))
+    looks = SeenOf(outline="o", pose="declared", image_y="+z", origin=(0.0, 0.015, 0.0))
+    by = MovedBy("noted", "zmax", "-z", sideways=False, noted=(0.0, 0.4e-3, 1e-3))
+    p = replace(BASE, moved=by, seen=looks)
+    seen = recording(contours={"o": Contours(t, shapes, 2e-5, np.eye(4), "image")})
+    names = {"contour.rms@low": "agrees", "contour.rms@high": "agrees"}
+    assert verdicts(compare(experiment(tmp_path, p, seen, "contour"))) == names
+    twice = replace(p, moved=replace(by, noted=(0.0, 2e-3)))
+    found = verdicts(compare(experiment(tmp_path, twice, seen, "contour")))
+    assert found["contour.rms@high"] == "differs"
+    for noted in ((), (1e-3,), (1e-3, 1e-3)):
+        with pytest.raises(UsageError, match="two amounts or more that differ"):
+            compare(experiment(tmp_path, replace(p, moved=replace(by, noted=noted)), seen))
 
 
 def test_a_mesh_file_is_found_beside_the_experiment(tmp_path: Path) -> None:

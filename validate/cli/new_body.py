@@ -17,7 +17,7 @@ from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.measured_body import body_of
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_seen import AS_SEEN, FEWEST
+from validate.replay.measured_seen import AS_SEEN, FEWEST, NOTED
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import GRAMMAR, axis_of, place_of
@@ -33,9 +33,7 @@ _PATHS = {p.path for p in describe(MeasuredBody())}
 
 def _fits(recording: Recording) -> bool:
     units = {s.unit for s in recording.signals.values()}
-    return bool(recording.markers) or bool(units & {"m", "N"} and (
-        recording.contours or {"m", "N"} <= units
-    ))  # fmt: skip
+    return bool(recording.markers or recording.contours or {"m", "N"} <= units)
 
 
 # --- the questions --------------------------------------------------------------------------------
@@ -83,7 +81,14 @@ def _of_the_material(found: Answers) -> list[Question]:
 
 def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> list[Question]:
     by = found.get("moved.by")
-    asked = [Question("moved.by", "what loads the body", open=True, choices=_movers(recording))]
+    asked = [
+        Question(
+            "moved.by",
+            f"what loads the body; {NOTED}: a place was moved, by what was written down alone",
+            open=True,
+            choices=_movers(recording),
+        )
+    ]
     if by is None:
         return asked
     if by != "markers":
@@ -97,6 +102,9 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
         text = f"markers on it, three or more, of {', '.join(names)}"
         asked.append(Question("moved.markers", text, open=True, check=_three_of(names)))
     elif _unit(recording, by) == "m":
+        if by == NOTED:
+            asked.append(_path("moved.noted", "its motion as it was noted, evenly from the first "
+                               "instant to the last, straight between, as 0,2mm,5mm"))  # fmt: skip
         asked.append(Question("moved.sideways", "whether the moved place is held across its "
                               "direction (glued, gripped), or slides", open=True,
                               choices=("true", "false")))  # fmt: skip
@@ -105,7 +113,7 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
 
 def _movers(recording: Recording) -> tuple[str, ...]:
     signals = [t for t, s in recording.signals.items() if s.unit in ("m", "N")]
-    return (*signals, *(("markers",) if recording.markers else ()), "gravity")
+    return (*signals, *(("markers",) if recording.markers else ()), "gravity", NOTED)
 
 
 def _of_the_supports(mesh: Mesh | None) -> list[Question]:
@@ -245,6 +253,8 @@ def _facets(mesh: Mesh | None) -> Callable[[str], Any]:
 
 
 def _unit(recording: Recording, topic: str) -> str:
+    if topic == NOTED:
+        return "m"
     found = recording.signals.get(topic)
     return found.unit if found is not None else ""
 
@@ -336,7 +346,7 @@ def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
 BODY = NewKind(
     "body",
     "any body, held and moved where you say, judged by force, markers or outlines",
-    "markers, or outlines with a signal in m or N",
+    "markers, outlines, or signals in m and N",
     "FEM",
     "new_body.py.txt",
     _fits,

@@ -58,13 +58,17 @@ class HeldAt:
 @dataclass(frozen=True)
 class MovedBy:
     """What loads the body: a signal in m (moves a place) or N (pulls at it), "markers" that sit on
-    a place, which follows them as a rigid body, or "gravity"."""
+    a place, which follows them as a rigid body, "gravity", or a motion of a place that was "noted"
+    by hand where nothing recorded it."""
 
-    by: str = quantity("gravity", "1", "a signal's topic, or: markers, gravity")
+    by: str = quantity("gravity", "1", "a signal's topic, or: markers, gravity, noted")
     place: str | None = quantity(None, "1", "where; gravity needs none")
     along: str = quantity("-z", "1", "direction: +x, -z, or three numbers")
     sideways: bool = quantity(True, "1", "whether a moved place is held across its direction")
     markers: tuple[str, ...] = quantity((), "1", "markers on the moved place, three or more")
+    noted: tuple[float, ...] = quantity(
+        (), "m", "motion, evenly from the first instant to the last"
+    )
     amount: float = quantity(9.80665, "m/s^2", "gravity")
     scale: float = quantity(1.0, "1", "true load over the recorded one")
 

@@ -29,7 +29,7 @@ from validate.scene.select import Place
 from validate.scene.tracked import Prescribed
 
 LOW, HIGH = "low", "high"
-AS_SEEN = "as seen"
+AS_SEEN, NOTED = "as seen", "noted"
 Kind = Literal["weighs", "pulls", "moves", "follows"]
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
 _At = tuple[Mesh, Path]  # the body's mesh, and the experiment's folder
@@ -43,13 +43,15 @@ def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
         return "weighs"
     if p.moved.by == "markers":
         return "follows"
+    if p.moved.by == NOTED:
+        return "moves"
     found = recording.signals.get(p.moved.by)
     unit = found.unit if found is not None else ""
     if unit not in ("m", "N"):
         known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in ("m", "N")]
         raise UsageError(
             f"moved.by = {p.moved.by}: {'in ' + unit if unit else 'no signal of that name'}; one "
-            f"of {', '.join([*known, 'markers', 'gravity'])}"
+            f"of {', '.join([*known, 'markers', 'gravity', NOTED])}"
         )
     return "moves" if unit == "m" else "pulls"
 
@@ -89,7 +91,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
 def _instants(recording: Recording, p: MeasuredBody) -> tuple[Floats, float]:
     """Rest and evenly spaced times (nt,) s that all streams in use cover; images' own, where
     outlines are compared."""
-    used = {p.seen.force, p.seen.markers, p.seen.outline, p.moved.by} - {None, "gravity"}
+    used = {p.seen.force, p.seen.markers, p.seen.outline, p.moved.by} - {None, "gravity", NOTED}
     used = {p.seen.markers if topic == "markers" else topic for topic in used} - {None}
     streams = recording.streams
     missing = sorted(str(topic) for topic in used if topic not in streams)
@@ -125,6 +127,8 @@ def _drive(
         return SignalObservation("gravity", "drives", t, y, "m/s^2", 0.0)
     if kind == "follows":
         return _followed(recording, p, t, at)
+    if p.moved.by == NOTED:
+        return _noted(p, t)
     topic, unit = p.moved.by, "m" if kind == "moves" else "N"
     signal = _zeroed(recording, topic, unit, rest + p.seen.still)
     y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
@@ -132,6 +136,19 @@ def _drive(
     return SignalObservation(
         topic, "drives", t, y, unit, signal.sd, sd_t=clock_sd(recording, topic)
     )
+
+
+def _noted(p: MeasuredBody, t: Floats) -> SignalObservation:
+    """What was noted, evenly over the instants t (nt,) and straight between; how uncertain it is
+    says `ranges.load`."""
+    if len(p.moved.noted) < 2 or not np.any(np.diff(p.moved.noted)):
+        raise UsageError(
+            f"moved.noted = {p.moved.noted or 'none'}: two amounts or more that "
+            "differ, from the first instant to the last, as 0,2mm,5mm"
+        )
+    at = np.linspace(t[0], t[-1], len(p.moved.noted))
+    y = p.moved.scale * (np.interp(t, at, p.moved.noted) - p.moved.noted[0])
+    return SignalObservation(NOTED, "drives", t, y[:, None], "m", 0.0)
 
 
 def _zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
