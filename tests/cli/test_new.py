@@ -21,6 +21,7 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Recording, Signal, Source
 from validate.replay import compare
+from validate.replay.compression_cards import stated_sizes
 from validate.replay.find import load_file
 from validate.scene.box import box
 from validate.scene.mesh_file import write_mesh
@@ -39,7 +40,7 @@ def log(name: str = "gel", **specimen: str) -> Recording:
         "force": Signal(t, force[:, None], "N", 0.005, "machine"),
     }
     return Recording(name, Source("x", "", 0, "x"), 0, signals=signals,
-                     metadata={"specimen": specimen} if specimen else {})  # fmt: skip
+                     metadata={"specimen": {"test": "compression"} | specimen})  # fmt: skip
 
 
 BLOCK = {"block.x": "0.06", "block.y": "0.045", "block.z": "0.07"}
@@ -173,7 +174,7 @@ def test_it_names_channels_rates_units_and_what_is_not_recorded(tmp_path: Path) 
     sized = written("my_gel", log(**SIZES), "../gel.mcap")
     assert "height=0.02,  # m, recorded: in the header" in sized
     sides = written("g", log(area_m2="0.0004", height_m="0.02"), "../gel.mcap")
-    assert "diameter=0.0225676,  # m, recorded: of the header's area" in sides
+    assert "diameter=0.0225676,  # m, recorded: of the header's cross-section" in sides
     odd = written("g", log(diameter_m="-3", height_m="1e"), "../gel.mcap")
     assert odd.count("=None,  # m, not in the recording") == 2
     assert len(text.splitlines()) <= 60
@@ -224,7 +225,7 @@ def test_a_recordings_texts_are_never_code(tmp_path: Path) -> None:
     bad = replace(
         bad,
         signals={**bad.signals, evil: bad.signals["force"]},
-        metadata={evil: {evil: evil}},
+        metadata={**bad.metadata, evil: {evil: evil}},
     )
     write_recording(bad, tmp_path / "gel.mcap")
     assert in_folder(tmp_path, "new", "mine", "--from", "gel.mcap", "-o", "mine.py")[0] == 0
@@ -271,18 +272,41 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
 
 
 def test_what_presses_is_asked_where_nothing_says_it(tmp_path: Path) -> None:
-    write_recording(log(**SIZES), tmp_path / "gel.mcap")
-    _, said = in_folder(tmp_path, "new", "a", "--from", "gel.mcap")
-    assert "compression is assumed" in " ".join(said.split())
+    """It was taken as compression."""
+    write_recording(log(test="", **SIZES), tmp_path / "gel.mcap")
+    code, said = in_folder(tmp_path, "new", "a", "--from", "gel.mcap")
+    assert (code, "whether the test presses or pulls" in said) == (2, True)
+    assert not (tmp_path / "experiments" / "a.py").exists()
     (tmp_path / "a.toml").write_text('test = "tension"\naccept.force = "40mN"\n', "utf-8")
     arguments = ("new", "b", "--from", "gel.mcap", "--answers", "a.toml")
-    code, said = in_folder(tmp_path, *arguments)
-    assert (code, "assumed" in said) == (0, False)
+    assert in_folder(tmp_path, *arguments)[0] == 0
     text = (tmp_path / "experiments" / "b.py").read_text("utf-8")
     assert 'test="tension",  # answered' in text
     assert 'Accept("force", 0.04, "answered (change it)")' in text
-    write_recording(log(test="compression", **SIZES), tmp_path / "gel.mcap")
-    assert "assumed" not in in_folder(tmp_path, "new", "c", "--from", "gel.mcap")[1]
+
+
+@pytest.mark.parametrize(("test", "sides", "area"), [
+    ("tension", {"width": 0.01, "thickness": 0.003, "length": 0.05}, 3e-5),
+    ("tension", {"width": 0.01, "length": 0.05}, None),
+    ("tension", {"thickness": 0.003, "height": 0.05}, None),
+    ("compression", {"width": 0.02, "length": 0.03, "height": 0.01}, 6e-4),
+    ("compression", {"width": 0.02, "length": 0.03, "thickness": 0.01}, None),
+    ("compression", {"width": 0.02, "thickness": 0.01}, None),
+])  # fmt: skip
+def test_a_cross_section_is_taken_from_sides_that_tell_it_alone(
+    test: str, sides: dict[str, float], area: float | None
+) -> None:
+    """A slab's width and thickness were its area, and so were a strip's width and length."""
+    said = {f"{name}_m": repr(value) for name, value in sides.items()}
+    found = stated_sizes(log(test=test, **said)).get("specimen.diameter")
+    assert found == (None if area is None else pytest.approx(2 * np.sqrt(area / np.pi)))
+
+
+def test_the_header_s_lengths_stand_beside_the_question_for_a_size(tmp_path: Path) -> None:
+    said = {"width_m": "0.02", "thickness_m": "0.01"}
+    write_recording(log(**said), tmp_path / "gel.mcap")
+    _, listed = in_folder(tmp_path, "new", "a", "--from", "gel.mcap", "--questions")
+    assert listed.count("; the header says width 20 mm, thickness 10 mm, m or as") == 2
 
 
 def test_the_file_of_an_inclusion_is_short(project_root: Path) -> None:

@@ -41,7 +41,17 @@ def test_engineering_measures_are_multiplied(tmp_path: Path) -> None:
     assert "displacement = engineering strain 'Strain (%)' x length 0.02 m (said)" in told
     assert "force = engineering stress 'Stress (kPa)' x area 0.000314 m2 (said)" in told
     assert float(recording.record("specimen")["area_m2"]) == pytest.approx(AREA)
-    assert float(recording.record("specimen")["length_m"]) == pytest.approx(LENGTH)
+    assert float(recording.record("specimen")["height_m"]) == pytest.approx(LENGTH)
+
+
+def test_the_sides_of_a_strip_that_is_pulled_are_its_area(tmp_path: Path) -> None:
+    """Those of a slab that is pressed may be its height: its area is asked for."""
+    sides = "Width: 20 mm\nThickness: 15.7 mm\n"
+    mapping = {"length": "20mm", "measure": "engineering"}
+    text = sides + table(PLAIN, 100 * E, SIGMA)
+    assert_pulled(read(tmp_path, text, **mapping, test="tension"))
+    with pytest.raises(RecordingError, match="area=314mm2"):
+        read(tmp_path, text, **mapping, test="compression")
 
 
 def test_true_measures_are_turned_back(tmp_path: Path) -> None:

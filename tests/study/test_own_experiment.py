@@ -23,7 +23,7 @@ def compressed() -> Recording:
         "displacement": Signal(t, d[:, None], "m", 0.0, "machine"),
         "force": Signal(t, force[:, None], "N", 0.005, "machine"),
     }
-    sizes = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT)}
+    sizes = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT), "test": "compression"}
     return Recording("gel", Source("x", "", 0, "x"), 0, signals=signals,
                      metadata={"specimen": sizes})  # fmt: skip
 

@@ -13,6 +13,7 @@ from validate.recording.types import Recording
 from validate.replay.compression_cards import stated_sizes
 
 _SIZES = ("diameter", "height")
+_SIDES = ("width_m", "thickness_m", "length_m")
 _WORDS = {
     "compression": ("slipping plates", "bonded plates", "plates"),
     "tension": ("ends free to contract", "gripped ends", "grips"),
@@ -28,10 +29,10 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     stated, length = stated_sizes(recording), quantity_in("m")
     asked = []
     if not stated_test(recording):
-        asked.append(Question("test", "whether the test presses or pulls", "compression",
-                              "assumed", choices=("compression", "tension")))  # fmt: skip
+        asked.append(Question("test", "whether the test presses or pulls", open=True,
+                              choices=tuple(_WORDS)))  # fmt: skip
     asked += [
-        Question(f"specimen.{name}", f"{name} of the specimen, m or as 25mm; empty: left open",
+        Question(f"specimen.{name}", f"{_what(name, recording)}, m or as 25mm; empty: left open",
                  check=length)
         for name in _SIZES if f"specimen.{name}" not in stated
     ]  # fmt: skip
@@ -40,6 +41,18 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
                           f"{limit:.3g}", f"a tenth of {judged}, assumed",
                           check=quantity_in("N")))  # fmt: skip
     return [*asked, *new_outline.asks(recording, found)]
+
+
+def _what(name: str, recording: Recording) -> str:
+    """What is asked for, and which lengths of the header may be it: none is taken unasked."""
+    said = recording.metadata.get("specimen", {})
+    lengths = [f"{key.removesuffix('_m')} {1e3 * float(said[key]):.6g} mm" for key in _SIDES
+               if key in said]  # fmt: skip
+    what = {
+        "diameter": "diameter of the specimen (not round: of the circle of its area)",
+        "height": "height of the specimen, pulled: its length between the grips",
+    }[name]
+    return f"{what}{'; the header says ' + ', '.join(lengths) if lengths else ''}"
 
 
 def _judged(recording: Recording) -> tuple[float, float | None, float, str]:
@@ -59,13 +72,13 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     limit, _, accepted, judged = _judged(recording)
     stated = stated_sizes(recording)
     by_area = "diameter_m" not in recording.metadata.get("specimen", {})
-    test = stated_test(recording) or found.get("test", "compression")
+    test = stated_test(recording) or found["test"]
     free, fixed, ends = _WORDS[test]
     own = found.get("accept.force", "")
     said = quantity_in("N")(own) if own else accepted
     reason = f"a tenth of {judged}" if f"{said:.3g}" == f"{accepted:.3g}" else "answered"
     return {
-        "test": f'"{test}",  # {"recorded" if stated_test(recording) else "answered or assumed"}',
+        "test": f'"{test}",  # {"recorded" if stated_test(recording) else "answered"}',
         "diameter": _size("diameter", stated, found, by_area=by_area),
         "height": _size("height", stated, found),
         "fit_from": f"{0.05 * limit:.3g}",
@@ -84,7 +97,7 @@ def _size(name: str, stated: dict[str, float], found: Answers, *, by_area: bool 
     """A value and its comment; what nobody says is left open."""
     value, said = stated.get(f"specimen.{name}"), found.get(f"specimen.{name}", "")
     if value is not None:
-        how = "of the header's area" if by_area else "in the header"
+        how = "of the header's cross-section" if by_area else "in the header"
         return f"{value:.6g},  # m, recorded: {how}"
     if said:
         return f"{quantity_in('m')(said):.6g},  # m, answered"
@@ -93,14 +106,6 @@ def _size(name: str, stated: dict[str, float], found: Answers, *, by_area: bool 
 
 def _used(recording: Recording, found: Answers) -> set[str]:
     return {"displacement", "force"} | new_outline.used(recording, found)
-
-
-def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
-    unjudged = new_outline.assumed(recording, found)
-    if stated_test(recording) or found.get("test", "compression") != "compression":
-        return unjudged
-    return ("nothing in the recording says whether it presses or pulls: compression is assumed; "
-            "change it in the file, or answer test = \"tension\"", *unjudged)  # fmt: skip
 
 
 PLATES = NewKind(
@@ -113,5 +118,5 @@ PLATES = NewKind(
     _asks,
     _fields,
     _used,
-    _assumed,
+    new_outline.assumed,
 )

@@ -4,8 +4,9 @@ declared uncertainties, windows of strain, and what images show of it."""
 import math
 from dataclasses import dataclass
 
-from validate.identify.modulus import Cylinder, TestKind
+from validate.identify.modulus import Cylinder, TestKind, stated_test
 from validate.parameters import Ranges, known, part, quantity
+from validate.recording.exports.geometry import loaded_area
 from validate.recording.types import Recording
 from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
@@ -23,11 +24,7 @@ def stated_sizes(recording: Recording) -> dict[str, float]:
     """
     said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
     found = {k: v for k, v in said.items() if v is not None}
-    sizes = {}
-    area = found.get("area_m2")
-    sides = [found[k] for k in ("width_m", "thickness_m", "length_m") if k in found]
-    if area is None and len(sides) >= 2:
-        area = sides[0] * sides[1]
+    area, sizes = loaded_area(found, stated_test(recording)), {}
     if "diameter_m" in found:
         sizes["specimen.diameter"] = found["diameter_m"]
     elif area is not None:

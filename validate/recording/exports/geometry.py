@@ -44,12 +44,19 @@ def specimen_of(header: Mapping[str, str], decimal: str) -> dict[str, float]:
     return {name: value for name, (value, _) in found.items()}
 
 
-def loaded_area(specimen: Mapping[str, float]) -> float | None:
-    """The area (m2) under nominal stress: given, of a disc, or of a rectangle; None: not known."""
+def loaded_area(specimen: Mapping[str, float], test: str = "") -> float | None:
+    """The area (m2) under nominal stress: given, of a disc, or of a rectangle; None: not known.
+
+    A strip that is pulled has width and thickness. Which two of three sides a pressed block stands
+    on is known only beside its height: a thickness may be the height, too.
+    """
     if "area_m2" in specimen:
         return specimen["area_m2"]
     if "diameter_m" in specimen:
         return math.pi * specimen["diameter_m"] ** 2 / 4
+    if test == "tension":
+        sides = [specimen[k] for k in ("width_m", "thickness_m") if k in specimen]
+        return sides[0] * sides[1] if len(sides) == 2 else None
     sides = [specimen[k] for k in ("width_m", "thickness_m", "length_m") if k in specimen]
     return sides[0] * sides[1] if len(sides) == 2 and "height_m" in specimen else None
 

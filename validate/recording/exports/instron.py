@@ -119,7 +119,7 @@ def recording_of(
     found = _found(table, said, sizes, kind)
     picks, made = {role: one.pick for role, one in found.items()}, _made(found)
     kind = kind or next((one.kind for one in made.values() if one.kind), None)
-    specimen = with_sizes(specimen, mapping, kind)
+    specimen = with_sizes(specimen, mapping)
     flips, notes = _checked(table, found, specimen, kind, sizes)
     time, signals = _signals(picks, flips)
     stamps = np.round(time * 1e9).astype(np.int64)
@@ -238,7 +238,7 @@ def _checked(
         check_swapped(time, displacement, force, strain, stress)
     pairs = (
         (displacement, strain, specimen.get("height_m")),
-        (force, stress, loaded_area(specimen)),
+        (force, stress, loaded_area(specimen, kind.name if kind else "")),
     )
     notes = [
         check_derived(base, beside, size, table.lines)

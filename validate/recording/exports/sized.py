@@ -71,18 +71,18 @@ def sizes_of(mapping: Mapping[str, str], specimen: Mapping[str, float], kind: Ki
     if measure not in (None, *MEASURES):
         raise UsageError(f"--map measure={measure}: expected one of {', '.join(MEASURES)}")
     pressed = kind is not None and kind.name == "compression"
-    told = {"area": loaded_area(specimen), "length": specimen.get("height_m") if pressed else None}
+    told = {
+        "area": loaded_area(specimen, kind.name if kind else ""),
+        "length": specimen.get("height_m") if pressed else None,
+    }
     found = {k: said.get(k, told[k]) for k in told}
     words = {k: "said" if k in said else "of the header" for k in told}
     return Sizes(found["area"], found["length"], measure, words)
 
 
-def with_sizes(
-    specimen: Mapping[str, float], mapping: Mapping[str, str], kind: Kind | None
-) -> dict[str, float]:
+def with_sizes(specimen: Mapping[str, float], mapping: Mapping[str, str]) -> dict[str, float]:
     """The header's sizes and those that the user gives, who is believed."""
-    length = "height_m" if kind and kind.name == "compression" else "length_m"
-    names = {"area": "area_m2", "length": length}
+    names = {"area": "area_m2", "length": "height_m"}  # a header's length is the whole specimen's
     return {**specimen, **{names[k]: _size(k, mapping[k]) for k in names if k in mapping}}
 
 
