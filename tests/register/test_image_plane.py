@@ -172,6 +172,19 @@ def test_the_command_writes_images_that_know_where_they_lie(tmp_path: Path) -> N
     assert "image 1.7: there are 0 to 7" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u,v,target\n1,one,1,a0\n")
     assert "points.csv: u = 'one' is no number" in refused(*given, "--probe", "ProbeToReference")
+    (tmp_path / "points.csv").write_text("image,u,v,target\n0,1\n")
+    assert "no target ''" in refused(*given, "--probe", "ProbeToReference")
+    (tmp_path / "points.csv").write_text("image,u,v,target\n0,1,1,a0\n")
+    for rows, why in (
+        ("x,y,z,target\n1,2,3\n", "no target 'a0'"),
+        ("target,x,y,z,x2\na0,0,0,0,5\n", "y2 = '' is no number"),
+        (f"target,x,y,z\na0,{'1' * 200000},0,0\n", "no table with commas (field"),
+    ):
+        (tmp_path / "wires.csv").write_text(rows)
+        assert why in refused(*given, "--probe", "ProbeToReference")
+    files(tmp_path, wired(np.random.default_rng(3), 2))
+    (tmp_path / "points.csv").write_text("image;u;v;target\n")
+    assert "with commas between them" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u\n")
     assert "expected image, u, v, target" in refused(*given, "--probe", "ProbeToReference")
 

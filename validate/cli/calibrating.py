@@ -108,23 +108,29 @@ def _rows(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
         if file.stat().st_size > _MAX_TABLE:
             raise RecordingError(f"{file.name}: {file.stat().st_size} bytes, limit {_MAX_TABLE}")
         with file.open(encoding="utf-8-sig", errors="replace", newline="") as opened:
-            rows = csv.DictReader(opened)
+            rows = csv.DictReader(opened, restval="")
             names = [str(n).strip().lower() for n in rows.fieldnames or ()]
             if not set(wanted) <= set(names):
-                raise UsageError(f"{file.name}: columns {names}, expected {', '.join(wanted)}")
+                raise UsageError(
+                    f"{file.name}: columns {names}, expected {', '.join(wanted)}, with commas "
+                    "between them, as text in UTF-8"
+                )
             rows.fieldnames = names
             return list(rows)
+    except csv.Error as error:
+        raise RecordingError(f"{file.name}: no table with commas ({error})") from None
     except OSError as error:
         raise RecordingError(f"{file}: cannot be read ({error.strerror})") from error
 
 
 def _number(file: Path, row: dict[str, str], name: str) -> float:
+    said = row.get(name, "")
     try:
-        value = float(row[name])
-    except (TypeError, ValueError):
+        value = float(said)
+    except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise RecordingError(f"{file.name}: {name} = {row[name]!r} is no number")
+        raise RecordingError(f"{file.name}: {name} = {said[:40]!r} is no number")
     return value
 
 
