@@ -184,3 +184,39 @@ def test_a_signal_that_does_not_move_takes_the_others_sign(still: str, tmp_path:
 def test_quotes_may_follow_a_blank(tmp_path: Path) -> None:
     names = '"Time (s)", "Extension (mm)", "Load (N)"\n'
     assert_test(read(tmp_path, names + rows(", ", lambda x: f'"{comma(x)}"')))
+
+
+@pytest.mark.parametrize(
+    ("head", "test"),
+    [
+        ("Ensayo de tracción\nTiempo (s);Alargamiento (mm);Fuerza (N)\n", "tension"),
+        ("Zugversuch\nZeit;Längenänderung;Zugkraft\ns;mm;N\n", "tension"),
+        ("Çekme testi\nZaman;Uzama;Kuvvet\ns;mm;N\n", "tension"),
+        ("Sıkıştırma testi\nZaman;Deplasman;Yük\ns;mm;N\n", "compression"),
+        ("Vetokoe\nAika;Venymä;Voima\ns;mm;N\n", "tension"),
+        ("Puristuskoe\nAika;Siirtymä;Voima\ns;mm;N\n", "compression"),
+        ("인장 시험\n시간;변위;하중\ns;mm;N\n", "tension"),
+        ("Tension\nTime;Actuator;Load\ns;mm;N\n", "tension"),
+    ],
+)
+def test_the_words_of_a_language_name_columns_and_kind(
+    head: str, test: str, tmp_path: Path
+) -> None:
+    recording = read(tmp_path, head + rows(";"), test=None)
+    way = -1 if test == "tension" else 1
+    assert recording.record("specimen")["test"] == test
+    assert np.allclose(recording.signals["displacement"].y[:, 0], way * D * 1e-3)
+    assert np.allclose(recording.signals["force"].y[:, 0], way * F, atol=1e-5)
+
+
+def test_a_column_that_no_word_names_is_offered_before_a_strain(tmp_path: Path) -> None:
+    """Who followed the advice to say a length took the strain instead of the way beside it."""
+    text = "Tension\nTime (s),Koloumb (mm),Load (N),Strain (%)\n" + "".join(
+        f"{t:.1f},{d:.5f},{f:.5f},{5 * d:.5f}\n" for t, d, f in PAIRS
+    )
+    with pytest.raises(RecordingError) as raised:
+        read(tmp_path, text, test=None)
+    said = "(if 'Koloumb (mm)' is the displacement, say --map 'displacement=Koloumb (mm)' alone)"
+    assert said in str(raised.value)
+    recording = read(tmp_path, text, test=None, displacement="Koloumb (mm)")
+    assert np.allclose(recording.signals["displacement"].y[:, 0], -D * 1e-3)

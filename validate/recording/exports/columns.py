@@ -172,6 +172,14 @@ def _by_unit(role: str, table: Table) -> str:
     )
 
 
+def unnamed_column(role: str, table: Table) -> str:
+    """The advice where a column that no known word names has the unit of a needed role."""
+    found = [c for c in table.columns if not role_of(c) and _measures(c, QUANTITY[role])]
+    if not found:
+        return ""
+    return f" (if '{found[0].label}' is the {role}, say --map '{role}={found[0].label}' alone)"
+
+
 def said_pick(role: str, table: Table, said: Said) -> Pick:
     """The column that the user names; raises as `needed_pick`."""
     named = _named(said.column, table)

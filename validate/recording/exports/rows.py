@@ -43,7 +43,7 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
         if any(cells[count:]) or not (missing <= gaps or len(cells) in ends):
             raise RecordingError(
                 f"line {line}: {len(cells)} cells, but line {names[0]} names {count} columns; "
-                "a cut row, or decimal commas between separating commas: export it again"
+                "a cut row: remove it; or decimal commas between separating commas: export it again"
             )
     if short:
         notes.append(f"{len(short)} rows end early, first line {short[0]}")

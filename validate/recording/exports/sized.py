@@ -20,6 +20,7 @@ from validate.recording.exports.columns import (
     needed_pick,
     picked,
     said_pick,
+    unnamed_column,
 )
 from validate.recording.exports.geometry import loaded_area
 from validate.recording.exports.kinds import Kind
@@ -117,7 +118,8 @@ def derived(
         raise MissingColumnError(str(error), missing) from error
     measure, asked = _measure(stress, sizes)
     asked += missing
-    _refuse_unsaid(f"no force, but stress '{stress.column.label}'", asked)
+    unnamed = unnamed_column("force", table)
+    _refuse_unsaid(f"no force, but stress '{stress.column.label}'{unnamed}", asked)
     assert sizes.area is not None
     nominal, words = stress.values, f"{measure} stress '{stress.column.label}'"
     if measure == "true":
@@ -135,7 +137,8 @@ def _displacement(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Ki
         raise MissingColumnError(str(error), missing) from error
     measure, asked = ("", []) if source.role == "stretch" else _measure(source, sizes)
     asked += missing
-    _refuse_unsaid(f"no displacement, but {source.role} '{source.column.label}'", asked)
+    unnamed = unnamed_column("displacement", table)
+    _refuse_unsaid(f"no displacement, but {source.role} '{source.column.label}'{unnamed}", asked)
     assert sizes.length is not None
     what = f"{measure} strain" if measure else "(stretch - 1) of"
     words = f"displacement = {what} '{source.column.label}' x length {sizes.length:.6g} m"

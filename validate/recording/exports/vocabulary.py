@@ -13,7 +13,7 @@ from functools import cache
 _ROLES = {
     "stress": """stress spannung druckspannung zugspannung contrainte naprezenie esfuerzo sforzo
         tensao spanning drukspanning trekspanning napeti napatie feszultseg gerilme
-        напряжение 应力 応力 응력""",
+        напряжение jannitys 应力 応力 응력""",
     "strain": """strain dehnung nominaldehnung odksztalcenie nyulas rek tojning unitaria
         unitario 应变 ひずみ 歪み 변형률""",
     "stretch": "stretch lambda λ streckung etirement",
@@ -22,7 +22,8 @@ _ROLES = {
         zaman sure aika timp время 时间 時間 시간""",
     "force": """force load f kraft standardkraft prufkraft pruefkraft druckkraft zugkraft last
         effort charge sila obciazenie fuerza carga forza carico forca zatizeni ero kracht
-        drukkracht trekkracht belasting сила нагрузка усилие 力 载荷 负荷 荷重""",
+        drukkracht trekkracht belasting voima kuvvet yuk сила нагрузка усилие 力 载荷 负荷 荷重
+        하중 시험력""",
     "displacement": """displacement disp compression extension crosshead position stroke travel
         deflection deformation closing indentation weg standardweg traversenweg traverse kolbenweg
         verformung stauchung verschiebung deplacement course allongement ecrasement enfoncement
@@ -31,8 +32,8 @@ _ROLES = {
         deformazione draha posuv posunuti prodlouzeni stlaceni deformace elmozdulas distance
         erweiterung elongation alongamento extensao verlangerung verplaatsing indrukking
         vervorming verlenging forlangning forskjutning deformering forskydning forlaengelse
-        forlengelse перемещение
-        деформация удлинение 位移 变形 行程 変位 ストローク 伸び""",
+        forlengelse actuator langenanderung alargamiento uzama deplasman venyma siirtyma
+        перемещение деформация удлинение 位移 变形 行程 変位 ストローク 伸び 변위""",
 }
 _NOT_MEASURED = """max maximum maximal maximale maxi peak maksymalna maksymalne maximo maxima
     massimo massima command target setpoint sollwert consigne 最大 峰值"""
@@ -54,7 +55,7 @@ _NOT = {
 LENGTH_OR_STRAIN = """compression deformation verformung stauchung deformacja deformacion deformacao
     deformazione deformace compresion деформация 变形 extension elongation allongement allungamento
     alongamento extensao wydluzenie prodlouzeni vervorming verlenging forlangning deformering
-    verlangerung удлинение 伸び"""
+    verlangerung alargamiento uzama venyma удлинение 伸び"""
 SIZES = {
     "diameter": """diameter durchmesser probendurchmesser diametre srednica diametro prumer atmero
         диаметр 直径""",
@@ -75,11 +76,12 @@ OTHER_PARTS = """platen plate anvil probe plunger indenter grip final cell stemp
 # `Druck`, `tlak` (pressure) and `extension` (the crosshead's way in any test) are not among them.
 COMPRESSION = """compress compresion compresiv closing druckversuch druckpruf druckpruef druckkraft
     druckspannung druckfestigkeit druckbelast druckmodul druckverform stauch ecrasement sciska
-    skrocen tlakem tlakov stlacen nyomo сжати сжима сжимающ drukproef drukkracht 压缩 抗压 壓縮 圧縮
-    압축"""
+    skrocen tlakem tlakov stlacen nyomo сжати сжима сжимающ drukproef drukkracht puristuskoe basma
+    sikistirma sıkıstırma 压缩 抗压 壓縮 圧縮 압축"""
 TENSION = """tensil tension traction tracci trazion tracao tracoes zugversuch zugpruf zugpruef
     zugkraft zugspannung zugfestigkeit zugbelast zugmodul zugdehnung zugverform rozciag tahem tahov
-    huzo szakito растяж растягив trekproef trekkracht dragprov 拉伸 抗拉 引張 引っ張 인장"""
+    huzo szakito растяж растягив trekproef trekkracht dragprov vetokoe cekme 拉伸 抗拉 引張 引っ張
+    인장"""
 # Of neither test: what a specimen is loaded with before it, and the air that shuts a grip.
 _NO_KIND = re.compile(
     r"pre[-_ ]?(tension|compression)\w*|surface tension|(compressed|сжат\w+) (air|воздух)\w*"
