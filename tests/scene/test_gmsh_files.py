@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from validate.cli.main import cli
 from validate.errors import SceneError, UsageError
+from validate.scene.body_facts import quality
 from validate.scene.foreign_mesh import read_foreign
 from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_file import read_mesh
@@ -40,6 +41,33 @@ def test_a_shell_on_a_solid_is_no_facet(tmp_path: Path) -> None:
     (tmp_path / "shell.inp").write_text(text, "utf-8")
     with pytest.raises(SceneError, match="its elements are 60 S3, 60 tetra"):
         read_foreign(tmp_path / "shell.inp", "mm")
+
+
+@pytest.mark.parametrize("name", ["bricks20.inp", "bricks20.msh", "bricks27.msh"])
+def test_straight_quadratic_bricks_come_in(name: str, tmp_path: Path) -> None:
+    """Two bricks of 10 x 20 x 15 mm with a node on every edge, or on faces and within, too."""
+    body = read_foreign(FILES / name, "mm")
+    assert (body.mesh.kind, body.mesh.cells.shape) == ("hex27", (2, 27))
+    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-6)
+    assert quality(body.mesh).min() == pytest.approx(1)
+    bottom = body.mesh.facets["bottom" if name.endswith("msh") else "Surface5"]
+    assert np.abs(body.mesh.nodes[bottom][..., 2]).max() < 1e-12
+    assert bottom.shape == (1, 9)
+    text = (FILES / name).read_text("utf-8")
+    place, bent = ("5, 0, 0", "5, 0, 0.5") if name.endswith("inp") else ("\n5 0 0", "\n5 0 0.5")
+    assert place in text
+    (tmp_path / name).write_text(text.replace(place, bent), "utf-8")
+    with pytest.raises(SceneError, match=r"1 edges or faces .* curved, middles up to 0.5 mm off"):
+        read_foreign(tmp_path / name, "mm")
+
+
+def test_faces_of_a_quadratic_brick_are_those_of_its_corners(tmp_path: Path) -> None:
+    """All of both bricks': ten are outside."""
+    rows = "\n".join(f"Volume1, S{k}" for k in range(1, 7))
+    text = (FILES / "bricks20.inp").read_text("utf-8")
+    (tmp_path / "s.inp").write_text(f"{text}*Surface, name=all\n{rows}\n", "utf-8")
+    body = read_foreign(tmp_path / "s.inp", "mm")
+    assert body.mesh.facets["all"].shape == (10, 9)
 
 
 def test_no_group_is_no_set() -> None:

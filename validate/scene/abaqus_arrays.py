@@ -29,7 +29,7 @@ _CORNERS = {3: 3, 4: 4, 6: 3, 8: 4}
 # Corners of the faces S1, S2, ... of the elements that surfaces name (Abaqus' own numbering).
 _TET = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _HEX = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
-_FACES = {4: _TET, 10: _TET, 8: _HEX}
+_FACES = {4: _TET, 10: _TET, 8: _HEX, 20: _HEX}
 _MOST = 10_000_000  # numbers of nodes and elements
 Elements = dict[int, tuple[int, ...]]  # nodes by the element's number
 

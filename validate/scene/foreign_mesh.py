@@ -25,7 +25,17 @@ from validate.units import in_si
 
 SUFFIXES = (".inp", ".msh", ".vtu", ".vtk")
 EXTRA = "meshes"
-_KINDS: Mapping[str, Kind] = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8"}
+_KINDS: Mapping[str, Kind] = {"tetra": "tet4", "hexahedron": "hex8", "tetra10": "tet4",
+                              "hexahedron20": "hex8", "hexahedron27": "hex8"}  # fmt: skip
+_HEX = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6),
+        (3, 7))  # fmt: skip
+# Between which corners the further nodes of quadratic cells lie, in their order.
+_BETWEEN: Mapping[str, tuple[tuple[int, ...], ...]] = {
+    "tetra10": EDGES[3],
+    "hexahedron20": _HEX,
+    "hexahedron27": (*_HEX, (0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1),
+                     (4, 5, 6, 7), (0, 1, 2, 3, 4, 5, 6, 7)),
+}  # fmt: skip
 _CELLS, _NSET, _FACET, _PART = "cells.", "nset.", "facet.", "part."
 _MOST = 64 * 2**20  # bytes: some 500 000 tetrahedra
 _STRAIGHT = 1e-3  # of an edge: how far its middle node may lie off
@@ -68,7 +78,7 @@ def read_foreign(path: Path, unit: str, part: str | None = None) -> ForeignBody:
     Elements whose nodes are told the other way round are turned, but in .inp, whose order has a
     meaning. Raises `SceneError` for a file that is missing, too large or damaged, several parts of
     .inp of which none is chosen, a part that is not there, shapes other than linear and straight
-    quadratic tetrahedra and linear hexahedra or several of them; `UsageError` without the library.
+    quadratic tetrahedra and hexahedra or several of them; `UsageError` without the library.
     """
     factor = metres(path.name, unit)
     require_readable(path)
@@ -111,9 +121,9 @@ def _body(
             f"{len(points)}; damaged"
         )
     unused = len(points) - len(np.unique(cells))
-    if kind == "tet10":
-        _require_straight(name, points[cells])
-        kind, cells = "tet4", cells[:, :4]
+    if shape in _BETWEEN:
+        _require_straight(name, points[cells], _BETWEEN[shape])
+        cells = cells[:, : {"tet4": 4, "hex8": 8}[kind]]
     used, at = np.unique(cells, return_inverse=True)
     try:
         mesh = Mesh(points[used], at.reshape(cells.shape), kind)
@@ -137,7 +147,7 @@ def _body(
     if "included" in found:
         told["included"] = str(found["included"])
     mesh = replace(mesh, facets=_facets(mesh, used, found))
-    return ForeignBody(quadratic(mesh) if shape == "tetra10" else mesh, told)
+    return ForeignBody(quadratic(mesh) if shape in _BETWEEN else mesh, told)
 
 
 def _named(found: Mapping[str, NDArray[Any]]) -> dict[str, Ints]:
@@ -171,13 +181,16 @@ def _labelled(outer: Ints, facets: Ints) -> NDArray[np.bool_]:
     return np.array([tuple(row) in wanted for row in np.sort(outer, axis=1).tolist()], dtype=bool)
 
 
-def _require_straight(name: str, x: Floats) -> None:
-    """x (e, 10, 3) m of quadratic tetrahedra."""
-    for k, (a, b) in enumerate(EDGES[3]):
-        off = np.linalg.norm(x[:, 4 + k] - (x[:, a] + x[:, b]) / 2, axis=1)
-        bent = off > _STRAIGHT * np.linalg.norm(x[:, b] - x[:, a], axis=1)
+def _require_straight(name: str, x: Floats, between: tuple[tuple[int, ...], ...]) -> None:
+    """x (e, n, 3) m of quadratic cells, the last nodes `between` corners."""
+    first = x.shape[1] - len(between)
+    for k, corners in enumerate(between):
+        ends = x[:, list(corners)]
+        off = np.linalg.norm(x[:, first + k] - ends.mean(axis=1), axis=1)
+        bent = off > _STRAIGHT * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         if bent.any():
             raise SceneError(
-                f"{name}: {int(bent.sum())} edges {a}-{b} are curved, middles up to "
-                f"{1e3 * off.max():.3g} mm off; straight ones are taken: export linear elements"
+                f"{name}: {int(bent.sum())} edges or faces {'-'.join(map(str, corners))} are "
+                f"curved, middles up to {1e3 * off.max():.3g} mm off; straight ones are taken: "
+                "export linear elements"
             )
