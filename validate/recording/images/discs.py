@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import label
 
 from validate.arrays import Floats
 from validate.recording.images.image import correlated, shrunk
@@ -36,6 +37,17 @@ def candidates(image: Floats, m_per_px: tuple[float, float], most: int = 4) -> l
         found += _of_radius(small, radius, spread, scale)
         radius *= _GROWTH
     return _apart(sorted(found, key=lambda c: -c.score), most)
+
+
+def scanned(image: Floats) -> Floats:
+    """The image (h, w) with the grey of what was scanned in place of what was not: all of one level
+    from a corner on, as outside of a sector probe's fan. A search would find that first."""
+    parts, _ = label(image == image.min())
+    corners = {int(parts[i, j]) for i in (0, -1) for j in (0, -1)} - {0}
+    outside = np.isin(parts, sorted(corners))
+    if not outside.any() or outside.all():
+        return image
+    return np.where(outside, image[~outside].mean(), image)
 
 
 def _isotropic(image: Floats, m_per_px: tuple[float, float]) -> tuple[Floats, float]:

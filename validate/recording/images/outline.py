@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError
-from validate.recording.images.discs import candidates
+from validate.recording.images.discs import candidates, scanned
 from validate.recording.images.polar import Grey, Wall, speckle_area, trace
 from validate.recording.images.quality import Quality, quality, wall_sd
 from validate.recording.images.shapes import circle_points, ellipse_points, off_curve
@@ -174,7 +174,7 @@ def _starts(
     if radius is not None and not 0 < radius < np.inf:
         raise RecordingError(f"rough radius {radius} m: expected a positive number")
     if centre is None:
-        found = candidates(grey.image, grey.m_per_px)
+        found = candidates(scanned(grey.image), grey.m_per_px)
         return [(c.centre, c.radius if radius is None else radius) for c in found]
     place = checked(np.asarray(centre), "rough centre [m]", (2,), error=RecordingError)
     if np.isnan(grey.at(place[None])).any():

@@ -51,7 +51,16 @@ def placed(grey: Grey, wall: Wall, bright: bool) -> Placed:
     most = _MOST * float(np.sqrt(grey.speckle))
     sideways, along = (float(np.clip(m, -most, most)) for m in (sideways, along))
     move = across * sideways + (1 - across) * along
-    return Placed(points + move[:, None] * normals, float(move.mean()))
+    there = points + move[:, None] * normals
+    if not _goes_round(there - wall.centre):
+        there = points + move[:, None] * DIRECTIONS
+    return Placed(there, float(move.mean()))
+
+
+def _goes_round(away: Floats) -> bool:
+    """Whether polar angles of (k, 2) grow: a wall moved along normals that cross folds."""
+    one, next_ = away, np.roll(away, -1, axis=0)
+    return bool((one[:, 0] * next_[:, 1] > one[:, 1] * next_[:, 0]).all())
 
 
 def _normals(points: Floats) -> Floats:
