@@ -227,6 +227,7 @@ def test_a_label_of_gmsh_is_a_part(tmp_path: Path) -> None:
         cell_data={k: [np.where(upper, 5, 4)] for k in ("gmsh:physical", "gmsh:geometrical")},
         field_data={"fat": np.array([4, 3])},
     ).write(path, file_format="gmsh22", binary=False)  # fmt: skip
+    assert read_foreign(path, "mm").told["parts"] == "fat, label 5: one alone by --part"
     fat, other = (read_foreign(path, "mm", part).mesh for part in ("fat", "label 5"))
     for half, low in ((fat, 0.0), (other, SIZE[2] / 2)):
         assert cell_volumes(half).sum() == pytest.approx(np.prod(SIZE) / 2)

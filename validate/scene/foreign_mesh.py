@@ -38,6 +38,7 @@ _BETWEEN: Mapping[str, tuple[tuple[int, ...], ...]] = {
 }  # fmt: skip
 _CELLS, _NSET, _FACET, _PART = "cells.", "nset.", "facet.", "part."
 _MOST = 64 * 2**20  # bytes: some 500 000 tetrahedra
+_LISTED = 12  # names of parts
 _STRAIGHT = 1e-3  # of an edge: how far its middle node may lie off
 _TURNED: Mapping[Kind, tuple[int, ...]] = {
     "tet4": (0, 2, 1, 3), "hex8": (4, 5, 6, 7, 0, 1, 2, 3),
@@ -138,6 +139,8 @@ def _body(
         "turned": f"{turned} of {len(mesh.cells)} elements",
         "not used": f"{unused} of {len(points)} nodes",
     }
+    if part is None and len(names := list(_named(found))) > 1:
+        told["parts"] = f"{', '.join(names[:_LISTED])}: one alone by --part"
     if part is not None:
         told["part"] = f"{part}: {len(mesh.cells)} of {len(cells)} elements"
     if "beside" in found:
