@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.papers.accuracy.needle import needle_block
 from validate.papers.accuracy.rod import bending_rod
@@ -77,12 +78,35 @@ def test_a_folded_quadrilateral_is_refused_though_its_area_is_positive() -> None
         require_positive_cells(dart)
 
 
+def test_hexahedra_are_halved_as_a_finer_grid_has_them() -> None:
+    """Sheared: the same nodes, cells and facets as the grid of twice the cells an edge."""
+    shear = np.array([[1, 0, 0], [0.3, 1, 0], [0, 0.2, 1]])
+    coarse, fine = (grid((1.0, 2.0, 3.0), cells) for cells in ((1, 2, 1), (2, 4, 2)))
+    body = Mesh(coarse.nodes @ shear, coarse.cells, "hex8", coarse.facets)
+    got = refined(Scene(quadratic(body), Material(1.0, 0.3))).mesh
+    assert got.kind == "hex8"
+    assert cell_volumes(got) == pytest.approx(np.full(16, 6 / 16))
+
+    def places(nodes: Floats, rows: Ints) -> list[list[tuple[float, ...]]]:
+        x = np.round(nodes[rows], 9) + 0.0
+        return sorted(sorted(map(tuple, one)) for one in x.tolist())
+
+    assert places(got.nodes, got.cells) == places(fine.nodes @ shear, fine.cells)
+    for name, facets in fine.facets.items():
+        assert places(got.nodes, got.facets[name]) == places(fine.nodes @ shear, facets)
+    flat = np.cross(
+        got.nodes[got.facets["z1"][:, 1]] - got.nodes[got.facets["z1"][:, 0]],
+        got.nodes[got.facets["z1"][:, 3]] - got.nodes[got.facets["z1"][:, 0]],
+    )
+    assert (flat[:, 2] > 0).all()  # outward, as they were
+
+
 def test_what_bricks_do_not_have_is_refused() -> None:
     rod = bending_rod(1)
     with pytest.raises(SceneError, match="quad4 have no quadratic form"):
         quadratic(needle_block(4).mesh)
-    with pytest.raises(SceneError, match="refined by a finer grid"):
-        refined(rod)
+    with pytest.raises(SceneError, match="quad4 have no quadratic form"):
+        refined(needle_block(4))
     with pytest.raises(SceneError, match="nodal mean dilatation is for simplices, not hex8"):
         replace(rod, dilatation="nodal_mean")
     with pytest.raises(SceneError, match="need triangular facets"):

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from validate.arrays import Ints
-from validate.errors import SceneError
 from validate.scene.mesh import Kind, Mesh, quadratic
 from validate.scene.scene import Scene
+from validate.scene.shape_functions import CORNERS, LATTICE
 
 # The cells of a quadratic simplex, by the local numbers of its nodes (mesh.EDGES): corners first,
 # then what is left in the middle.
@@ -34,23 +34,30 @@ def linear(mesh: Mesh) -> Mesh:
 
 
 def refined(scene: Scene) -> Scene:
-    """Every simplex cut into 2^d at the middles of its edges; facet sets and regions follow.
+    """Every cell cut into 2^d at the middles of its edges (of hexahedra also of their faces and of
+    itself); facet sets and regions follow.
 
-    Cells of linear elements. Raises `SceneError` for bricks.
+    Cells of linear elements. Raises `SceneError` for quadrilaterals.
     """
-    if scene.mesh.bricks:
-        raise SceneError(f"elements of kind {scene.mesh.kind} are refined by a finer grid()")
     fine = quadratic(linear(scene.mesh))
-    d = fine.dimension
-    kind: Kind = "tri3" if d == 2 else "tet4"
-    parts = _HALVES if d == 2 else _PARTS[2]
-    facets = {name: _cut(f, parts) for name, f in fine.facets.items()}
-    mesh = Mesh(fine.nodes, _cut(fine.cells, _PARTS[d]), kind, facets)
+    d, kind = fine.dimension, linear(scene.mesh).kind
+    inside, outside = _PARTS[d], _HALVES if d == 2 else _PARTS[2]
+    if fine.bricks:
+        inside, outside = _bricks(3), _bricks(2)
+    facets = {name: _cut(f, outside) for name, f in fine.facets.items()}
+    mesh = Mesh(fine.nodes, _cut(fine.cells, inside), kind, facets)
     each = np.arange(2**d)
     regions = tuple(
         replace(r, cells=(2**d * r.cells[:, None] + each).ravel()) for r in scene.regions
     )
     return replace(scene, mesh=mesh, regions=regions)
+
+
+def _bricks(d: int) -> tuple[tuple[int, ...], ...]:
+    """The 2^d bricks of a quadratic one, each at a corner, by the local numbers of its nodes."""
+    at = {tuple(place): i for i, place in enumerate(LATTICE[d].tolist())}
+    corners = CORNERS[d]
+    return tuple(tuple(at[tuple((c + q) / 2)] for q in corners) for c in corners)
 
 
 def _cut(cells: Ints, parts: Sequence[tuple[int, ...]]) -> Ints:
