@@ -15,7 +15,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
 from validate.replay import compare
 from validate.replay.find import load_file
-from validate.scene.box import box
+from validate.scene.box import box, grid
 from validate.scene.mesh_file import write_mesh
 
 E, NU, RHO, G, SIZE = 20e3, 0.3, 1100.0, 9.80665, (0.04, 0.03, 0.05)
@@ -67,6 +67,21 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_recording(recording(signals=log(), markers=markers()), tmp_path / "all.mcap")
     (tmp_path / "a.toml").write_text(PRESSED, "utf-8")
     return tmp_path
+
+
+def test_a_body_of_hexahedra_is_solved_as_its_methods_say(here: Path) -> None:
+    """As they are, mixed: neither quadratic, nor by two methods that are one."""
+    write_mesh(grid(SIZE, (2, 2, 2)), here / "h.npz")
+    body = 'body = {shape = "block", block = "40mm,30mm,50mm"}'
+    file = PRESSED.replace(body, 'body = {shape = "file", file = "h.npz"}')
+    (here / "h.toml").write_text(file, "utf-8")
+    assert called("new", "hexa", "--from", "all.mcap", "--answers", "h.toml")[0] == 0
+    text = (here / "experiments" / "hexa.py").read_text("utf-8")
+    assert '"linear": solid("linear law, mixed hexahedra", "linear", 1)' in text
+    assert '"quick"' not in text
+    found = compare(load_file(here / "experiments" / "hexa.py"), quick=True)
+    method = found.methods[0]
+    assert {s.name: s.value for s in method.scores}["force.rms@high"] < 0.03  # of 0.48 N: exact
 
 
 def test_answers_make_an_experiment_that_runs(here: Path) -> None:

@@ -292,7 +292,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     return {
         "cards": ",\n    ".join(sorted(_classes(parameters))) + ",",
         "parameters": rendered(parameters),
-        "methods": "\n        ".join(_methods(found["law"], order)),
+        "methods": "\n        ".join(_methods(found["law"], mesh, order)),
         "accepted": "solid" if found["law"] != "linear" else "linear",
         "accept": "\n        ".join(
             f'Accept("{name}", {quantity_in(_ACCEPTED[name][0])(found[f"accept.{name}"]):.6g}, '
@@ -313,11 +313,13 @@ def _card(source: str, folder: Path, found: Answers) -> MeasuredBody:
     return card
 
 
-def _methods(law: str, order: int) -> list[str]:
-    cells = "quadratic" if order == 2 else "linear"
-    lines = [f'"linear": solid("linear law, {cells} cells", "linear", {order}),']
+def _methods(law: str, mesh: Mesh | None, order: int) -> list[str]:
+    cells = "quadratic cells" if order == 2 else "linear cells"
+    if mesh is not None and mesh.bricks:  # which are taken as they are, mixed
+        cells, order = "mixed hexahedra", 1
+    lines = [f'"linear": solid("linear law, {cells}", "linear", {order}),']
     if law != "linear":
-        words = f"{_LAWS[law]}, {cells} cells"
+        words = f"{_LAWS[law]}, {cells}"
         lines.insert(0, f'"solid": solid("{words}", "{law}", {order}),')
     if order == 2:
         lines.append('"quick": solid("linear law, linear cells", "linear", 1),')
