@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -11,11 +12,12 @@ from collections import defaultdict
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import cv2
 import numpy as np
 import pytest
+from foxglove import layouts
 from google.protobuf import descriptor_pb2, descriptor_pool
 from mcap.reader import make_reader
 from mcap.records import Schema
@@ -445,6 +447,41 @@ def leaves(tree: Any) -> list[str]:
     assert tree["direction"] in ("row", "column")
     assert 0 < tree["splitPercentage"] < 100
     return leaves(tree["first"]) + leaves(tree["second"])
+
+
+def as_foxgloves(kind: Any, config: dict[str, Any]) -> Any:
+    """A panel's settings in the types that Foxglove publishes for them: every key one of theirs,
+    every word one of those allowed."""
+    known = get_type_hints(kind)
+    values = {}
+    for key, value in config.items():
+        name = re.sub("([A-Z])", r"_\1", key).lower()
+        assert name in known, f"{kind.__name__} has no {key}"
+        allowed = [a for part in get_args(known[name]) for a in get_args(part)]
+        if isinstance(value, str) and allowed and all(isinstance(a, str) for a in allowed):
+            assert value in allowed, f"{key} = {value}"
+        values[name] = value
+    return kind(**values)
+
+
+def test_the_panels_are_settings_that_foxglove_knows(path: Path) -> None:
+    """Read into the vendor's own types (foxglove-sdk), and written by them again as they were."""
+    parts = {"cameraState": layouts.ThreeDeeCameraState, "imageMode": layouts.ImageModeConfig}
+    kinds = {"Plot": layouts.PlotConfig, "3D": layouts.ThreeDeeConfig, "Image": layouts.ImageConfig}
+    made = json.loads(path.with_suffix(".layout.json").read_text("utf-8"))
+    seen = set()
+    for name, config in made["configById"].items():
+        title = config.pop("foxglovePanelTitle")
+        own = {**config, "paths": [as_foxgloves(layouts.PlotSeries, s) for s in config["paths"]]
+               } if "paths" in config else dict(config)  # fmt: skip
+        for key, kind in parts.items():
+            if key in own:
+                own[key] = as_foxgloves(kind, own[key])
+        panel = as_foxgloves(kinds[name.partition("!")[0]], own)
+        assert title
+        assert json.loads(panel.to_json()) == config
+        seen.add(name.partition("!")[0])
+    assert seen >= {"Plot", "3D"}
 
 
 def test_the_layout_shows_every_topic_of_the_replay(path: Path, messages: Messages) -> None:

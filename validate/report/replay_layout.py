@@ -115,7 +115,7 @@ def _space(view: View, tracks: Sequence[Track]) -> Json:
     topics = {t.topic: {"visible": t.schema == SCENE} for t in tracks if t.schema in (SCENE, CLOUD)}
     return {"cameraState": camera, "followMode": "follow-none", "followTf": view.frame,
             "fixedFrame": view.frame, "scene": {}, "transforms": {}, "topics": topics,
-            "layers": {}, "imageMode": {}, "foxglovePanelTitle": _title(view)}  # fmt: skip
+            "layers": {}, "foxglovePanelTitle": _title(view)}  # fmt: skip
 
 
 def _body(view: View) -> tuple[Floats, float]:
