@@ -73,12 +73,12 @@ def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recordi
 
 
 def _tell(recording: Recording) -> None:
-    """What was assumed, where a scale is from, how deep images became 8 bits, what is told of a
-    stream, and events, of which none is one."""
+    """What was assumed, where a scale is from, how deep images became 8 bits, by which lens they
+    are straight, what is told of a stream, and events, of which none is one."""
     for key, text in recording.metadata.get(ASSUMED, {}).items():
         say(f"{key}: {text}", indent="  ")
     made = recording.metadata.get("provenance", {})
-    for key in ("scale", "levels", "events", *recording.streams):
+    for key in ("scale", "levels", "lens", "events", *recording.streams):
         if made.get(key, AS_IT_IS) != AS_IT_IS:
             say(f"{key}: {made[key]}", indent="  ")
 

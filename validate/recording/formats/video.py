@@ -1,7 +1,7 @@
 """Videos (MP4, MOV, AVI, Matroska) as images: grey, on the container's own times, at a scale said.
 
-A container states no size of a pixel; a camera that is not calibrated has none that holds over the
-whole image. Its end is checked by its own account of lengths.
+A container states no size of a pixel; a camera that is not calibrated (`lens`) has none that holds
+over the whole image. Its end is checked by its own account of lengths.
 """
 
 import struct
@@ -14,10 +14,11 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
+from validate.recording.images.lens import LENS, straightened
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Frames, Recording
 
-_OPTIONS = ("m_per_px", "rate", "every", "topic", "frame")
+_OPTIONS = ("m_per_px", "rate", "every", "topic", "frame", LENS)
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # an MP4 or MOV begins with one
 _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"  # Matroska and WebM (RFC 9559)
 _STILLS = (b"heic", b"heix", b"mif1", b"avif")  # photographs in the same container
@@ -27,7 +28,8 @@ _EVEN = 2.0  # ms by which even frames differ: containers count in coarse ticks
 
 def read_video(path: Path, options: Options) -> Recording:
     """Frames (h, w) in grey. Options: `m_per_px` (needed), `rate` (Hz, in place of the container's
-    times), `every` (10: one frame in ten), `topic` (default images), `frame`.
+    times), `every` (10: one frame in ten), `topic` (default images), `frame`, `lens`: a file of the
+    camera's calibration, by which they are straightened.
 
     Raises `UsageError` without a scale, and for times that the container does not tell;
     `RecordingError` for a file that is cut, damaged, or shorter than it declares, or whose pixels
@@ -45,7 +47,7 @@ def read_video(path: Path, options: Options) -> Recording:
             f"{path.name}: {count} frames can be decoded, {declared} are declared: damaged"
         )
     t, told = _times(path, found["t"], float(found["rate"]), every, options)
-    images = tuple(np.ascontiguousarray(image) for image in found["images"])
+    images, lens = straightened([np.ascontiguousarray(i) for i in found["images"]], options)
     topic, frame = options.get("topic", "images"), options.get("frame", "image")
     streams = {topic: Frames(t, images, (side, side), np.eye(4), frame)}
     said = {
@@ -54,6 +56,7 @@ def read_video(path: Path, options: Options) -> Recording:
         "times": told,
         "colour": "made grey (ITU-R 601)" if bool(found["colour"]) else "grey as recorded",
         "m_per_px": f"{options['m_per_px']} (entered)",
+        **lens,
     }
     source = source_of(path, "a video keeps no checksum: integrity not provable")
     return recorded(path.stem, source, streams, said)

@@ -223,3 +223,11 @@ def demosaiced(mosaic: NDArray[Any], order: str) -> NDArray[Any]:
     if min(mosaic.shape) < _MOSAIC:
         raise RecordingError(f"a mosaic of {mosaic.shape}, at least {_MOSAIC} px a side")
     return np.asarray(cv2.cvtColor(mosaic, getattr(cv2, f"COLOR_Bayer{order}2GRAY")))
+
+
+def undistorted(image: Pixels, K: Floats, D: Floats) -> Pixels:
+    """The image (h, w) as a camera of the matrix K (3, 3) px without the distortion D (k,) sees it;
+    what it did not see is black."""
+    import cv2
+
+    return np.asarray(cv2.undistort(image, K, D), dtype=np.uint8)

@@ -11,6 +11,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
+from validate.recording.images.lens import LENS, straightened
 from validate.recording.images.levels import shallow
 from validate.recording.images.numbered import pictures
 from validate.recording.images.png_stack import by_size, offered
@@ -19,7 +20,7 @@ from validate.recording.reader import Options, Reader, head, require_known, sour
 from validate.recording.types import Frames, Recording, Source
 from validate.units import in_si
 
-_OPTIONS = ("m_per_px", "rate", "topic", "frame", "white")
+_OPTIONS = ("m_per_px", "rate", "topic", "frame", "white", LENS)
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _OTHERS = tuple(s for s in SUFFIXES if s != ".png")
 _SECONDS = 60
@@ -29,9 +30,9 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     """Frames (h, w) in grey, in the order of the numbers in the files' names or of the pages.
 
     Options: `m_per_px` and `rate` (Hz), where an ImageJ TIFF states none; `white`: the level that
-    becomes 255 in images deeper than 8 bits (default: the stack's largest, which is told); `topic`
-    and `frame`. Raises `UsageError` without scale or times, `RecordingError` for damage. Images of
-    several sizes are streams of their own.
+    becomes 255 in images deeper than 8 bits (default: the stack's largest, which is told); `lens`:
+    a file of the camera's calibration; `topic` and `frame`. Raises `UsageError` without scale or
+    times, `RecordingError` for damage. Images of several sizes are streams of their own.
     """
     require_known(options, _OPTIONS)
     found = decoded("validate.recording.images.stack_arrays", path, "images", None, _SECONDS)
@@ -39,6 +40,7 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     if not deep:
         raise RecordingError(f"{path.name}: no image in it")
     images, levels = shallow(deep, options)
+    images, lens = straightened(images, options)
     sides, scale = _sides(path, found, options)
     t, times = _times(path, len(images), found, options)
     topic, frame = options.get("topic", "images"), options.get("frame", "image")
@@ -50,6 +52,7 @@ def read_image_stack(path: Path, options: Options) -> Recording:
         "kind": "images", "images": str(len(images)), "m_per_px": scale, "times": times,
         "levels": levels,
         "colour": "made grey (ITU-R 601)" if bool(found["colour"]) else "grey as recorded",
+        **lens,
     }  # fmt: skip
     name = path.resolve().name if path.is_dir() else path.stem
     whole = "images keep no common checksum: integrity not provable"

@@ -10,6 +10,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import above_zero
 from validate.recording.images.image import Pixels, decode_png
+from validate.recording.images.lens import LENS, straightened
 from validate.recording.images.numbered import numbered, pictures
 from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.scales import odd_pixel
@@ -36,16 +37,17 @@ _PRINTERS = (
     600,
     1200,
 )  # dots an inch
-_OPTIONS = ("m_per_px", "rate", "topic")
+_OPTIONS = ("m_per_px", "rate", "topic", LENS)
 
 
 def read_png_stack(folder: Path, options: Options) -> Recording:
     """All *.png of a folder as one stream of frames, in the order of the numbers in their names.
 
-    Options are `m_per_px` (m, or with its unit), `rate` (Hz) and `topic` (default images). Frames
-    are in the image's own metres, x right, y down. Raises `UsageError` without size or rate, for a
-    pixel beyond reason and for what is no folder, `RecordingError`: no files, equal numbers,
-    damaged images, over `MAX_STACK`. Images of several sizes are streams of their own.
+    Options are `m_per_px` (m, or with its unit), `rate` (Hz), `topic` (default images) and `lens`,
+    a file of the camera's calibration. Frames are in the image's own metres, x right, y down.
+    Raises `UsageError` without size or rate, for a pixel beyond reason and for what is no folder,
+    `RecordingError`: no files, equal numbers, damaged images, over `MAX_STACK`. Images of several
+    sizes are streams of their own.
     """
     require_known(options, _OPTIONS)
     if not {"m_per_px", "rate"} <= options.keys():
@@ -54,13 +56,14 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder of PNG images")
     side, rate = _pixel(options["m_per_px"]), above_zero(options, "rate")
-    images = _images(folder)
+    images, lens = straightened(_images(folder), options)
     _require_meant(options["m_per_px"], side, images[0])
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
     topic, name = options.get("topic", "images"), folder.resolve().name
     streams = by_size(topic, images)
-    made = {"kind": "folder of PNG images", "images": str(len(images)), "rate_hz": repr(rate)}
+    made = {"kind": "folder of PNG images", "images": str(len(images)), "rate_hz": repr(rate),
+            **lens}  # fmt: skip
     return Recording(
         name=name,
         source=Source(name, "", 0, "folder of images: integrity not provable"),
