@@ -126,6 +126,8 @@ def test_a_stack_needs_scale_and_rate_and_a_shift_is_checked(own_files: Path) ->
     assert "expected SECONDS" in called([*both, "us=soon"])[2]
     assert "0 of 100 samples (0 %) meet" in called([*both, "us=60"])[2]
     assert "no other stream" in called([*both, "images=1"])[2]
+    assert "clocks are taken as one" in called(both[:-1])[2]
+    assert "clocks are taken as one" not in called([*both, "us=0"])[2]
     code, _, err = called(["import", "log.csv", "--as", "png-stack", "-o", "x.mcap",
                            "--m-per-px", "1", "--rate", "1"])  # fmt: skip
     assert (code, "no folder of PNG images" in err) == (2, True)

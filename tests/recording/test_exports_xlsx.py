@@ -14,6 +14,7 @@ from odf.table import Table, TableCell, TableRow
 from odf.text import P
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.exports.every import every_specimen
 from validate.recording.exports.xlsx import read_sheets, read_xlsx
 from validate.recording.formats import apart, xlsx_arrays
 from validate.recording.readers import recognised
@@ -49,6 +50,26 @@ def test_the_first_sheet_with_a_test_is_read(tmp_path: Path) -> None:
     assert provenance["text"].startswith("sheet 'Data' (of a workbook)")
     assert "sheet 'Info' not used" in provenance["besides"]
     assert recording.source.bytes == path.stat().st_size
+
+
+def test_specimens_on_sheets_of_their_own_are_all_taken(tmp_path: Path) -> None:
+    """Testing machines write each specimen on a sheet: `specimen=all` was refused."""
+    doubled = [[*r[:2], 2 * r[2]] for r in SAMPLES]
+    path = written(tmp_path, Info=[["words"]], A=[*TABLE, *SAMPLES], B=[*TABLE, *doubled])
+    said = {"test": "compression", "specimen": "all"}
+    a, b = every_specimen(recognised(path), path, said)
+    assert (a.name, b.name) == ("log-A", "log-B")
+    assert_test(a)
+    assert_test(b, f=2 * F)
+    english = [["Time", "Position", "Force"], ["s", "mm", "N"], *SAMPLES]
+    asking = written(tmp_path, A=english)
+    with pytest.raises(UsageError, match=r"log.xlsx: nothing says whether this test presses"):
+        read_xlsx(asking, {})
+    path = written(tmp_path, A=[*TABLE, *SAMPLES], B=[*TABLE, *doubled])
+    (alone,) = every_specimen(recognised(path), path, {**said, "sheet": "B"})
+    assert_test(alone, f=2 * F)
+    with pytest.raises(RecordingError, match=r"log.xlsx: no table in the sheets 'A'"):
+        every_specimen(recognised(path), written(tmp_path, A=[["words"]]), said)
 
 
 def test_several_sheets_with_a_test_are_asked_for(tmp_path: Path) -> None:

@@ -118,6 +118,11 @@ def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> 
         merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))
     write_recording(merged, out)
     written(merged, out)
+    if not shifts and len(files) > 1:
+        complain(
+            "the files' clocks are taken as one; where each recorder had its own, "
+            "`validate align` finds the offset, or --shift TOPIC=SECONDS says it"
+        )
     ask_back(merged)
 
 

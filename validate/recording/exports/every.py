@@ -8,24 +8,25 @@ from validate.recording.exports.blocks import parse_tables
 from validate.recording.exports.encoding import whole_file
 from validate.recording.exports.instron import INSTRON
 from validate.recording.exports.specimens import specimen_tables
-from validate.recording.exports.xlsx import SHEETS, XLSX, specimens_in_sheet
+from validate.recording.exports.xlsx import ALL, SHEETS, XLSX, specimens_in_book
 from validate.recording.reader import Options, Reader
 from validate.recording.types import Recording
 
-ALL = "all"  # --map specimen=all
+__all__ = ["ALL", "every_specimen"]
 
 
 def every_specimen(reader: Reader, path: Path, options: Options) -> list[Recording]:
     """A recording of each specimen, named by its label; raises as the reader, and `UsageError` for
     one of another format."""
     if reader in (XLSX, SHEETS):
-        labels = specimens_in_sheet(path, options)
+        chosen = specimens_in_book(path, options)
     elif reader is INSTRON:
         said = (options.get("encoding"), options.get("decimal"))
-        labels = tuple(specimen_tables(parse_tables(whole_file(path), *said)))
+        tables = specimen_tables(parse_tables(whole_file(path), *said))
+        chosen = {label: {"specimen": label} for label in tables}
     else:
         raise UsageError(
             f"--map specimen={ALL}: {path.name} is {reader.doc}, which has no specimens"
         )
-    logs = [reader.read(path, {**options, "specimen": label}) for label in labels]
-    return [replace(log, name=f"{log.name}-{i}") for log, i in zip(logs, labels, strict=True)]
+    logs = {label: reader.read(path, {**options, **one}) for label, one in chosen.items()}
+    return [replace(log, name=f"{log.name}-{label}") for label, log in logs.items()]

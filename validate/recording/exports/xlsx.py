@@ -17,6 +17,7 @@ from validate.recording.formats.apart import decoded
 from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.types import Recording
 
+ALL = "all"  # --map specimen=all
 _WORKBOOK = "xl/workbook.xml"
 _ARCHIVE = b"PK\x03\x04"
 _CONTAINER = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -59,27 +60,36 @@ def _read(path: Path, options: Options, decoder: str, extra: str) -> Recording:
     said = {key: value for key, value in options.items() if key != "sheet"}
     data = whole_file(path)
     try:
-        sheet, sheets = _test_sheet(path, options, decoder, extra)
+        sheets = _sheets(path, options, decoder, extra)
+        sheet = _chosen(sheets, options.get("sheet"))
         label, table = chosen(sheet.tables, said.get("specimen"))
         return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from error
 
 
-def specimens_in_sheet(path: Path, options: Options) -> tuple[str, ...]:
-    """The labels of the specimens in the sheet that would be read; raises as `read_xlsx`."""
+def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
+    """What chooses each specimen, by its label: those of the sheet that is named or alone holds a
+    test, else of all sheets that do; raises as `read_xlsx`."""
     decoder = ("xlsx_arrays", "xlsx") if _is_workbook(path) else ("sheets_arrays", "sheets")
-    return tuple(_test_sheet(path, options, *decoder)[0].tables)
+    try:
+        tests = _tests(_sheets(path, options, *decoder), options.get("sheet"))
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+    one = len(tests) == 1
+    return {
+        label if one else s.name if len(s.tables) == 1 else f"{s.name}-{label}":
+        {"sheet": s.name, "specimen": label} for s in tests for label in s.tables
+    }  # fmt: skip
 
 
-def _test_sheet(
-    path: Path, options: Options, decoder: str, extra: str
-) -> tuple[_Sheet, list[_Sheet]]:
+def _sheets(path: Path, options: Options, decoder: str, extra: str) -> list[_Sheet]:
     require_known(options, (*KEYS, "sheet"))
     found = decoded(decoder, path, extra)
     texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
-    sheets = [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
-    return _chosen(sheets, options.get("sheet")), sheets
+    return [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
 
 
 def _sheet(name: str, text: bytes, decimal: str | None) -> _Sheet:
@@ -90,6 +100,18 @@ def _sheet(name: str, text: bytes, decimal: str | None) -> _Sheet:
 
 
 def _chosen(sheets: list[_Sheet], said: str | None) -> _Sheet:
+    tests = _tests(sheets, said)
+    if len(tests) > 1:
+        held = ", ".join(f"'{s.name}'" for s in tests[:8])
+        raise RecordingError(
+            f"{len(tests)} sheets may hold the test: {held}; choose one with "
+            f"--map 'sheet={tests[0].name}'; import takes all as repeats with specimen={ALL}"
+        )
+    return tests[0]
+
+
+def _tests(sheets: list[_Sheet], said: str | None) -> list[_Sheet]:
+    """The sheet that is named, else those that hold a test, else those that hold a table."""
     names = ", ".join(f"'{s.name}'" for s in sheets[:8])
     if said is not None:
         named = [s for s in sheets if s.name == said]
@@ -97,18 +119,12 @@ def _chosen(sheets: list[_Sheet], said: str | None) -> _Sheet:
             raise UsageError(f"--map sheet={said}: no such sheet; the workbook has {names}")
         if not named[0].tables:
             raise RecordingError(f"sheet '{said}': {named[0].why}")
-        return named[0]
+        return named
     tests = [s for s in sheets if s.is_test] or [s for s in sheets if s.tables]
     if not tests:
         why = sheets[0].why if sheets else "no sheet"
         raise RecordingError(f"no table in the sheets {names} of this workbook: {why}")
-    if len(tests) > 1:
-        held = ", ".join(f"'{s.name}'" for s in tests[:8])
-        raise RecordingError(
-            f"{len(tests)} sheets may hold the test: {held}; choose one with "
-            f"--map 'sheet={tests[0].name}'"
-        )
-    return tests[0]
+    return tests
 
 
 def _noted(table: Table, used: _Sheet, sheets: list[_Sheet]) -> Table:
