@@ -1,12 +1,13 @@
 """Every defect of a force-displacement table gives its own error, and what mends it."""
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from validate.errors import RecordingError, UsageError
+from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.exports.columns import _same
 from validate.recording.exports.instron import read_instron
 from validate.recording.exports.rows import fitted
@@ -250,3 +251,10 @@ def test_columns_are_one_where_they_move_alike_or_not_at_all() -> None:
     assert _same(a, 5.0 - a)
     assert _same(0 * a, 0 * a + 3.0)
     assert not _same(a, 1.01 * a)
+
+
+def test_a_damaged_number_of_two_hundred_digits_overflows_nothing(tmp_path: Path) -> None:
+    """Squares of it did, in the check for swapped columns."""
+    (tmp_path / "log.csv").write_text(spoiled(20, lambda r: cell(r, 2, "-4.7e226")), "utf-8")
+    with np.errstate(all="raise"), contextlib.suppress(ValidateError):
+        read_instron(tmp_path / "log.csv", {"test": "compression"})

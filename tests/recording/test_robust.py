@@ -116,6 +116,15 @@ def test_where_mcap_is_expected_another_format_is_called_by_its_name(
     assert "validate import sample -o sample.mcap" in said
 
 
+def test_a_log_given_for_a_recording_is_not_called_a_damaged_one(tmp_path: Path) -> None:
+    """It was to be copied again from its source."""
+    (tmp_path / "log.csv").write_text("Time (s),Extension (mm),Load (N)\n0,0,0\n", "utf-8")
+    with pytest.raises(RecordingError) as raised:
+        read_recording(tmp_path / "log.csv")
+    assert "copy" not in str(raised.value)
+    assert "validate import log.csv -o log.mcap" in str(raised.value)
+
+
 def test_every_command_calls_a_c3d_a_c3d(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -24,7 +24,7 @@ from validate.recording.images.image_stack import IMAGE_STACK
 from validate.recording.images.png_stack import PNG_STACK
 from validate.recording.mcap import read as mcap
 from validate.recording.mcap.read import MCAP
-from validate.recording.reader import Reader
+from validate.recording.reader import Reader, head
 from validate.recording.types import Recording
 
 # Any text may be a testing machine's: its reader is asked after all that know their own.
@@ -63,7 +63,8 @@ def no_mcap(path: Path, error: RecordingError) -> RecordingError:
         return RecordingError(said)
     may = INSTRON.recognises(path)
     way = f"; if it is {INSTRON.doc}: validate import {path.name} -o {path.stem}.mcap"
-    return RecordingError(f"{error}{way}") if may else error
+    what = f"{path.name}: the first 8 bytes are no MCAP magic"
+    return RecordingError(f"{what} ({head(path, 8).hex()}){way}") if may else error
 
 
 def named(kind: str) -> Reader:

@@ -134,9 +134,15 @@ def _power_of_ten(ratio: float) -> int:
 
 def _misfit(x: Floats, y: Floats) -> float:
     """1 - r^2 of a straight line of y over x; 1 when one of them is constant."""
-    x, y = x - x.mean(), y - y.mean()
+    x, y = _centred(x), _centred(y)
     scale = float(x @ x) * float(y @ y)
     return max(0.0, 1 - float(x @ y) ** 2 / scale) if scale > 0 else 1.0
+
+
+def _centred(x: Floats) -> Floats:
+    """About its mean and over its largest value: squares of a damaged file's numbers overflow."""
+    x = x / (float(np.abs(x).max()) or 1.0)
+    return np.asarray(x - x.mean())
 
 
 def _backward(x: Floats) -> float:
