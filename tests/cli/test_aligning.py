@@ -63,6 +63,7 @@ def test_an_offset_is_found_below_a_sample_and_kept(tmp_path: Path) -> None:
     assert (tmp_path / "both-aligned.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_a_drift_is_said_enters_the_sd_and_is_taken_out_on_demand(tmp_path: Path) -> None:
     drift, out = 4e-4, tmp_path / "both.mcap"
     given = files(tmp_path, drift)
@@ -96,7 +97,9 @@ def third(folder: Path, late: float, noise: float) -> str:
     return str(folder / "laser.mcap")
 
 
-@pytest.mark.parametrize("late", [7.25, -3.5])  # a clock that began after the first, or before
+@pytest.mark.parametrize(  # a clock that began after the first, or before
+    "late", [pytest.param(7.25, marks=pytest.mark.slow), -3.5]
+)
 def test_three_files_come_onto_the_first_clock(tmp_path: Path, late: float) -> None:
     out = tmp_path / "all.mcap"
     given = (*files(tmp_path), third(tmp_path, late, 0.02), *BY, "--by", "force=laser")
@@ -136,6 +139,7 @@ def test_one_file_that_does_not_follow_is_named_and_nothing_is_written(tmp_path:
     assert "1 file, at least 2" in refused("align", given[0], *BY, "-o", out)
 
 
+@pytest.mark.slow
 def test_what_is_enough_is_the_users(tmp_path: Path) -> None:
     given = (*files(tmp_path, noise=0.8), *BY, "-o", str(tmp_path / "x.mcap"))
     why = refused("align", *given, "--correlation", "0.9")

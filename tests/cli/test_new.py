@@ -342,6 +342,7 @@ def test_the_phantoms_experiment_agrees_as_written(tmp_path: Path, project_root:
     assert "9 of 9 checks agree" in output
 
 
+@pytest.mark.slow
 def test_a_mesh_file_is_a_body_too(tmp_path: Path) -> None:
     """A block of the cylinder's area between slipping plates: the same force, by statics."""
     side = float(np.sqrt(np.pi) * DIAMETER / 2)

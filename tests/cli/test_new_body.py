@@ -245,6 +245,7 @@ def test_a_file_of_answers_is_toml(tmp_path: Path) -> None:
             read_answers(path)
 
 
+@pytest.mark.slow
 def test_markers_that_the_layout_calls_otherwise_are_named(here: Path) -> None:
     """They were "0 names, 0 different ones" where none is called alike, and left out in silence."""
     head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"

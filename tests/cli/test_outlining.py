@@ -115,6 +115,7 @@ def test_what_is_meant_is_said(two: Path, tmp_path: Path) -> None:
     assert radii(outline, np.array([110, 55])).mean() == pytest.approx(21, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_rival_that_leaves_too_little_confidence_refuses(two: Path, tmp_path: Path) -> None:
     out = tmp_path / "c.mcap"
     told = refused("outline", str(two), "-o", str(out), "--confidence", "0.9")

@@ -58,6 +58,7 @@ def drifted(
     return np.array(nis), np.array(dof), tested, rejected
 
 
+@pytest.mark.slow
 def test_what_is_measured_late_is_consistent_only_for_who_doubts_the_clock() -> None:
     nis, dof, _, _ = drifted(SD_T, SD_T, None)
     assert nis_consistency(nis, dof).holds

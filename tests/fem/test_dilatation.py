@@ -28,6 +28,7 @@ def rest_slope(responses: Responses) -> float:
     return float(form[0, 0, 0] / (3 * form[0, 0, -1]))
 
 
+@pytest.mark.slow
 def test_bending_of_a_beam() -> None:
     quadratic = cantilever_tip(2, "pointwise", 0.4999)
     linear = cantilever_tip(1, "pointwise", 0.4999)

@@ -50,6 +50,7 @@ def test_a_law_that_is_not_the_material_s_is_said_to_differ(tmp_path: Path) -> N
     assert "predicted: stress.equibiaxial" in result.sentence
 
 
+@pytest.mark.slow
 def test_the_material_s_law_predicts_the_other_modes(tmp_path: Path) -> None:
     read = {"data": str(curves(tmp_path)), "ranges.reading": "0.002", "ranges.axis": "0.002"}
     options = Options(read, methods=("neo_hooke", "mooney_rivlin"))

@@ -44,6 +44,7 @@ def test_the_same_images_in_other_encodings_are_the_same_bit_for_bit(other: str)
     assert plain.t.tolist() == [0, 0.05]
 
 
+@pytest.mark.slow
 def test_two_views_beside_each_other_are_two_streams_from_the_left() -> None:
     got = read_dicom(DATA / "gdcm-US-ALOKA-16.dcm", {})
     assert sorted(got.frames) == ["images/1", "images/2"]
@@ -55,6 +56,7 @@ def test_two_views_beside_each_other_are_two_streams_from_the_left() -> None:
         assert (got.frame(topic).images[0] == big.frame(topic).images[0]).all()
 
 
+@pytest.mark.slow
 def test_a_scale_of_an_image_of_another_size_is_not_believed() -> None:
     path = BESIDE / "examples_ybr_color.dcm"
     with pytest.raises(
@@ -139,6 +141,7 @@ def test_a_folder_of_one_series_is_one_sequence(tmp_path: Path) -> None:
     assert told["scale"].endswith("mm a pixel (SequenceOfUltrasoundRegions)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "why"),
     [

@@ -72,6 +72,7 @@ def test_specimens_on_sheets_of_their_own_are_all_taken(tmp_path: Path) -> None:
         every_specimen(recognised(path), written(tmp_path, A=[["words"]]), said)
 
 
+@pytest.mark.slow
 def test_several_sheets_with_a_test_are_asked_for(tmp_path: Path) -> None:
     doubled = [[*r[:2], 2 * r[2]] for r in SAMPLES]
     path = written(tmp_path, A=[*TABLE, *SAMPLES], B=[*TABLE, *doubled], C=[["words"]])

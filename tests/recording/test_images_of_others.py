@@ -132,6 +132,7 @@ def test_a_png_of_16_bits_is_sent_to_the_reader_that_takes_it(tmp_path: Path) ->
     assert CliRunner().invoke(cli, [*arguments, "--as", "image-stack"]).exception is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["jpg", pytest.param("tif", marks=pytest.mark.slow)])
 def test_a_bomb_or_a_cut_image_costs_a_line(tmp_path: Path, kind: str) -> None:
     file = tmp_path / f"a1.{kind}"

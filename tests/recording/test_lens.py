@@ -78,7 +78,10 @@ def shots(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", ["lens.yml", "lens.xml", "lens.json", "ros.yaml"])
+@pytest.mark.parametrize("name", [
+    "lens.yml", "ros.yaml",
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("lens.xml", "lens.json")),
+])  # fmt: skip
 def test_dots_are_where_they_are_once_the_lens_is_known(
     name: str, shots: Path, tmp_path: Path
 ) -> None:
@@ -94,6 +97,7 @@ def test_dots_are_where_they_are_once_the_lens_is_known(
         assert ("reprojection error 0.21 px" in told) == name.startswith("lens")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "change", "why"), [
     ("a.yml", lambda p: p.write_text("nothing: 1"), "a.yml: no camera_matrix in it"),
     ("b.yml", lambda p: opencvs(p, coefficients=D[:3]), "3 coefficients of distortion; one of"),

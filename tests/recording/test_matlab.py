@@ -39,6 +39,7 @@ def test_a_stack_of_images_has_its_frames_last(shared_data: Path) -> None:
     assert got.t[1] == pytest.approx(1 / 30)
 
 
+@pytest.mark.slow
 def test_what_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     points = written(tmp_path / "x.mat", P=np.ones((4, 2)))
     with pytest.raises(UsageError, match=r"x\.mat: P states no unit of length; .* unit=mm"):
@@ -77,6 +78,7 @@ def test_numbers_that_are_none_are_no_positions(tmp_path: Path) -> None:
         read_matlab(written(tmp_path / "x.mat", P=points), {"unit": "m"})
 
 
+@pytest.mark.slow
 def test_one_wrong_byte_of_a_packed_variable_fails_its_checksum(tmp_path: Path) -> None:
     path = written(tmp_path / "x.mat", True, P=np.random.default_rng(1).normal(size=(50, 3)))
     whole = path.read_bytes()

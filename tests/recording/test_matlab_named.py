@@ -119,6 +119,7 @@ def test_inspect_lists_the_arrays_before_anything_is_said(file: Path) -> None:
         inspect_file(file, "matlab", {"force": "nothing:N"})
 
 
+@pytest.mark.slow
 def test_import_and_inspect_by_the_command(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = file.with_suffix(".mcap")
     said = ["--map", "force=data.load.N:N", "--map", "time=data.t:ms"]
@@ -160,6 +161,7 @@ def test_what_is_no_array_of_numbers_is_named(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_damaged_file_of_the_new_kind_costs_a_line(tmp_path: Path) -> None:
     whole = new(tmp_path / "y.mat").read_bytes()
     path = tmp_path / "x.mat"

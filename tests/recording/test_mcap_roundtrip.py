@@ -45,6 +45,7 @@ def test_same_values_sees_one_bit() -> None:
     )
 
 
+@pytest.mark.slow
 def test_two_writes_are_byte_equal_and_times_of_many_chunks_return(tmp_path: Path) -> None:
     t = np.arange(12_000) * 33_333_333 / 1e9
     y = np.random.default_rng(1).normal(size=(len(t), 2))

@@ -30,6 +30,7 @@ def test_exact_points_are_met_and_equal_noise_is_the_plain_fit() -> None:
     np.testing.assert_allclose(same.matrix, plain.matrix, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_the_covariance_is_that_of_many_draws_and_less_than_the_plain_fits() -> None:
     rng, C = np.random.default_rng(7), covariance_of(DEEP)
     at = np.array([[0.0, 0.0, 0.05]])

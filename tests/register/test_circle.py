@@ -34,6 +34,7 @@ def test_half_a_circle_is_recovered():
     assert found.radius == pytest.approx(0.008, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_stated_sd_is_the_scatter_of_repeated_fits():
     """400 repetitions, 48 points, 0.15 mm along the normal; sd of an sd is 1/sqrt(800) = 3.5 %."""
     rng = np.random.default_rng(7)

@@ -483,6 +483,7 @@ def test_an_unexplained_excess_is_stated_against_the_declared_noise():
     assert found.outliers == ()
 
 
+@pytest.mark.slow
 def test_unrelated_points_are_an_excess_not_a_permutation():
     for seed in range(5):
         said = register(cloud(seed, 42) * [1, 1, 0], grid(0.003, seed)).findings[-1]

@@ -94,6 +94,7 @@ def test_what_a_law_cannot_predict_does_not_keep_it_from_being_identified() -> N
     assert [r.finished for r in refused.runs] == [True, False]
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_not_identifiable_refuses_its_own_law() -> None:
     narrow = replace(
         laws(1.2, 1.2), calibrations=(calibration("svk", 1e6), calibration("neo", 1e3))

@@ -89,6 +89,7 @@ def unsaid(card: Card, folder: Path) -> tuple[Recording, ...]:
     return (record(Card(), print),)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("files", [1, 2])
 def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(files: int) -> None:
     silent = other_model(load=lambda card, folder: files * unsaid(card, folder))

@@ -84,6 +84,7 @@ def test_a_ratio_at_its_bound_has_no_standard_deviation() -> None:
     assert best_ratio(errors, np.ones(3))[:2] == (0.0, None)
 
 
+@pytest.mark.slow
 def test_which_files_are_a_pair_is_asked_for(tmp_path: Path) -> None:
     folder = pair(tmp_path / "other")
     savemat(folder / "three.mat", {"R": np.ones((4, 3))})

@@ -229,6 +229,7 @@ def test_without_packets_the_force_is_held_fades_and_is_nothing() -> None:
     assert done.findings["ticks without a new place"] == ticks - 3
 
 
+@pytest.mark.slow
 def test_no_force_beyond_the_limit_goes_out() -> None:
     strict = prepared(
         experiment_named("needle_pocket"), Options({**COARSE, "hand.limit": "5"}), "p1_exact"

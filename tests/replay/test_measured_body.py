@@ -200,6 +200,7 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
         compare(experiment(tmp_path, replace(p, seen=replace(p.seen, image_y="+x")), seen))
 
 
+@pytest.mark.slow
 def test_a_motion_that_was_only_noted_is_judged_by_outlines(tmp_path: Path) -> None:
     """Pressed by .4 mm in half of the time, by 1 mm at the end; as if by 2 mm it differs."""
     t = np.linspace(0.0, 2.0, 11)

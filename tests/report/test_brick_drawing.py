@@ -47,6 +47,7 @@ def test_a_cut_shows_the_whole_section() -> None:
     assert area == pytest.approx(500.0 * 250.0)
 
 
+@pytest.mark.slow
 def test_quadratic_hexahedra_are_listed_as_vtk_does() -> None:
     """Its own local coordinates of the 27 nodes, in its order, are the places of ours."""
     if not gl.available():

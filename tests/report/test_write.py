@@ -93,6 +93,7 @@ def test_failing_figure_leaves_the_old_report(
     assert [p.name for p in tmp_path.iterdir()] == ["cube"]
 
 
+@pytest.mark.slow
 def test_failed_move_puts_the_old_report_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -188,6 +188,7 @@ def test_two_bodies_without_a_common_node_are_told(tmp_path: Path) -> None:
     assert "--part 1 (the largest)" in shown.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".msh", ".npz", ".stl"])
 def test_one_of_two_bodies_is_chosen_by_size_and_by_label(suffix: str, tmp_path: Path) -> None:
     """The smaller, which stands first in the file; its facet set comes with it."""

@@ -110,6 +110,7 @@ def test_bodies_that_overlap_are_refused_with_both_volumes(tmp_path: Path) -> No
         filled(stl(tmp_path / "x.stl", points, both), "mm", 6e-3)
 
 
+@pytest.mark.slow
 def test_a_coordinate_that_is_no_number_is_one_line(tmp_path: Path) -> None:
     path = stl(tmp_path / "x.stl", X, T)
     path.write_text(path.read_text().replace("vertex -5 ", "vertex nan ", 1))

@@ -110,6 +110,7 @@ def test_a_dropped_block_never_gains_energy() -> None:
     assert np.diff(touching.astype(int)).min() < 0 < touching.sum()  # it comes off again
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.9, 1.1])
 def test_a_block_slides_from_the_angle_of_friction_on(ratio: float) -> None:
     """Below it stays where it is; beyond it falls with g (sin - mu cos)."""

@@ -242,6 +242,7 @@ def test_the_consistent_force_is_the_slope_of_the_energy() -> None:
         assert -force(state)[c] == pytest.approx((up - down) / (2 * h), rel=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(st.lists(st.tuples(st.floats(-0.004, 0.004), st.floats(-0.008, 0.002)), min_size=3,
                 max_size=8))  # fmt: skip

@@ -130,6 +130,7 @@ def test_the_static_limit_is_exact(border: Any, far: Any) -> None:
     assert force(settings, ramp)[-1] == pytest.approx(LIMIT, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_three_regions_of_three_solvers_settle_at_the_static_limit() -> None:
     ramp = np.minimum(np.arange(1, 6001) / 500, 1.0) * 0.01
     settings = replace(
@@ -156,6 +157,7 @@ def test_without_a_spring_there_is_no_force() -> None:
 # --- orders and stability -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_error_of_borders_is_of_first_order_in_the_slow_period() -> None:
     pushed = swing(2.0)
     whole = force(WHOLE, pushed)

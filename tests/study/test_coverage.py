@@ -88,6 +88,7 @@ def test_one_number_with_normal_noise_differs_in_two_sided_two_sd() -> None:
     assert all(q.undecided.number == 0 for q in found.quantities)
 
 
+@pytest.mark.slow
 def test_a_standard_deviation_that_is_declared_twice_too_small_is_named() -> None:
     found = studied(noise=2.0, draws=100)
     assert pooled(found) == pytest.approx(0.317, abs=0.06)  # a normal law beyond one sd
