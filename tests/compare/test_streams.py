@@ -48,6 +48,7 @@ def experiment() -> Experiment:
     )
 
 
+@pytest.mark.slow
 def test_a_recording_with_more_than_an_experiment_uses(experiment: Experiment) -> None:
     result = compare(experiment, Options({}, quick=True))
     used = {s.topic: s.why for s in result.streams if s.used}

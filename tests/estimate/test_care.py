@@ -66,6 +66,7 @@ def test_what_is_measured_late_is_consistent_only_for_who_doubts_the_clock() -> 
     assert nis_consistency(nis, dof).mean > 10
 
 
+@pytest.mark.slow
 def test_a_gate_rejects_the_share_of_good_looks_that_it_says() -> None:
     """Rejected looks among 6400 of a filter whose claims hold, by the binomial distribution. A
     tight gate rejects more (14 % at .9): what it misses of good looks leaves larger errors."""

@@ -355,6 +355,7 @@ def test_a_load_bias_is_a_load(pulled: Case) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_steady_claim_is_where_the_sequence_settles(pulled: Case) -> None:
     for every in (1, 4):
         seen = pulled.measured(1, every=every)

@@ -52,6 +52,7 @@ def test_compression_between_slipping_plates_is_exact(
     assert r.fields[0] == pytest.approx(np.stack([nu * x, nu * y, -z], axis=1), abs=10 * within)
 
 
+@pytest.mark.slow
 def test_bonded_plates_raise_the_force() -> None:
     """D 50, h 30 mm at nu .4999: 1.40 by FEM, 1.347 by Gent's formula (README of the shared data).
 

@@ -196,6 +196,7 @@ def test_other_laws_without_sense_are_refused(laws: dict[str, float], words: str
         FluidLaws(**laws)
 
 
+@pytest.mark.slow
 def test_a_curve_is_shown_with_its_units() -> None:
     shown = curve_exhibit([("one", curve_of(condensed_block(with_mesh(10), 2)))])
     assert all("/" in h or h == "cavity" for h in shown.tables[0].headings)

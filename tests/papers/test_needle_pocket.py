@@ -197,6 +197,7 @@ def test_a_path_of_ones_own_is_run_and_judged_by_what_it_has(tmp_path: Path) -> 
     assert result.kind == "measured"
 
 
+@pytest.mark.slow
 def test_space_is_chosen_by_a_parameter_and_the_shipped_path_with_it() -> None:
     experiment = experiment_named("needle_pocket")
     values = {"body.space": "solid", "mesh.solid": "6"}

@@ -122,6 +122,7 @@ def test_a_tracker_is_as_far_off_its_stage_as_it_was_made(tmp_path: Path) -> Non
         against_stage(StageTest("short", x[:3], stage[:3]))
 
 
+@pytest.mark.slow
 def test_the_first_steps_predict_the_last_one(tmp_path: Path) -> None:
     options = Options({"recording": str(written(tmp_path))}, methods=("neo_coupled", "svk"))
     result = compare(load_experiment("rubber_strip"), options)

@@ -67,6 +67,7 @@ def test_an_image_without_a_disk_is_named_and_most_without_one_are_an_error(tmp_
         run(path)
 
 
+@pytest.mark.slow
 def test_bad_input_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "two.mat"
     savemat(path, {"a": imaged(8.0, 0.2, 1), "b": imaged(8.0, 0.2, 1)})

@@ -249,6 +249,7 @@ def test_images_of_other_kinds_are_refused() -> None:
         extract_outline(np.zeros((32, 32)), PX)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_outlines_of_frames_are_contours_and_none_is_left_out() -> None:
     frames = tuple(image(ellipse(10e-3, 10e-3 + d, 4e-3, 4e-3), level=-25.0) for d in (0, 5e-4))
     pose = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -126,6 +126,7 @@ def test_every_dress_gives_the_same_si_arrays(dress: Dress, tmp_path: Path) -> N
         assert recording.record("header")["Cylinder Diameter"] == "50mm"
 
 
+@pytest.mark.slow
 @given(
     separator=st.sampled_from(",;\t"),
     decimal=st.sampled_from(".,"),

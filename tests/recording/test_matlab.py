@@ -21,6 +21,7 @@ def written(path: Path, packed: bool = False, **variables: Any) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_particles_in_pixels_are_metres_by_the_size_that_is_said(shared_data: Path) -> None:
     """35 316 particles in a volume of 1022 x 1022 x 304 px of 0.4 um, as their source says."""
     got = read_matlab(shared_data / GEL, {"unit": "0.4um"})

@@ -88,7 +88,7 @@ def test_a_recording_of_outlines_and_images_is_asked_back(tmp_path: Path) -> Non
     write_recording(other, tmp_path / "log.mcap")
     merged = ("merge", str(path), str(tmp_path / "log.mcap"), "-o", str(tmp_path / "b.mcap"))
     code, _, err = here(*merged)
-    assert (code, err.count("\n")) == (0, 2)
+    assert (code, err.count("\n")) == (0, 3)  # two scales, and that clocks are taken as one
     assert "a factor 1000 or 1000000?" in err
     defects = inspect_recording(path).defects
     assert sum("m a pixel is outside" in d or "outlines of 20 m" in d for d in defects) == 2

@@ -42,6 +42,7 @@ def test_what_itk_writes_is_read_pixel_by_pixel(
     np.testing.assert_allclose(moved.y, [[0.01, -0.002, 1.0]] * 2)
 
 
+@pytest.mark.slow
 @EACH_ENDING
 def test_volumes_and_levels_that_are_none_are_called_so(ending: str, itk: Path) -> None:
     with pytest.raises(RecordingError, match=r"2 px deep|\(5, 4, 2, 3\)"):

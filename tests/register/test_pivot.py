@@ -134,6 +134,7 @@ def test_what_the_command_cannot_use_is_told(tmp_path: Path) -> None:
     assert "Missing option '--points'" in refused("calibrate", str(x), "-o", out)
 
 
+@pytest.mark.slow
 def test_a_stylus_on_eight_landmarks_against_its_published_tip(
     shared_data: Path, tmp_path: Path
 ) -> None:

@@ -110,6 +110,7 @@ def test_an_inclusion_that_goes_on_beyond_the_sweep_is_refused() -> None:
         stacked(seen, TIMES[: last + 1], POSITIONS[: last + 1])
 
 
+@pytest.mark.slow
 def test_a_sweep_without_an_inclusion_is_refused() -> None:
     empty = POSITIONS[-3:] + 10e-3
     with pytest.raises(RegistrationError, match="no slice shows an inclusion"):

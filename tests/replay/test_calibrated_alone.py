@@ -114,6 +114,7 @@ def test_only_the_laws_that_are_run_are_identified_and_none_left_is_an_error() -
         compare(none, Options({}))
 
 
+@pytest.mark.slow
 def test_what_is_shared_is_identified_whichever_law_is_run_and_ends_all() -> None:
     first, second = laws(1.2, 1.2).calibrations
     made = replace(laws(1.2, 1.2), calibrations=(replace(first, shared=True), second))

@@ -73,6 +73,7 @@ def test_without_parameters_nothing_is_shown() -> None:
     assert case.charts == ()
 
 
+@pytest.mark.slow
 def test_on_the_road_parameters_are_chosen_by_name_and_the_report_has_them(
     project_root: Path,
 ) -> None:

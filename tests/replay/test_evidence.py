@@ -77,6 +77,7 @@ def test_another_models_twin_is_evidence_but_no_measurement() -> None:
     assert {s.against for s in result.methods[0].scores} >= {"recording of a twin"}
 
 
+@pytest.mark.slow
 def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
     result = judged(other_model(), sd="1e-4")
     assert result.notes[0].startswith("The twin was recorded anew")
@@ -98,6 +99,7 @@ def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(f
         judged(silent, sd="1e-4")
 
 
+@pytest.mark.slow
 def test_a_setting_that_the_record_does_not_know_is_refused() -> None:
     def older(card: Card, folder: Path) -> tuple[Recording, ...]:
         made = stamped(record(Card(), print), Card())

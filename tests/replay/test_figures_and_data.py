@@ -29,6 +29,7 @@ def tiny(frames: float, **settings: str) -> Result:
     return compare(experiment, Options(settings))
 
 
+@pytest.mark.slow
 def test_run_fails_and_says_so_where_our_value_moved() -> None:
     assert tiny(3.0).passed
     moved = tiny(4.0)

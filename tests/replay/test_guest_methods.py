@@ -80,6 +80,7 @@ def judged(fake: str, shared_data: Path) -> Result:
     return compare(with_guests(load("hanging_bar"), (fake,)), options)
 
 
+@pytest.mark.slow
 def test_the_table_has_program_error_rate_and_memory(judged: Result) -> None:
     assert judged.kind == "reference"
     (exhibit,) = (e for e in judged.exhibits if e.anchor == "guests")

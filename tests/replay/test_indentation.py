@@ -123,6 +123,7 @@ def test_its_report_has_the_traces(result: Result, tmp_path: Path) -> None:
     assert {"ball.force", "ball.penetration", "ball.area"} <= set(stored["methods"][0]["traces"])
 
 
+@pytest.mark.slow
 def test_contact_is_set_like_any_parameter(result: Result) -> None:
     rough = compare(EXPERIMENT, {"contact.friction": ".8", "contact.radius": "15mm"}, quick=True)
     (run,) = rough.methods[0].runs

@@ -124,6 +124,7 @@ def test_the_path_is_walked_on_time_and_forces_are_those_of_the_stepper() -> Non
     assert done.changed.sum() == 4
 
 
+@pytest.mark.slow
 def test_ticks_that_take_too_long_are_missed_and_none_is_left_out() -> None:
     path = RecordedPath(made().path.t[:50], made().path.x[:50])
     done = run(path, Turned(cost=0.003))

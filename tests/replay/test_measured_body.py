@@ -119,6 +119,7 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
     assert rms["marker.rms@high"] < 1.5 * np.sqrt(3) * SD  # of a length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("places", [
     {"A": (0.04, 0.03, 0.05), "B": (0.0, 0.03, 0.04), "C": (0.04, 0.0, 0.02), "D": (0, 0, 0.01)},
     {"A": (0.04, 0.03, 0.05), "B": (0.04, 0.01, 0.04), "C": (0.04, 0.0, 0.02),
@@ -181,6 +182,7 @@ def outline(share: float) -> Any:
                                                       strict=True)])  # fmt: skip
 
 
+@pytest.mark.slow
 def test_outlines_of_a_section(tmp_path: Path) -> None:
     t = T[::16]
     shapes = tuple(outline(float(v)) for v in np.clip((t - 0.5) / 3.0, 0, 1))

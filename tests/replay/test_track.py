@@ -320,6 +320,7 @@ def test_quick_skips_cases_own_exhibits_and_printed_figures() -> None:
     assert "quick run" in result.sentence
 
 
+@pytest.mark.slow
 def test_what_an_experiment_tells_reaches_its_printed_figures_when_all_was_run() -> None:
     experiment = replace(TINY, exhibits=told, published=PUBLISHED)
     (figure,) = run(experiment).published

@@ -68,6 +68,7 @@ def test_self_contained_and_well_formed() -> None:
     assert len(text.encode()) < 2_000_000
 
 
+@pytest.mark.slow
 def test_sections_of_a_recording_with_force_only() -> None:
     found, _ = made(small_result())
     assert set(found) == {
@@ -82,6 +83,7 @@ def test_sections_when_nothing_finished() -> None:
     assert "not_converged at step 3: 1 update allowed" in unescape(text)
 
 
+@pytest.mark.slow
 def test_all_recordings_are_drawn() -> None:
     found, _ = made(small_result())
     level, off = found["curves"].exhibit.charts

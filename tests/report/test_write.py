@@ -26,6 +26,7 @@ def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
 
 
+@pytest.mark.slow
 def test_files_without_gl(tmp_path: Path) -> None:
     steps: list[str] = []
     path = write_report(
@@ -45,6 +46,7 @@ def test_files_without_gl(tmp_path: Path) -> None:
     assert [p.name for p in folder.parent.iterdir()] == ["cube"]
 
 
+@pytest.mark.slow
 def test_figures_are_whole_pictures(tmp_path: Path) -> None:
     folder = write_report(small_result(), tmp_path / "cube", created=CREATED).parent
     for path in (folder / "figures").iterdir():
@@ -76,6 +78,7 @@ def test_old_report_is_replaced_whole(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["cube"]
 
 
+@pytest.mark.slow
 def test_failing_figure_leaves_the_old_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -219,6 +219,7 @@ def test_one_of_two_bodies_is_chosen_by_size_and_by_label(suffix: str, tmp_path:
         assert re.search(r"x.npz: no part '3'; .* 1 \(the largest\) to 2", str(odd.exception))
 
 
+@pytest.mark.slow
 def test_a_label_of_gmsh_is_a_part(tmp_path: Path) -> None:
     """Two that share nodes: the lower half of a body."""
     mesh, path = linear(), tmp_path / "x.msh"

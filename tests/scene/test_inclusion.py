@@ -68,6 +68,7 @@ def test_projection_moves_radially() -> None:
     assert moved == pytest.approx(np.array([[0.6, 0.7, 0.8], [0, 2.0, 0], [1.0, -1.0, 0]]))
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     st.floats(0.027, 0.033),

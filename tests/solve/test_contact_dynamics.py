@@ -96,6 +96,7 @@ def test_a_strike_gives_the_bar_no_more_than_the_plates_work(
     assert stored[-1] > (1 - 2 * off) * work[-1]
 
 
+@pytest.mark.slow
 def test_a_dropped_block_never_gains_energy() -> None:
     """It bounces on a rough slope: strain + kinetic + weight's energy only fall, to rounding."""
     system = on_a_slope(grid((0.1, 0.1, 0.1), (2, 2, 2)), 0.3, 0.4, gap=0.002)

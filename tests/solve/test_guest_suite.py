@@ -55,6 +55,7 @@ def test_the_bar_hangs() -> None:
         assert np.sign(small.u[0, tip, 2]) == np.sign(small.scene.loads[0].direction[2]) == 1
 
 
+@pytest.mark.slow
 def test_a_guest_that_can_nothing_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     """Each scene is a row with the reason, and the command fails."""
     assert command_line(["guest", "check", "false", "--json"]) == 1

@@ -281,6 +281,7 @@ def test_weight_is_in_the_balance(tmp_path: Path) -> None:
         assert said[1:] == ((found,) if found else ())
 
 
+@pytest.mark.slow
 def test_it_is_at_home_in_the_folder_alone(tmp_path: Path) -> None:
     twist = (
         "inside = [os.getcwd(), *(os.environ[k] for k in ('HOME', 'TMPDIR', 'XDG_CACHE_HOME'))]\n"

@@ -89,6 +89,7 @@ def test_a_series_changes_what_follows_though_the_body_is_remembered() -> None:
     assert modal(heavy, 0.1).traces["tip.z"].y.min() < 1.5 * free.min()  # another body is another
 
 
+@pytest.mark.slow
 def test_let_go_is_the_march_and_then_the_equilibrium() -> None:
     t = np.append(T[:20], 3.0)
     run = run_scheme("l", LetGo(DT), SCENE, t, inputs(9.8, t), np.array([20]))

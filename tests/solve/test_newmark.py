@@ -49,6 +49,7 @@ def error(state: State, system: System, truth: Floats) -> float:
     return max(float(np.abs(x - y).max() / np.abs(y).max()) for x, y in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES)
 def test_order_under_a_load_that_is_switched_on(rule: RuleName) -> None:
     system = small()

@@ -123,6 +123,7 @@ def test_a_stiff_and_heavy_half_hangs_as_its_materials_say() -> None:
     assert moved[0] / moved[2] == pytest.approx(7 / 4, rel=0.06)
 
 
+@pytest.mark.slow
 def test_what_finds_no_equilibrium_names_the_load_and_what_helps() -> None:
     """The cube folds under 44 N, however large the step that leads beyond."""
     for whole in (-50.0, -100.0, -300.0):

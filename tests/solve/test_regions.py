@@ -372,6 +372,7 @@ def test_damping_by_stiffness_is_refused() -> None:
         stepper_of(NEAR, replace(scene, material=replace(scene.material, stiffness_damping=0.1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_regions_of_a_block_settle_where_the_whole_body_does(dimension: int) -> None:
     scene = block(E, 4, dimension)

@@ -58,6 +58,7 @@ def test_forty_lines_of_80_columns_and_the_largest_change_first(
     assert "left out" not in whole
 
 
+@pytest.mark.slow
 def test_the_page_lies_beside_the_first_run_and_has_its_picture(tmp_path: Path) -> None:
     runs = two(tmp_path / "runs", 3)
     out = here("compare", *runs, cwd=tmp_path)[1]

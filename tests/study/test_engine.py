@@ -162,6 +162,7 @@ def test_a_killed_worker_loses_no_cell_and_none_is_done_twice(
     assert finish(waiting(tmp_path, cells), tmp_path / "cells", where).reused == len(cells)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,6 +61,7 @@ def test_shared_gains_give_the_scores_of_single_runs(
     assert len(set(together.scores["top.rmse"])) == 3  # every seed has its own noise
 
 
+@pytest.mark.slow
 def test_gated_and_smoothed_seeds_run_one_by_one(pulled: Experiment) -> None:
     """Gains that depend on what was measured are nobody else's; a smoothed run has no step time."""
     plain = first(pulled)

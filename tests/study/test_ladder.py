@@ -73,6 +73,7 @@ def test_elements_of_a_quadratic_scene_are_those_of_its_vertices() -> None:
     assert of_element(scene, "MD").dilatation == "nodal_mean"
 
 
+@pytest.mark.slow
 def test_a_parameter_refines_where_it_changes_the_nodes_and_not_the_body(
     own_phantom: OwnBody,
 ) -> None:

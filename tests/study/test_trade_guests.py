@@ -38,6 +38,7 @@ if job["material"]["law"] == "linear":
 NOTHING = Recording("none", Source("none", "", 0, "made here"), 0)
 
 
+@pytest.mark.slow
 def test_its_answer_is_read_where_all_are_compared(tmp_path: Path) -> None:
     script = tmp_path / "fake.py"
     script.write_text(FAKE, "utf-8")

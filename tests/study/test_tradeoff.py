@@ -248,6 +248,7 @@ def test_choose_writes_its_folder_and_exits_by_its_verdict(
     assert (folder / "figures" / "chart_choice.png").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("commanded")
 def test_tradeoff_writes_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["study", "tradeoff", "small", "--out", str(tmp_path)]) == 0

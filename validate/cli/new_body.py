@@ -1,6 +1,6 @@
 """Any body under what a recording says moved it: questions by the paths of its parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -10,6 +10,21 @@ import numpy as np
 
 from validate.cli.asking import Answers, Question
 from validate.cli.holdings import beside
+from validate.cli.new_body_questions import (
+    NONE,
+    RECORDED,
+    UNKNOWN,
+    a_known_modulus,
+    a_layout,
+    by_path,
+    by_topic,
+    facets_of,
+    named_place,
+    parsed,
+    there,
+    three_of,
+    unit_of,
+)
 from validate.cli.new_kind import NewKind, quantity_in
 from validate.cli.rendered import rendered
 from validate.errors import UsageError
@@ -17,12 +32,12 @@ from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.measured_body import body_of
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_seen import AS_SEEN, FEWEST, NOTED
+from validate.replay.measured_drive import NOTED
+from validate.replay.measured_markers import AS_SEEN
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.mesh import Mesh
-from validate.scene.named_place import GRAMMAR, axis_of, place_of
+from validate.scene.named_place import axis_of
 
-_UNKNOWN, _NONE, _RECORDED = "unknown", "none", "recorded"
 _LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "linear"}
 _SHAPES = ("file", "block", "cylinder")
 _FEW = 150  # cells of a mesh file whose quadratic ones are halved twice in some minutes
@@ -45,8 +60,8 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
-    if forces and _unit(recording, found.get("moved.by", "")) == "m":
-        asked.append(_topics("seen.force", "force on the moved place that is judged", forces))
+    if forces and unit_of(recording, found.get("moved.by", "")) == "m":
+        asked.append(by_topic("seen.force", "force on the moved place that is judged", forces))
     asked += _of_the_material(found)
     return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
 
@@ -56,24 +71,26 @@ def _of_the_body(found: Answers) -> list[Question]:
     asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
     if shape == "file":
         asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (of a surface: "
-                              "`validate body` fills it)", open=True, check=_there))  # fmt: skip
+                              "`validate body` fills it)", open=True, check=there))  # fmt: skip
         if Path(file).suffix.lower() in FOREIGN:
             asked.append(Question("body.unit", "unit of its lengths, as mm", open=True))
     elif shape == "block":
-        asked.append(_path("body.block", "sizes along x, y, z from the origin, as 60mm,45mm,70mm"))
+        asked.append(
+            by_path("body.block", "sizes along x, y, z from the origin, as 60mm,45mm,70mm")
+        )
     elif shape == "cylinder":
-        asked.append(_path("body.cylinder", "diameter and height, axis z, as 25mm,30mm"))
+        asked.append(by_path("body.cylinder", "diameter and height, axis z, as 25mm,30mm"))
     return asked
 
 
 def _of_the_material(found: Answers) -> list[Question]:
     """The modulus is open only under a displacement with a force that is judged."""
-    sought = found.get("seen.force", _NONE) != _NONE
-    way = f"; {_UNKNOWN}: identified on the lower part of the load" if sought else ""
+    sought = found.get("seen.force", NONE) != NONE
+    way = f"; {UNKNOWN}: identified on the lower part of the load" if sought else ""
     return [
         Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
-                 check=_parsed("material.E", _UNKNOWN) if sought else _a_known_modulus),
-        _path("material.nu", "Poisson ratio"),
+                 check=parsed("material.E", UNKNOWN) if sought else a_known_modulus),
+        by_path("material.nu", "Poisson ratio"),
         Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
                  "beside it", choices=tuple(_LAWS)),
     ]  # fmt: skip
@@ -95,15 +112,15 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
         asked.append(Question("moved.along", "direction of it, as -z (force and displacement are "
                               "positive along it)", open=True, check=axis_of))  # fmt: skip
     if by == "gravity":
-        return [*asked, _path("material.rho", "density, kg/m3")]
-    asked.append(_place("moved.place", "place that is moved or pulled", mesh, is_open=True))
+        return [*asked, by_path("material.rho", "density, kg/m3")]
+    asked.append(named_place("moved.place", "place that is moved or pulled", mesh, is_open=True))
     if by == "markers":
         names = [n for m in recording.markers.values() for n in m.names]
         text = f"markers on it, three or more, of {', '.join(names)}"
-        asked.append(Question("moved.markers", text, open=True, check=_three_of(names)))
-    elif _unit(recording, by) == "m":
+        asked.append(Question("moved.markers", text, open=True, check=three_of(names)))
+    elif unit_of(recording, by) == "m":
         if by == NOTED:
-            asked.append(_path("moved.noted", "its motion as it was noted, evenly from the first "
+            asked.append(by_path("moved.noted", "its motion as it was noted, evenly from the first "
                                "instant to the last, straight between, as 0,2mm,5mm"))  # fmt: skip
         asked.append(Question("moved.sideways", "whether the moved place is held across its "
                               "direction (glued, gripped), or slides", open=True,
@@ -118,26 +135,26 @@ def _movers(recording: Recording) -> tuple[str, ...]:
 
 def _of_the_supports(mesh: Mesh | None) -> list[Question]:
     return [
-        _place("held.all", "places held in every direction", mesh),
-        *(_place(f"held.{c}", f"places held along {c} alone", mesh) for c in "xyz"),
-        _place("held.slides", "a flat place that slides on its plate", mesh),
+        named_place("held.all", "places held in every direction", mesh),
+        *(named_place(f"held.{c}", f"places held along {c} alone", mesh) for c in "xyz"),
+        named_place("held.slides", "a flat place that slides on its plate", mesh),
     ]
 
 
 def _of_the_markers(recording: Recording, found: Answers) -> list[Question]:
     if not recording.markers:
         return []
-    asked = [_topics("seen.markers", "markers that are judged", list(recording.markers))]
-    if found.get("seen.markers") == _NONE and found.get("moved.by") != "markers":
+    asked = [by_topic("seen.markers", "markers that are judged", list(recording.markers))]
+    if found.get("seen.markers") == NONE and found.get("moved.by") != "markers":
         return asked
     known = "marker_layout" in recording.metadata
     return [
         *asked,
-        Question("seen.layout", f"where the markers sit in the body's frame: {_RECORDED}, a file "
+        Question("seen.layout", f"where the markers sit in the body's frame: {RECORDED}, a file "
                  f"of landmarks, or '{AS_SEEN}' (they were recorded in that frame)",
-                 _RECORDED if known else "", "the record marker_layout", open=not known,
-                 check=_layout),
-        _path("seen.still", "seconds from the start in which the body is unloaded", "0",
+                 RECORDED if known else "", "the record marker_layout", open=not known,
+                 check=a_layout),
+        by_path("seen.still", "seconds from the start in which the body is unloaded", "0",
               "the first sample alone"),
     ]  # fmt: skip
 
@@ -147,14 +164,14 @@ def _of_the_outlines(
 ) -> list[Question]:  # fmt: skip
     if not recording.contours:
         return []
-    asked = [_topics("seen.outline", "outlines that are judged", list(recording.contours))]
+    asked = [by_topic("seen.outline", "outlines that are judged", list(recording.contours))]
     topic = found.get("seen.outline")
-    if topic is None or topic == _NONE:
+    if topic is None or topic == NONE:
         return asked
     posed = not np.array_equal(recording.contour(topic).pose, np.eye(4))
     asked += [
         Question("seen.surface", "facet set whose section the outlines are; surface: the whole "
-                 "body's", "surface", "the whole body's", check=_facets(mesh)),
+                 "body's", "surface", "the whole body's", check=facets_of(mesh)),
         Question("seen.pose", "where the images lie: recorded, declared (origin and directions), "
                  "fitted (directions; the outline at rest on the body's section through its "
                  "middle)", "recorded" if posed else "", "the recording has a pose",
@@ -162,7 +179,7 @@ def _of_the_outlines(
     ]  # fmt: skip
     pose = found.get("seen.pose", "recorded")
     if pose == "declared":
-        asked.append(_path("seen.origin", "the images' first pixel in the body's frame, as "
+        asked.append(by_path("seen.origin", "the images' first pixel in the body's frame, as "
                            "0,20mm,0"))  # fmt: skip
     if pose not in ("", "recorded"):
         asked += [
@@ -184,79 +201,14 @@ def _of_the_limits(found: Answers) -> list[Question]:
 def _of_the_ranges(found: Answers) -> list[Question]:
     words = {"E": "relative, of the modulus", "nu": "of the Poisson ratio",
              "load": "relative, of what loads the body"}  # fmt: skip
-    if found.get("material.E") == _UNKNOWN:
+    if found.get("material.E") == UNKNOWN:
         del words["E"]
-    return [_path(f"ranges.{k}", f"standard uncertainty, {text}") for k, text in words.items()]
+    return [by_path(f"ranges.{k}", f"standard uncertainty, {text}") for k, text in words.items()]
 
 
 def _judged(found: Answers) -> set[str]:
     keys = {"force": "seen.force", "marker": "seen.markers", "contour": "seen.outline"}
-    return {name for name, key in keys.items() if found.get(key, _NONE) != _NONE}
-
-
-# --- kinds of questions ---------------------------------------------------------------------------
-
-
-def _path(path: str, text: str, default: str = "", why: str = "") -> Question:
-    """A parameter's value as --set takes it."""
-    return Question(path, text, default, why, open=not default, check=_parsed(path))
-
-
-def _a_known_modulus(text: str) -> None:
-    if text == _UNKNOWN:
-        raise UsageError("it is identified on a force that is judged under a displacement "
-                         "(seen.force, moved.by a signal in m), which is not here")  # fmt: skip
-    _parsed("material.E")(text)
-
-
-def _parsed(path: str, skip: str = "") -> Callable[[str], Any]:
-    return lambda text: None if text == skip else with_values(MeasuredBody(), {path: text})
-
-
-def _place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
-    """The first of them says what words there are; it is asked in every interview."""
-    named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
-    words = f": {GRAMMAR}{named}; several joined by +" if key == "held.all" else ""
-    return Question(
-        key, f"{text}{words}{'' if is_open else '; empty: none'}",
-        open=is_open, check=lambda words: mesh is None or place_of(words, mesh),
-    )  # fmt: skip
-
-
-def _topics(key: str, text: str, topics: list[str]) -> Question:
-    return Question(key, text, topics[0], "the first recorded", choices=(*topics, _NONE))
-
-
-def _three_of(names: Sequence[str]) -> Callable[[str], Any]:
-    def check(text: str) -> None:
-        chosen = [part.strip() for part in text.split(",")]
-        if absent := [n for n in chosen if n not in names]:
-            raise UsageError(f"{', '.join(absent)} not among {', '.join(names)}")
-        if len(set(chosen)) < FEWEST:
-            raise UsageError(f"{len(set(chosen))} markers, at least {FEWEST} are needed")
-
-    return check
-
-
-def _there(text: str) -> None:
-    if not Path(text).is_file():
-        raise UsageError("no such file here")
-
-
-def _layout(text: str) -> None:
-    if text not in (_RECORDED, AS_SEEN):
-        _there(text)
-
-
-def _facets(mesh: Mesh | None) -> Callable[[str], Any]:
-    return lambda name: mesh is None or mesh.facet_nodes(name)
-
-
-def _unit(recording: Recording, topic: str) -> str:
-    if topic == NOTED:
-        return "m"
-    found = recording.signals.get(topic)
-    return found.unit if found is not None else ""
+    return {name for name, key in keys.items() if found.get(key, NONE) != NONE}
 
 
 # --- what is written ------------------------------------------------------------------------------
@@ -303,10 +255,10 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
 
 
 def _card(source: str, folder: Path, found: Answers) -> MeasuredBody:
-    skipped = ("", _UNKNOWN)
+    skipped = ("", UNKNOWN)
     values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
     for key in ("body.file", "seen.layout"):
-        if values.get(key, AS_SEEN) not in (AS_SEEN, _RECORDED):
+        if values.get(key, AS_SEEN) not in (AS_SEEN, RECORDED):
             values[key] = beside(Path(values[key]), folder / "x.py")
     values |= {"recording": source}
     card: MeasuredBody = with_values(MeasuredBody(), values)

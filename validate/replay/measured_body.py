@@ -29,7 +29,8 @@ from validate.replay.experiment import (
     Uncertainty,
 )
 from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
-from validate.replay.measured_seen import LOW, drive_kind, place, prescribed
+from validate.replay.measured_drive import drive_kind, prescribed
+from validate.replay.measured_seen import LOW, place
 from validate.replay.method import Method
 from validate.replay.solved import solve
 from validate.scene.box import box

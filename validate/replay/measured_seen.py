@@ -1,59 +1,31 @@
 """A measured body's recording, registered: what moves it, what is compared, at which instants."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import ComparisonError, RecordingError, RegistrationError, UsageError
-from validate.identify.modulus import MIN_SAMPLES, load_noise
-from validate.recording.readers import recognised
+from validate.errors import ComparisonError, RegistrationError, UsageError
 from validate.recording.scatter import repeats_share
-from validate.recording.types import Recording, Signal
-from validate.register.clock import clock_sd, interpolated
+from validate.recording.types import Recording
+from validate.register.clock import clock_sd
 from validate.register.from_rest import noise, rested, since_rest
-from validate.register.markers import MarkerObservation, Together, observe_markers, vector
+from validate.register.markers import MarkerObservation, Together
 from validate.register.observation import Observation, Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.register.two_step import fit_plane
 from validate.replay.measured_cards import MeasuredBody
+from validate.replay.measured_drive import NOTED, Kind, drive_kind, driven, zeroed
+from validate.replay.measured_markers import BodyAt, listed_names, markers_topic, registered
 from validate.replay.measured_outline import observed_outline
-from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
-from validate.scene.select import Place
-from validate.scene.tracked import Prescribed
 
 LOW, HIGH = "low", "high"
-AS_SEEN, NOTED = "as seen", "noted"
-Kind = Literal["weighs", "pulls", "moves", "follows"]
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
-_At = tuple[Mesh, Path]  # the body's mesh, and the experiment's folder
+_FEWEST = 3  # instants of a window
 _AGAINST = 0.2  # of the farthest marker's way: so far back the mean of all may go
-FEWEST = 3  # markers on a place that follows them
-
-
-def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
-    """What the load is; raises `UsageError` for a topic that is no signal in m or N."""
-    if p.moved.by == "gravity":
-        return "weighs"
-    if p.moved.by == "markers":
-        return "follows"
-    if p.moved.by == NOTED:
-        return "moves"
-    found = recording.signals.get(p.moved.by)
-    unit = found.unit if found is not None else ""
-    if unit not in ("m", "N"):
-        known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in ("m", "N")]
-        raise UsageError(
-            f"moved.by = {p.moved.by}: {'in ' + unit if unit else 'no signal of that name'}; one "
-            f"of {', '.join([*known, 'markers', 'gravity', NOTED])}"
-        )
-    return "moves" if unit == "m" else "pulls"
 
 
 def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) -> Registered:
@@ -64,7 +36,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
     """
     t, rest = _instants(recording, p)
     kind = drive_kind(recording, p)
-    drive = _drive(recording, p, kind, t, rest, (scene.mesh, folder))
+    drive = driven(recording, p, kind, t, rest, (scene.mesh, folder))
     compared: list[Observation] = []
     findings: tuple[str, ...] = ()
     if p.seen.force:
@@ -115,88 +87,6 @@ def _instants(recording: Recording, p: MeasuredBody) -> tuple[Floats, float]:
     return np.append(start, np.linspace(start, end, count + 1)[1:]), float(start)
 
 
-# --- what moves it --------------------------------------------------------------------------------
-
-
-def _drive(
-    recording: Recording, p: MeasuredBody, kind: Kind, t: Floats, rest: float, at: _At
-) -> SignalObservation:
-    if kind == "weighs":
-        y = np.full((len(t), 1), p.moved.amount * p.moved.scale)
-        y[0] = 0.0
-        return SignalObservation("gravity", "drives", t, y, "m/s^2", 0.0)
-    if kind == "follows":
-        return _followed(recording, p, t, at)
-    if p.moved.by == NOTED:
-        return _noted(p, t)
-    topic, unit = p.moved.by, "m" if kind == "moves" else "N"
-    signal = _zeroed(recording, topic, unit, rest + p.seen.still)
-    y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
-    y[0] = 0.0
-    return SignalObservation(
-        topic, "drives", t, y, unit, signal.sd, sd_t=clock_sd(recording, topic)
-    )
-
-
-def _noted(p: MeasuredBody, t: Floats) -> SignalObservation:
-    """What was noted, evenly over the instants t (nt,) and straight between; how uncertain it is
-    says `ranges.load`."""
-    if len(p.moved.noted) < 2 or not np.any(np.diff(p.moved.noted)):
-        raise UsageError(
-            f"moved.noted = {p.moved.noted or 'none'}: two amounts or more that "
-            "differ, from the first instant to the last, as 0,2mm,5mm"
-        )
-    at = np.linspace(t[0], t[-1], len(p.moved.noted))
-    y = p.moved.scale * (np.interp(t, at, p.moved.noted) - p.moved.noted[0])
-    return SignalObservation(NOTED, "drives", t, y[:, None], "m", 0.0)
-
-
-def _zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
-    """The signal from its mean at rest; its noise as declared, or more as its samples scatter."""
-    s = recording.signal(topic, unit)
-    early = s.y[s.t <= max(until, float(s.t[0]))]
-    scatter = load_noise(s.y[:, 0]) if len(s.t) >= MIN_SAMPLES else 0.0
-    sd = max(s.sd, scatter) * float(np.sqrt(1 + 1 / len(early)))
-    return replace(s, y=s.y - early.mean(axis=0), sd=sd)
-
-
-def prescribed(recording: Recording, p: MeasuredBody, where: Place, at: _At) -> Prescribed:
-    """The place that follows its markers as a rigid body; raises `UsageError` for fewer than three
-    markers, or names that are none."""
-    markers = recording.marker(_topic(recording, p))
-    absent = [n for n in p.moved.markers if n not in markers.names]
-    if absent or len(p.moved.markers) < FEWEST:
-        raise UsageError(
-            f"moved.markers = {','.join(p.moved.markers) or 'none'}: "
-            f"{f'{absent} are not recorded' if absent else 'three or more are needed'}; the "
-            f"recording has {', '.join(markers.names)}"
-        )
-    observed = _registered(recording, p, at)
-    places = dict(zip(observed.names, observed.x[0], strict=True))
-    unseen = [n for n in p.moved.markers if n not in places]
-    if unseen:
-        raise RegistrationError(f"markers {unseen} on the moved place are not seen at rest")
-    points = tuple((n, tuple(places[n].tolist())) for n in p.moved.markers)
-    return Prescribed("moved", where, points)
-
-
-def _followed(recording: Recording, p: MeasuredBody, t: Floats, at: _At) -> SignalObservation:
-    """What the markers on the moved place did, one column an axis of each."""
-    seen = _registered(recording, p, at)
-    own = [seen.names.index(n) for n in p.moved.markers]
-    moved = (seen.x[:, own] - seen.x[0, own]).reshape(len(seen.t), -1)
-    y, _ = interpolated(seen.t, moved, t)
-    if not np.isfinite(y).all():
-        first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
-        raise RegistrationError(
-            f"the markers on the moved place are not all seen at t = {first:.3f} s: fill the gap, "
-            "or leave one out of moved.markers"
-        )
-    y[0] = 0.0
-    sd_t = clock_sd(recording, _topic(recording, p))
-    return SignalObservation("moved", "drives", t, p.moved.scale * y, "m", seen.sd, sd_t=sd_t)
-
-
 # --- what is compared -----------------------------------------------------------------------------
 
 
@@ -211,7 +101,7 @@ def _force(
             f"place; here the body {kind}. Set seen.force=none"
         )
     topic = str(p.seen.force)
-    force = _zeroed(recording, topic, "N", rest + p.seen.still)
+    force = zeroed(recording, topic, "N", rest + p.seen.still)
     t = drive.t
     y = np.interp(t, force.t, force.y[:, 0])
     far = int(np.abs(drive.y[:, 0]).argmax())
@@ -228,11 +118,11 @@ def _force(
 
 
 def _markers(
-    recording: Recording, p: MeasuredBody, kind: Kind, at: _At
+    recording: Recording, p: MeasuredBody, kind: Kind, at: BodyAt
 ) -> tuple[MarkerObservation, tuple[str, ...]]:
     """All markers that move nothing themselves, from where they stood at rest."""
-    whole = _registered(recording, p, at)
-    source, unseen, samples = rested(recording.marker(_topic(recording, p)), p.seen.still)
+    whole = registered(recording, p, at)
+    source, unseen, samples = rested(recording.marker(markers_topic(recording, p)), p.seen.still)
     driving = p.moved.markers if kind == "follows" else ()
     kept = [i for i, n in enumerate(whole.names) if n not in driving]
     if not kept:
@@ -244,7 +134,9 @@ def _markers(
     found = since_rest(part, at[0], noise(source), samples, p.seen.stands)
     bare = [n for n in source.names if n not in whole.names]
     left = (("not seen at rest", unseen), ("not in the layout", bare))
-    said = tuple(f"markers {why} are left out: {_shown(names)}" for why, names in left if names)
+    said = tuple(
+        f"markers {why} are left out: {listed_names(names)}" for why, names in left if names
+    )
     return replace(found, together=_TOGETHER), said
 
 
@@ -267,69 +159,6 @@ def _require_along(p: MeasuredBody, markers: MarkerObservation, kind: Kind, amou
         )
 
 
-def _registered(recording: Recording, p: MeasuredBody, at: _At) -> MarkerObservation:
-    """Markers in the body's frame: their layout's, or the one they were recorded in."""
-    mesh, folder = at
-    topic = _topic(recording, p)
-    markers, _, _ = rested(recording.marker(topic), p.seen.still)
-    layout = dict(zip(markers.names, markers.x[0], strict=True))
-    if p.seen.layout != AS_SEEN:
-        layout = layout_of(recording, p.seen.layout, folder)
-    kept = [i for i, n in enumerate(markers.names) if n in layout]
-    if not kept:
-        raise RegistrationError(
-            f"seen.layout = {p.seen.layout} has {_shown(layout)}; the recording has "
-            f"{_shown(markers.names)}: no marker's name is in both; spell them as recorded"
-        )
-    markers = replace(
-        markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
-        sd=noise(markers),
-    )  # fmt: skip
-    same = _side(markers.x[0]) if p.seen.layout == AS_SEEN else None
-    return observe_markers(
-        markers, layout, mesh, how=p.seen.registration, up=same, name=topic, stands=np.inf,
-        sd_t=clock_sd(recording, topic),
-    )  # fmt: skip
-
-
-def _shown(names: Iterable[str]) -> str:
-    found = [repr(name) for name in names]
-    return ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
-
-
-def _side(x: Floats) -> tuple[Floats, Floats] | None:
-    """The normal of planar markers (k, 3) m, which are in one frame twice: it tells them from their
-    mirror image. None for others, whose shape does."""
-    try:
-        normal = fit_plane(x).axes[:, 2]
-    except RegistrationError:
-        return None
-    return normal, normal
-
-
-def layout_of(recording: Recording, text: str, folder: Path) -> dict[str, Floats]:
-    """Places (3,) m of markers in the body's frame: of the record "marker_layout", or of the points
-    of a file of landmarks. Raises `RecordingError` for a file without points."""
-    if text == "recorded":
-        record = recording.record("marker_layout")
-        return {name: vector(at, f"marker_layout '{name}'") for name, at in record.items()}
-    path = folder / text
-    points = recognised(path).read(path, {}).markers
-    if not points:
-        raise RecordingError(f"{path.name}: no points; a layout is a file of landmarks, as FCSV")
-    first = next(iter(points.values()))
-    return dict(zip(first.names, first.x[0], strict=True))
-
-
-def _topic(recording: Recording, p: MeasuredBody) -> str:
-    """The markers' topic, where it is not said the only one."""
-    if p.seen.markers:
-        return p.seen.markers
-    if len(recording.markers) != 1:
-        raise UsageError(f"seen.markers is not set; one of {sorted(recording.markers)}")
-    return next(iter(recording.markers))
-
-
 # --- windows --------------------------------------------------------------------------------------
 
 
@@ -349,9 +178,9 @@ def _selections(p: MeasuredBody, drive: SignalObservation, kind: Kind) -> tuple[
 
 
 def _window(label: str, t: Floats, words: str) -> Selection:
-    if len(t) < FEWEST:
+    if len(t) < _FEWEST:
         raise ComparisonError(
-            f"window '{label}': {len(t)} {words}, {FEWEST} are needed; set seen.fit_to or "
+            f"window '{label}': {len(t)} {words}, {_FEWEST} are needed; set seen.fit_to or "
             "seen.states"
         )
     return Selection(label, t, words)

@@ -1,0 +1,79 @@
+"""Kinds of questions about a measured body: what each takes, checked as it is answered."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from validate.cli.asking import Question
+from validate.errors import UsageError
+from validate.parameters import with_values
+from validate.recording.types import Recording
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.measured_drive import FEWEST, NOTED
+from validate.replay.measured_markers import AS_SEEN
+from validate.scene.mesh import Mesh
+from validate.scene.named_place import GRAMMAR, place_of
+
+UNKNOWN, NONE, RECORDED = "unknown", "none", "recorded"
+
+
+def by_path(path: str, text: str, default: str = "", why: str = "") -> Question:
+    """A parameter's value as --set takes it."""
+    return Question(path, text, default, why, open=not default, check=parsed(path))
+
+
+def a_known_modulus(text: str) -> None:
+    if text == UNKNOWN:
+        raise UsageError("it is identified on a force that is judged under a displacement "
+                         "(seen.force, moved.by a signal in m), which is not here")  # fmt: skip
+    parsed("material.E")(text)
+
+
+def parsed(path: str, skip: str = "") -> Callable[[str], Any]:
+    return lambda text: None if text == skip else with_values(MeasuredBody(), {path: text})
+
+
+def named_place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
+    """The first of them says what words there are; it is asked in every interview."""
+    named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
+    words = f": {GRAMMAR}{named}; several joined by +" if key == "held.all" else ""
+    return Question(
+        key, f"{text}{words}{'' if is_open else '; empty: none'}",
+        open=is_open, check=lambda words: mesh is None or place_of(words, mesh),
+    )  # fmt: skip
+
+
+def by_topic(key: str, text: str, topics: list[str]) -> Question:
+    return Question(key, text, topics[0], "the first recorded", choices=(*topics, NONE))
+
+
+def three_of(names: Sequence[str]) -> Callable[[str], Any]:
+    def check(text: str) -> None:
+        chosen = [part.strip() for part in text.split(",")]
+        if absent := [n for n in chosen if n not in names]:
+            raise UsageError(f"{', '.join(absent)} not among {', '.join(names)}")
+        if len(set(chosen)) < FEWEST:
+            raise UsageError(f"{len(set(chosen))} markers, at least {FEWEST} are needed")
+
+    return check
+
+
+def there(text: str) -> None:
+    if not Path(text).is_file():
+        raise UsageError("no such file here")
+
+
+def a_layout(text: str) -> None:
+    if text not in (RECORDED, AS_SEEN):
+        there(text)
+
+
+def facets_of(mesh: Mesh | None) -> Callable[[str], Any]:
+    return lambda name: mesh is None or mesh.facet_nodes(name)
+
+
+def unit_of(recording: Recording, topic: str) -> str:
+    if topic == NOTED:
+        return "m"
+    found = recording.signals.get(topic)
+    return found.unit if found is not None else ""

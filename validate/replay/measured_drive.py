@@ -1,0 +1,120 @@
+"""What loads a measured body: a signal, markers on a place, gravity, or a motion that was noted."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RegistrationError, UsageError
+from validate.identify.modulus import MIN_SAMPLES, load_noise
+from validate.recording.types import Recording, Signal
+from validate.register.clock import clock_sd, interpolated
+from validate.register.signals import SignalObservation
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.measured_markers import BodyAt, markers_topic, registered
+from validate.scene.select import Place
+from validate.scene.tracked import Prescribed
+
+NOTED = "noted"
+Kind = Literal["weighs", "pulls", "moves", "follows"]
+FEWEST = 3  # markers on a place that follows them
+
+
+def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
+    """What the load is; raises `UsageError` for a topic that is no signal in m or N."""
+    if p.moved.by == "gravity":
+        return "weighs"
+    if p.moved.by == "markers":
+        return "follows"
+    if p.moved.by == NOTED:
+        return "moves"
+    found = recording.signals.get(p.moved.by)
+    unit = found.unit if found is not None else ""
+    if unit not in ("m", "N"):
+        known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in ("m", "N")]
+        raise UsageError(
+            f"moved.by = {p.moved.by}: {'in ' + unit if unit else 'no signal of that name'}; one "
+            f"of {', '.join([*known, 'markers', 'gravity', NOTED])}"
+        )
+    return "moves" if unit == "m" else "pulls"
+
+
+def driven(
+    recording: Recording, p: MeasuredBody, kind: Kind, t: Floats, rest: float, at: BodyAt
+) -> SignalObservation:
+    """What loads the body at the instants t (nt,), 0 at the first; `rest` s is where it begins."""
+    if kind == "weighs":
+        y = np.full((len(t), 1), p.moved.amount * p.moved.scale)
+        y[0] = 0.0
+        return SignalObservation("gravity", "drives", t, y, "m/s^2", 0.0)
+    if kind == "follows":
+        return _followed(recording, p, t, at)
+    if p.moved.by == NOTED:
+        return _noted(p, t)
+    topic, unit = p.moved.by, "m" if kind == "moves" else "N"
+    signal = zeroed(recording, topic, unit, rest + p.seen.still)
+    y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
+    y[0] = 0.0
+    return SignalObservation(
+        topic, "drives", t, y, unit, signal.sd, sd_t=clock_sd(recording, topic)
+    )
+
+
+def _noted(p: MeasuredBody, t: Floats) -> SignalObservation:
+    """What was noted, evenly over the instants t (nt,) and straight between; how uncertain it is
+    says `ranges.load`."""
+    if len(p.moved.noted) < 2 or not np.any(np.diff(p.moved.noted)):
+        raise UsageError(
+            f"moved.noted = {p.moved.noted or 'none'}: two amounts or more that "
+            "differ, from the first instant to the last, as 0,2mm,5mm"
+        )
+    at = np.linspace(t[0], t[-1], len(p.moved.noted))
+    y = p.moved.scale * (np.interp(t, at, p.moved.noted) - p.moved.noted[0])
+    return SignalObservation(NOTED, "drives", t, y[:, None], "m", 0.0)
+
+
+def zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
+    """The signal from its mean at rest; its noise as declared, or more as its samples scatter."""
+    s = recording.signal(topic, unit)
+    early = s.y[s.t <= max(until, float(s.t[0]))]
+    scatter = load_noise(s.y[:, 0]) if len(s.t) >= MIN_SAMPLES else 0.0
+    sd = max(s.sd, scatter) * float(np.sqrt(1 + 1 / len(early)))
+    return replace(s, y=s.y - early.mean(axis=0), sd=sd)
+
+
+def prescribed(recording: Recording, p: MeasuredBody, where: Place, at: BodyAt) -> Prescribed:
+    """The place that follows its markers as a rigid body; raises `UsageError` for fewer than three
+    markers, or names that are none."""
+    markers = recording.marker(markers_topic(recording, p))
+    absent = [n for n in p.moved.markers if n not in markers.names]
+    if absent or len(p.moved.markers) < FEWEST:
+        raise UsageError(
+            f"moved.markers = {','.join(p.moved.markers) or 'none'}: "
+            f"{f'{absent} are not recorded' if absent else 'three or more are needed'}; the "
+            f"recording has {', '.join(markers.names)}"
+        )
+    observed = registered(recording, p, at)
+    places = dict(zip(observed.names, observed.x[0], strict=True))
+    unseen = [n for n in p.moved.markers if n not in places]
+    if unseen:
+        raise RegistrationError(f"markers {unseen} on the moved place are not seen at rest")
+    points = tuple((n, tuple(places[n].tolist())) for n in p.moved.markers)
+    return Prescribed("moved", where, points)
+
+
+def _followed(recording: Recording, p: MeasuredBody, t: Floats, at: BodyAt) -> SignalObservation:
+    """What the markers on the moved place did, one column an axis of each."""
+    seen = registered(recording, p, at)
+    own = [seen.names.index(n) for n in p.moved.markers]
+    moved = (seen.x[:, own] - seen.x[0, own]).reshape(len(seen.t), -1)
+    y, _ = interpolated(seen.t, moved, t)
+    if not np.isfinite(y).all():
+        first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
+        raise RegistrationError(
+            f"the markers on the moved place are not all seen at t = {first:.3f} s: fill the gap, "
+            "or leave one out of moved.markers"
+        )
+    y[0] = 0.0
+    sd_t = clock_sd(recording, markers_topic(recording, p))
+    return SignalObservation("moved", "drives", t, p.moved.scale * y, "m", seen.sd, sd_t=sd_t)
