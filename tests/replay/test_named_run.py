@@ -8,6 +8,7 @@ from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
+from validate.replay.measured_cards import MeasuredBody, SeenOf, Solid
 from validate.replay.named_run import run_folder, run_name, tag
 from validate.replay.options import Options, mesh_files
 
@@ -67,6 +68,18 @@ def test_many_words_are_counted_and_odd_signs_replaced() -> None:
 
 def test_meshes_that_parameters_name(project_root: Path, tmp_path: Path) -> None:
     cube = load_file(project_root / "experiments" / "ekf_cube.py")
-    assert [f.name for f in mesh_files(cube.parameters)] == ["cube.npz"]
+    assert [f.name for f in mesh_files(cube.parameters, tmp_path)] == ["cube.npz"]
     gone = with_values(cube.parameters, {"mesh.file": str(tmp_path / "gone.npz")})
-    assert mesh_files(gone) == ()
+    assert mesh_files(gone, tmp_path) == ()
+
+
+def test_files_of_a_measured_body_lie_beside_the_experiment(tmp_path: Path) -> None:
+    """Its mesh, what that includes, and the layout of its markers: another one is another run."""
+    (tmp_path / "deck.INP").write_text('*Include, input = nodes.inc\n*ELSET, INPUT="b c.inc"\n')
+    (tmp_path / "nodes.inc").write_text("*NODE, input=more.inc\n*include,input=deck.INP\n")
+    for name in ("more.inc", "b c.inc", "points.fcsv"):
+        (tmp_path / name).write_text("1\n")
+    (tmp_path / "more.inc").write_text("1, 0., 0., 0.\n")
+    p = MeasuredBody(body=Solid("deck.INP"), seen=SeenOf(layout="points.fcsv"))
+    found = {f.name for f in mesh_files(p, tmp_path)}
+    assert found == {"deck.INP", "nodes.inc", "more.inc", "b c.inc", "points.fcsv"}

@@ -11,9 +11,12 @@ from validate.parameters import describe, doubts, nearest_names, with_values
 from validate.replay.experiment import Experiment
 from validate.replay.guests import added_guests
 from validate.replay.method import Method
+from validate.scene.abaqus_lines import files_named
+from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
-_MESHES = ".npz"
+_MESHES = (".npz", *FOREIGN)
+_LAYOUTS = (".fcsv", ".json")  # of landmarks, which place markers
 
 
 @dataclass(frozen=True)
@@ -60,11 +63,14 @@ def _split(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
     return mine, {k[8:]: v for k, v in values.items() if k.startswith("methods.")}
 
 
-def mesh_files(parameters: Any) -> tuple[Path, ...]:
-    """The files of meshes that parameters name, as far as they can be read."""
+def mesh_files(parameters: Any, folder: Path) -> tuple[Path, ...]:
+    """The files of meshes and of landmarks that parameters name, beside the experiment in `folder`
+    or where the program runs, as far as they can be read; with what a deck includes."""
     named = (p.default for p in describe(parameters) if isinstance(p.default, str))
-    paths = (Path(text) for text in named if text.endswith(_MESHES))
-    return tuple(p for p in paths if p.is_file() and os.access(p, os.R_OK))
+    texts = [text for text in named if text.lower().endswith((*_MESHES, *_LAYOUTS))]
+    paths = [p for text in texts for p in (folder / text, Path(text))]
+    there = {p.resolve(): p for p in reversed(paths) if p.is_file() and os.access(p, os.R_OK)}
+    return tuple(f for p in reversed(there.values()) for f in files_named(p))
 
 
 def folder_of(experiment: Experiment) -> Path:

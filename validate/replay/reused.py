@@ -29,7 +29,8 @@ def rests_on(experiment: Experiment, options: Options, command: Sequence[str] = 
     """What makes a run, taken before it: files may be edited while it computes."""
     path = experiment.path
     parameters, _ = configure(experiment, options)
-    found = made(command, sources_of(path) if path else (), mesh_files(parameters))
+    read = mesh_files(parameters, path.parent if path else Path())
+    found = made(command, sources_of(path) if path else (), read)
     others = (r for on in apart(experiment, parameters) for r in opened(experiment, on).recordings)
     found = replace(found, files=(*found.files, *(_used(r, "calibrates") for r in others)))
     if options.quick:

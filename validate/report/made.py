@@ -32,8 +32,8 @@ class Commit:
 
 @dataclass(frozen=True)
 class UsedFile:
-    """A file that a run read beside its recordings: `role` is experiment, mesh, case: the
-    recording of another truth, or calibrates: one that only calibrates."""
+    """A file that a run read beside its recordings: `role` is experiment, mesh, layout (of
+    markers), case: the recording of another truth, or calibrates: one that only calibrates."""
 
     role: str
     path: str
@@ -56,11 +56,12 @@ class Made:
 def made(
     arguments: Sequence[str] = (), sources: Sequence[Path] = (), meshes: Iterable[Path] = ()
 ) -> Made:
-    """`arguments` of the command line, `sources` the experiment's file and its helpers."""
+    """`arguments` of the command line, `sources` the experiment's file and its helpers, `meshes`
+    with layouts of markers."""
     command = shlex.join(["validate", *map(_told, arguments)]) if arguments else ""
     ours, theirs = commit_of([_PACKAGE]), commit_of(sources)
     same = theirs is None or (ours is not None and theirs.sha == ours.sha and not theirs.dirty)
-    files = (*(("experiment", f) for f in sources), *(("mesh", f) for f in meshes))
+    files = (*(("experiment", f) for f in sources), *((_role(f), f) for f in meshes))
     return Made(
         command, ours, None if same else theirs, code_sha256(),
         tuple(_used(role, path) for role, path in files),
@@ -73,6 +74,10 @@ def _told(argument: str) -> str:
     key, sign, value = (before, equals, after) if equals else ("", "", argument)
     short = str(without_folder(value))
     return argument if short == value else f"{key}{sign}{_LEFT_OUT}{short}"
+
+
+def _role(path: Path) -> str:
+    return "layout" if path.suffix.lower() in (".fcsv", ".json") else "mesh"
 
 
 def _used(role: str, path: Path) -> UsedFile:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from validate.errors import SceneError
 
+_NAMED = re.compile(rb'(?im)^\s*\*[^\r\n]*?\binput\s*=\s*"?([^",\r\n]+)')
 _MOST, _TIMES = 64 * 2**20, 200  # bytes of all files together; how often one is included
 
 
@@ -92,6 +93,24 @@ class Deck:
         if self._bytes > _MOST:
             raise SceneError(f"more than {_MOST} bytes with what it includes")
         return path.read_bytes().decode("utf-8", "replace")
+
+
+def files_named(path: Path) -> tuple[Path, ...]:
+    """The file itself, and of a deck those of its folder that it names, and that they name, as far
+    as they are there."""
+    found: list[Path] = []
+    left = [path]
+    while left and len(found) <= _TIMES:
+        file = left.pop(0)
+        if file in found:
+            continue
+        found.append(file)
+        if path.suffix.lower() == ".inp" and file.stat().st_size <= _MOST:
+            names = (
+                n.decode("utf-8", "replace").strip() for n in _NAMED.findall(file.read_bytes())
+            )
+            left += [p for n in names if (p := path.parent / n.replace("\\", "/")).is_file()]
+    return tuple(found)
 
 
 def words_of(text: str) -> tuple[str, dict[str, str]]:
