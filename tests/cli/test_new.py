@@ -309,6 +309,27 @@ def test_the_header_s_lengths_stand_beside_the_question_for_a_size(tmp_path: Pat
     assert listed.count("; the header says width 20 mm, thickness 10 mm, m or as") == 2
 
 
+def test_an_answered_height_decides_what_is_judged_and_accepted(tmp_path: Path) -> None:
+    """To 1.6 mm of 40 mm: the limit is within 4 % strain, and no tenth of the largest force of the
+    log stands as an answer before the height is known."""
+    write_recording(log(diameter_m=repr(DIAMETER)), tmp_path / "gel.mcap")
+    arguments = ("new", "a", "--from", "gel.mcap")
+    assert '\naccept.force = ""' in in_folder(tmp_path, *arguments, "--questions")[1]
+    answers = tmp_path / "a.toml"
+    asked = (*arguments, "--answers", "a.toml")
+    answers.write_text('specimen.height = "high"', "utf-8")
+    assert in_folder(tmp_path, *asked, "--questions")[1].startswith("specimen.height = high: ")
+    answers.write_text('specimen.height = "40mm"', "utf-8")
+    assert (
+        "a tenth of the force at the strain limit, ass"
+        in in_folder(tmp_path, *asked, "--questions")[1]
+    )
+    assert in_folder(tmp_path, *asked)[0] == 0
+    text = (tmp_path / "experiments" / "a.py").read_text("utf-8")
+    assert "limit=0.0358," in text
+    assert 'a tenth of the force at the strain limit (change it)"' in text
+
+
 def test_the_file_of_an_inclusion_is_short(project_root: Path) -> None:
     recording = read_recording(project_root / "recordings" / "fluid_phantom.mcap")
     assert len(written("mine", recording, "../x.mcap").splitlines()) <= 60

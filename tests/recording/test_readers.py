@@ -304,6 +304,13 @@ def test_what_no_reader_recognises_names_them_all(tmp_path: Path) -> None:
         named("instrom")
 
 
+@pytest.mark.parametrize("first", ["APO-Zentrum;8", '"Procédure";"x"', "\tProbe"])
+def test_text_with_a_p_as_its_second_letter_is_no_c3d(first: str, tmp_path: Path) -> None:
+    """The key of C3D, 80, is that letter: such exports were called a damaged C3D."""
+    (tmp_path / "x").write_text(f"{first}\nTime (s),Force (N)\n" + rows(), encoding="utf-8")
+    assert recognised(tmp_path / "x").name == "instron"
+
+
 def test_an_export_in_utf_16_is_text(tmp_path: Path) -> None:
     (tmp_path / "x").write_text("Time (s),力 (N)\n" + rows(), encoding="utf-16")
     assert recognised(tmp_path / "x").name == "instron"

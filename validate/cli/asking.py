@@ -126,7 +126,7 @@ def on_a_terminal() -> bool:
 
 def listed(asks: Asks, given: Answers) -> str:
     """The questions as a file of answers: those known so far, the given ones answered, and which
-    were answers to none."""
+    were answers to none. Raises `UsageError` for a wrong answer; an open one may be empty here."""
     found: dict[str, str] = {}
     lines = []
     for _ in range(_MOST):
@@ -135,7 +135,7 @@ def listed(asks: Asks, given: Answers) -> str:
             break
         question = pending[0]
         answer = given.get(question.key, question.default)
-        found[question.key] = answer
+        found[question.key] = question.checked(answer) if answer.strip() else answer
         lines += [f"# {line}" for line in _explained(question)]
         lines.append(f'{question.key} = "{answer}"')
     if odd := [key for key in given if key not in found]:

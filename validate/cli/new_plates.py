@@ -36,11 +36,19 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
                  check=length)
         for name in _SIZES if f"specimen.{name}" not in stated
     ]  # fmt: skip
-    limit, judged = _judged(recording)[2:]
-    asked.append(Question("accept.force", "largest error of the force that is accepted, N",
-                          f"{limit:.3g}", f"a tenth of {judged}, assumed",
-                          check=quantity_in("N")))  # fmt: skip
-    return [*asked, *new_outline.asks(recording, found)]
+    return [*asked, _accepts(recording, found), *new_outline.asks(recording, found)]
+
+
+def _accepts(recording: Recording, found: Answers) -> Question:
+    """Without a height the force at the strain limit is not known yet, so that no number is shown
+    that would stay when the height is answered."""
+    what, check = "largest error of the force that is accepted, N", quantity_in("N")
+    height, limit, judged = _judged(recording, found)[1:]
+    if height is None:
+        what += "; empty: a tenth of the force at the strain limit"
+        return Question("accept.force", what, check=check)
+    return Question("accept.force", what, f"{limit:.3g}", f"a tenth of {judged}, assumed",
+                    check=check)  # fmt: skip
 
 
 def _what(name: str, recording: Recording) -> str:
@@ -55,9 +63,11 @@ def _what(name: str, recording: Recording) -> str:
     return f"{what}{'; the header says ' + ', '.join(lengths) if lengths else ''}"
 
 
-def _judged(recording: Recording) -> tuple[float, float | None, float, str]:
+def _judged(recording: Recording, found: Answers) -> tuple[float, float | None, float, str]:
     """Strain limit, height m, limit of the error N, and what that is a tenth of."""
-    height = stated_sizes(recording).get("specimen.height")
+    said = found.get("specimen.height", "")
+    answered = quantity_in("m")(said) if said else None
+    height = stated_sizes(recording).get("specimen.height", answered)
     moved = recording.signal("displacement", "m").y[:, 0]
     force = recording.signal("force", "N").y[:, 0]
     limit, inside, judged = 0.10, np.full(len(force), True), "the largest force recorded"
@@ -69,7 +79,7 @@ def _judged(recording: Recording) -> tuple[float, float | None, float, str]:
 
 
 def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> dict[str, str]:
-    limit, _, accepted, judged = _judged(recording)
+    limit, _, accepted, judged = _judged(recording, found)
     stated = stated_sizes(recording)
     by_area = "diameter_m" not in recording.metadata.get("specimen", {})
     test = stated_test(recording) or found["test"]

@@ -168,10 +168,17 @@ def _events(found: dict[str, Any]) -> dict[str, str]:
     return {"events": f"{told} (of the trial; told, no stream)"} if told else {}
 
 
+def _recognises(path: Path) -> bool:
+    """The key is a P, too: text with one there (`Probe`, `"Procedure`) holds no zero byte, the
+    header of a C3D does."""
+    first = head(path, _BLOCK)
+    return first[1:2] == bytes([_KEY]) and first[0] > 0 and 0 in first
+
+
 C3D = Reader(
     "c3d",
     "motion capture (C3D)",
-    lambda p: head(p, 2)[1:2] == bytes([_KEY]),
+    _recognises,
     read_c3d,
-    "its second byte is 80",
+    "its second byte is 80 and its first block is no text",
 )
