@@ -180,3 +180,126 @@ def test_a_file_of_sgi_is_not_called_damaged(tmp_path: Path) -> None:
     path.write_bytes(head.ljust(512, b"\0") + bytes([1, 80, 1, 86]).ljust(512, b"\0") + bytes(512))
     with pytest.raises(RecordingError, match="byte order of SGI"):
         read_c3d(path, {})
+
+
+def labelled(file: ezc3d.c3d, path: Path) -> Path:
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    file.write(str(path))
+    return path
+
+
+def with_points(count: int, frames: int) -> ezc3d.c3d:
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["LABELS"]["value"] = tuple(f"p{i}" for i in range(count))
+    points = np.ones((4, count, frames))
+    points[:3] = 1 + np.arange(3.0 * count * frames).reshape(3, count, frames) % 4096
+    file["data"]["points"] = points
+    return file
+
+
+def test_angles_that_stand_among_the_points_are_no_positions(tmp_path: Path) -> None:
+    """As Vicon's models write them: labels in the group of points, units of their own."""
+    file = with_points(3, 4)
+    for name, value in (("ANGLES", "p1"), ("ANGLE_UNITS", "deg"), ("MOMENTS", "p2")):
+        file.add_parameter("POINT", name, [value])
+    got = read_c3d(labelled(file, tmp_path / "x.c3d"), {})
+    assert got.marker("markers").names == ("p0",)
+    angle = got.signals["model/p1"]
+    np.testing.assert_allclose(angle.y, file["data"]["points"][:3, 1].T)
+    assert angle.unit == "deg"
+    assert got.signals["model/p2"].unit == "not stated"
+
+
+def test_poses_of_bodies_are_read(tmp_path: Path) -> None:
+    """A quarter turn about z takes x to y; 7 mm along x."""
+    file = with_points(1, 2)
+    T = np.eye(4)
+    T[:3] = [[0, -1, 0, 7], [1, 0, 0, 0], [0, 0, 1, 0]]
+    file.add_parameter("ROTATION", "LABELS", ["pelvis_4X4"])
+    file.add_parameter("ROTATION", "RATE", [100.0])
+    file["data"]["rotations"] = np.repeat(T[:, :, None, None], 2, axis=3)
+    got = read_c3d(labelled(file, tmp_path / "x.c3d"), {}).signals
+    turned = got["pelvis/rotation"].y[1].reshape(3, 3) @ [1, 0, 0]
+    np.testing.assert_allclose(turned, [0, 1, 0])
+    np.testing.assert_allclose(got["pelvis/translation"].y, [[7e-3, 0, 0]] * 2)
+
+
+def test_force_plates_alone_need_no_unit_of_length(tmp_path: Path) -> None:
+    file = with_points(0, 5)
+    analog = file["parameters"]["ANALOG"]
+    analog["RATE"]["value"], analog["UNITS"]["value"] = [200.0], ("N", "N")
+    analog["LABELS"]["value"] = ("Fz", "Fx")
+    file["data"]["analogs"] = np.arange(20.0).reshape(1, 2, 10)
+    file["data"]["analogs"][0, 1, 3] = np.nan
+    path = labelled(file, tmp_path / "x.c3d")
+    got = read_c3d(path, {})
+    assert not got.markers
+    np.testing.assert_allclose(got.signals["analog/Fz"].y[:, 0], np.arange(10))
+    assert got.signals["analog/Fz"].t[-1] == pytest.approx(9 / 200)
+    assert got.unread == {"analog/Fx": "1 numbers are none"}
+
+
+def test_points_of_three_zeros_were_not_seen(tmp_path: Path) -> None:
+    file = with_points(2, 4)
+    file["data"]["points"][:3, 1, 2] = 0
+    got = read_c3d(labelled(file, tmp_path / "x.c3d"), {})
+    assert np.isnan(got.marker("markers").x[2, 1]).all()
+    assert got.metadata["provenance"]["three zeros"].startswith("1 points")
+
+
+@pytest.mark.parametrize("tells", ["LONG_FRAMES", "TRIAL", "nothing"])
+def test_a_trial_beyond_what_its_header_counts_is_whole_or_said_to_be_none(
+    tmp_path: Path, tells: str
+) -> None:
+    file = with_points(1, 66_000)
+    if tells == "TRIAL":
+        file.add_parameter("TRIAL", "ACTUAL_START_FIELD", [1.0, 0.0])
+        file.add_parameter("TRIAL", "ACTUAL_END_FIELD", [66_000.0 - 65_536, 1.0])
+    elif tells == "LONG_FRAMES":
+        file.add_parameter("POINT", tells, [66_000.0])
+    got = read_c3d(labelled(file, tmp_path / "x.c3d"), {})
+    count = 65_535 if tells == "nothing" else 66_000
+    x = 1e3 * got.marker("markers").x[:, 0]
+    np.testing.assert_allclose(x, file["data"]["points"][:3, 0, :count].T, rtol=1e-6)
+    left = got.metadata["provenance"].get("left out", "")
+    assert left.endswith("no parameter does") == (tells == "nothing")
+
+
+def whole_numbers(first: int, analog: str) -> bytes:
+    """Two frames of one point (8, 12, 16) mm and one analog sample, in Intel's whole numbers."""
+
+    def record(name: bytes, group: int, kind: int, shape: list[int], data: bytes) -> bytes:
+        body = struct.pack("bB", kind, len(shape)) + bytes(shape) + data + b"\0"
+        return struct.pack("bb", len(name), group) + name + struct.pack("<h", 2 + len(body)) + body
+
+    def group(name: bytes, number: int) -> bytes:
+        return struct.pack("bb", len(name), -number) + name + struct.pack("<hB", 3, 0)
+
+    words = group(b"POINT", 1) + record(b"UNITS", 1, -1, [2], b"mm")
+    for name, kind, value in ((b"USED", 2, struct.pack("<h", 1)), (b"FRAMES", 2, b"\2\0"),
+                              (b"SCALE", 4, struct.pack("<f", 0.5)),
+                              (b"DATA_START", 2, b"\3\0"),
+                              (b"RATE", 4, struct.pack("<f", 100))):  # fmt: skip
+        words += record(name, 1, kind, [], value)
+    words += group(b"ANALOG", 2) + record(b"FORMAT", 2, -1, [len(analog)], analog.encode())
+    for name, kind, value in ((b"USED", 2, b"\1\0"), (b"SCALE", 4, struct.pack("<f", 0.25)),
+                              (b"OFFSET", 2, struct.pack("<H", 32_768)),
+                              (b"GEN_SCALE", 4, struct.pack("<f", 2)),
+                              (b"RATE", 4, struct.pack("<f", 100))):  # fmt: skip
+        words += record(name, 2, kind, [1] if name == b"OFFSET" else [], value)
+    head = struct.pack("<BBHHHH", 2, 80, 1, 1, first, (first + 1) % 65_536)
+    head += struct.pack("<Hf", 10, 0.5) + struct.pack("<HHf", 3, 1, 100)
+    front = head.ljust(512, b"\0") + (bytes([1, 80, 1, 84]) + words).ljust(512, b"\0")
+    return front + b"".join(struct.pack("<4hH", 16, 24, 32, 0, v) for v in (32_770, 32_764))
+
+
+@pytest.mark.parametrize("first", [1, 65_535])
+def test_whole_numbers_without_a_sign_are_read_as_such(tmp_path: Path, first: int) -> None:
+    """Raw 32770 and 32764 about 32768, 0.25 x 2 N each; a trial may begin so late that its header
+    counts over 65535."""
+    path = tmp_path / "x.c3d"
+    path.write_bytes(whole_numbers(first, "UNSIGNED"))
+    got = read_c3d(path, {})
+    np.testing.assert_allclose(got.marker("markers").x, [[[8e-3, 12e-3, 16e-3]]] * 2, rtol=1e-6)
+    assert got.signals["analog/unnamed 1"].y[:, 0].tolist() == [1.0, -2.0]

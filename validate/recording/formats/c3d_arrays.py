@@ -1,35 +1,111 @@
 """What a C3D file holds, as plain arrays. The only file that imports ezc3d."""
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from validate.errors import RecordingError
+from validate.recording.formats.c3d_bytes import BLOCK, MOST, layout, parts_beyond
+from validate.recording.reader import head
+
 LIBRARIES = ("ezc3d",)
+_OUTPUTS = {"ANGLES": "ANGLE_UNITS", "FORCES": "FORCE_UNITS", "MOMENTS": "MOMENT_UNITS",
+            "POWERS": "POWER_UNITS", "SCALARS": "SCALAR_UNITS"}  # fmt: skip
+_WORD = 65536  # levels of a whole number of two bytes
+_MANY = 10  # parameters of one name, numbered from 2: one holds 255 words at most
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Points (nt, n, 3) and residuals (nt, n) in the file's unit, analog (nt a, c), and words."""
+    """Points (nt, n, 3) and residuals (nt, n) in the file's unit, analog (nt a, c), poses
+    (nt r, m, 4, 4), `rates` of the three, and words; `outputs` (k, 2): labels among the points that
+    are none, as angles, and their units; `uncounted`: bytes after the frames that were counted.
+
+    Raises `RecordingError` for a file without all frames that its parameters tell of.
+    """
     import ezc3d
 
     found = ezc3d.c3d(str(path))
-    points = np.moveaxis(found["data"]["points"][:3], 0, -1)  # (n, nt, 3)
-    analog = found["data"]["analogs"][0]
     parameters = found["parameters"]
+    lies = layout(path, head(path, BLOCK))
+    frames = _count(parameters) if lies.frames == MOST else 0
+    size = path.stat().st_size
+    if size < lies.at(frames):
+        raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: cut")
+    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
+        rest = parts_beyond(path, frames, Path(folder) / "part.c3d")
+        held = [_frames(found), *(_frames(ezc3d.c3d(str(part))) for part in rest)]
+    header = found["header"]
+    rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
+             _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
     return {
-        "points": np.swapaxes(points, 0, 1),
-        "residuals": found["data"]["meta_points"]["residuals"][0].T,
-        "rates": np.array([found["header"]["points"]["frame_rate"], _rate(parameters, analog)]),
+        **{name: np.concatenate([one[name] for one in held]) for name in held[0]},
+        "rates": np.array(rates),
         "labels": _words(parameters, "POINT", "LABELS"),
         "unit": _words(parameters, "POINT", "UNITS")[:1],
-        "analog": np.asarray(analog.T, dtype=np.float64),
         "channels": _words(parameters, "ANALOG", "LABELS"),
         "channel_units": _words(parameters, "ANALOG", "UNITS"),
-        "first_frame": np.array(found["header"]["points"]["first_frame"] + 1),
+        "bodies": _words(parameters, "ROTATION", "LABELS"),
+        "outputs": _outputs(parameters),
+        "first_frame": np.array(header["points"]["first_frame"] + 1),
+        "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
         "events": _words(parameters, "EVENT", "LABELS"),
         "event_times": _event_times(parameters),
     }
+
+
+def _frames(found: Any) -> dict[str, NDArray[Any]]:
+    """What the file holds frame by frame, times first."""
+    data = found["data"]
+    return {
+        "points": np.transpose(data["points"][:3], (2, 1, 0)),
+        "residuals": data["meta_points"]["residuals"][0].T,
+        "analog": _analog(found["parameters"], data["analogs"][0].T),
+        "poses": np.transpose(data["rotations"], (3, 2, 0, 1)),
+    }
+
+
+def _analog(parameters: Any, found: NDArray[Any]) -> NDArray[np.float64]:
+    """Samples in their units. The library takes whole numbers without a sign for signed ones."""
+    values = np.asarray(found, dtype=np.float64)
+    whole = float(_numbers(parameters, "POINT", "SCALE", 1)[0]) > 0
+    words = _words(parameters, "ANALOG", "FORMAT")[:1]
+    if not (values.size and whole and [w.upper() for w in words] == ["UNSIGNED"]):
+        return values
+    many = values.shape[1]
+    each = _numbers(parameters, "ANALOG", "SCALE", many)
+    each = each * _numbers(parameters, "ANALOG", "GEN_SCALE", 1)[0]
+    offset = _numbers(parameters, "ANALOG", "OFFSET", many)
+    raw = np.rint(values / np.where(each == 0, 1.0, each) + offset)
+    return np.asarray((raw % _WORD - offset % _WORD) * each)
+
+
+def _numbers(parameters: Any, group: str, name: str, many: int) -> NDArray[np.float64]:
+    """The first numbers of a parameter and its continuations; where too few, a scale of 1."""
+    held = [float(v) for v in _values(parameters, group, name)][:many]
+    return np.array(held + [1.0] * (many - len(held)))
+
+
+def _count(parameters: Any) -> int:
+    """Frames of a long trial as programs tell of them: Vicon's first and last field, of two words
+    each, else a number beside or in place of the one that counts to 65535."""
+    fields = [list(_values(parameters, "TRIAL", f"ACTUAL_{w}_FIELD")) for w in ("START", "END")]
+    if all(len(words) == 2 for words in fields):
+        begin, end = (int(low) % _WORD + _WORD * int(high) for low, high in fields)
+        return end - begin + 1
+    told = [v for name in ("LONG_FRAMES", "FRAMES") for v in _values(parameters, "POINT", name)]
+    return max((int(v) for v in told), default=0)
+
+
+def _outputs(parameters: Any) -> NDArray[Any]:
+    """Labels and units of computed outputs, which lie among the points."""
+    pairs = []
+    for group, units in _OUTPUTS.items():
+        unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
+        pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
+    return np.array(pairs, dtype=str).reshape(-1, 2)
 
 
 def _event_times(parameters: Any) -> NDArray[np.float64]:
@@ -39,14 +115,17 @@ def _event_times(parameters: Any) -> NDArray[np.float64]:
     return times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0))
 
 
-def _rate(parameters: Any, analog: NDArray[np.float64]) -> float:
-    value = parameters["ANALOG"]["RATE"]["value"] if analog.size else []
+def _rate(parameters: Any, group: str, samples: NDArray[np.float64]) -> float:
+    value = parameters[group]["RATE"]["value"] if samples.size else []
     return float(value[0]) if len(value) else 0.0
 
 
-def _words(parameters: Any, group: str, name: str) -> NDArray[Any]:
-    """A list of words, and those of NAME2, NAME3, ...: one parameter holds 255 at most."""
-    names = [name, *(f"{name}{i}" for i in range(2, 10))]
+def _values(parameters: Any, group: str, name: str) -> list[Any]:
+    """The values of a parameter and of NAME2, NAME3, ... that continue it."""
+    names = [name, *(f"{name}{i}" for i in range(2, _MANY))]
     held = parameters.get(group, {})
-    found = [w for n in names if n in held for w in held[n]["value"]]
-    return np.array([str(w).strip() for w in found], dtype=str)
+    return [v for n in names if n in held for v in held[n]["value"]]
+
+
+def _words(parameters: Any, group: str, name: str) -> NDArray[Any]:
+    return np.array([str(w).strip() for w in _values(parameters, group, name)], dtype=str)
