@@ -14,6 +14,7 @@ from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, RegistrationError, SceneError, UsageError
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
+from validate.register.fitting import MarkerFit
 from validate.replay import compare
 from validate.replay.experiment import Experiment
 from validate.replay.measured_body import measured_body, solid
@@ -26,6 +27,7 @@ from validate.replay.measured_cards import (
     Solid,
     Tissue,
 )
+from validate.report.registration import registration
 from validate.scene.box import box
 from validate.scene.mesh_file import write_mesh
 from validate.scene.named_place import axis_of, place_of, point_of
@@ -133,6 +135,32 @@ def test_markers_as_seen_may_stand_anywhere(
     found = recording(signals=log(), markers={"markers": tracked(stretched)})
     result = compare(experiment(tmp_path, p, found, "marker"))
     assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"agrees"}
+
+
+@pytest.mark.parametrize("some", [("A",), ("A", "D")], ids=["one", "two"])
+def test_a_single_marker_is_enough_in_the_body_s_own_frame(
+    some: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is fitted there; a layout of its own needs four, and says what fewer may do."""
+    monkeypatch.setattr(f"{__name__}.PLACES", {n: PLACES[n] for n in some})
+    p = replace(BASE, seen=replace(BASE.seen, markers="markers"))
+    layout = {name: " ".join(map(repr, at)) for name, at in PLACES.items()}
+    found = recording(
+        signals=log(), markers={"markers": tracked(stretched)}, metadata={"marker_layout": layout}
+    )
+    result = compare(experiment(tmp_path, p, found, "marker"))
+    assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"agrees"}
+    shown = registration(result)
+    assert shown.words == (
+        "Nothing was fitted: the markers were recorded in the body's frame, as declared.",
+    )
+    assert shown.pictures == ()
+    laid = replace(p, seen=replace(p.seen, layout="recorded"))
+    with pytest.raises(RegistrationError, match=f"{len(some)} of its .* needs 4; .*as seen"):
+        compare(experiment(tmp_path, laid, found, "marker"))
+    fitted = replace(p, seen=replace(p.seen, registration=MarkerFit(robust=True)))
+    with pytest.raises(UsageError, match="fits nothing"):
+        compare(experiment(tmp_path, fitted, found, "marker"))
 
 
 def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:

@@ -151,7 +151,8 @@ def _of_the_markers(recording: Recording, found: Answers) -> list[Question]:
     return [
         *asked,
         Question("seen.layout", f"where the markers sit in the body's frame: {RECORDED}, a file "
-                 f"of landmarks, or '{AS_SEEN}' (they were recorded in that frame)",
+                 f"of landmarks (four or more), or '{AS_SEEN}' (they were recorded in that frame; "
+                 "one will do)",
                  RECORDED if known else "", "the record marker_layout", open=not known,
                  check=a_layout),
         by_path("seen.still", "seconds from the start in which the body is unloaded", "0",

@@ -218,8 +218,10 @@ def observe_markers(
     together: tuple[Together, ...] = (),
     sd_t: float = 0.0,
     stands: float = 0.0,
+    registration: Registration | None = None,
 ) -> MarkerObservation:
     """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
+    A `registration` that is known already is taken as it is.
 
     `up` is one direction in the markers' frame and in the scene's: without it a planar set that
     was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the plane
@@ -235,10 +237,11 @@ def observe_markers(
         )
     rest = np.array([layout[marker] for marker in markers.names])
     _require_scale(markers.x[0], rest)
-    registration = register_points(
-        markers.names, markers.x[0], rest, method=how.method, exclude=how.exclude,
-        robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
-    )  # fmt: skip
+    if registration is None:
+        registration = register_points(
+            markers.names, markers.x[0], rest, method=how.method, exclude=how.exclude,
+            robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
+        )  # fmt: skip
     d = mesh.dimension
     sds = _along_axes(registration, d)
     places = rest[:, :d]

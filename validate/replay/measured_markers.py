@@ -9,11 +9,13 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, RegistrationError, UsageError
 from validate.recording.readers import recognised
-from validate.recording.types import Recording
+from validate.recording.types import Markers, Recording
 from validate.register.clock import clock_sd
+from validate.register.declared import as_declared
+from validate.register.fitting import MarkerFit
 from validate.register.from_rest import noise, rested
 from validate.register.markers import MarkerObservation, observe_markers, vector
-from validate.register.two_step import fit_plane
+from validate.register.measures import FEWEST
 from validate.replay.measured_cards import MeasuredBody
 from validate.scene.mesh import Mesh
 
@@ -26,39 +28,51 @@ def registered(recording: Recording, p: MeasuredBody, at: BodyAt) -> MarkerObser
     mesh, folder = at
     topic = markers_topic(recording, p)
     markers, _, _ = rested(recording.marker(topic), p.seen.still)
-    layout = dict(zip(markers.names, markers.x[0], strict=True))
-    if p.seen.layout != AS_SEEN:
-        layout = layout_of(recording, p.seen.layout, folder)
+    if p.seen.layout == AS_SEEN:
+        return _declared(recording, replace(markers, sd=noise(markers)), p, mesh)
+    layout = layout_of(recording, p.seen.layout, folder)
     kept = [i for i, n in enumerate(markers.names) if n in layout]
     if not kept:
         raise RegistrationError(
             f"seen.layout = {p.seen.layout} has {listed_names(layout)}; the recording has "
             f"{listed_names(markers.names)}: no marker's name is in both; spell them as recorded"
         )
+    if len(kept) < FEWEST:
+        raise RegistrationError(
+            f"seen.layout = {p.seen.layout}: {len(kept)} of its markers are seen at rest, a "
+            f"registration with a residual needs {FEWEST}; fewer will do where they were recorded "
+            f"in the body's frame: seen.layout = '{AS_SEEN}'"
+        )
     markers = replace(
         markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
         sd=noise(markers),
     )  # fmt: skip
-    same = _side(markers.x[0]) if p.seen.layout == AS_SEEN else None
     return observe_markers(
-        markers, layout, mesh, how=p.seen.registration, up=same, name=topic, stands=np.inf,
+        markers, layout, mesh, how=p.seen.registration, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
+    )  # fmt: skip
+
+
+def _declared(
+    recording: Recording, markers: Markers, p: MeasuredBody, mesh: Mesh
+) -> MarkerObservation:
+    """Markers in the frame that they were recorded in, which is said to be the body's: one is
+    enough, as nothing is fitted. Raises `UsageError` for settings of a fit."""
+    if p.seen.registration != MarkerFit():
+        raise UsageError(
+            f"seen.registration is of a fit, and seen.layout = '{AS_SEEN}' fits nothing; name a "
+            "layout, or leave it out"
+        )
+    topic, rest = markers_topic(recording, p), markers.x[0]
+    return observe_markers(
+        markers, dict(zip(markers.names, rest, strict=True)), mesh, name=topic, stands=np.inf,
+        sd_t=clock_sd(recording, topic), registration=as_declared(markers.names, rest, markers.sd),
     )  # fmt: skip
 
 
 def listed_names(names: Iterable[str]) -> str:
     found = [repr(name) for name in names]
     return ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
-
-
-def _side(x: Floats) -> tuple[Floats, Floats] | None:
-    """The normal of planar markers (k, 3) m, which are in one frame twice: it tells them from their
-    mirror image. None for others, whose shape does."""
-    try:
-        normal = fit_plane(x).axes[:, 2]
-    except RegistrationError:
-        return None
-    return normal, normal
 
 
 def layout_of(recording: Recording, text: str, folder: Path) -> dict[str, Floats]:

@@ -9,12 +9,14 @@ from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import max_length
+from validate.register.declared import AsDeclared
 from validate.register.markers import MarkerObservation
 from validate.register.quality import Registration
 from validate.report.numbers import shown_unit, with_unit
 from validate.report.observed import markers
 from validate.report.residual_arrows import residual_arrows
 
+_DECLARED = ("Nothing was fitted: the markers were recorded in the body's frame, as declared.",)
 _CLEAN = ("No findings: no outlier, no mirror image, no permuted labels.",)
 
 
@@ -22,19 +24,28 @@ def registration(result: Result) -> Exhibit:
     """Method, FRE, FLE, predicted TRE, residuals of every marker; rest residuals."""
     seen = markers(result.registered[0]) if result.registered else None
     rest = (_rest(result.rest),) if result.rest else ()
+    declared = seen is not None and isinstance(seen.registration, AsDeclared)
     if seen is None:
         return Exhibit("registration", "Registration", (), rest)
     return Exhibit(
         "registration",
         "Registration",
-        seen.registration.findings or _CLEAN,
-        (_quality(result, seen), *rest, _residuals(result)),
-        pictures=(residual_arrows(seen.registration),),
+        _said(seen.registration),
+        (_quality(result, seen), *rest, *(() if declared else (_residuals(result),))),
+        pictures=() if declared else (residual_arrows(seen.registration),),
     )
+
+
+def _said(found: Registration) -> tuple[str, ...]:
+    return _DECLARED if isinstance(found, AsDeclared) else found.findings or _CLEAN
 
 
 def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
     found = seen.registration
+    noise = ("declared noise", with_unit(found.expected_sd, "m"), "standard deviation per axis")
+    if isinstance(found, AsDeclared):
+        markers_ = ("markers", str(found.k_effective), "in the body's frame as recorded")
+        return NumberTable("", "Markers as recorded.", ("", "value", "meaning"), (markers_, noise))
     rows = (
         ("method", found.method, "fitted once, on the rest state, then frozen"),
         ("markers in the fit", str(found.k_effective), f"{len(found.missing)} not seen, "
@@ -42,7 +53,7 @@ def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
          f"{len(found.rejected)} left out by a robust fit); all that were seen are compared"),
         ("fitted scale", f"{found.scale.value:.5f} ± {found.scale.half:.2g}",
          f"markers over layout, 99.9 %; {'not ' * (found.transform.s == 1)}used"),
-        ("declared noise", with_unit(found.expected_sd, "m"), "standard deviation per axis"),
+        noise,
         ("FRE", with_unit(found.fre, "m"), "rms residual at the markers; no measure of accuracy"),
         ("FLE", with_unit(found.fle, "m"), "rms localisation error of one marker, from the FRE"),
         ("TRE at the markers", with_unit(float(rms(seen.tre[:, None])), "m"), "predicted, rms"),
