@@ -10,6 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from phantoms import COARSE_GRID, phantom_mesh
+from tree import ONE_PROCESS, nodes
+
+pytestmark = ONE_PROCESS
 
 # Grows while one file is read and never leaves its reader.
 ACCUMULATORS = {"streams.py:Collected", "foreign.py:Gathered", "threads.py:Team"}
@@ -20,8 +23,7 @@ def modules(root: Path) -> list[Path]:
 
 
 def defined(path: Path) -> Iterator[ast.ClassDef]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    return (node for node in nodes(path) if isinstance(node, ast.ClassDef))
 
 
 @cache
@@ -122,7 +124,7 @@ def test_no_module_imports_itself_by_a_detour(project_root: Path) -> None:
 def _imports(path: Path, modules: Mapping[str, Path]) -> set[str]:
     """The project's modules that a file names in its imports."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.module:
             for name in node.names:
                 whole = f"{node.module}.{name.name}"
@@ -135,4 +137,4 @@ def _imports(path: Path, modules: Mapping[str, Path]) -> set[str]:
 def test_what_a_module_prepares_is_prepared_by_one_worker(request: pytest.FixtureRequest) -> None:
     """pytest 9.2 with pytest-xdist 3.8 drops the groups without a word (xdist issue 1386)."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        assert request.node.nodeid.endswith("@test_architecture.py")
+        assert request.node.nodeid.endswith("@tree")

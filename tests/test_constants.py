@@ -4,6 +4,10 @@ import ast
 import tomllib
 from pathlib import Path
 
+from tree import ONE_PROCESS, parsed
+
+pytestmark = ONE_PROCESS
+
 DRAWN = "validate/report"
 _LONGEST = 120  # characters: what is longer is a declaration, with tests of its own
 _TABLES = (ast.Dict, ast.DictComp)  # they grow by an entry, and are tested entry by entry
@@ -15,7 +19,7 @@ def _named(root: Path) -> dict[str, dict[str, str]]:
     found: dict[str, dict[str, str]] = {}
     for path in sorted(set((root / "validate").rglob("*.py")) - {*(root / DRAWN).iterdir()}):
         module = ".".join(path.relative_to(root / "validate").with_suffix("").parts)
-        tree = ast.parse(path.read_text("utf-8"))
+        tree = parsed(path)
         kinds = [n for n in tree.body if isinstance(n, ast.ClassDef)]
         named = {**_written(tree.body, ""), **_fields(kinds)}
         if named:

@@ -4,13 +4,16 @@ import ast
 import tomllib
 from pathlib import Path
 
+from tree import ONE_PROCESS, parsed
+
+pytestmark = ONE_PROCESS
+
 
 def _declared(root: Path) -> dict[str, dict[str, float]]:
     """Numbers that fields declare as `quantity(number, unit, words)`, by class."""
     found: dict[str, dict[str, float]] = {}
     for path in sorted((root / "validate").rglob("*.py")):
-        tree = ast.parse(path.read_text("utf-8"))
-        for kind in (n for n in tree.body if isinstance(n, ast.ClassDef)):
+        for kind in (n for n in parsed(path).body if isinstance(n, ast.ClassDef)):
             for field in (f for f in kind.body if isinstance(f, ast.AnnAssign)):
                 match field.value:
                     case ast.Call(func=ast.Name(id="quantity"), args=[default, *_]):

@@ -122,6 +122,7 @@ def test_three_files_come_onto_the_first_clock(tmp_path: Path, late: float) -> N
     assert names == ["all-laser-aligned.png", "all-seen-aligned.png"]
 
 
+@pytest.mark.slow
 def test_one_file_that_does_not_follow_is_named_and_nothing_is_written(tmp_path: Path) -> None:
     out = str(tmp_path / "x.mcap")
     given = (*files(tmp_path), third(tmp_path, 7.25, 30.0), *BY, "--by", "force=laser")
@@ -174,6 +175,7 @@ def test_a_flash_marks_images(tmp_path: Path) -> None:
     assert float(record["sd"]) == pytest.approx(0.05 / np.sqrt(12), rel=0.2)
 
 
+@pytest.mark.slow
 def test_what_does_not_tell_an_offset_is_one_line(tmp_path: Path) -> None:
     log, seen = files(tmp_path)
     out = str(tmp_path / "x.mcap")

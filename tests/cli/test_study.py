@@ -36,6 +36,7 @@ def swept(made: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
     folder = swept(made)
     content = json.loads((folder / "results.json").read_text("utf-8"))
@@ -55,6 +56,7 @@ def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
         assert best["command"] in page.replace("​", "")
 
 
+@pytest.mark.slow
 def test_the_best_line_is_the_best_cell(made: Path) -> None:
     folder = swept(made)
     told = json.loads((folder / "results.json").read_text("utf-8"))["study"]
@@ -99,11 +101,11 @@ def test_a_finished_study_is_not_run_again(
 
 
 def test_bad_input_is_one_line(
-    made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(made)
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("validate.study.cluster.CONNECT_S", 0.5)
-    file = str(made / "experiments" / "pulled.py")
+    file = str(experiment_file(tmp_path))
     for arguments, said in (
         (["--sweep", "methods.kf.QQ=1,2"], "nearest: kf.Q"),
         (["--seeds", "many"], "--seeds many"),

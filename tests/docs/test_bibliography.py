@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tree import ONE_PROCESS, nodes
+
+pytestmark = ONE_PROCESS
 
 NAME = r"[A-Z][\w'’-]+"
 CITED = re.compile(
@@ -17,7 +20,7 @@ STANDARD = re.compile(r"ASME V&V \d+")
 
 def docstrings(root: Path) -> Iterator[tuple[Path, str]]:
     for path in sorted([*(root / "validate").rglob("*.py"), *(root / "experiments").glob("*.py")]):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
                 yield path, " ".join((ast.get_docstring(node) or "").split())
 

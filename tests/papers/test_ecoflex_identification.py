@@ -100,6 +100,7 @@ def test_what_the_mesh_does_not_resolve_stands_in_the_interval(
     assert moved < found["modulus.E_bonded.confidence"]
 
 
+@pytest.mark.slow
 def test_it_follows_the_methods_as_they_are_set(methods: Mapping[str, Method]) -> None:
     same = MappingProxyType({"neo_slip.law": "svk", "bonded.plates": "slip"})
     set_otherwise = identified([pressed()], SMALL, with_values(methods, same))

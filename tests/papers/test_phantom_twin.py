@@ -45,6 +45,7 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, twin: Recording) -> 
     assert not np.array_equal(other.markers["markers"].x, twin.markers["markers"].x)
 
 
+@pytest.mark.slow
 def test_sensors_read_the_simulation_with_their_declared_noise(twin: Recording) -> None:
     quiet = made(replace(COARSE, sd_outline=0.0, sd_tip=0.0, sd_hand=0.0, sd_force=0.0,
                          sd_pressure=0.0, sd_stage=0.0))  # fmt: skip

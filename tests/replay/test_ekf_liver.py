@@ -92,6 +92,7 @@ def test_the_data_folders_liver_is_recorded_in_memory_and_has_its_own_figures(
     assert liver.follows(liver, result.recordings, p).published == LIVER_FIGURES["data"]
 
 
+@pytest.mark.slow
 def test_the_printed_step_is_taken_twice_that_is_refused_and_diverges(printed: Result) -> None:
     assert of(printed, "nfem").run.finished
     refused, run = (of(printed, n).run.outcome for n in ("nfem_double", "nfem_double_run"))
@@ -102,6 +103,7 @@ def test_the_printed_step_is_taken_twice_that_is_refused_and_diverges(printed: R
     assert all(np.isfinite(t.y).all() for t in of(printed, "nfem_double_run").run.traces.values())
 
 
+@pytest.mark.slow
 def test_the_printed_filter_overflows_and_held_it_keeps_the_noise(printed: Result) -> None:
     """Gain near .99 at A; what its corrections set in motion reaches B."""
     end = of(printed, "ekf_printed").run.outcome

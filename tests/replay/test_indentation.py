@@ -105,6 +105,7 @@ def result() -> Result:
     return compare(EXPERIMENT)
 
 
+@pytest.mark.slow
 def test_force_against_depth_is_compared(result: Result) -> None:
     (check,) = result.checks
     assert (check.unit, check.count) == ("N", 4)
