@@ -14,6 +14,7 @@ from validate.recording.formats.metaimage import METAIMAGE
 from validate.recording.formats.ndi import NDI
 from validate.recording.formats.nrrd import NRRD
 from validate.recording.formats.optitrack import OPTITRACK
+from validate.recording.formats.point_table import POINTS
 from validate.recording.formats.qualisys import QUALISYS
 from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.formats.trc import TRC
@@ -30,7 +31,7 @@ from validate.recording.types import Recording
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
     MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
-    XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, INSTRON,
+    XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, POINTS, INSTRON,
 )  # fmt: skip
 
 
@@ -81,7 +82,7 @@ def recognised(path: Path) -> Reader:
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
     for reader in READERS:
-        if reader is INSTRON and (said := known_unread(path)):
+        if reader in (POINTS, INSTRON) and (said := known_unread(path)):
             raise UsageError(said)
         if reader.recognises(path):
             return reader

@@ -1,6 +1,6 @@
 """A measured body's markers in its own frame: by their layout, or as they were recorded there."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -82,11 +82,22 @@ def layout_of(recording: Recording, text: str, folder: Path) -> dict[str, Floats
         record = recording.record("marker_layout")
         return {name: vector(at, f"marker_layout '{name}'") for name, at in record.items()}
     path = folder / text
-    points = recognised(path).read(path, {}).markers
+    points = _points_in(path)
     if not points:
         raise RecordingError(f"{path.name}: no points; a layout is a file of landmarks, as FCSV")
     first = next(iter(points.values()))
     return dict(zip(first.names, first.x[0], strict=True))
+
+
+def _points_in(path: Path) -> Mapping[str, Markers]:
+    try:
+        return recognised(path).read(path, {}).markers
+    except UsageError as error:
+        why = str(error).split("; say it")[0]
+        raise UsageError(
+            f"seen.layout: {why}; a layout says all itself: as a table its columns are name, "
+            "x (mm), y (mm), z (mm)"
+        ) from None
 
 
 def markers_topic(recording: Recording, p: MeasuredBody) -> str:

@@ -45,26 +45,30 @@ class TextRows:
 
 
 def text_rows(path: Path) -> TextRows:
-    """The file split at tabs, else at semicolons or commas, whichever its first lines have most of.
+    """The file split at tabs, semicolons or commas, whichever most of its first lines have; before
+    commas the others, beside which a comma is a number's.
 
     Raises `UsageError` for a file that cannot be read, `RecordingError` for one that is no text.
     """
-    data = whole_file(path)
+    return rows_of(path.name, whole_file(path))
+
+
+def rows_of(name: str, data: bytes) -> TextRows:
+    """`text_rows` of the bytes of the file `name`."""
     try:
         text = decode(data).text
     except RecordingError as error:
-        raise RecordingError(f"{path.name}: {error}") from None
+        raise RecordingError(f"{name}: {error}") from None
     lines = text.splitlines()
-    begin = "\n".join(lines[:8])
-    separator = max("\t;,", key=begin.count)
+    separator = max("\t;,", key=lambda mark: sum(mark in line for line in lines[:8]))
     cells = csv.reader(lines, delimiter=separator, skipinitialspace=True, quoting=csv.QUOTE_MINIMAL)
     try:
         rows = tuple(
             TextRow(i + 1, tuple(c.strip() for c in found)) for i, found in enumerate(cells)
         )
     except csv.Error as error:
-        raise RecordingError(f"{path.name}: no table of cells ({error})") from None
-    return TextRows(path.name, rows, not text.endswith(("\n", "\r")))
+        raise RecordingError(f"{name}: no table of cells ({error})") from None
+    return TextRows(name, rows, not text.endswith(("\n", "\r")))
 
 
 def numbers(
@@ -159,7 +163,7 @@ def _decimals(cell: str) -> int:
 def whole_points(
     held: TextRows, x: Floats, names: Sequence[str], rows: Sequence[TextRow]
 ) -> Floats:
-    """Coordinates (nt, k, 3), where a point with one that is blank has none.
+    """Coordinates (nt, k, d), where a point with one that is blank has none.
 
     Raises `RecordingError` naming line and point: a damaged line, not a point that was not seen.
     """
@@ -169,7 +173,7 @@ def whole_points(
         i, k = (int(j) for j in np.argwhere(torn)[0])
         raise RecordingError(
             f"{held.name}: line {rows[i].line}: point '{names[k]}' has "
-            f"{3 - int(absent[i, k].sum())} of 3 coordinates; damaged"
+            f"{int((~absent[i, k]).sum())} of {x.shape[2]} coordinates; damaged"
         )
     return x
 
