@@ -14,7 +14,7 @@ from validate.errors import RegistrationError
 from validate.recording.formats.poses import pose_signals
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Contours, Frames, Recording, Source
+from validate.recording.types import Contours, Frames, Markers, Recording, Source
 from validate.register.image_plane import KnownTarget, SeenPoints, image_plane
 from validate.register.transform import Similarity
 
@@ -202,12 +202,43 @@ def test_a_mistaken_unit_and_outlines_of_before_are_refused(tmp_path: Path) -> N
     x = tmp_path / "x.mcap"
     assert here("calibrate", str(x), *given, "--unit", "mm")[0] == 0
     (tmp_path / "y.mcap").unlink()
+    assert "wires.csv: a table states no unit" in refused("calibrate", str(x), *given)
     assert "a pixel would be 110 mm wide" in refused("calibrate", str(x), *given, "--unit", "m")
     ring = np.array([[0, 0], [0.01, 0], [0, 0.01]])
     drawn = Contours(np.zeros(1), (ring,), 1e-4, np.eye(4), "image", "images")
     write_recording(replace(read_recording(x), contours={"outline": drawn}), x)
     assert "['outline'] would keep" in refused("calibrate", str(x), *given, "--unit", "mm")
     assert not (tmp_path / "y.mcap").exists()
+
+
+def test_targets_are_taken_from_landmarks_as_from_a_table(tmp_path: Path) -> None:
+    seen = landmarks(np.random.default_rng(5), 4, 5, 0.5)
+    files(tmp_path, seen)
+    names = tuple(target.name for target in seen.targets)
+    places = np.array([target.place for target in seen.targets])
+    lines = [
+        f"{n},{','.join(map(repr, (1e3 * x).tolist()))}" for n, x in zip(names, places, strict=True)
+    ]
+    (tmp_path / "table.csv").write_text("\n".join(["target,x,y,z", *lines]))
+    points = {
+        "pen/landmarks": Markers(np.zeros(1), names, places[None], 1e-4, "Reference"),
+        "pen/tip": Markers(np.arange(2.0), ("tip",), np.zeros((2, 1, 3)), 1e-4, "Reference"),
+    }
+    write_recording(Recording("t", Source("t", "", 0, ""), 0, markers=points), tmp_path / "t.mcap")
+    given = ["calibrate", str(tmp_path / "x.mcap"), "--points", str(tmp_path / "points.csv"),
+             "--probe", "ProbeToReference", "-o", str(tmp_path / "y.mcap")]  # fmt: skip
+    found = []
+    for name, unit in (("table.csv", ["--unit", "mm"]), ("t.mcap", [])):
+        assert here(*given, "--targets", str(tmp_path / name), *unit)[0] == 0
+        found.append(read_recording(tmp_path / "y.mcap").frame("images").pose)
+        (tmp_path / "y.mcap").unlink()
+    assert found[1] == pytest.approx(found[0], abs=1e-8)
+    assert "whose points are metres" in refused(
+        *given, "--targets", str(tmp_path / "t.mcap"), "--unit", "mm"
+    )
+    assert "0 streams of points at one instant" in refused(
+        *given, "--targets", str(tmp_path / "x.mcap")
+    )
 
 
 def test_swapped_targets_are_doubted_and_named_twice_refused(tmp_path: Path) -> None:

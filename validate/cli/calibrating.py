@@ -1,6 +1,5 @@
 """`validate calibrate`: the image plane of a tracked probe, from targets marked in its images."""
 
-import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +8,11 @@ import numpy as np
 from validate.arrays import Floats
 from validate.cli.arguments import complain
 from validate.cli.display import say, table
+from validate.cli.known_places import known_places, number, rows_of
 from validate.cli.recordings import written
-from validate.errors import RecordingError, UsageError
+from validate.cli.tool_poses import tool_poses
+from validate.errors import UsageError
 from validate.places import try_file
-from validate.recording.formats.poses import ROTATION, TRANSLATION
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.recording.types import Frames, Recording
@@ -23,26 +23,24 @@ from validate.register.image_plane import (
     by_target,
     image_plane,
 )
-from validate.units import in_si
 
-_MAX_TABLE = 16 * 2**20  # bytes
 _GROSS = 0.05  # of the image's diagonal: what marking by hand never misses by
 _LARGEST = 5e-3  # m: no scanner's or camera's pixel on tissue is wider
 _APART = 0.5  # of the images' period: a pose later than that is not that of the image
 
 
 def calibrate(
-    file: Path, out: Path, points: Path, targets: Path, unit: str, probe: str, topic: str
+    file: Path, out: Path, points: Path, targets: Path, unit: str | None, probe: str, topic: str
 ) -> None:
     """Finds where the images `topic` lie on the tracked `probe`, and writes them with that."""
     try_file(out)
     recording = read_recording(file)
     frames = recording.frame(topic)
     _require_no_outlines(recording, topic)
-    known = {t.name: t for t in _targets(targets, unit)}
+    known = {t.name: t for t in known_places(targets, unit)}
     seen = _seen(recording, frames, probe, known, points)
     found = image_plane(seen)
-    _require_plausible(found, unit)
+    _require_plausible(found)
     _told(seen, found, frames)
     frame = probe.partition("To")[0] or probe
     placed = replace(frames, m_per_px=found.m_per_px, pose=found.pose.matrix, frame=frame)
@@ -63,12 +61,12 @@ def _require_no_outlines(recording: Recording, topic: str) -> None:
         )
 
 
-def _require_plausible(found: ImagePlane, unit: str) -> None:
+def _require_plausible(found: ImagePlane) -> None:
     size = max(found.m_per_px)
     if size > _LARGEST:
         raise UsageError(
-            f"--unit {unit}: a pixel would be {1e3 * size:.4g} mm wide, above "
-            f"{1e3 * _LARGEST:g} mm: check the unit of the targets"
+            f"a pixel would be {1e3 * size:.4g} mm wide, above {1e3 * _LARGEST:g} mm: check the "
+            "unit of the targets"
         )
 
 
@@ -103,61 +101,10 @@ def _record(seen: SeenPoints, found: ImagePlane, frames: Frames) -> dict[str, st
     }
 
 
-def _rows(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
-    try:
-        if file.stat().st_size > _MAX_TABLE:
-            raise RecordingError(f"{file.name}: {file.stat().st_size} bytes, limit {_MAX_TABLE}")
-        with file.open(encoding="utf-8-sig", errors="replace", newline="") as opened:
-            rows = csv.DictReader(opened, restval="")
-            names = [str(n).strip().lower() for n in rows.fieldnames or ()]
-            if not set(wanted) <= set(names):
-                raise UsageError(
-                    f"{file.name}: columns {names}, expected {', '.join(wanted)}, with commas "
-                    "between them, as text in UTF-8"
-                )
-            rows.fieldnames = names
-            return list(rows)
-    except csv.Error as error:
-        raise RecordingError(f"{file.name}: no table with commas ({error})") from None
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be read ({error.strerror})") from error
-
-
-def _number(file: Path, row: dict[str, str], name: str) -> float:
-    said = row.get(name, "")
-    try:
-        value = float(said)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise RecordingError(f"{file.name}: {name} = {said[:40]!r} is no number")
-    return value
-
-
-def _targets(file: Path, unit: str) -> list[KnownTarget]:
-    """Places (x, y, z), or wires by a second place (x2, y2, z2)."""
-    factor = in_si(1.0, unit, "m")
-    if factor is None:
-        raise UsageError(f"--unit {unit}: expected a length, as mm")
-    found: list[KnownTarget] = []
-    for row in _rows(file, ("target", "x", "y", "z")):
-        if row["target"].strip() in [target.name for target in found]:
-            raise RecordingError(f"{file.name}: target {row['target']} stands there twice")
-        place = factor * np.array([_number(file, row, c) for c in "xyz"])
-        along = None
-        if (row.get("x2") or "").strip():
-            way = factor * np.array([_number(file, row, c) for c in ("x2", "y2", "z2")]) - place
-            if not np.linalg.norm(way):
-                raise RecordingError(f"{file.name}: wire {row['target']} has one place twice")
-            along = way / np.linalg.norm(way)
-        found.append(KnownTarget(row["target"].strip(), place, along))
-    return found
-
-
 def _seen(
     recording: Recording, frames: Frames, probe: str, known: dict[str, KnownTarget], file: Path
 ) -> SeenPoints:
-    rows = _rows(file, ("image", "u", "v", "target"))
+    rows = rows_of(file, ("image", "u", "v", "target"))
     if not rows:
         raise UsageError(f"{file.name}: no points are marked")
     turns, shifts = _poses(recording, frames, probe)
@@ -166,14 +113,14 @@ def _seen(
         name = (row["target"] or "").strip()
         if name not in known:
             raise UsageError(f"{file.name}: no target '{name}'; there are {', '.join(known)}")
-        said = _number(file, row, "image")
+        said = number(file, row, "image")
         at = int(said)
         if said != at or not (0 <= at < len(frames.t) and np.isfinite(shifts[at]).all()):
             raise UsageError(
                 f"{file.name}: image {said:g}: there are 0 to {len(frames.t) - 1}, and "
                 f"{int(np.isfinite(shifts[:, 0]).sum())} of them have a pose of '{probe}'"
             )
-        px.append([_number(file, row, c) for c in "uv"])
+        px.append([number(file, row, c) for c in "uv"])
         image.append(at)
         targets.append(known[name])
     i = np.array(image)
@@ -183,18 +130,13 @@ def _seen(
 def _poses(recording: Recording, frames: Frames, probe: str) -> tuple[Floats, Floats]:
     """The probe's rotations (n, 3, 3) and places (n, 3) m at the images, NaN where it was not
     seen."""
-    turns = [t for t in recording.signals if t.endswith(f"/{ROTATION}")]
-    tools = sorted(t.removesuffix(f"/{ROTATION}") for t in turns)
-    if probe not in tools:
-        raise UsageError(f"no poses of '{probe}'; there are {', '.join(tools) or 'none'}")
-    turned = recording.signal(f"{probe}/{ROTATION}", "1")
-    moved = recording.signal(f"{probe}/{TRANSLATION}", "m")
-    near = np.abs(turned.t[None] - frames.t[:, None])
+    t, turned, moved = tool_poses(recording, probe)
+    near = np.abs(t[None] - frames.t[:, None])
     at, period = (
         near.argmin(axis=1),
         float(np.median(np.diff(frames.t))) if len(frames.t) > 1 else 0,
     )
     late = near[np.arange(len(at)), at] > max(_APART * period, 1e-9)
-    R, t = turned.y[at].reshape(-1, 3, 3).copy(), moved.y[at].copy()
-    R[late], t[late] = np.nan, np.nan
-    return R, t
+    R, T = turned[at].copy(), moved[at].copy()
+    R[late], T[late] = np.nan, np.nan
+    return R, T

@@ -140,8 +140,8 @@ def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: An
 @click.argument("file", type=FILE)
 @click.option("--points", type=FILE, help="CSV: image, u, v (px), target.")
 @click.option("--targets", type=FILE,
-              help="CSV: target, x, y, z; a wire has x2, y2, z2, too.")  # fmt: skip
-@click.option("--unit", metavar="UNIT", help="Of the targets, as mm.")
+              help="A file of landmarks, or CSV: target, x, y, z; a wire x2, y2, z2.")  # fmt: skip
+@click.option("--unit", metavar="UNIT", help="Of a table's targets, as mm.")
 @click.option("--probe", metavar="TOOL", help="Its poses, as ProbeToReference.")
 @click.option("--topic", default="images", show_default=True, help="The images.")
 @click.option("--pivot", "tool", metavar="TOOL", help="Its tip, from turns about a point.")
@@ -167,11 +167,31 @@ def calibrate(
         pivoting.calibrate_tip(file, out, tool, reference, rough)
         return
     for name, value in given.items():
-        if value is None:
+        if value is None and name != "unit":
             raise click.UsageError(f"Missing option '--{name}'.")
     from validate.cli import calibrating
 
     calibrating.calibrate(file, out, **given)
+
+
+@click.command()
+@click.argument("file", type=FILE)
+@click.option("--tool", required=True, metavar="TOOL", help="Its poses, as StylusToTracker.")
+@click.option(
+    "--tip", required=True, metavar="X,Y,Z", help="In the tool's frame, as 108mm,8mm,3mm."
+)
+@click.option("--reference", default="", metavar="TOOL", help="A tracked tool, in whose frame.")
+@click.option("--known", type=FILE, help="A file of landmarks, or CSV: target, x, y, z.")
+@click.option("--unit", metavar="UNIT", help="Of a table's landmarks, as mm.")
+@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+def digitise(file: Path, out: Path, **how: Any) -> None:
+    """Find the landmarks that the tip of a tracked tool was held on.
+
+    Known landmarks name them; each is then also predicted from the others.
+    """
+    from validate.cli import digitising
+
+    digitising.digitise(file, out, digitising.HowDigitised(**how))
 
 
 @click.command()
@@ -242,4 +262,4 @@ def get_(name: str) -> None:
     data.get(name)
 
 
-COMMANDS = (inspect, import_, outline, align, calibrate, merge, body, new, record, data_)
+COMMANDS = (inspect, import_, outline, align, calibrate, digitise, merge, body, new, record, data_)
