@@ -309,6 +309,17 @@ def test_the_header_s_lengths_stand_beside_the_question_for_a_size(tmp_path: Pat
     assert listed.count("; the header says width 20 mm, thickness 10 mm, m or as") == 2
 
 
+def test_several_lengths_of_a_strip_are_shown_and_none_is_taken(tmp_path: Path) -> None:
+    """A header with the length between grips and that of the gauge was refused."""
+    top = "Zugversuch\nEinspannlänge;100;mm\nMesslänge;50;mm\nBreite;10;mm\nDicke;2;mm\n"
+    rows = "".join(f"{i / 10};{i / 100};{i / 20}\n" for i in range(50))
+    (tmp_path / "z.csv").write_text(f"{top}Zeit (s);Weg (mm);Kraft (N)\n{rows}", "utf-8")
+    assert in_folder(tmp_path, "import", "z.csv", "-o", "z.mcap")[0] == 0
+    _, listed = in_folder(tmp_path, "new", "a", "--from", "z.mcap", "--questions")
+    assert "the header says width 10 mm, thickness 2 mm, Einspannlänge 100 mm, Messlä" in listed
+    assert "specimen.diameter" not in listed
+
+
 def test_an_answered_height_decides_what_is_judged_and_accepted(tmp_path: Path) -> None:
     """To 1.6 mm of 40 mm: the limit is within 4 % strain, and no tenth of the largest force of the
     log stands as an answer before the height is known."""

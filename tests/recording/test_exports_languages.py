@@ -220,3 +220,19 @@ def test_a_column_that_no_word_names_is_offered_before_a_strain(tmp_path: Path) 
     assert said in str(raised.value)
     recording = read(tmp_path, text, test=None, displacement="Koloumb (mm)")
     assert np.allclose(recording.signals["displacement"].y[:, 0], -D * 1e-3)
+
+
+@pytest.mark.parametrize(("way", "diameter", "height"), [
+    ("Distanza", "Diametro", "Altezza"), ("Distancia", "Diámetro", "Altura"),
+    ("Afstand", "Diameter", "Hoogte"), ("Eindringtiefe", "Durchmesser", "Höhe"),
+    ("压入深度", "直径", "高度"), ("クロスヘッド", "直径", "高さ"), ("Flèche", "Diamètre", "Hauteur"),
+])  # fmt: skip
+def test_depths_and_distances_are_displacements(
+    way: str, diameter: str, height: str, tmp_path: Path
+) -> None:
+    """As of indenters, texture analysers and bending tests."""
+    text = f"{diameter};25,0 mm\n{height};20 mm\nt (s);{way} (mm);F (N)\n" + rows(";", comma)
+    recording = read(tmp_path, text)
+    assert_test(recording)
+    specimen = recording.record("specimen")
+    assert (float(specimen["diameter_m"]), float(specimen["height_m"])) == (0.025, 0.02)

@@ -273,7 +273,10 @@ def test_places_in_words() -> None:
     assert axis_of("0,3,4") == (0.0, 0.6, 0.8)
     assert point_of("10mm,0,0.02m") == (0.01, 0.0, 0.02)
     for words, why in (("top", "none of a facet set"), ("z=1", "none of .* faces is chosen"),
-                       ("z=5 apples", "no length"), ("near 1,2", "three lengths")):  # fmt: skip
+                       ("z=5 apples", "no length"),
+                       ("near 20,15,25", "in metres, write 10mm"),
+                       ("box 0,0,49 to 40,30,51", "off a body of 70.7 mm; .* write 10mm"),
+                       ("near 1,2", "three lengths")):  # fmt: skip
         with pytest.raises(SceneError, match=why):
             place_of(words, mesh)
     with pytest.raises(SceneError, match="each with its unit"):

@@ -69,6 +69,15 @@ def gmsh4(path: Path, mesh: Mesh) -> Path:
     return path
 
 
+def test_a_version_of_gmsh_may_be_written_with_zeros(tmp_path: Path) -> None:
+    """As netgen writes it."""
+    path = gmsh2(tmp_path / "x.msh", linear())
+    text = path.read_text("utf-8")
+    assert "\n2.2 0 8" in text
+    path.write_text(text.replace("\n2.2 0 8", "\n2.000000 0 8"), "utf-8")
+    assert len(read_foreign(path, "mm").mesh.cells) == len(linear().cells)
+
+
 @pytest.mark.parametrize("write", [gmsh2, gmsh4])
 def test_groups_of_gmsh_are_facet_sets(write: Callable[[Path, Mesh], Path], tmp_path: Path) -> None:
     body = read_foreign(write(tmp_path / "x.msh", linear()), "mm")

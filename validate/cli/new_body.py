@@ -137,7 +137,12 @@ def _of_the_supports(mesh: Mesh | None) -> list[Question]:
     return [
         named_place("held.all", "places held in every direction", mesh),
         *(named_place(f"held.{c}", f"places held along {c} alone", mesh) for c in "xyz"),
-        named_place("held.slides", "a flat place that slides on its plate", mesh),
+        named_place(
+            "held.slides",
+            "a flat place that slides on its plate, which it does not leave "
+            "(held along one axis alone a body can drift)",
+            mesh,
+        ),
     ]
 
 

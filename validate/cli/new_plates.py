@@ -54,13 +54,18 @@ def _accepts(recording: Recording, found: Answers) -> Question:
 def _what(name: str, recording: Recording) -> str:
     """What is asked for, and which lengths of the header may be it: none is taken unasked."""
     said = recording.metadata.get("specimen", {})
-    lengths = [f"{key.removesuffix('_m')} {1e3 * float(said[key]):.6g} mm" for key in _SIDES
-               if key in said]  # fmt: skip
+    lengths = [f"{_called(key)} {1e3 * float(value):.6g} mm" for key, value in said.items()
+               if key.split("/")[0] in _SIDES]  # fmt: skip
     what = {
         "diameter": "diameter of the specimen (not round: of the circle of its area)",
         "height": "height of the specimen, pulled: its length between the grips",
     }[name]
     return f"{what}{'; the header says ' + ', '.join(lengths) if lengths else ''}"
+
+
+def _called(size: str) -> str:
+    """A size of the record in words: width of width_m, the header's own of length_m/OWN."""
+    return size.partition("/")[2] or size.removesuffix("_m")
 
 
 def _judged(recording: Recording, found: Answers) -> tuple[float, float | None, float, str]:

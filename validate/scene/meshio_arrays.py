@@ -94,7 +94,8 @@ def _require_version(path: Path) -> None:
         head = file.read(200).decode("latin-1").split()
     version = head[1] if len(head) > 1 and head[0] == "$MeshFormat" else "1"
     gmsh = bool(head) and head[0] in ("$MeshFormat", "$NOD")
-    if gmsh and version not in _READ:
+    plain = version.rstrip("0").rstrip(".") if "." in version else version  # netgen's 2.000000
+    if gmsh and plain not in _READ:
         raise SceneError(
             f"Gmsh's format {version}; 2.2 and 4.1 are read: save it again, "
             "gmsh FILE -0 -format msh41 -o NEW.msh"

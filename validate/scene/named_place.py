@@ -79,10 +79,13 @@ def _site(text: str, mesh: Mesh) -> Site:
     if text in mesh.facets:
         return Labelled(text)
     if text.startswith("near "):
-        return Nearest(point_of(text[5:]))
+        point = point_of(text[5:])
+        _require_at(text, point, point, mesh)
+        return Nearest(point)
     if text.startswith("box ") and " to " in text:
-        low, high = text[4:].split(" to ", 1)
-        return InBox(point_of(low), point_of(high))
+        low, high = map(point_of, text[4:].split(" to ", 1))
+        _require_at(text, low, high, mesh)
+        return InBox(low, high)
     if text[:1] in tuple(_AXES) and text[1:] in ("min", "max"):
         return _side(mesh, _AXES.index(text[0]), text[1:])
     if text[:2] in ("x=", "y=", "z="):
@@ -90,6 +93,19 @@ def _site(text: str, mesh: Mesh) -> Site:
     known = set(mesh.facets)
     named = f"; {nearest_names(text, known)}" if known else "; the body has no facet sets"
     raise SceneError(f"place '{text[:40]}': none of {GRAMMAR}{named}")
+
+
+def _require_at(text: str, low: tuple[float, ...], high: tuple[float, ...], mesh: Mesh) -> None:
+    """Raises `SceneError` for a box further off the body than the body is large: the nearest point
+    to millimetres that were taken for metres is some point, too."""
+    gap = np.maximum(np.array(low) - mesh.nodes.max(axis=0), mesh.nodes.min(axis=0) - high)
+    away = float(np.linalg.norm(np.maximum(gap, 0.0)))
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    if away > size:
+        raise SceneError(
+            f"place '{text[:60]}': {1e3 * away:.3g} mm off a body of {1e3 * size:.3g} mm; a number "
+            "without a unit is in metres, write 10mm"
+        )
 
 
 def _side(mesh: Mesh, axis: int, end: str) -> Site:

@@ -12,12 +12,13 @@ from validate.units import is_unit, si_factor
 
 # (name in the record, quantity, words of the header's key, words that make it something else)
 _NO_TEST_SPEED = OTHER_PARTS + " jog return preload vorkraft data datenrate abtastrate"
+LENGTH = "length_m"
 GEOMETRY: tuple[tuple[str, str, str, str], ...] = (
     ("diameter_m", "length", SIZES["diameter"], OTHER_PARTS),
     ("height_m", "length", SIZES["height"], OTHER_PARTS),
     ("width_m", "length", SIZES["width"], OTHER_PARTS),
     ("thickness_m", "length", SIZES["thickness"], OTHER_PARTS),
-    ("length_m", "length", SIZES["length"], OTHER_PARTS),
+    (LENGTH, "length", SIZES["length"], OTHER_PARTS),
     ("area_m2", "area", SIZES["area"], OTHER_PARTS),
     ("speed_m_per_s", "speed", SIZES["speed"], _NO_TEST_SPEED),
 )
@@ -27,21 +28,30 @@ _GLUED = re.compile(r"(?P<number>[-+]?[0-9.,' ]*[0-9][.,]?(?:[eE][-+]?[0-9]+)?)\
 def specimen_of(header: Mapping[str, str], decimal: str) -> dict[str, float]:
     """SI numbers by name (`diameter_m`, `height_m`, ..., `speed_m_per_s`) of the header block.
 
-    Only values with a unit, glued to them or in the key, are used. Raises `RecordingError` when two
-    lines, or key and value, contradict each other, and for sizes that are not positive.
+    Only values with a unit, glued to them or in the key, are used. A strip has several lengths (of
+    itself, between grips, of a gauge): where they differ each is `length_m/KEY`, and none is meant.
+    Raises `RecordingError` when two other lines, or key and value, contradict each other, and for
+    sizes that are not positive.
     """
     found: dict[str, tuple[float, str]] = {}
+    lengths: dict[str, float] = {}
     for key, text in header.items():
         for name, quantity, given, taken in GEOMETRY:
             value = _value(key, text, quantity, given, taken, decimal)
             if value is None:
                 continue
+            if name == LENGTH:
+                lengths[f"{LENGTH}/{key}"] = value
             before, by = found.setdefault(name, (value, key))
-            if not math.isclose(before, value, rel_tol=1e-6):
+            if name != LENGTH and not math.isclose(before, value, rel_tol=1e-6):
                 raise RecordingError(
                     f"header: '{by}' gives {name} = {before:.6g}, '{key}' {value:.6g}; keep one"
                 )
-    return {name: value for name, (value, _) in found.items()}
+    told = {name: value for name, (value, _) in found.items()}
+    if not all(math.isclose(told[LENGTH], value, rel_tol=1e-6) for value in lengths.values()):
+        del told[LENGTH]
+        told |= lengths
+    return told
 
 
 def loaded_area(specimen: Mapping[str, float], test: str = "") -> float | None:

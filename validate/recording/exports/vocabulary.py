@@ -33,7 +33,11 @@ _ROLES = {
         erweiterung elongation alongamento extensao verlangerung verplaatsing indrukking
         vervorming verlenging forlangning forskjutning deformering forskydning forlaengelse
         forlengelse actuator langenanderung alargamiento uzama deplasman venyma siirtyma
-        перемещение деформация удлинение 位移 变形 行程 変位 ストローク 伸び 변위""",
+        перемещение деформация удлинение 位移 变形 行程 変位 ストローク 伸び 변위
+        distanza distancia afstand slag hub auslenkung durchbiegung doorbuiging fleche flecha
+        freccia eindringtiefe eindrucktiefe eindringweg eindruckweg depth penetration profondeur
+        profundidad profundidade profondita penetrazione penetracion penetracao indringing
+        indringdiepte flyttning vandring 移動量 クロスヘッド 押込 压入 压痕深度 挠度 たわみ""",
 }
 _NOT_MEASURED = """max maximum maximal maximale maxi peak maksymalna maksymalne maximo maxima
     massimo massima command target setpoint sollwert consigne 最大 峰值"""
@@ -58,16 +62,21 @@ LENGTH_OR_STRAIN = """compression deformation verformung stauchung deformacja de
     verlangerung alargamiento uzama venyma удлинение 伸び"""
 SIZES = {
     "diameter": """diameter durchmesser probendurchmesser diametre srednica diametro prumer atmero
-        диаметр 直径""",
+        диаметр halkaisija cap 直径""",
     "height": """height hohe hoehe probenhohe hauteur wysokosc altura altezza vyska magassag высота
-        高度 高さ""",
+        hoogte hojd hojde hoyde korkeus yukseklik 高度 高さ""",
     "width": """width breite probenbreite largeur szerokosc anchura ancho larghezza largura sirka
-        ширина 宽度""",
+        ширина
+        breedte bredd bredde leveys genislik 宽度 幅""",
     "thickness": """thickness dicke probendicke epaisseur grubosc espesor spessore espessura
-        tloustka толщина 厚度""",
+        tloustka толщина
+        dikte tjocklek tykkelse tykkelsen paksuus kalinlik 厚度 厚さ 厚み""",
     "length": """length lange laenge probenlange longueur dlugosc longitud lunghezza comprimento
-        delka длина 长度""",
-    "area": "area flache querschnitt querschnittsflache superficie powierzchnia plocha 面积",
+        delka длина
+        lengte langd laengde lengde pituus uzunluk einspannlange messlange klemmlange anfangslange
+        长度 标距 長さ 標線間距離""",
+    "area": """area flache querschnitt querschnittsflache superficie powierzchnia plocha section
+        seccion sezione seccao aire oppervlakte doorsnede areal tvarsnitt 面积 断面積""",
     "speed": _SPEED + " prufgeschwindigkeit pruefgeschwindigkeit testgeschwindigkeit",
 }
 OTHER_PARTS = """platen plate anvil probe plunger indenter grip final cell stempel druckplatte
