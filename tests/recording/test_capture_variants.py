@@ -154,3 +154,74 @@ def test_import_and_inspect_by_the_command(kind: str, name: str, tmp_path: Path)
     code, said, _ = here("import", *given, "-o", str(tmp_path / "y.mcap"))
     assert code == 0
     assert "markers" in said
+
+
+def written(path: Path, text: str) -> Recording:
+    path.write_text(text)
+    return recognised(path).read(path, {})
+
+
+def test_two_blocks_of_devices_are_both_read_and_events_told(tmp_path: Path) -> None:
+    block = (
+        "Devices\n1000\n,,Plate,Plate\nFrame,Sub Frame,Fz,Fz\n,,N,N\n1,0,{0},{0}.5\n1,1,{0},8\n\n"
+    )
+    events = "Events\n100\nSubject,Context,Name,Time (s)\nS,Left,Foot Strike,1.03\n\n"
+    got = written(tmp_path / "x.csv", events + block.format(1) + block.format(2))
+    first = {topic: s.y[0, 0] for topic, s in got.signals.items()}
+    assert first == {
+        "analog/Plate.Fz (1)": 1, "analog/Plate.Fz (2)": 1.5,
+        "analog/Plate.Fz (2) (1)": 2, "analog/Plate.Fz (2) (2)": 2.5,
+    }  # fmt: skip
+    told = got.metadata["provenance"]["events"]
+    assert told.startswith("Left Foot Strike 1.03 s (of the trial")
+    assert not got.unread
+
+
+def test_every_event_of_qualisys_is_told(tmp_path: Path) -> None:
+    text = qualisys("blank", event=True).replace(
+        "MARKER_NAMES", "EVENT\tToe off\t7\t0.06\nMARKER_NAMES"
+    )
+    told = written(tmp_path / "x.tsv", text).metadata["provenance"]
+    assert told["events"].startswith("Heel strike 0.04 s; Toe off 0.06 s (of the trial")
+
+
+def test_a_code_of_time_beside_the_times_of_qualisys_is_no_coordinate(tmp_path: Path) -> None:
+    text = qualisys("blank", 2).replace("Time\t", "Time\tSMPTE\t")
+    text = text.replace("0.00\t", "0.00\t10:11:12:00\t").replace("0.01\t", "0.01\t10:11:12:01\t")
+    got = written(tmp_path / "x.tsv", text).marker("markers")
+    assert got.x[0].tolist() == (1e-3 * np.array([A, B])).tolist()
+
+
+@pytest.mark.parametrize("plate", [False, True])
+def test_analog_channels_and_plates_of_qualisys_come_in(tmp_path: Path, plate: bool) -> None:
+    text = "NO_OF_SAMPLES\t2\nFREQUENCY\t500\nDESCRIPTION\tForce data\n"
+    if plate:
+        text += "SAMPLE\tTIME\tForce_X\tForce_Z\n1\t0.000\t1\t2\n2\t0.002\t3\t4\n"
+    else:
+        text += "CHANNEL_NAMES\tForce_X\tForce_Z\nCHANNEL_GAIN\t1\t1\n1\t2\n3\t4\n"
+    got = written(tmp_path / "x.tsv", text)
+    assert got.signals["analog/Force_Z"].y[:, 0].tolist() == [2, 4]
+    assert got.signals["analog/Force_X"].t.tolist() == [0, 0.002]
+    assert len(got.signals) == 2
+
+
+def trc(times: list[str], rate: str, z: str = "3.5") -> str:
+    head = "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumMarkers\tUnits\n" + rate + "\t1\tmm\n"
+    rows = "".join(f"{i + 1}\t{t}\t0\t0\t{z}\n" for i, t in enumerate(times))
+    return f"{head}Frame#\tTime\ttip\t\t\n\t\tX1\tY1\tZ1\n\n{rows}"
+
+
+def test_times_rounded_to_equal_ones_are_counted_at_the_stated_rate(tmp_path: Path) -> None:
+    times = [f"{k / 2000:.3f}" for k in range(9)]
+    got = written(tmp_path / "x.trc", trc(times, "2000"))
+    assert got.marker("markers").t.tolist() == pytest.approx(np.arange(9) / 2000)
+    assert "2000 Hz that it states" in got.metadata["provenance"]["assumed"]
+    (tmp_path / "y.trc").write_text(trc(["0", "0.1", "0.1"], "2000"))
+    with pytest.raises(RecordingError, match=r"row 3 is not after .* say --map rate=HZ"):
+        recognised(tmp_path / "y.trc").read(tmp_path / "y.trc", {})
+
+
+def test_three_zeros_of_a_trc_are_not_seen(tmp_path: Path) -> None:
+    got = written(tmp_path / "x.trc", trc(["0", "0.1"], "10", "0"))
+    assert np.isnan(got.marker("markers").x).all()
+    assert got.metadata["provenance"]["three zeros"] == "2 points, taken as not seen"

@@ -187,3 +187,40 @@ def test_a_file_packed_as_a_whole_is_read_unless_it_is_a_bomb(tmp_path: Path) ->
     body = b"".join(packer.compress(bytes(2**24)) for _ in range(17)) + packer.flush()
     with pytest.raises(RecordingError, match=r"y\.dcm: it unpacks to over 268435456 bytes"):
         read_dicom(deflated(tmp_path / "y.dcm", body), {"rate": "20"})
+
+
+def of_pixels(syntax: str, pixels: bytes, **words: object) -> pydicom.Dataset:
+    """Three images of 4 x 6 px, 0.1 mm a pixel, 10 a second."""
+    ds = pydicom.Dataset()
+    ds.file_meta = pydicom.dataset.FileMetaDataset()
+    ds.file_meta.TransferSyntaxUID = syntax
+    ds.SOPClassUID, ds.SOPInstanceUID = pydicom.uid.UltrasoundMultiFrameImageStorage, "1.2.3"
+    ds.Rows, ds.Columns, ds.NumberOfFrames, ds.SamplesPerPixel = 4, 6, 3, 1
+    ds.BitsAllocated, ds.BitsStored, ds.HighBit, ds.PixelRepresentation = 8, 8, 7, 0
+    ds.PhotometricInterpretation, ds.PixelSpacing, ds.FrameTime = "MONOCHROME2", [0.1, 0.1], 100
+    ds.PixelData = pixels
+    for name, value in words.items():
+        setattr(ds, name, value)
+    return ds
+
+
+def test_every_image_with_half_of_its_colours_is_read(tmp_path: Path) -> None:
+    """Uncompressed loops in YBR_FULL_422: two levels, then two colours for both; grey here."""
+    grey = np.arange(72, dtype=np.uint8).reshape(3, 4, 3, 2)
+    both = np.full_like(grey, 128)
+    ds = of_pixels(
+        pydicom.uid.ExplicitVRLittleEndian, np.concatenate([grey, both], axis=3).tobytes(),
+        PhotometricInterpretation="YBR_FULL_422", SamplesPerPixel=3, PlanarConfiguration=0,
+    )  # fmt: skip
+    ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
+    images = read_dicom(tmp_path / "x.dcm", {}).frame("images").images
+    np.testing.assert_array_equal(images, grey.reshape(3, 4, 6))
+
+
+def test_a_codec_that_is_not_here_is_named_with_the_tool_that_has_it(tmp_path: Path) -> None:
+    packed = pydicom.encaps.encapsulate([bytes(8)] * 3)
+    ds = of_pixels(pydicom.uid.JPEGLSLossless, packed)
+    ds["PixelData"].is_undefined_length = True
+    ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
+    with pytest.raises(RecordingError, match=r"as by `dcmdjpls x\.dcm"):
+        read_dicom(tmp_path / "x.dcm", {})

@@ -152,6 +152,11 @@ def make_dicom(path: Path) -> None:
     ds.save_as(path, enforce_file_format=True)
 
 
+def make_qualisys_analog(path: Path) -> None:
+    head = "NO_OF_SAMPLES\t4\nFREQUENCY\t1000\nDATA_INCLUDED\tANALOG\nCHANNEL_NAMES\tFx\tFz\n"
+    path.write_text(head + "".join(f"{0.1 * i:.3f}\t{i}.5\n" for i in range(4)))
+
+
 def make_fcsv(path: Path) -> None:
     head = "# Markups fiducial file version = 5.0\n# CoordinateSystem = LPS\n"
     rows = [f"{i},{i}.5,2,3,0,0,0,1,1,1,0,F-{i},,,2,0\n" for i in range(3)]
@@ -191,6 +196,7 @@ MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "qualisys": (make_qualisys, {}),
     "optitrack": (make_optitrack, {}),
     "ndi": (make_ndi, {}),
+    "qualisys-analog": (make_qualisys_analog, {}),
     "fcsv": (make_fcsv, {}),
     "dicom": (make_dicom, {}),
     "markups": (make_markups, {}),
@@ -205,7 +211,7 @@ MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "video": (make_video, {"m_per_px": "1e-4"}),
 }
 #: Written line by line: what a program that was ended left of the last line is left out, and said.
-LINEWISE = ("trc", "vicon", "qualisys", "optitrack", "ndi", "points")
+LINEWISE = ("trc", "vicon", "qualisys", "qualisys-analog", "optitrack", "ndi", "points")
 EACH = pytest.mark.parametrize("reader", READERS, ids=lambda r: r.name)
 
 

@@ -12,7 +12,7 @@ from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
 from validate.recording.chain import require_chain
 from validate.recording.exports.every import ALL, every_specimen
-from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT
+from validate.recording.formats.text_rows import ASSUMED, LEFT_OUT, ZEROS
 from validate.recording.formats.unread import known_unread
 from validate.recording.images.levels import AS_IT_IS
 from validate.recording.mcap.recover import recover
@@ -73,12 +73,12 @@ def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recordi
 
 
 def _tell(recording: Recording) -> None:
-    """What was assumed, where a scale is from, how deep images became 8 bits, by which lens they
-    are straight, what is told of a stream, and events, of which none is one."""
+    """What was assumed or taken as not seen, where a scale is from, how deep images became 8 bits,
+    by which lens they are straight, what is told of a stream, and events, of which none is one."""
     for key, text in recording.metadata.get(ASSUMED, {}).items():
         say(f"{key}: {text}", indent="  ")
     made = recording.metadata.get("provenance", {})
-    for key in ("scale", "levels", "lens", "events", *recording.streams):
+    for key in (ASSUMED, ZEROS, "scale", "levels", "lens", "events", *recording.streams):
         if made.get(key, AS_IT_IS) != AS_IT_IS:
             say(f"{key}: {made[key]}", indent="  ")
 

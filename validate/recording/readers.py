@@ -16,6 +16,7 @@ from validate.recording.formats.nrrd import NRRD
 from validate.recording.formats.optitrack import OPTITRACK
 from validate.recording.formats.point_table import POINTS
 from validate.recording.formats.qualisys import QUALISYS
+from validate.recording.formats.qualisys_analog import QUALISYS_ANALOG
 from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.formats.trc import TRC
 from validate.recording.formats.unread import known_unread
@@ -30,8 +31,8 @@ from validate.recording.types import Recording
 
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
-    MCAP, C3D, TRC, VICON, QUALISYS, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV, MARKUPS, MATLAB,
-    XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, POINTS, INSTRON,
+    MCAP, C3D, TRC, VICON, QUALISYS, QUALISYS_ANALOG, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV,
+    MARKUPS, MATLAB, XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, POINTS, INSTRON,
 )  # fmt: skip
 
 

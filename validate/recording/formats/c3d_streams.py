@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.recording.formats.poses import pose_signals
 from validate.recording.formats.recorded import distinct
-from validate.recording.formats.text_rows import without_zeros
+from validate.recording.formats.text_rows import told_zeros, without_zeros
 from validate.recording.types import Markers, Record, Signal, Stream
 
 NOT_STATED = "not stated"
@@ -44,7 +44,7 @@ def markers_of(
     seen = residuals[residuals > 0]
     told = {
         "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
-        **({"three zeros": f"{zeros} points, taken as not seen"} if zeros else {}),
+        **told_zeros(zeros),
         "residual_median_m": f"{factor * np.median(seen):.3g}" if len(seen) else NOT_STATED,
     }
     return Markers(np.arange(len(x)) / rate, names, x, sd, frame), told

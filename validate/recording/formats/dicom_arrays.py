@@ -13,7 +13,7 @@ import numpy as np
 import pydicom
 from numpy.typing import NDArray
 from pydicom.pixels.processing import apply_color_lut
-from pydicom.pixels.utils import iter_pixels
+from pydicom.pixels.utils import iter_pixels, pixel_array
 from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from validate.errors import RecordingError, UsageError
@@ -21,6 +21,7 @@ from validate.recording.formats.dicom_files import files_of
 from validate.recording.formats.sequence import MAX_PIXELS
 
 _LACKS = ("missing dependencies", "does not support")  # as a codec says that it is none for these
+_HALF = "YBR_FULL_422"  # half of the colours
 _LUMA = np.array([0.299, 0.587, 0.114])
 _META = 144  # bytes before the group of meta information that states its length, and of that
 _PACKED = 2**28  # bytes of a file that is packed as a whole
@@ -150,13 +151,19 @@ def _images(sets: list[pydicom.Dataset]) -> NDArray[Any]:
 def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
     name = ds.file_meta.TransferSyntaxUID.name if ds.file_meta.get("TransferSyntaxUID") else "none"
     try:
-        yield from iter_pixels(ds)
+        if ds.PhotometricInterpretation == _HALF and not ds["PixelData"].is_undefined_length:
+            # Its library loses count of such images from the second on when it goes through them.
+            count = int(ds.get("NumberOfFrames") or 1)
+            yield from (pixel_array(ds, index=i) for i in range(count))
+        else:
+            yield from iter_pixels(ds)
     except (NotImplementedError, RuntimeError) as error:
         lacks = any(words in str(error) for words in _LACKS)
         if lacks or isinstance(error, NotImplementedError):
+            tool = "dcmdjpls" if "JPEG-LS" in name else "dcmdjpeg"  # of DCMTK
             raise UsageError(
                 f"its pixels are in '{name}', which no permissively licensed library here decodes; "
-                "make it uncompressed first, as by `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
+                f"make it uncompressed first, as by `{tool} x.dcm y.dcm` or `gdcmconv --raw`"
             ) from None
         raise
 

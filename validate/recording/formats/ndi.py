@@ -8,7 +8,8 @@ cells, or another state than OK: no sample.
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -18,39 +19,32 @@ from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.poses import pose_signals, rotations
-from validate.recording.formats.recorded import begun, distinct, recorded
-from validate.recording.formats.text_rows import TextRow, TextRows, numbers, text_rows, told_left
+from validate.recording.formats.recorded import begun, recorded
+from validate.recording.formats.text_rows import (
+    ASSUMED,
+    NONE,
+    TextRow,
+    TextRows,
+    fields_above,
+    numbers,
+    text_rows,
+    told_left,
+)
+from validate.recording.formats.tool_columns import Tool, clock_of_columns, tools_of
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Recording, Stream
 
-_POSITION = re.compile(r"t?([xyz])(.*)")
-_TURN = re.compile(r"q([0owxyz])(.*)")
-_PORT = re.compile(r"(port|tool|sensor)[\W_]*(\d\w*)")
 # A column that says of which tool a line is, where each tool has lines of its own.
 _WHOSE = re.compile(
     r"(tool|sensor|port|marker|body|handle)?\W*_?(id|name|handle|number|no|serial)?"
 )
-_IN_NAME = re.compile(r"\(mm\)|\[mm\]|\W|_")
-_CLOCK = {
-    **dict.fromkeys(("hour", "hours"), 3600.0), **dict.fromkeys(("minute", "minutes"), 60.0),
-    **dict.fromkeys(("second", "seconds"), 1.0),
-    **dict.fromkeys(("ms", "millisecond", "milliseconds"), 1e-3),
-}  # fmt: skip
-_TIME = re.compile(r"time ?(?:stamp)?\W*(ms|s|sec|seconds)?\W*")
+_MOMENT = re.compile(
+    r"(?:(\d{4})-(\d\d)-(\d\d)[T ])?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)(?:Z|[+-]\d\d:?\d\d)?"
+)
 _OPTIONS = ("unit", "rate", "frame")
-_OK = ("", "ok")
+_OK = ("", "ok", "enabled", "valid", "visible", "tracked")
 _DAY = 86400.0  # s
 _MOST_TOOLS = 64
-
-
-@dataclass(frozen=True)
-class Tool:
-    """Columns of position x, y, z, of the quaternion x, y, z, w and of the state, if any."""
-
-    name: str
-    position: tuple[int, ...]
-    turn: tuple[int, ...]
-    state: int | None
 
 
 def read_ndi(path: Path, options: Options) -> Recording:
@@ -64,25 +58,33 @@ def read_ndi(path: Path, options: Options) -> Recording:
     require_known(options, _OPTIONS)
     held = text_rows(path)
     header = _header(held)
-    tools = _tools(header)
-    clock = _clock(header)
-    body = [r for r in held.rows if r.line > header.line and any(r.cells)]
+    tools, above = tools_of(header), fields_above(held, header)
+    options = {**({"rate": above["frequency"]} if "frequency" in above else {}), **options}
+    clock = clock_of_columns(header)
+    body = _rows(held, header, [i for i, _ in clock])
     columns = [*(i for tool in tools for i in (*tool.position, *tool.turn)), *(i for i, _ in clock)]
-    values, rows, left = numbers(held, body, len(header.cells), columns)
+    values, rows, left = numbers(held, body, _width(header, body), columns)
     whose = _whose(header, rows, tools)
     t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options, whose)
-    factor = length({"unit": "mm", **options}, "unit", "mm")
+    stated = tools[0].unit or above.get("units", "")
+    factor = length({"unit": stated or "mm", **options}, "unit", "mm")
     frame = options.get("frame", "tracker")
     streams: dict[str, Stream] = {}
     told = {}
     for name, k, own in _tracks(tools, whose):
         pose = values[own, 7 * k : 7 * k + 7]
+        pose = np.where(np.abs(pose) < NONE, pose, np.nan)
         seen = _seen(pose, tools[k], [rows[i] for i in own])
         told[name] = f"{int((~seen).sum())} of {len(seen)}"
         if seen.any():
             R = rotations(pose[seen, 3:], f"{path.name}: {name}")
             streams |= pose_signals(name, t[own][seen], R, factor * pose[seen, :3], frame)
-    return _recording(path, streams, told, left)
+    if not streams:
+        states = sorted({row.cell(tool.state) for row in rows for tool in tools if tool.state})
+        raise RecordingError(f"{path.name}: no tool was seen: {told}; states {states[:6]}")
+    said = options.get("unit", stated)
+    unit = {"unit": said} if said else {ASSUMED: "lengths in mm, as NDI writes; else --map unit=m"}
+    return _recording(path, streams, told, {**unit, **told_left(left)})
 
 
 def _whose(header: TextRow, rows: Sequence[TextRow], tools: Sequence[Tool]) -> list[str]:
@@ -106,82 +108,61 @@ def _tracks(tools: Sequence[Tool], whose: Sequence[str]) -> list[tuple[str, int,
 
 
 def _recording(
-    path: Path, streams: dict[str, Stream], missing: dict[str, str], left: Sequence[str]
+    path: Path, streams: dict[str, Stream], missing: dict[str, str], more: dict[str, str]
 ) -> Recording:
-    if not streams:
-        raise RecordingError(f"{path.name}: no tool was seen: {missing}")
     never = {name: "never seen" for name in missing if f"{name}/rotation" not in streams}
     told = {
         "kind": "tracker log (NDI)",
         "not_seen": "; ".join(f"{name}: {count}" for name, count in missing.items()),
-        **told_left(left),
+        **more,
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, never)
 
 
+def _width(header: TextRow, body: Sequence[TextRow]) -> int:
+    """Columns; those after a name that ends in dots, as of NDI's own sample, go on."""
+    last = next((c for c in reversed(header.cells) if c), "")
+    return (
+        max((len(r.cells) for r in body), default=0) if last.endswith("...") else len(header.cells)
+    )
+
+
+def _rows(held: TextRows, header: TextRow, clock: Sequence[int]) -> list[TextRow]:
+    """Rows below the header, times of the day as seconds, days counted from the first."""
+    body = [r for r in held.rows if r.line > header.line and any(r.cells)]
+    dated = [m for r in body[:1] for i in clock if (m := _MOMENT.fullmatch(r.cell(i)))]
+    if not dated:
+        return body
+    first = _day(dated[0])
+    return [
+        replace(
+            r, cells=tuple(_second(c, first) if i in clock else c for i, c in enumerate(r.cells))
+        )
+        for r in body
+    ]
+
+
+def _day(found: re.Match[str]) -> int:
+    return date(*(int(v) for v in found.groups()[:3])).toordinal() if found[1] else 0
+
+
+def _second(cell: str, first: int) -> str:
+    """Seconds from the beginning of the first day, as text; what is no time as it is."""
+    found = _MOMENT.fullmatch(cell)
+    if found is None:
+        return cell
+    hours = 24 * (_day(found) - first) + int(found[4])
+    return f"{3600 * hours + 60 * int(found[5]) + float(found[6].replace(',', '.')):.9f}"
+
+
 def _header(held: TextRows) -> TextRow:
     for row in held.rows:
-        if _tools(row):
+        if tools_of(row):
             return row
     raise RecordingError(
         f"{held.name}: no line names position and quaternion of a tool (x y z q0 qx qy qz)"
     )
-
-
-def _tools(header: TextRow) -> tuple[Tool, ...]:
-    """Groups of seven columns."""
-    cells = [c.lower() for c in header.cells]
-    found: list[tuple[tuple[int, ...], tuple[int, ...], int | None]] = []
-    names: list[str] = []
-    i = after = 0
-    while i + 7 <= len(cells):
-        group = _group(cells[i : i + 7])
-        if group is None:
-            i += 1
-            continue
-        position, turn, suffix = group
-        between = range(after, i)
-        state = next((j for j in between if cells[j] in ("state", "status")), None)
-        port = next((m for j in between if (m := _PORT.fullmatch(cells[j]))), None)
-        names.append(suffix or (f"{port[1]}{port[2]}" if port else f"tool{len(found) + 1}"))
-        found.append((tuple(i + j for j in position), tuple(i + j for j in turn), state))
-        i += 7
-        after = i
-    labels = distinct(names, len(names))
-    return tuple(Tool(n, p, q, s) for n, (p, q, s) in zip(labels, found, strict=True))
-
-
-def _group(cells: Sequence[str]) -> tuple[tuple[int, ...], tuple[int, ...], str] | None:
-    """Columns of x, y, z and of qx, qy, qz, qw among seven, and what follows their letters."""
-    for first in (0, 4):
-        at = range(first, first + 3)
-        four = [j for j in range(7) if j not in at]
-        p = [_POSITION.fullmatch(cells[j]) for j in at]
-        q = [_TURN.fullmatch(cells[j]) for j in four]
-        named = [m for m in (*p, *q) if m]
-        if len(named) < 7 or len({m[2] for m in named}) > 1:
-            continue
-        letters = {("w" if m[1] in "0ow" else m[1]): j for m, j in zip(q, four, strict=True) if m}
-        if [m[1] for m in p if m] == ["x", "y", "z"] and len(letters) == 4:
-            return (
-                tuple(at),
-                tuple(letters[c] for c in "xyzw"),
-                re.sub(r"\(mm\)|\[mm\]|\W|_", "", named[0][2]),
-            )
-    return None
-
-
-def _clock(header: TextRow) -> list[tuple[int, float]]:
-    """Columns that make up the time, and the seconds of one of their units."""
-    cells = [c.lower().strip(": ") for c in header.cells]
-    parts = [(i, _CLOCK[c]) for i, c in enumerate(cells) if c in _CLOCK]
-    if parts:
-        return parts
-    for i, cell in enumerate(cells):
-        if found := _TIME.fullmatch(cell):
-            return [(i, 1e-3 if found[1] == "ms" else 1.0)]
-    return []
 
 
 def _times(
@@ -222,7 +203,7 @@ def _seen(pose: Floats, tool: Tool, rows: Sequence[TextRow]) -> NDArray[np.bool_
 def _recognises(path: Path) -> bool:
     text = head(path).decode("utf-8", "replace")
     lines = [re.split(r"[,;\t]", line) for line in text.splitlines()[:12]]
-    return any(_tools(TextRow(0, tuple(c.strip() for c in cells))) for cells in lines)
+    return any(tools_of(TextRow(0, tuple(c.strip() for c in cells))) for cells in lines)
 
 
 NDI = Reader(

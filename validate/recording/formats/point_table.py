@@ -6,7 +6,7 @@ landmarks at one instant. Columns that belong to no point are told, never taken 
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +19,11 @@ from validate.recording.formats.options import above_zero, length, metres, sprea
 from validate.recording.formats.recorded import distinct, recorded
 from validate.recording.formats.text_rows import (
     LEFT_OUT,
+    NONE,
     TextRow,
     TextRows,
     as_number,
+    fields_above,
     numbers,
     rows_of,
     text_rows,
@@ -43,7 +45,8 @@ _DEEPEST = 40  # lines in which the line of names is looked for
 
 @dataclass(frozen=True)
 class _Layout:
-    """The line of names: columns of each point, of time, of labels; units; the rows below."""
+    """The line of names: columns of each point, of time, of labels; units; the rows below, and
+    values by key of the lines above."""
 
     points: dict[str, list[int]]
     time: int | None
@@ -51,6 +54,7 @@ class _Layout:
     names: tuple[str, ...]
     units: tuple[str, ...]
     rows: list[TextRow]
+    above: dict[str, str] = field(default_factory=dict)
 
     @property
     def columns(self) -> list[int]:
@@ -76,7 +80,8 @@ def read_point_table(path: Path, options: Options) -> Recording:
     columns = layout.columns + ([] if layout.time is None else [layout.time])
     values, rows, left = numbers(held, layout.rows, len(layout.names), columns)
     x = _points(held, layout, values, rows, options)
-    factor, stated = metres(options, _one_unit(held, layout), path.name)
+    above = layout.above
+    factor, stated = metres(options, _one_unit(held, layout) or above.get("units", ""), path.name)
     third = factor if x.shape[2] == len(_AXES) else 1.0
     x = _with_third(held, x, options) * np.array([factor, factor, third])
     landmarks = layout.label is not None
@@ -97,6 +102,7 @@ def _points(
     """Coordinates (nt, k, d) in the table's unit; of landmarks (1, k, d)."""
     d = len(next(iter(layout.points.values())))
     x = values[:, : len(layout.columns)].reshape(len(values), -1, d)
+    x = np.where(np.abs(x) < NONE, x, np.nan)
     if layout.label is not None:
         if np.isnan(x).any():
             raise RecordingError(f"{held.name}: a landmark without coordinates; remove its line")
@@ -122,7 +128,7 @@ def _times(held: TextRows, layout: _Layout, values: Floats, options: Options) ->
     if "rate" in options:
         return np.arange(len(values)) / above_zero(options, "rate")
     if layout.time is None:
-        raise UsageError(f"{held.name}: no column of time; say --map rate=HZ")
+        return np.arange(len(values)) / _frequency(held, layout)
     unit = options.get("time", layout.units[layout.time])
     if not unit:
         raise UsageError(f"{held.name}: '{layout.names[layout.time]}' has no unit; say it: "
@@ -133,6 +139,14 @@ def _times(held: TextRows, layout: _Layout, values: Floats, options: Options) ->
         raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is "
                              "not after the one before; mend it, or say --map rate=HZ")  # fmt: skip
     return np.asarray(t - t[0])
+
+
+def _frequency(held: TextRows, layout: _Layout) -> float:
+    """Hz, as a line above the names states it."""
+    stated = as_number(layout.above.get("frequency", "")) or 0.0
+    if not 0 < stated < np.inf:
+        raise UsageError(f"{held.name}: no column of time; say --map rate=HZ")
+    return stated
 
 
 def _labels(layout: _Layout, rows: Sequence[TextRow]) -> tuple[str, ...]:
@@ -163,7 +177,7 @@ def _layout(held: TextRows) -> _Layout | None:
             continue
         found = _of_line(row, list(held.rows[i + 1 :]))
         if found is not None:
-            return found
+            return replace(found, above=fields_above(held, row))
     return None
 
 

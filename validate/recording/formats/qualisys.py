@@ -21,6 +21,7 @@ from validate.recording.formats.text_rows import (
     numbers,
     text_rows,
     told_left,
+    told_zeros,
     whole_points,
     without_zeros,
 )
@@ -30,7 +31,7 @@ from validate.recording.types import Markers, Recording, Stream
 _MAGIC = (b"NO_OF_FRAMES", b"FILE_VERSION")  # the latter since its version 2.0.0
 _NAMES = ("MARKER_NAMES", "BODY_NAMES")
 _COUNTS = ("NO_OF_MARKERS", "NO_OF_BODIES")
-_SIX = "6D"
+_SIX, _EVENT = "6D", "EVENT"
 _WIDE, _RESIDUAL, _TURN = 16, 6, 7  # columns of a body, and where two of them begin
 _ROUND = 0.02  # by which a rotation may miss being one: exports have few decimals
 _OPTIONS = ("unit", "sd", "frame")
@@ -53,9 +54,10 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     if header.get("DATA_INCLUDED") == _SIX:
         return _bodies(path, held, header, names, body, rate, options)
     before = _before(body, len(names))
-    values, rows, left = numbers(held, body, before + 3 * len(names))
-    x = values[:, before:].reshape(len(values), -1, 3)
-    x = whole_points(held, without_zeros(x)[0], names, rows)
+    width = before + 3 * len(names)
+    values, rows, left = numbers(held, body, width, range(before, width))
+    shown, zeros = without_zeros(values.reshape(len(values), -1, 3))
+    x = whole_points(held, shown, names, rows)
     factor = length({"unit": "mm", **options}, "unit", "mm")
     t = np.arange(len(values)) / rate
     markers = Markers(t, names, factor * x, spread(options), options.get("frame", "capture"))
@@ -64,9 +66,16 @@ def read_qualisys(path: Path, options: Options) -> Recording:
         "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
         "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
         "rows": f"{len(values)}, the header states {header.get('NO_OF_FRAMES', 'none')}",
-    }
+        **_events(held), **told_zeros(zeros), **told_left(left),
+    }  # fmt: skip
     source = source_of(path, "text file: integrity not provable")
-    return recorded(path.stem, source, {"markers": markers}, told | told_left(left))
+    return recorded(path.stem, source, {"markers": markers}, told)
+
+
+def _events(held: TextRows) -> dict[str, str]:
+    """Lines of a name, a frame and a time, in the time of the measurement."""
+    told = [f"{r.cell(1)} {r.cell(3)} s" for r in held.rows if r.cell(0) == _EVENT]
+    return {"events": f"{'; '.join(told)} (of the trial; told, no stream)"} if told else {}
 
 
 def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRow]]:
@@ -74,7 +83,7 @@ def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRo
     if not held.rows or held.rows[0].cell(0).encode() not in _MAGIC:
         raise RecordingError(f"{held.name}: no Qualisys text: its first cell is not NO_OF_FRAMES")
     keys = [r for r in held.rows if r.cell(0).isupper() and r.cell(0) not in ABSENT]
-    header = {r.cell(0): r.cell(1) for r in keys if r.cell(0) not in _NAMES}
+    header = {r.cell(0): r.cell(1) for r in keys if r.cell(0) not in (*_NAMES, _EVENT)}
     if header.get("DATA_INCLUDED", "3D") not in ("3D", _SIX):
         raise RecordingError(
             f"{held.name}: data of kind '{header['DATA_INCLUDED']}'; 3D and 6D are read: export one"
@@ -131,6 +140,7 @@ def _bodies(
         "kind": "motion capture (Qualisys TSV, 6D)",
         "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
         "not_seen": "; ".join(f"{name}: {count}" for name, count in told.items()),
+        **_events(held),
         **told_left(left),
     }
     source = source_of(path, "text file: integrity not provable")
@@ -160,9 +170,10 @@ def _rate(held: TextRows, header: dict[str, str]) -> float:
 
 
 def _before(rows: list[TextRow], points: int) -> int:
-    """Columns before the first coordinate: none, or frame and time."""
+    """Columns before the first coordinate: none, or frame and time, and a code of time or none."""
     width = max((sum(1 for _ in r.cells) for r in rows), default=0)
-    return 2 if width >= 3 * points + 2 else 0
+    coded = any(":" in r.cell(2) for r in rows[:1])
+    return (3 if coded else 2) if width >= 3 * points + 2 else 0
 
 
 QUALISYS = Reader(

@@ -17,6 +17,7 @@ from validate.recording.types import Markers, Recording
 
 TOPIC = "landmarks"
 _FCSV = b"# Markups fiducial file version"
+_OLD = b"# Fiducial List file"  # of version 3
 _SYSTEMS = {"0": "RAS", "1": "LPS", "2": "IJK"}  # of files before version 4.11
 _COLUMNS = ("id", "x", "y", "z", "ow", "ox", "oy", "oz", "vis", "sel", "lock", "label", "desc",
             "associatedNodeID")  # fmt: skip
@@ -36,7 +37,7 @@ def read_fcsv(path: Path, options: Options) -> Recording:
     """
     require_known(options, _OPTIONS)
     held = text_rows(path)
-    if not held.rows or not held.rows[0].cell(0).startswith(_FCSV.decode()):
+    if not held.rows or not held.rows[0].cell(0).encode().startswith((_FCSV, _OLD)):
         raise RecordingError(f"{path.name}: no FCSV: its first line is not '{_FCSV.decode()}'")
     stated = [r.cells for r in held.rows if r.cell(0).startswith("#")]
     header = dict(c[0].lstrip("# ").partition(" = ")[::2] for c in stated)
@@ -86,7 +87,7 @@ def read_markups(path: Path, options: Options) -> Recording:
     require_known(options, _OPTIONS)
     lists = _lists(path)
     systems = {str(m.get("coordinateSystem", "LPS")) for m in lists}
-    units = {str(m.get("coordinateUnits", "mm")) for m in lists}
+    units = {unit for m in lists for unit in _units(m)}
     if len(systems) > 1 or len(units) > 1:
         raise RecordingError(
             f"{path.name}: lists in {sorted(systems)} and {sorted(units)}; save them apart"
@@ -96,6 +97,12 @@ def read_markups(path: Path, options: Options) -> Recording:
     system = _SYSTEMS.get(next(iter(systems)), next(iter(systems)))
     given = {"unit": unit, **options}
     return _landmarks(path, points, system, "landmarks (markups JSON)", given)
+
+
+def _units(markups: Mapping[str, Any]) -> list[str]:
+    """The unit of a list, which may state one for each axis."""
+    stated = markups.get("coordinateUnits", "mm")
+    return [str(unit) for unit in stated] if isinstance(stated, list) and stated else [str(stated)]
 
 
 def _lists(path: Path) -> list[Mapping[str, Any]]:
@@ -142,7 +149,7 @@ def _landmarks(
 FCSV = Reader(
     "fcsv",
     "landmarks of 3D Slicer (FCSV)",
-    lambda p: head(p, len(_FCSV)) == _FCSV,
+    lambda p: head(p, len(_FCSV)).startswith((_FCSV, _OLD)),
     read_fcsv,
     "its first line says so",
 )

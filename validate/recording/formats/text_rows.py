@@ -17,8 +17,10 @@ from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.exports.encoding import decode, whole_file
 
+NONE = 1e20  # NDI writes -3.7e28 for a number that is none
 ASSUMED = "assumed"  # a record: what was taken of a file and what decided, a line each
 LEFT_OUT = "left out"  # a record's key: what of the file did not become data
+ZEROS = "three zeros"  # a record's key: how many points were taken as not seen
 ABSENT = {"", "nan", "NaN", "NAN", "-", "NULL", "Null", "null"}
 
 
@@ -69,6 +71,16 @@ def rows_of(name: str, data: bytes) -> TextRows:
     except csv.Error as error:
         raise RecordingError(f"{name}: no table of cells ({error})") from None
     return TextRows(name, rows, not text.endswith(("\n", "\r")))
+
+
+def fields_above(held: TextRows, header: TextRow) -> dict[str, str]:
+    """Values by key, in small letters, of the lines above a line of names, as `Frequency: 100`."""
+    found = {}
+    for row in held.rows:
+        key, _, value = row.cell(0).partition(":")
+        if row.line < header.line and (text := value.strip() or row.cell(1)):
+            found[key.strip().lower()] = text
+    return found
 
 
 def numbers(
@@ -127,6 +139,11 @@ def without_zeros(x: Floats) -> tuple[Floats, int]:
     zeros for what no camera saw, and no camera sees a point at zero in all digits."""
     zero = (x == 0).all(axis=2, keepdims=True)
     return np.where(zero, np.nan, x), int(zero.sum())
+
+
+def told_zeros(count: int) -> dict[str, str]:
+    """The record's entry about points that are three zeros; none where none is."""
+    return {ZEROS: f"{count} points, taken as not seen"} if count else {}
 
 
 def _first_odd(rows: Sequence[TextRow], columns: Sequence[int]) -> str:

@@ -9,23 +9,28 @@ from validate.errors import RecordingError
 from validate.recording.formats.options import above_zero, metres, spread
 from validate.recording.formats.recorded import distinct, recorded
 from validate.recording.formats.text_rows import (
+    ASSUMED,
     TextRow,
     TextRows,
+    as_number,
     numbers,
     text_rows,
     told_left,
+    told_zeros,
     whole_points,
+    without_zeros,
 )
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Markers, Recording
 
 _MAGIC = b"PathFileType"
 _OPTIONS = ("unit", "sd", "frame", "rate")
+_ROUNDED = 1e-3  # s: times have three decimals
 _BEFORE = 2  # columns before the first coordinate: frame, time
 
 
 def read_trc(path: Path, options: Options) -> Recording:
-    """Points as `markers` (nt, k, 3) m; a blank or NaN is "not seen".
+    """Points as `markers` (nt, k, 3) m; a blank, NaN or three zeros are "not seen".
 
     Options: `unit` in place of the file's, `sd` of a coordinate (0: not stated), `rate` (Hz) in
     place of its times, `frame` (default capture). Raises `UsageError` without a unit of length,
@@ -36,9 +41,10 @@ def read_trc(path: Path, options: Options) -> Recording:
     header = _header(held)
     names = _names(held, header)
     values, rows, left = numbers(held, _rows(held), _BEFORE + 3 * len(names))
-    x = whole_points(held, values[:, _BEFORE:].reshape(len(values), -1, 3), names, rows)
+    shown, zeros = without_zeros(values[:, _BEFORE:].reshape(len(values), -1, 3))
+    x = whole_points(held, shown, names, rows)
     factor, stated = metres(options, header.get("Units", ""), path.name)
-    t = _times(held, values, options)
+    t, counted = _times(held, header, values, options)
     markers = Markers(t, names, factor * x, spread(options), options.get("frame", "capture"))
     told = {
         "kind": "marker trajectories (TRC)",
@@ -48,7 +54,8 @@ def read_trc(path: Path, options: Options) -> Recording:
         "rows": f"{len(values)}, the header states {header.get('NumFrames', 'none')}",
     }
     source = source_of(path, "text file: integrity not provable")
-    return recorded(path.stem, source, {"markers": markers}, told | told_left(left))
+    told |= counted | told_zeros(zeros) | told_left(left)
+    return recorded(path.stem, source, {"markers": markers}, told)
 
 
 def _header(held: TextRows) -> dict[str, str]:
@@ -79,15 +86,26 @@ def _rows(held: TextRows) -> list[TextRow]:
     return [r for r in body[begin:] if any(r.cells)]
 
 
-def _times(held: TextRows, values: Floats, options: Options) -> Floats:
-    """Seconds from the first row."""
+def _times(
+    held: TextRows, header: dict[str, str], values: Floats, options: Options
+) -> tuple[Floats, dict[str, str]]:
+    """Seconds from the first row, and what was assumed: rows of equal times, as of three decimals
+    at 2 kHz, are counted at the header's rate where they stand by it."""
     if "rate" in options:
-        return np.arange(len(values)) / above_zero(options, "rate")
-    t = values[:, 1]
+        return np.arange(len(values)) / above_zero(options, "rate"), {}
+    t = values[:, 1] - values[0, 1]
     if np.isnan(t).any():
         raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; say "
                              "--map rate=HZ")  # fmt: skip
-    return np.asarray(t - t[0])
+    if (np.diff(t) > 0).all():
+        return np.asarray(t), {}
+    rate = as_number(header.get("DataRate", "")) or np.nan
+    exact = np.arange(len(t)) / rate
+    if not (rate > 0 and np.abs(t - exact).max() <= _ROUNDED):
+        row = int(np.argmax(np.diff(t) <= 0)) + 2
+        raise RecordingError(f"{held.name}: the time of row {row} is not after the one before it; "
+                             "say --map rate=HZ")  # fmt: skip
+    return exact, {ASSUMED: f"rows of equal times are counted at the {rate:g} Hz that it states"}
 
 
 TRC = Reader(

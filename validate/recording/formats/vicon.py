@@ -4,6 +4,7 @@ A block is its title, its rate in Hz, a line of names, one of columns, one of un
 frame (devices: a row a sub-frame) until a blank line.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,26 +17,28 @@ from validate.errors import RecordingError
 from validate.recording.formats.options import metres, spread
 from validate.recording.formats.recorded import begun, distinct, recorded
 from validate.recording.formats.text_rows import (
+    LEFT_OUT,
     TextRow,
     TextRows,
     as_number,
     numbers,
     text_rows,
     told_left,
+    told_zeros,
     whole_points,
     without_zeros,
 )
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Markers, Recording, Signal, Stream
 
-_POINTS, _DEVICES = "Trajectories", "Devices"
+_POINTS, _DEVICES, _EVENTS = "Trajectories", "Devices", "Events"
 _TITLES = (
     _POINTS,
     _DEVICES,
     "Segments",
     "Joints",
     "Model Outputs",
-    "Events",
+    _EVENTS,
     "Force Plates",
     "Objects",
 )
@@ -75,10 +78,12 @@ def read_vicon(path: Path, options: Options) -> Recording:
         markers, more = _points(held, blocks[_POINTS], options)
         streams["markers"] = markers
         told |= more
-    if _DEVICES in blocks:
-        signals, more = _signals(held, blocks[_DEVICES], options)
+    devices = {title: block for title, block in blocks.items() if title.startswith(_DEVICES)}
+    for title, block in devices.items():
+        signals, more = _signals(held, block, title.removeprefix(_DEVICES), options)
         streams |= signals
-        told |= more
+        told |= more | told_left([r[LEFT_OUT] for r in (told, more) if LEFT_OUT in r])
+    told |= _events(held)
     if not streams:
         raise RecordingError(
             f"{path.name}: neither trajectories nor devices; it has "
@@ -87,21 +92,33 @@ def read_vicon(path: Path, options: Options) -> Recording:
     unread = {
         title: f"a block of {len(b.rows)} rows that is not read"
         for title, b in blocks.items()
-        if title not in (_POINTS, _DEVICES)
+        if title != _POINTS and title not in devices
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, unread)
 
 
 def _blocks(held: TextRows) -> dict[str, CsvBlock]:
-    """Blocks by title; one without rows is left out."""
+    """Blocks by title, numbered where one stands twice; one without rows is left out."""
     begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
-    found = {}
+    found: dict[str, CsvBlock] = {}
+    titles: Counter[str] = Counter()
     for begin, end in pairwise([*begins, len(held.rows)]):
-        block = _block(held, held.rows[begin:end])
+        title = held.rows[begin].cell(0)
+        block = _block(held, held.rows[begin:end]) if title != _EVENTS else None
         if block is not None:
-            found[held.rows[begin].cell(0)] = block
+            titles[title] += 1
+            found[title if titles[title] == 1 else f"{title} ({titles[title]})"] = block
     return found
+
+
+def _events(held: TextRows) -> dict[str, str]:
+    """Rows of subject, context, name and time below their title, rate and names."""
+    begin = next((i for i, r in enumerate(held.rows) if r.cell(0) == _EVENTS and _lone(r)), None)
+    rows = held.rows[begin + 3 :] if begin is not None else ()
+    end = next((i for i, r in enumerate(rows) if not any(r.cells)), len(rows))
+    told = [f"{' '.join(filter(None, r.cells[1:3]))} {r.cell(3)} s" for r in rows[:end]]
+    return {"events": f"{'; '.join(told)} (of the trial; told, no stream)"} if told else {}
 
 
 def _lone(row: TextRow) -> bool:
@@ -141,27 +158,34 @@ def _points(held: TextRows, block: CsvBlock, options: Options) -> tuple[Markers,
     )  # fmt: skip
     missing = f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}"
     return markers, {"unit": stated, "rate_hz": repr(block.rate), "points_not_seen": missing,
-                     **({"three zeros": f"{zeros} points, taken as not seen"} if zeros else {}),
+                     **told_zeros(zeros),
                      **told_left(left)}  # fmt: skip
 
 
 def _signals(
-    held: TextRows, block: CsvBlock, options: Options
+    held: TextRows, block: CsvBlock, more: str, options: Options
 ) -> tuple[dict[str, Signal], dict[str, str]]:
-    """Channels of devices; one with blank cells is left out and told."""
+    """Channels of devices; one with blank cells is left out and told. `more` follows each name."""
     values, _, left = numbers(held, block.rows, block.width)
     t = _sub_frames(values) / block.rate
-    device, found, gone = "device", {}, list(left)
-    for i in range(_BEFORE, block.width):
-        device = block.names[i] if i < len(block.names) and block.names[i] else device
-        topic = f"analog/{device}.{block.columns[i]}"
+    found, gone = {}, list(left)
+    frame = options.get("frame", "capture")
+    for i, topic in enumerate(_channels(block, more), start=_BEFORE):
         if np.isnan(values[:, i]).any():
             gone.append(f"{topic}: {int(np.isnan(values[:, i]).sum())} blank cells")
             continue
         unit = block.units[i] if i < len(block.units) else ""
-        frame = options.get("frame", "capture")
         found[topic] = Signal(t, values[:, [i]], unit or "not stated", 0.0, frame)
     return found, {"analog_rate_hz": repr(block.rate), **told_left(gone)}
+
+
+def _channels(block: CsvBlock, more: str) -> tuple[str, ...]:
+    """A topic for every column of a device: its name stands above the first of them."""
+    device, topics = "device", []
+    for i in range(_BEFORE, block.width):
+        device = block.names[i] if i < len(block.names) and block.names[i] else device
+        topics.append(f"analog/{device}.{block.columns[i]}{more}")
+    return distinct(topics, len(topics))
 
 
 def _sub_frames(values: Floats) -> Floats:

@@ -1,0 +1,27 @@
+"""Lists of landmarks by other versions of 3D Slicer."""
+
+from pathlib import Path
+
+import pytest
+
+from validate.errors import RecordingError
+from validate.recording.formats.slicer import read_markups
+from validate.recording.readers import recognised
+
+
+def test_a_list_of_slicer_3_is_in_ras(tmp_path: Path) -> None:
+    path = tmp_path / "x.fcsv"
+    path.write_text("# Fiducial List file x.fcsv\n# columns = label,x,y,z,sel,vis\nL-1,1,2,3,1,1\n")
+    got = recognised(path).read(path, {}).marker("landmarks")
+    assert (got.names, got.frame, got.x.tolist()) == (("L-1",), "RAS", [[[0.001, 0.002, 0.003]]])
+
+
+def test_a_unit_for_each_axis_of_a_list_is_one(tmp_path: Path) -> None:
+    path = tmp_path / "x.mrk.json"
+    points = '[{"label": "A", "position": [1, 2, 3]}]'
+    text = '{"@schema": "markups-schema", "markups": [{"coordinateUnits": ["cm", "cm", "%s"], '
+    path.write_text(text % "cm" + f'"controlPoints": {points}}}]}}')
+    assert read_markups(path, {}).marker("landmarks").x.tolist() == [[[0.01, 0.02, 0.03]]]
+    path.write_text(text % "mm" + f'"controlPoints": {points}}}]}}')
+    with pytest.raises(RecordingError, match=r"\['cm', 'mm'\]; save them apart"):
+        read_markups(path, {})
