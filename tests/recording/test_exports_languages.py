@@ -225,7 +225,8 @@ def test_a_column_that_no_word_names_is_offered_before_a_strain(tmp_path: Path) 
 @pytest.mark.parametrize(("way", "diameter", "height"), [
     ("Distanza", "Diametro", "Altezza"), ("Distancia", "Diámetro", "Altura"),
     ("Afstand", "Diameter", "Hoogte"), ("Eindringtiefe", "Durchmesser", "Höhe"),
-    ("压入深度", "直径", "高度"), ("クロスヘッド", "直径", "高さ"), ("Flèche", "Diamètre", "Hauteur"),
+    ("压入深度", "直径", "高度"), ("クロスヘッド", "直径", "高さ"),
+    ("Flèche", "Diamètre", "Hauteur"),
 ])  # fmt: skip
 def test_depths_and_distances_are_displacements(
     way: str, diameter: str, height: str, tmp_path: Path
