@@ -17,7 +17,7 @@ from validate.recording.types import Contours, Markers, Recording, Signal, Sourc
 from validate.register.fitting import MarkerFit
 from validate.replay import compare
 from validate.replay.experiment import Experiment
-from validate.replay.measured_body import measured_body, solid
+from validate.replay.measured_body import body_of, measured_body, solid
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,
@@ -31,6 +31,7 @@ from validate.report.registration import registration
 from validate.scene.box import box
 from validate.scene.mesh_file import write_mesh
 from validate.scene.named_place import axis_of, place_of, point_of
+from validate.scene.select import facets_of
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)
@@ -283,6 +284,19 @@ def test_places_in_words() -> None:
         point_of("10mm,20,0")
     with pytest.raises(SceneError, match="or three numbers"):
         axis_of("up")
+
+
+@pytest.mark.parametrize("words", ["near 20mm,15mm,50mm", "box 5mm,5mm,49mm to 36mm,26mm,51mm"])
+def test_a_place_in_words_is_as_large_on_every_mesh_of_a_file(words: str, tmp_path: Path) -> None:
+    """A point's nearest facet was a quarter, a sixteenth of it on the halved ones, and a box took
+    the smaller facets at its edge, too: no mesh could be the finer one of another."""
+    write_mesh(box(SIZE, (4, 4, 4)), tmp_path / "b.npz")
+    areas = []
+    for halvings in (0, 1):
+        mesh = body_of(Solid("b.npz", halvings=halvings), folder=tmp_path, places=(words,))
+        a, b, c = np.moveaxis(mesh.nodes[facets_of(mesh, place_of(words, mesh))], 1, 0)[:3]
+        areas.append(float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()))
+    assert areas[0] == pytest.approx(areas[1], rel=1e-9)
 
 
 @pytest.mark.parametrize(("change", "error", "why"), [

@@ -42,7 +42,7 @@ from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import linear, of_element, refined
 from validate.scene.scene import Drive, Load, Pin, Scene, Support, Weight
-from validate.scene.select import nodes_of
+from validate.scene.select import facets_of, nodes_of
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
@@ -136,7 +136,7 @@ def _identify(
 def _build(
     recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
 ) -> Scene:
-    mesh = body(p.body)
+    mesh = body(p.body, places=_places(p))
     scene = Scene(
         mesh,
         Material(known(p.material.E, "material.E"), p.material.nu, model.law, p.material.rho,
@@ -207,21 +207,31 @@ def known_place(p: MeasuredBody) -> str:
     return p.moved.place
 
 
-def body_of(card: Solid, *, folder: Path) -> Mesh:
+def _places(p: MeasuredBody) -> tuple[str, ...]:
+    said = (*(getattr(p.held, name) for name in (*_AXES, "slides")), p.moved.place)
+    return tuple(text for text in said if text)
+
+
+def body_of(card: Solid, *, folder: Path, places: tuple[str, ...] = ()) -> Mesh:
     """The body with the facet set "surface" of all of it; of 3-D cells.
+
+    The `places` of a mesh file are facet sets by their words, chosen on the mesh as it is and
+    halved with it: smaller facets beside a box would enter it, and the nearest one of a point is
+    a quarter as large.
 
     Raises `UsageError` for a card that says none, `SceneError` for a mesh of 2-D cells.
     """
-    mesh = _meshed(card, folder)
+    mesh = _meshed(card, folder, places)
     if mesh.dimension != 3:
         raise SceneError(f"{card.file}: cells of {mesh.kind}; a body of 3-D cells is needed")
     return replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
 
 
 @lru_cache(maxsize=8)
-def _meshed(card: Solid, folder: Path) -> Mesh:
+def _meshed(card: Solid, folder: Path, places: tuple[str, ...]) -> Mesh:
     if card.file is not None:
-        scene = Scene(linear(read_mesh(folder / card.file, card.unit)), Material(1.0, 0.3))
+        whole = linear(read_mesh(folder / card.file, card.unit))
+        scene = Scene(_with_places(whole, places), Material(1.0, 0.3))
         for _ in range(card.halvings):
             scene = refined(scene)
         return scene.mesh
@@ -236,6 +246,12 @@ def _meshed(card: Solid, folder: Path) -> Mesh:
         radial, axial = ceil(diameter / 2 / edge), ceil(height / edge)
         return whole_cylinder(diameter, height, max(2, radial), max(2, axial))
     raise UsageError("body: none is given; set body.file, body.block or body.cylinder")
+
+
+def _with_places(mesh: Mesh, places: tuple[str, ...]) -> Mesh:
+    whole = replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
+    chosen = {text: facets_of(whole, place_of(text, whole)) for text in places}
+    return replace(whole, facets={**whole.facets, **chosen})
 
 
 # --- what is uncertain ----------------------------------------------------------------------------
@@ -257,7 +273,7 @@ def _level(share: float | None, halvings: int | None) -> Change:
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:
     """The edge m of a cube as large as a mean cell."""
-    return float(np.cbrt(cell_volumes(body(p.body)).mean()))
+    return float(np.cbrt(cell_volumes(body(p.body, places=_places(p))).mean()))
 
 
 def _stiffer(p: MeasuredBody, z: float) -> float | None:
