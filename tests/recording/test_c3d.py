@@ -174,14 +174,6 @@ def test_a_file_of_whole_numbers_is_as_long_as_its_own_processor_says(
         _require_whole(path)
 
 
-def test_a_file_of_sgi_is_not_called_damaged(tmp_path: Path) -> None:
-    head = struct.pack(">BBHHHHHfHHf", 2, 80, 1, 0, 1, 2, 10, -0.1, 3, 0, 50.0)
-    path = tmp_path / "x.c3d"
-    path.write_bytes(head.ljust(512, b"\0") + bytes([1, 80, 1, 86]).ljust(512, b"\0") + bytes(512))
-    with pytest.raises(RecordingError, match="byte order of SGI"):
-        read_c3d(path, {})
-
-
 def labelled(file: ezc3d.c3d, path: Path) -> Path:
     file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
     file["parameters"]["POINT"]["RATE"]["value"] = [100.0]

@@ -4,8 +4,6 @@ The file's own words are taken: labels, unit, rate. A residual is the mean dista
 meet in a point, not a standard deviation: it is told, never used as one.
 """
 
-import struct
-from collections.abc import Iterator
 from math import prod
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import numpy as np
 
 from validate.errors import RecordingError
 from validate.recording.formats.apart import decoded
-from validate.recording.formats.c3d_bytes import BIG, BLOCK, MOST, layout
+from validate.recording.formats.c3d_bytes import BLOCK, MOST, layout, records
 from validate.recording.formats.c3d_streams import (
     Found,
     Held,
@@ -96,11 +94,6 @@ def _require_whole(path: Path) -> None:
             f"{lies.points} points and {lies.analog} analog numbers: {lies.needs} bytes; cut or "
             "damaged"
         )
-    if lies.processor == BIG:
-        raise RecordingError(
-            f"{path.name}: a whole C3D file in the byte order of SGI, which ezc3d does not read; "
-            "write it anew as Intel's by another program, as Mokka or Vicon's, or export it as TRC"
-        )
     _require_parameters(path, head(path, lies.at(0)), BLOCK * max(first[0] - 1, 1))
 
 
@@ -108,32 +101,15 @@ def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
     """No parameter tells of more values than the file has bytes left: ezc3d takes memory for them
     before it reads, for seconds."""
     size = path.stat().st_size
-    for name, dimensions, at in _parameters(raw, begin):
+    for group, name, at in records(raw, begin):
+        dimensions = raw[at + 4 : at + 4 + raw[at + 3]] if group > 0 else b""
         told = prod(d for d in dimensions if d)
         if told > size - at:
+            word = name.decode("ascii", "replace")
             raise RecordingError(
-                f"{path.name}: its parameter {name!r} tells of {told:.3g} values, {size - at} "
+                f"{path.name}: its parameter {word!r} tells of {told:.3g} values, {size - at} "
                 "bytes are left: damaged"
             )
-
-
-def _parameters(raw: bytes, begin: int) -> Iterator[tuple[str, bytes, int]]:
-    """Name, dimensions and place of each parameter, as far as their links lead; groups have none.
-
-    C3D user guide, parameter section: four bytes, then records that are linked.
-    """
-    order = ">" if raw[begin + 3 : begin + 4] == bytes([BIG]) else "<"
-    at, ahead = begin + 4, 1
-    while ahead > 0 and at + 2 <= len(raw):
-        length, group = struct.unpack("bb", raw[at : at + 2])
-        after = at + 2 + abs(length)  # of a locked one it is negative
-        if length == 0 or after + 4 > len(raw):
-            return
-        if group > 0:
-            name = raw[at + 2 : after].decode("ascii", "replace")
-            yield name, raw[after + 4 : after + 4 + raw[after + 3]], after
-        (ahead,) = struct.unpack(f"{order}h", raw[after : after + 2])
-        at = after + ahead
 
 
 def _trial(found: Held) -> Record:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.recording.formats.c3d_bytes import BLOCK, MOST, layout, parts_beyond
+from validate.recording.formats.c3d_turned import turned
 from validate.recording.reader import head
 
 LIBRARIES = ("ezc3d",)
@@ -25,6 +26,12 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
 
     Raises `RecordingError` for a file without all frames that its parameters tell of.
     """
+    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
+        return _held(turned(path, Path(folder) / "turned.c3d"), Path(folder) / "part.c3d")
+
+
+def _held(path: Path, part: Path) -> dict[str, NDArray[Any]]:
+    """Of a file in an order that the library reads; a long trial is read by parts."""
     import ezc3d
 
     found = ezc3d.c3d(str(path))
@@ -34,9 +41,8 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     size = path.stat().st_size
     if size < lies.at(frames):
         raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: cut")
-    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
-        rest = parts_beyond(path, frames, Path(folder) / "part.c3d")
-        held = [_frames(found), *(_frames(ezc3d.c3d(str(part))) for part in rest)]
+    rest = parts_beyond(path, frames, part)
+    held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
     header = found["header"]
     rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
              _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 from validate.recording.reader import head
 
 BLOCK = 512  # bytes
-BIG = 86  # the processor whose numbers stand the other way round
+INTEL, BIG = 84, 86  # processors; numbers of the latter (SGI) stand the other way round
 _DEC = 85  # the one whose floats stand so by halves
 MOST = 65535  # frames that a header counts
 _FRAMES = 6  # where the header has its first and last frame
@@ -71,3 +71,21 @@ def parts_beyond(path: Path, frames: int, copy: Path) -> Iterator[Path]:
         front[_FRAMES : _FRAMES + 4] = struct.pack("<2H", 1, count)
         copy.write_bytes(front + raw[lies.at(begin) : lies.at(begin + count)])
         yield copy
+
+
+def records(raw: bytes, begin: int) -> Iterator[tuple[int, bytes, int]]:
+    """Group number (below 0: a group itself), name and the place of the link of each record, as far
+    as the links lead.
+
+    C3D user guide, parameter section: four bytes, then records that are linked.
+    """
+    order = ">" if raw[begin + 3 : begin + 4] == bytes([BIG]) else "<"
+    at, ahead = begin + 4, 1
+    while ahead > 0 and at + 2 <= len(raw):
+        length, group = struct.unpack("bb", raw[at : at + 2])
+        after = at + 2 + abs(length)  # of a locked one it is negative
+        if length == 0 or after + 4 > len(raw):
+            return
+        yield group, raw[at + 2 : after], after
+        (ahead,) = struct.unpack(f"{order}h", raw[after : after + 2])
+        at = after + ahead
