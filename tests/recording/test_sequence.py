@@ -92,7 +92,7 @@ def test_a_line_may_have_any_length_and_the_header_may_not(
         ("0 0 0 1 \n", "0 0 1 1 \n", "last row"),
         ("1e3", "nan", "16 finite numbers"),
         ("Seq_Frame0001_Timestamp", "Seq_Frame0001_Time", "without a time, the first is 1"),
-        ("MET_UCHAR", "MET_FLOAT", "grey of 8 or 16 bits"),
+        ("MET_UCHAR", "MET_FLOAT", "grey or colour of 8 or 16 bits"),
         ("DimSize = 5 4 3", "DimSize = 5 4 9", "its header needs 180"),
         ("DimSize = 5 4 3", "DimSize = 50000 40000 9", "limit"),
         ("DimSize = 5 4 3", "DimSize = 5 -4 3", "DimSize"),

@@ -19,10 +19,10 @@ from pydicom.uid import DeflatedExplicitVRLittleEndian
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.dicom_files import files_of
 from validate.recording.formats.sequence import MAX_PIXELS
+from validate.recording.images.levels import luma
 
 _LACKS = ("missing dependencies", "does not support")  # as a codec says that it is none for these
 _HALF = "YBR_FULL_422"  # half of the colours
-_LUMA = np.array([0.299, 0.587, 0.114])
 _META = 144  # bytes before the group of meta information that states its length, and of that
 _PACKED = 2**28  # bytes of a file that is packed as a whole
 _CM = 3  # PS3.3 C.8.5.5.1.15: physical units, cm
@@ -174,7 +174,7 @@ def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
     if image.dtype not in (np.uint8, np.uint16, np.int16):
         raise RecordingError(f"pixels of {image.dtype}; those of 8 and 16 bits are read")
     if image.ndim == 3:
-        image = np.rint(image @ _LUMA).astype(image.dtype)
+        image = luma(image)
     if ds.PhotometricInterpretation == "MONOCHROME1":
         return np.asarray(2 ** int(ds.BitsStored) - 1 - image, dtype=image.dtype)
     return image

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.recording.formats.sequence import MAX_PIXELS, Sequence, by_frame, recorded
+from validate.recording.images.levels import luma
 from validate.recording.reader import Options, Reader, head
 from validate.recording.types import Recording
 
 _HEADER = 128 * 2**20  # bytes: some 200 000 frames of two tools
 _LAST = "ElementDataFile"
 _DEPTHS = {"MET_UCHAR": np.uint8, "MET_USHORT": np.uint16, "MET_SHORT": np.int16}
+_CHANNELS = ("1", "3", "4")  # grey, colour, colour with opacity
 _BIG = ("BinaryDataByteOrderMSB", "ElementByteOrderMSB")
 _KNOWN = ("ObjectType", "NDims", "Comment", "ObjectSubType", "DimSize")
 
@@ -29,14 +31,15 @@ def read_metaimage(path: Path, options: Options) -> Recording:
     """Transforms and images of a sequence, as `sequence.recorded` has them.
 
     Raises `RecordingError` for a file that is cut, damaged, too large, or of other pixels than
-    grey of 8 or 16 bits, and a .mhd whose pixels do not lie beside it; `UsageError` as `recorded`.
+    grey or colour of 8 or 16 bits, and a .mhd whose pixels do not lie beside it; `UsageError` as
+    `recorded`.
     """
     fields, after = _header(path)
     images = _images(path, fields, after)
     kind = "MetaImage sequence"
-    return recorded(
-        path, Sequence(by_frame(fields.items()), images, _spacing(path, fields), kind), options
-    )
+    way = fields.get("UltrasoundImageOrientation", "")
+    spacing = _spacing(path, fields)
+    return recorded(path, Sequence(by_frame(fields.items()), images, spacing, kind, way), options)
 
 
 def _header(path: Path) -> tuple[dict[str, str], int]:
@@ -61,19 +64,22 @@ def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[Any
     if not width * height * count:
         return ()
     depth = _depth(path, fields)
-    size = width * height * count * depth.itemsize
+    channels = int(fields.get("ElementNumberOfChannels", "1"))
+    size = width * height * count * channels * depth.itemsize
     if size > MAX_PIXELS:
         raise RecordingError(f"{path.name}: {size} bytes of pixels, limit {MAX_PIXELS}; split it")
     data = _unpacked(path, fields, _packed(path, fields, after, size), size)
-    return tuple(np.frombuffer(data, dtype=depth).reshape(count, height, width))
+    pixels = np.frombuffer(data, dtype=depth).reshape(count, height, width, channels)
+    return tuple(pixels[..., 0] if channels == 1 else luma(pixels))
 
 
 def _depth(path: Path, fields: dict[str, str]) -> np.dtype[Any]:
-    """The type of a pixel, grey, in the file's order of bytes."""
+    """The type of a level, in the file's order of bytes."""
     kind, channels = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
-    if kind not in _DEPTHS or channels != "1":
+    if kind not in _DEPTHS or channels not in _CHANNELS:
         raise RecordingError(
-            f"{path.name}: pixels {kind or 'of no type'} x {channels}; save as grey of 8 or 16 bits"
+            f"{path.name}: pixels {kind or 'of no type'} x {channels}; save as grey or "
+            "colour of 8 or 16 bits"
         )
     said = (fields.get(key, "False").lower() for key in _BIG)
     return np.dtype(_DEPTHS[kind]).newbyteorder(">" if "true" in said else "<")

@@ -29,7 +29,10 @@ def read_nrrd(path: Path, options: Options) -> Recording:
     keys, texts = found["keys"].tolist(), found["texts"].tolist()
     x, y = found["spacing"].tolist()
     fields = by_frame(zip(keys, texts, strict=True))
-    return recorded(path, Sequence(fields, _images(path, found["pixels"]), (x, y), "NRRD"), options)
+    images = _images(path, found["pixels"])
+    way = dict(zip(keys, texts, strict=True)).get("UltrasoundImageOrientation", "")
+    times = found["times"] if len(found["times"]) == len(images) else None
+    return recorded(path, Sequence(fields, images, (x, y), "NRRD", way, times), options)
 
 
 def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[Any], ...]:
@@ -41,8 +44,8 @@ def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     whole = pixels.dtype.kind in "iu" and (pixels.dtype == np.uint8 or pixels.itemsize == 2)
     if not whole or pixels.ndim not in (2, 3) or pixels.nbytes > MAX_PIXELS:
         raise RecordingError(
-            f"{path.name}: pixels {pixels.shape} {pixels.dtype}; images of 8 or 16-bit grey up to "
-            f"{MAX_PIXELS} bytes are read"
+            f"{path.name}: pixels {pixels.shape} {pixels.dtype}; images of 8 or 16-bit grey, one "
+            f"px deep, up to {MAX_PIXELS} bytes are read"
         )
     stack = pixels if pixels.ndim == 3 else pixels[..., None]
     return tuple(np.ascontiguousarray(image.T) for image in np.moveaxis(stack, 2, 0))

@@ -10,15 +10,21 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.recording.formats.sequence import MAX_PIXELS
+from validate.recording.images.levels import luma
+from validate.units import in_si
 
 LIBRARIES = ("nrrd",)
+_LIST = "list"  # the kind of the axis that lists images
+_SPACE = ("domain", "space")
+_COLOUR = ("rgb-color", "rgba-color", "3-color", "4-color", "vector", "3-vector", "4-vector")
 _GZIP = 31  # of zlib: with its header and its checksum
 _CHUNK = 2**20  # bytes
 _WIDEST = 8  # bytes of a number
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Pixels (w, h, n), the texts of all keys, and the sides (2,) of a pixel as stated."""
+    """Pixels (w, h, n), the texts of all keys, the sides (2,) of a pixel as stated, and `times`
+    (n,) s of the images, none where they are not stated."""
     import nrrd
 
     with path.open("rb") as lines:  # a name with a line break is taken for the header itself
@@ -30,22 +36,50 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         _require_end(path, _WIDEST * count)
     pixels, header = nrrd.read(str(path))
     own = {key: text for key, text in header.items() if isinstance(text, str)}
+    kinds = [str(kind).lower() for kind in header.get("kinds", ())]
     return {
-        "pixels": pixels,
+        "pixels": _images_last(pixels, kinds),
         "keys": np.array(list(own), dtype=str),
         "texts": np.array(list(own.values()), dtype=str),
-        "spacing": _spacing(header),
+        "spacing": _spacing(header, kinds),
+        "times": _times(header, kinds),
     }
 
 
-def _spacing(header: dict[str, Any]) -> NDArray[np.float64]:
-    """From the spacings, or the lengths of the axes' directions; 1 1 where none is stated."""
+def _images_last(pixels: NDArray[Any], kinds: list[str]) -> NDArray[Any]:
+    """Colour as grey, and the axis that lists the images, as 3D Slicer has it first, at the end."""
+    for i, kind in enumerate(kinds):
+        if kind in _COLOUR and pixels.shape[i] in (3, 4):
+            pixels = luma(np.moveaxis(pixels, i, -1))
+            kinds = kinds[:i] + kinds[i + 1 :]
+            break
+    return np.moveaxis(pixels, kinds.index(_LIST), -1) if _LIST in kinds else pixels
+
+
+def _times(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
+    """Seconds of the images, as 3D Slicer lists them where they are times; none of what is not."""
+    at = kinds.index(_LIST) if _LIST in kinds else 0
+    values = str(header.get(f"axis {at} index values", "")).split()
+    units = [*header.get("units", ()), *[""] * len(kinds)]
+    factor = in_si(1.0, str(header.get(f"axis {at} index unit") or units[at]) or "none", "s")
+    try:
+        t = np.array([float(v) for v in values])
+    except ValueError:
+        return np.empty(0)
+    return t * factor if factor is not None and (np.diff(t) > 0).all() else np.empty(0)
+
+
+def _spacing(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
+    """From the spacings, or the lengths of the axes' directions, of the first two axes in space;
+    1 1 where none is stated."""
+    space = [i for i, kind in enumerate(kinds) if kind in _SPACE]
+    i, j = space[:2] if len(space) > 1 else (0, 1)
     if "spacings" in header:
-        return np.asarray(header["spacings"][:2], dtype=np.float64)
+        return np.asarray(header["spacings"], dtype=np.float64)[[i, j]]
     directions = header.get("space directions")
     if directions is None:
         return np.ones(2)
-    return np.array([np.linalg.norm(axis) for axis in list(directions)[:2]], dtype=np.float64)
+    return np.array([np.linalg.norm(directions[k]) for k in (i, j)], dtype=np.float64)
 
 
 def _require_end(path: Path, most: int) -> None:

@@ -7,7 +7,7 @@ and `ImageStatus`. Only what is OK enters the recording: a tool that was not see
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +35,15 @@ _OPTIONS = ("m_per_px", "rate", "images", "white")
 @dataclass(frozen=True)
 class Sequence:
     """What a file holds: texts by frame and field, images n x (h, w) of 8 or 16 bits or none,
-    `spacing` (2,) as the file states it, `kind` in words."""
+    `spacing` (2,) as the file states it, `kind` in words; how the image lies to the transducer,
+    `orientation`, and `times` (n,) s of a file that has them apart, where it says so."""
 
     fields: Mapping[int, Mapping[str, str]]
     images: tuple[NDArray[Any], ...]
     spacing: tuple[float, float]
     kind: str
+    orientation: str = ""
+    times: Floats | None = None
 
 
 def by_frame(pairs: Iterable[tuple[str, str]]) -> dict[int, dict[str, str]]:
@@ -73,7 +76,8 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
         never += [] if found else [tool]
     levels: dict[str, str] = {}
     if held.images and options.get("images") != "no":
-        shown, levels["levels"] = _images(path, held, t, options)
+        turned, levels = _upright(path, held)
+        shown, levels["levels"] = _images(path, turned, t, options)
         streams |= shown
     if not streams:
         raise RecordingError(
@@ -100,6 +104,10 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
     stamped = [i for i in range(count) if "Timestamp" in held.fields.get(i, {})]
     if not count:
         raise RecordingError(f"{path.name}: no frame, neither an image nor fields Seq_Frame0000_*")
+    if not stamped and "rate" not in options and held.times is not None:
+        return np.asarray(held.times - held.times[0])
+    if count == 1 and not stamped:
+        return np.zeros(1)
     if not stamped or "rate" in options:
         return np.asarray(np.rint(1e9 * np.arange(count) / _rate(path, options)) / 1e9)
     if len(stamped) < count:
@@ -161,6 +169,29 @@ def _images(
     images, levels = shallow([held.images[i] for i in good], options)
     pixel = _pixel(path, held, options)
     return {IMAGES: Frames(t[good], images, pixel, np.eye(4), "image")}, levels
+
+
+def _upright(path: Path, held: Sequence) -> tuple[Sequence, dict[str, str]]:
+    """The images as PLUS has them beside its transforms, and what was turned: columns go to the
+    marked side of the transducer, rows away from it.
+
+    Raises `RecordingError` for lines along rows, as of radio-frequency data.
+    """
+    way = held.orientation.upper()
+    if way[:2] not in ("MF", "MN", "UF", "UN"):
+        if way[:1] in ("F", "N") and way[1:2] in ("M", "U"):
+            raise RecordingError(
+                f"{path.name}: its lines lie along rows (orientation {way}); save it as MF, or say "
+                "--map images=no"
+            )
+        return held, {}
+    across, along = (-1 if way[0] == "U" else 1), (-1 if way[1] == "N" else 1)
+    if across == along == 1:
+        return held, {}
+    turned = tuple(image[::along, ::across] for image in held.images)
+    sides = " and ".join((["columns"] if across < 0 else []) + (["rows"] if along < 0 else []))
+    told = f"{sides} reversed: the file has them as {way}, its transforms are for MF"
+    return replace(held, images=turned), {IMAGES: told}
 
 
 def _pixel(path: Path, held: Sequence, options: Options) -> tuple[float, float]:

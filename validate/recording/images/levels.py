@@ -11,7 +11,13 @@ from validate.recording.formats.options import above_zero
 from validate.recording.images.image import MAX_SIDE, Pixels
 from validate.recording.reader import Options
 
+_LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
 AS_IT_IS = "8 bits as recorded"
+
+
+def luma(colour: NDArray[Any]) -> NDArray[Any]:
+    """Grey (..., h, w) of red, green and blue (..., h, w, 3 or more), as an operator sees them."""
+    return np.asarray(np.rint(colour[..., :3] @ _LUMA), dtype=colour.dtype)
 
 
 def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixels, ...], str]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.recording.images.image import demosaiced
+from validate.recording.images.levels import luma
 
-_LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
 _CHANNELS = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
 _DEEP = {"mono16": 1, "16UC1": 1, "rgb16": 3, "bgr16": 3, "rgba16": 4, "bgra16": 4}
 _BRIGHTNESS = {"yuv422": 1, "uyvy": 1, "yuv422_yuy2": 0, "yuyv": 0}  # its byte of every pair
@@ -68,4 +68,4 @@ def _luma(pixels: NDArray[Any], encoding: str) -> NDArray[Any]:
     if pixels.shape[-1] == 1:
         return np.ascontiguousarray(pixels[..., 0])
     colour = pixels[..., 2::-1] if encoding.startswith("b") else pixels[..., :3]
-    return np.asarray(np.rint(colour @ _LUMA), dtype=pixels.dtype)
+    return luma(colour)
