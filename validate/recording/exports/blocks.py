@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.exports.beside_tables import labview_units, size_lines
 from validate.recording.exports.cells import (
     Line,
     is_data,
@@ -124,7 +125,9 @@ def _blocks(lines: Sequence[Line], run: int) -> list[TextBlock]:
             _refuse_pretender(names, units, rows, blocks)
             small.append(f"{len(rows)} rows below line {names[0]} ('{names[1][0]}', ...)")
             above += lines[top : tops[k + 1] if not last else len(lines)]
+            above += size_lines(names, units, rows)
             continue
+        units = units or labview_units(names[1], above)
         found = _stacked(TextBlock([], above, names, units, rows, ""))
         if blocks:
             found = [replace(b, shared=shared) for b in found]

@@ -12,6 +12,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.recording.exports.beside_tables import LABVIEW_X
 from validate.recording.exports.numerals import looks_numeric
 from validate.recording.exports.table import Column, Table
 from validate.recording.exports.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
@@ -120,6 +121,8 @@ def columns_called(role: str, table: Table) -> list[Column]:
 def role_of(column: Column) -> str | None:
     """The role of a column by its name and unit, None for a column of no interest here."""
     role = role_of_name(column.name)
+    if column.name == LABVIEW_X and _measures(column, "time"):
+        return "time"
     if role not in ("displacement", "strain") or not holds(column.name, LENGTH_OR_STRAIN):
         return "displacement" if role == "strain" and _measures(column, "length") else role
     return "strain" if _measures(column, "strain") else role
