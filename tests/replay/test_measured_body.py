@@ -27,6 +27,10 @@ from validate.replay.measured_cards import (
     Solid,
     Tissue,
 )
+from validate.report.body import _frame as drawn_frame
+from validate.report.loads import held
+from validate.report.markers import markers as drawn_markers
+from validate.report.observed import shown_loads
 from validate.report.registration import registration
 from validate.scene.box import box
 from validate.scene.mesh_file import write_mesh
@@ -120,6 +124,14 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
     assert set(verdicts(result).values()) == {"agrees"}
     rms = {s.name: s.value for s in result.methods[0].scores}
     assert rms["marker.rms@high"] < 1.5 * np.sqrt(3) * SD  # of a length
+    shown, run = result.methods[0], result.methods[0].run
+    assert len(held(shown.registered[0], run)) == len(run.u)  # the replay stood still at rest
+    at, frames = shown_loads(shown)
+    assert [h.label for h in at] == ["rest", "1.50s", "2.50s", "4.00s"]
+    assert frames == (0, 3, 5, 8)
+    assert drawn_frame(shown)[0] >= 7  # all of the load
+    assert (exhibit := drawn_markers(result)) is not None
+    assert [p.name for p in exhibit.pictures] == ["markers", "markers_across"]
 
 
 @pytest.mark.slow

@@ -20,8 +20,8 @@ from validate.report.observed import (
     axis_label,
     distinct,
     finished,
-    holds,
     markers_seen,
+    shown_loads,
     shown_method,
 )
 from validate.report.plane import flattest
@@ -50,12 +50,14 @@ _BANDS = 7  # groups of neighbours that a line joins
 class _Seen:
     """The markers, the loads after rest, and the axes that the markers spread along or lie across.
 
-    `across` is None in 2-D; labels of all axes say along which the body is driven.
+    `frames` are the runs' at rest and the loads, `across` is None in 2-D; labels of all axes say
+    along which the body is driven.
     """
 
     markers: MarkerObservation
     rest: Held
     loaded: tuple[Held, ...]
+    frames: tuple[int, ...]
     plane: list[int]
     across: int | None
     labels: tuple[str, ...]
@@ -69,13 +71,13 @@ def markers(result: Result) -> Exhibit | None:
     """Vectors and positions at every load, motion across their plane; None without loads."""
     judged = shown_method(result)
     seen = markers_seen(judged) if judged else None
-    at = holds(judged.registered[0]) if judged and seen else ()
+    at, frames = shown_loads(judged) if judged and seen else ((), ())
     if seen is None or judged is None or len(at) < 2:
         return None
     rest, *loaded = at
     plane, across = flattest(seen.rest)
     labels = tuple(axis_label(judged.scene, i) for i in range(seen.rest.shape[1]))
-    shown = _Seen(seen, rest, tuple(loaded), plane, across, labels)
+    shown = _Seen(seen, rest, tuple(loaded), frames, plane, across, labels)
     pictures = (_in_plane(shown, judged), *_across(result, shown))
     return Exhibit("markers", "Markers", pictures=pictures)
 
@@ -110,7 +112,7 @@ def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
     axes = figure.subplots(len(seen.loaded), 2, sharex=True, sharey=True, squeeze=False)
     start, rest = _MM * seen.at(seen.rest)[:, seen.plane], _MM * seen.markers.rest[:, seen.plane]
     for i, hold in enumerate(seen.loaded):
-        simulated = _MM * seen.markers.simulated(judged.run.u[i + 1])[:, seen.plane]
+        simulated = _MM * seen.markers.simulated(judged.run.u[seen.frames[i + 1]])[:, seen.plane]
         measured = _MM * seen.at(hold)[:, seen.plane]
         left, right = axes[i]
         _vectors(left, rest, simulated, _WIDE, judged.label)
@@ -154,9 +156,7 @@ def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
     c, styles = seen.across, looks(result)
     own = {m.name: o for m in finished(result) if (o := markers_seen(m)) is not None}
     known = [m for m in finished(result) if m.name in own]
-    on = distinct(
-        [(m, own[m.name].positions.apply(m.run.u[len(seen.loaded)])[:, c]) for m in known]
-    )
+    on = distinct([(m, own[m.name].positions.apply(m.run.u[seen.frames[-1]])[:, c]) for m in known])
     drawn = [(m, styles[m.name]) for m in known if m.name not in on]
     x, names = "xyz"[seen.plane[0]], ", ".join(m.label for m, _ in drawn)
     made = Picture(
@@ -186,7 +186,7 @@ def _across_panels(
         for method, look in drawn:
             own = markers_seen(method)
             assert own is not None
-            line = _banded(x, _MM * own.positions.apply(method.run.u[i])[:, c])
+            line = _banded(x, _MM * own.positions.apply(method.run.u[seen.frames[i]])[:, c])
             ax.plot(*line, color=look.colour, ls=look.dash, lw=look.width, marker=look.point, ms=4,
                     label=method.label)  # fmt: skip
         ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)

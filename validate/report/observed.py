@@ -15,10 +15,12 @@ from validate.register.markers import MarkerObservation
 from validate.register.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
+from validate.report.numbers import significant
 from validate.scene.meshless import AnyScene
 from validate.solve.types import Run, StepTimes
 
 _APART = 0.08  # share of the largest difference below which two methods draw one line
+_SHOWN = 4  # instants that are drawn of a run through many of them
 _ALONG = 0.9  # part of a drive's direction above which it moves along an axis
 
 
@@ -46,14 +48,36 @@ def driven(registered: Registered, t: Floats | float) -> Floats:
 
 
 def holds(registered: Registered) -> tuple[Held, ...]:
-    """The single instants at which everything was measured, in time; none of a run over time.
+    """The single instants at which everything was measured, in time; none of a run over time,
+    which may begin at rest, too.
 
     Where there are any, the output frames of a run are at them.
     """
-    compared = [s for s in (registered.rest, *registered.selections) if s is not None]
-    times = [(float(s.t[0]), s.label) for s in compared if s.t is not None and len(s.t) == 1]
+    loads = [s for s in registered.selections if s.t is not None and len(s.t) == 1]
+    rest = [registered.rest] if loads and registered.rest is not None else []
+    times = [(float(s.t[0]), s.label) for s in (*rest, *loads)
+             if s.t is not None and len(s.t) == 1]  # fmt: skip
     unit = drive(registered).unit
     return tuple(Held(label, registered.stage(t), unit, t) for t, label in sorted(times))
+
+
+def shown_loads(method: MethodResult) -> tuple[tuple[Held, ...], tuple[int, ...]]:
+    """What is drawn of a run, and the numbers of its output frames there: its loads; where it goes
+    from rest through many instants, rest and three of these, evenly; else nothing."""
+    if not method.registered:
+        return (), ()
+    registered, run = method.registered[0], method.run
+    if loads := holds(registered):
+        return loads, tuple(range(len(loads)))
+    rest = registered.rest
+    if rest is None or rest.t is None or len(rest.t) != 1:
+        return (), ()
+    frames = np.unique(np.linspace(0, len(run.u) - 1, _SHOWN).round().astype(int)).tolist()
+    times = run.t[run.at][frames].tolist()
+    labels = [rest.label, *(f"{significant(t)}s" for t in times[1:])]
+    unit, moved = drive(registered).unit, driven(registered, np.array(times)).tolist()
+    held = tuple(Held(*h) for h in zip(labels, moved, [unit] * len(times), times, strict=True))
+    return held, tuple(frames)
 
 
 def signals(registered: Registered) -> tuple[SignalObservation, ...]:

@@ -19,8 +19,8 @@ from validate.report.observed import (
     Held,
     distinct,
     finished,
-    holds,
     outline_seen,
+    shown_loads,
     shown_method,
 )
 from validate.report.outline_images import outline_images
@@ -41,11 +41,12 @@ _COLUMNS, _PANEL = 2, 2.6  # panels of a row, and their inches
 
 @dataclass(frozen=True)
 class _Outlines:
-    """The loads and the measured outlines (k, 2) m at them."""
+    """The loads, the measured outlines (k, 2) m at them, and the runs' frames there."""
 
     seen: OutlineObservation
     holds: tuple[Held, ...]
     measured: tuple[Floats, ...]
+    frames: tuple[int, ...]
 
     @property
     def loads(self) -> str:
@@ -65,10 +66,10 @@ def outlines(result: Result) -> Exhibit | None:
     """Outlines at every load, rivals and errors at the last one; None without outlines at loads."""
     judged = shown_method(result)
     seen = outline_seen(judged) if judged else None
-    at = holds(judged.registered[0]) if judged and seen else ()
+    at, frames = shown_loads(judged) if judged and seen else ((), ())
     if seen is None or judged is None or not at:
         return None
-    measured = _Outlines(seen, at, tuple(seen.measured(h.t) for h in at))
+    measured = _Outlines(seen, at, tuple(seen.measured(h.t) for h in at), frames)
     drawn = _drawn(result, measured)
     first = next(d for d in drawn if d.method is judged)
     return Exhibit(
@@ -90,7 +91,7 @@ def _drawn(result: Result, measured: _Outlines) -> list[_Sections]:
     for method in finished(result):
         seen = outline_seen(method)
         if seen is not None:
-            sections = tuple(seen.simulated(u) for u in method.run.u[: len(measured.holds)])
+            sections = tuple(seen.simulated(method.run.u[i]) for i in measured.frames)
             found.append(_Sections(method, styles[method.name], sections))
     on = distinct([(d.method, _off(d, measured)) for d in found])
     return [d for d in found if d.method.name not in on]
