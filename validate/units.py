@@ -22,6 +22,7 @@ QUANTITIES: tuple[tuple[str, str], ...] = (
 )
 _SI = dict(QUANTITIES)
 
+_PLAIN = ("N", "m", "s", "Pa", "m/s", "m^2", "1")  # what streams are in
 _NUMBERS = {"-": 1.0, "1": 1.0, "%": 0.01, "percent": 0.01}
 _SPELLED = {
     **dict.fromkeys(("in", "IN", "In", "INCH", "Inch", "ins", "Zoll", "pouce", "cal"), "inch"),
@@ -98,6 +99,15 @@ def in_si(number: float, unit: str, si_unit: str) -> float | None:
         known = _PRODUCT.fullmatch(text) is not None
         factor = _convert(text, _spelling(si_unit)) if known else None
     return None if factor is None else _times(number, factor)
+
+
+def si_of(unit: str) -> tuple[float, str]:
+    """Factor and unit in SI; a unit of another dimension (V, N m) stays as it is."""
+    for si in _PLAIN:
+        factor = in_si(1.0, unit, si)
+        if factor is not None:
+            return factor, si
+    return 1.0, unit
 
 
 def _times(number: float, factor: float) -> float:

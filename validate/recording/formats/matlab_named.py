@@ -18,12 +18,11 @@ from validate.errors import UsageError
 from validate.recording.formats.options import above_zero, spread
 from validate.recording.reader import Options
 from validate.recording.types import Markers, Signal
-from validate.units import in_si
+from validate.units import in_si, si_of
 
 Arrays = Mapping[str, NDArray[Any]]
 AXES = "axes."  # --map axes.STREAM=LETTERS
 _SHOWN = 12  # arrays in a message
-_SI = ("N", "m", "s", "Pa", "m/s", "m^2", "1")
 _ORDERS = {1: ("t",), 2: ("tc", "ct"), 3: tuple(map("".join, permutations("tpx")))}
 _KNOWN = {*(order for all_ in _ORDERS.values() for order in all_), "tx", "xt", "px", "xp"}
 
@@ -96,7 +95,7 @@ def named_stream(key: str, said: NamedArray, found: Arrays, options: Options) ->
     values = values.ravel() if values.size == max(values.shape, default=1) else values
     t = times_of(options, found)
     order = _order(key, values.shape, None if t is None else len(t), options)
-    factor, unit = _si(said.unit)
+    factor, unit = si_of(said.unit)
     scaled = said.sign * factor * values
     frame = options.get("frame", "matlab")
     if "x" in order:
@@ -130,15 +129,6 @@ def _misfit(key: str, shape: tuple[int, ...], nt: int | None) -> str:
         f"or --map {AXES}{key}=tpx (t times, p points, x coordinates, c channels; one letter an "
         "axis)"
     )
-
-
-def _si(unit: str) -> tuple[float, str]:
-    """Factor and unit in SI; a unit of another dimension (V, N m) stays as it is."""
-    for si in _SI:
-        factor = in_si(1.0, unit, si)
-        if factor is not None:
-            return factor, si
-    return 1.0, unit
 
 
 def _markers(

@@ -11,19 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from validate.arrays import Ints
+from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import length
 from validate.recording.images.levels import shallow
 from validate.recording.mcap.decoders import Plain, decoder_of
-from validate.recording.mcap.known_messages import MessagePart, parts_of
+from validate.recording.mcap.known_messages import MessagePart, parts_of, stamp_ns
 from validate.recording.mcap.records import Channel, Message, Schema
 from validate.recording.mcap.schemas import MIRROR_OF
 from validate.recording.mcap.streams import MAX_NUMBERS, ours
 from validate.recording.mcap.verified import Verified
 from validate.recording.reader import Options
 from validate.recording.types import Clock, Frames, Markers, Signal, Stream
+from validate.units import si_of
 
 SCALE, WHITE = "m_per_px", "white"
 
@@ -115,18 +116,26 @@ def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[
 
     def parts(message: Plain) -> Iterable[MessagePart]:
         stamp = message.get("header", {}).get("stamp", message.get("timestamp"))
-        ns = None if stamp is None else _ns(stamp)
+        ns = None if stamp is None else stamp_ns(stamp)
         frame = str(message.get("header", {}).get("frame_id", message.get("frame_id", "")))
         for key, unit in asked.items():
             path = key.removeprefix(topic)
-            values = np.atleast_1d(np.asarray(_at(message, path[1:]), dtype=np.float64)).ravel()
-            yield MessagePart(path, ns, frame or "topic", values, unit=unit)
+            factor, si = si_of(unit)
+            values = factor * _numbers(_at(message, path[1:]), key)
+            yield MessagePart(path, ns, frame or "topic", values, unit=si)
 
     return parts
 
 
-def _ns(stamp: Mapping[str, Any]) -> int:
-    return int(stamp["sec"]) * 10**9 + int(stamp.get("nanosec", stamp.get("nsec", 0)))
+def _numbers(found: Any, key: str) -> Floats:
+    """The numbers (c,) of a field; raises `RecordingError` for one that holds others, or text."""
+    if isinstance(found, dict):
+        below = ", ".join(f"{key}.{name}" for name in sorted(found))
+        raise RecordingError(f"'{key}' holds fields; name one: {below}")
+    try:
+        return np.atleast_1d(np.asarray(found, dtype=np.float64)).ravel()
+    except (TypeError, ValueError):
+        raise RecordingError(f"'{key}' is {str(found)[:40]!r}, no numbers") from None
 
 
 def _at(message: Any, path: str) -> Any:

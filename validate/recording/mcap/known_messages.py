@@ -6,6 +6,7 @@ Each known type is one function from its plain fields to parts; a part is a samp
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -47,18 +48,33 @@ def parts_of(schema: str) -> Parts | None:
     return _KNOWN.get(schema)
 
 
-def _ns(stamp: Any) -> int:
+def stamp_ns(stamp: Any) -> int:
+    """Of {sec, nsec} or {sec, nanosec}, or of text as JSON of Protobuf has it (UTC)."""
+    if isinstance(stamp, str):
+        return _moment_ns(stamp)
+    if not isinstance(stamp, Mapping):
+        raise RecordingError(f"{type(stamp).__name__} is no time")
     sec, nsec = stamp["sec"], stamp.get("nanosec", stamp.get("nsec"))
     return int(sec) * 10**9 + int(nsec)
 
 
+def _moment_ns(text: str) -> int:
+    """Of 2023-11-14T22:13:20.5Z; raises `RecordingError` for other text."""
+    whole, _, fraction = text.removesuffix("Z").partition(".")
+    try:
+        at = datetime.fromisoformat(whole).replace(tzinfo=UTC)
+        return int(at.timestamp()) * 10**9 + int(fraction.ljust(9, "0")[:9])
+    except ValueError:
+        raise RecordingError(f"'{text[:40]}' is no time, as 2023-11-14T22:13:20.5Z") from None
+
+
 def _header(message: Plain) -> tuple[int, str]:
-    return _ns(message["header"]["stamp"]), str(message["header"]["frame_id"])
+    return stamp_ns(message["header"]["stamp"]), str(message["header"]["frame_id"])
 
 
 def _own(message: Plain) -> tuple[int, str]:
     """Stamp and frame of Foxglove's messages."""
-    return _ns(message["timestamp"]), str(message["frame_id"])
+    return stamp_ns(message["timestamp"]), str(message["frame_id"])
 
 
 def _xyz(value: Mapping[str, Any]) -> list[float]:
@@ -83,6 +99,11 @@ def _points(ns: int, frame: str, x: Floats) -> list[MessagePart]:
 
 def _pose_stamped(m: Plain) -> Sequence[MessagePart]:
     return _pose("", *_header(m), m["pose"]["position"], m["pose"]["orientation"])
+
+
+def _pose_with_covariance(m: Plain) -> Sequence[MessagePart]:
+    inner = m["pose"]["pose"]
+    return _pose("", *_header(m), inner["position"], inner["orientation"])
 
 
 def _transform_stamped(m: Plain) -> Sequence[MessagePart]:
@@ -111,6 +132,10 @@ def _wrench(m: Plain) -> Sequence[MessagePart]:
         MessagePart("/force", ns, frame, np.array(_xyz(inner["force"])), unit="N"),
         MessagePart("/torque", ns, frame, np.array(_xyz(inner["torque"])), unit="N m"),
     ]
+
+
+def _pressure(m: Plain) -> Sequence[MessagePart]:
+    return [MessagePart("", *_header(m), np.array([float(m["fluid_pressure"])]), unit="Pa")]
 
 
 def _joints(m: Plain) -> Sequence[MessagePart]:
@@ -196,13 +221,17 @@ def _pose_in_frame(m: Plain) -> Sequence[MessagePart]:
     return _pose("", *_own(m), m["pose"]["position"], m["pose"]["orientation"])
 
 
+def _point_in_frame(m: Plain) -> Sequence[MessagePart]:
+    return _points(*_own(m), np.array([_xyz(m["point"])]))
+
+
 def _poses_in_frame(m: Plain) -> Sequence[MessagePart]:
     x = np.array([_xyz(p["position"]) for p in m["poses"]]).reshape(-1, 3)
     return _points(*_own(m), x)
 
 
 def _frame_transform(m: Plain) -> Sequence[MessagePart]:
-    ns, frame = _ns(m["timestamp"]), str(m["parent_frame_id"])
+    ns, frame = stamp_ns(m["timestamp"]), str(m["parent_frame_id"])
     return _pose(f"/{m['child_frame_id']}", ns, frame, m["translation"], m["rotation"])
 
 
@@ -216,14 +245,19 @@ _KNOWN: Mapping[str, Parts] = {
     "sensor_msgs/msg/JointState": _joints,
     "sensor_msgs/msg/PointCloud2": _ros_cloud,
     "geometry_msgs/msg/PoseStamped": _pose_stamped,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _pose_with_covariance,
     "geometry_msgs/msg/PoseArray": _pose_array,
     "geometry_msgs/msg/PointStamped": _point_stamped,
     "geometry_msgs/msg/TransformStamped": _transform_stamped,
     "geometry_msgs/msg/WrenchStamped": _wrench,
+    "nav_msgs/msg/Odometry": _pose_with_covariance,
+    "sensor_msgs/msg/FluidPressure": _pressure,
     "tf2_msgs/msg/TFMessage": _tf,
     "foxglove.RawImage": _foxglove_image,
     "foxglove.CompressedImage": _foxglove_picture,
     "foxglove.PoseInFrame": _pose_in_frame,
+    "foxglove.Odometry": _pose_in_frame,
+    "foxglove.Point3InFrame": _point_in_frame,
     "foxglove.PosesInFrame": _poses_in_frame,
     "foxglove.PointCloud": _foxglove_cloud,
     "foxglove.FrameTransform": _frame_transform,
