@@ -104,7 +104,7 @@ def test_axes_of_markers_have_labels_each(monkeypatch: pytest.MonkeyPatch) -> No
     for name, value in {
         "shown_method": lambda result: judged,
         "markers_seen": lambda method: seen,
-        "holds": lambda registered: (Made(), Made()),
+        "shown_loads": lambda method: ((Made(), Made()), (0, 1)),
         "axis_label": lambda scene, i: "xyz"[i],
         "_in_plane": lambda made, method: shown.append(made),
         "_across": lambda result, made: (),
@@ -122,7 +122,7 @@ def test_every_load_shows_the_section_of_the_judged_method(
     for name, value in {
         "shown_method": lambda result: judged,
         "outline_seen": lambda method: Made(name="o", corners=(), measured=lambda t: t),
-        "holds": lambda registered: (Made(t=0.0), Made(t=1.0)),
+        "shown_loads": lambda method: ((Made(t=0.0), Made(t=1.0)), (0, 1)),
         "_drawn": lambda result, measured: [
             Made(method=rival, sections="rival's"),
             Made(method=judged, sections="judged's"),
