@@ -184,3 +184,24 @@ def test_import_prints_the_level_by_which_deep_images_became_8_bits(tmp_path: Pa
     assert "levels: 16 bits made 8: 0 to 1000 (the largest) became 0 to 255" in said
     line[1] = str(tmp_path / "y.tif")
     assert "levels" not in CliRunner().invoke(cli, line).output
+
+
+def test_images_of_several_kinds_in_a_folder_are_all_read(tmp_path: Path) -> None:
+    """Beside PNG the others were left out without a word; what macOS leaves is none."""
+    for i, ending in enumerate(["png", "bmp", "tif", "png"]):
+        Image.fromarray(np.full((4, 6), 10 * i, np.uint8)).save(tmp_path / f"f{i}.{ending}")
+    (tmp_path / "._f0.png").write_bytes(b"\0\5\26\7")
+    reader = recognised(tmp_path)
+    assert reader.name == "image-stack"
+    levels = [int(image[0, 0]) for image in reader.read(tmp_path, SAID).frame("images").images]
+    assert levels == [0, 10, 20, 30]
+    for other in ("f1.bmp", "f2.tif"):
+        (tmp_path / other).unlink()
+    assert recognised(tmp_path).name == "png-stack"
+    assert len(recognised(tmp_path).read(tmp_path, SAID).frame("images").images) == 2
+
+
+def test_hdf5_that_is_none_of_matlab_says_how_it_becomes_one(tmp_path: Path) -> None:
+    (tmp_path / "x.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
+    with pytest.raises(UsageError, match=r"HDF5 file .*scipy.io.savemat\('x.mat'"):
+        recognised(tmp_path / "x.h5")

@@ -19,6 +19,8 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
     (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "a video of Windows Media", _FFMPEG),
     (b"\0\0\1\xba", "a video (MPEG)", _FFMPEG),
     (b"\0\0\1\xb3", "a video (MPEG)", _FFMPEG),
+    (b"\x89HDF", "an HDF5 file that is none of MATLAB",
+     "save its arrays, as by h5py and `scipy.io.savemat('{stem}.mat', ...)`"),
     (b"FLV\1", "a video (Flash)", _FFMPEG),
     (b"\x1f\x8b", "packed by gzip", "gunzip -k {name}"),
     (b"PK\3\4", "a ZIP archive", "unzip {name} -d {stem}, then name the folder or a file in it"),

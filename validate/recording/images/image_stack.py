@@ -13,16 +13,14 @@ from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
 from validate.recording.images.lens import LENS, straightened
 from validate.recording.images.levels import shallow
-from validate.recording.images.numbered import pictures
+from validate.recording.images.numbered import OTHERS, pictures
 from validate.recording.images.png_stack import by_size, offered
-from validate.recording.images.stack_arrays import SUFFIXES
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Frames, Recording, Source
 from validate.units import in_si
 
 _OPTIONS = ("m_per_px", "rate", "topic", "frame", "white", LENS)
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_OTHERS = tuple(s for s in SUFFIXES if s != ".png")
 _SECONDS = 60
 
 
@@ -94,7 +92,7 @@ def _times(
 def _recognises(path: Path) -> bool:
     try:
         if path.is_dir():
-            return bool(pictures(path, _OTHERS))
+            return bool(pictures(path, OTHERS))
     except OSError:
         return False
     return head(path, 4) in _TIFF

@@ -6,9 +6,13 @@ from pathlib import Path
 
 from validate.errors import RecordingError
 
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
+OTHERS = tuple(s for s in SUFFIXES if s != ".png")
+
 
 def pictures(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
-    return [f for f in folder.iterdir() if f.suffix.lower() in kinds]
+    """Files of these endings; hidden ones, as macOS leaves on foreign disks, are none."""
+    return [f for f in folder.iterdir() if f.suffix.lower() in kinds and not f.name.startswith(".")]
 
 
 def number_key(stem: str) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ from validate.recording.clocks import clock_of
 from validate.recording.formats.options import above_zero
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.images.lens import LENS, straightened
-from validate.recording.images.numbered import numbered, pictures
+from validate.recording.images.numbered import OTHERS, numbered, pictures
 from validate.recording.reader import Options, Reader, head, require_known
 from validate.recording.scales import odd_pixel
 from validate.recording.types import Frames, Recording, Source
@@ -144,7 +144,7 @@ def _read(file: Path) -> Pixels:
 
 def _recognises(path: Path) -> bool:
     try:
-        return path.is_dir() and bool(pictures(path))
+        return path.is_dir() and bool(pictures(path)) and not pictures(path, OTHERS)
     except OSError:
         return False
 
@@ -154,5 +154,5 @@ PNG_STACK = Reader(
     "a folder of PNG images",
     _recognises,
     read_png_stack,
-    "a folder that holds PNG files",
+    "a folder that holds PNG files and no other images",
 )

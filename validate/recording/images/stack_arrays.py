@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
-from validate.recording.images.numbered import numbered
+from validate.recording.images.numbered import SUFFIXES, numbered
 
 LIBRARIES = ("PIL.Image",)
-SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
 MOST = 400 * 2**20  # bytes of all images of one stack, in their own depth
 _DESCRIPTION = 270  # TIFF's tag of a text, in which ImageJ states scale and times
 _X_RESOLUTION, _Y_RESOLUTION = 282, 283
