@@ -17,6 +17,8 @@ from mcap_samples import sample_recording
 from PIL import Image
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import ExplicitVRLittleEndian
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
 from sequences import tracked
 
@@ -40,6 +42,21 @@ def make_mcap(path: Path) -> None:
 
 def make_export(path: Path) -> None:
     path.write_text("Time (s),Compressive extension (mm),Load (N)\n" + rows())
+
+
+def make_rosbag(path: Path) -> None:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    stamp, point = (
+        store.types[f"{n}"] for n in ("builtin_interfaces/msg/Time", "geometry_msgs/msg/Point")
+    )
+    header, kind = store.types["std_msgs/msg/Header"], "geometry_msgs/msg/PointStamped"
+    with Writer(f"{path}.bag", version=9) as writer:
+        to = writer.add_connection("/tip", kind, typestore=store)
+        for i in range(3):
+            sent = store.types[kind](header(stamp(i, 0), "lab"), point(0.1 * i, 0.2, 0.3))
+            writer.write(to, i * 10**9, bytes(store.serialize_cdr(sent, kind)))
+    next(Path(f"{path}.bag").glob("*.db3")).rename(path)
+    shutil.rmtree(f"{path}.bag")
 
 
 def make_xlsx(path: Path) -> None:
@@ -189,6 +206,7 @@ def make_images(path: Path) -> None:
 KINDS = ["domain", "domain", "list"]
 MAKE: Mapping[str, tuple[Callable[[Path], None], Mapping[str, str]]] = {
     "mcap": (make_mcap, {}),
+    "rosbag": (make_rosbag, {}),
     "c3d": (make_c3d, {}),
     "trc": (make_trc, {}),
     "vicon": (make_vicon, {}),
@@ -355,8 +373,7 @@ def test_a_standard_deviation_below_zero_or_none_is_refused(sd: float) -> None:
 @pytest.mark.parametrize(
     ("first", "said"),
     [
-        (b"#ROSBAG V2.0\n", "a ROS 1 bag.*rosbags-convert --src x.dat"),
-        (b"SQLite format 3\0", "an SQLite database.*rosbags-convert --src test_"),
+        (b"SQLite format 3\0", "an SQLite database.*sqlite3 -header -csv x.dat"),
         (b"GIF89a", "a GIF.*ffmpeg -i x.dat"),
         (b"TDSm", "LabVIEW.*CSV"),
     ],
@@ -369,11 +386,7 @@ def test_a_file_that_is_known_but_not_read_is_called_so(
         recognised(tmp_path / "x.dat")
 
 
-def test_a_folder_of_rosbag2_names_the_recording_in_it(tmp_path: Path) -> None:
+def test_a_folder_of_bags_without_its_metadata_names_one(tmp_path: Path) -> None:
     (tmp_path / "x_0.db3").touch()
-    with pytest.raises(UsageError, match=r"ROS 2 bag.*rosbags-convert"):
-        recognised(tmp_path)
-    (tmp_path / "x_0.mcap").touch()
-    (tmp_path / "metadata.yaml").touch()
-    with pytest.raises(UsageError, match=r"name one: validate import .*/x_0\.mcap"):
+    with pytest.raises(UsageError, match=r"metadata.yaml; name one: validate import .*/x_0\.db3"):
         recognised(tmp_path)

@@ -19,7 +19,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.reader import Reader
 from validate.recording.readers import READERS, named, read_recording, recognised, told_apart
 
-APART = ("c3d", "dicom", "nrrd", "matlab", "xlsx", "sheets", "video", "image-stack")
+APART = ("rosbag", "c3d", "dicom", "nrrd", "matlab", "xlsx", "sheets", "video", "image-stack")
 IN_PROCESS = pytest.mark.parametrize(
     "reader", [r for r in READERS if r.name not in APART], ids=lambda r: r.name
 )

@@ -17,6 +17,7 @@ from validate.recording.formats.optitrack import OPTITRACK
 from validate.recording.formats.point_table import POINTS
 from validate.recording.formats.qualisys import QUALISYS
 from validate.recording.formats.qualisys_analog import QUALISYS_ANALOG
+from validate.recording.formats.rosbag import ROSBAG
 from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.formats.trc import TRC
 from validate.recording.formats.unread import known_unread
@@ -31,8 +32,8 @@ from validate.recording.types import Recording
 
 # Any text may be a testing machine's: its reader is asked after all that know their own.
 READERS: tuple[Reader, ...] = (
-    MCAP, C3D, TRC, VICON, QUALISYS, QUALISYS_ANALOG, OPTITRACK, NDI, DICOM, METAIMAGE, NRRD, FCSV,
-    MARKUPS, MATLAB, XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, POINTS, INSTRON,
+    MCAP, ROSBAG, C3D, TRC, VICON, QUALISYS, QUALISYS_ANALOG, OPTITRACK, NDI, DICOM, METAIMAGE,
+    NRRD, FCSV, MARKUPS, MATLAB, XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, POINTS, INSTRON,
 )  # fmt: skip
 
 

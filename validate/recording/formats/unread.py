@@ -8,11 +8,9 @@ from pathlib import Path
 from validate.recording.reader import head
 
 _FFMPEG = "ffmpeg -i {name} -c:v libx264 -crf 0 {stem}.mp4"
-_BAG = "pip install rosbags; rosbags-convert --src {where} --dst {stem}_mcap --dst-storage mcap"
 _FIRST: tuple[tuple[bytes, str, str], ...] = (
-    (b"#ROSBAG V", "a ROS 1 bag", _BAG),
-    (b"SQLite format 3\0", "an SQLite database (as of rosbag2)",
-     _BAG),
+    (b"SQLite format 3\0", "an SQLite database (no bag of ROS)",
+     "sqlite3 -header -csv {name} 'SELECT * FROM ...' > {stem}.csv"),
     (b"TDSm", "a TDMS file of LabVIEW",
      "export it as CSV, as by npTDMS: `tdmsinfo`, `TdmsFile(...).as_dataframe().to_csv(...)`"),
     (b"GIF8", "a GIF", _FFMPEG),
@@ -35,11 +33,10 @@ def known_unread(path: Path) -> str:
     if path.is_dir():
         return _folder(path)
     first = head(path, 16)
-    where = path.resolve().parent.name if first.startswith(b"SQLite") else path.name
     return next(
         (
             f"{path.name} is {what}, which is not read here; make it one that is: "
-            + how.format(name=path.name, stem=path.stem, where=where)
+            + how.format(name=path.name, stem=path.stem)
             for magic, what, how in _FIRST
             if first.startswith(magic)
         ),
@@ -48,18 +45,15 @@ def known_unread(path: Path) -> str:
 
 
 def _folder(folder: Path) -> str:
-    """A folder as rosbag2 writes it, or of scans."""
+    """A folder of bags, or of scans."""
     name = folder.resolve().name
-    mcap = sorted(p.name for p in folder.glob("*.mcap"))
-    if mcap and (folder / "metadata.yaml").is_file():  # else logs beside what became of them
-        return (
-            f"{name} is a folder of recordings (MCAP); name one: validate import {name}/{mcap[0]}"
-        )
     if dicom := sorted(p.name for p in folder.glob("*.dcm")):
         return (
             f"{name} is a folder of DICOM files, read one by one: validate import {name}/{dicom[0]}"
         )
-    if any(folder.glob("*.db3")):
-        how = _BAG.format(where=name, stem=name)
-        return f"{name} is a ROS 2 bag (SQLite), which is not read here; make it MCAP: {how}"
+    if bags := sorted(p.name for p in folder.glob("*.db3")):
+        return (
+            f"{name} holds bags of ROS 2 without their metadata.yaml; name one: validate import "
+            f"{name}/{bags[0]}"
+        )
     return ""

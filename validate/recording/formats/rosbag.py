@@ -1,0 +1,75 @@
+"""Bags of ROS: rosbag2's SQLite or its folder, and ROS 1's. What is in them is read as in MCAP."""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+from validate.errors import RecordingError
+from validate.recording.formats.apart import decoded
+from validate.recording.formats.rosbag_arrays import ROS1
+from validate.recording.mcap.read import read_all
+from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.types import Recording, Source
+
+_SQLITE, _TABLES = b"SQLite format 3\0", (b"topics", b"messages")
+_PAGE = 65536  # bytes: the first page, which lists the tables, is no longer
+_YAML, _SAYS = "metadata.yaml", b"rosbag2_bagfile_information"
+
+
+def read_bag(path: Path, options: Options) -> Recording:
+    """The messages of a bag that mean something, as `validate.recording.mcap.read.read_all` has
+    them, with its options; a folder is read whole, in the order of its files.
+
+    A bag that holds no definitions of its types is read by those of ROS 2 Humble. Raises
+    `RecordingError` for a bag that is cut or damaged, or of which nothing is a stream.
+    """
+    if not path.exists():
+        raise RecordingError(f"{path}: no such file or folder")
+    if not _recognises(path):
+        raise RecordingError(f"{path.name}: no bag of ROS")
+    if path.is_dir() and len(one := list(path.glob("*.mcap"))) == 1:
+        return read_all(one[0], options)
+    _require_whole(path)
+    found = decoded("rosbag_arrays", path, "ros2")
+    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
+        whole = Path(folder) / f"{path.stem}.mcap"
+        found["mcap"].tofile(whole)
+        got = read_all(whole, options)
+    never = {topic: f"no definition of its type ({kind})" for topic, kind in found["undefined"]}
+    said = "a bag keeps no checksum: integrity not provable"
+    source = Source(path.resolve().name, "", 0, said) if path.is_dir() else source_of(path, said)
+    return replace(got, source=source, unread={**got.unread, **never})
+
+
+def _require_whole(path: Path) -> None:
+    """A database by its own count of pages, and nothing of it left in a log beside it."""
+    first = head(path, 32)
+    log = path.with_name(f"{path.name}-wal")
+    if log.is_file() and log.stat().st_size:
+        raise RecordingError(
+            f"{path.name}: {log.stat().st_size} bytes of it are still in {log.name}; put them in: "
+            f"sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
+        )
+    if first.startswith(_SQLITE):
+        page = int.from_bytes(first[16:18]) or 1
+        needs = (_PAGE if page == 1 else page) * int.from_bytes(first[28:32])
+        if (size := path.stat().st_size) < needs:
+            raise RecordingError(f"{path.name}: {size} bytes, its header tells of {needs}: cut")
+
+
+def _recognises(path: Path) -> bool:
+    if _SAYS in head(path / _YAML):
+        return True
+    first = head(path, _PAGE)
+    bag = first.startswith(_SQLITE) and all(name in first for name in _TABLES)
+    return bag or first.startswith(ROS1)
+
+
+ROSBAG = Reader(
+    "rosbag",
+    "a bag of ROS",
+    _recognises,
+    read_bag,
+    "it is SQLite with messages and topics, a folder with metadata of rosbag2, or begins with "
+    "#ROSBAG",
+)
