@@ -225,3 +225,30 @@ def test_three_zeros_of_a_trc_are_not_seen(tmp_path: Path) -> None:
     got = written(tmp_path / "x.trc", trc(["0", "0.1"], "10", "0"))
     assert np.isnan(got.marker("markers").x).all()
     assert got.metadata["provenance"]["three zeros"] == "2 points, taken as not seen"
+
+
+@pytest.mark.parametrize("before", [True, False])
+@pytest.mark.parametrize("end", ["", "\t"])
+@pytest.mark.parametrize("points", [1, 2, 3])
+def test_residuals_beside_the_points_of_qualisys_are_no_coordinates(
+    tmp_path: Path, before: bool, end: str, points: int
+) -> None:
+    """Two points with residuals are as wide as frame, time and two points."""
+    head = f"NO_OF_FRAMES\t2\nNO_OF_MARKERS\t{points}\nFREQUENCY\t100\nDATA_INCLUDED\t3D\n"
+    head += "MARKER_NAMES" + "".join(f"\tm{k}" for k in range(points)) + "\n"
+    row = "\t".join(f"{k + 1}.5\t2\t3\t0.4" for k in range(points)) + end + "\n"
+    rows = [f"{i + 11}\t{5 + 0.01 * i:.5f}\t{row}" if before else row for i in range(2)]
+    got = written(tmp_path / "x.tsv", head + "".join(rows)).marker("markers")
+    one = [[1e-3 * (k + 1.5), 2e-3, 3e-3] for k in range(points)]
+    np.testing.assert_allclose(got.x, [one] * 2)
+
+
+def test_zeros_of_optitrack_are_not_seen(tmp_path: Path) -> None:
+    text = optitrack(",", "1.23", "Meters", "Quaternion")
+    gone = ",".join(["2", "0.02", *["0"] * 8, "0,0,0", *map(str, B)])
+    got = written(tmp_path / "x.csv", f"{text}{gone}\n")
+    x = got.marker("markers").x
+    assert np.isnan(x[2, 0]).all()
+    assert x[2, 1].tolist() == B
+    assert got.metadata["provenance"]["three zeros"].startswith("1 points")
+    assert len(got.signals["Box/rotation"].t) == 2

@@ -17,7 +17,9 @@ from validate.recording.formats.text_rows import (
     numbers,
     text_rows,
     told_left,
+    told_zeros,
     whole_points,
+    without_zeros,
 )
 from validate.recording.reader import Options, Reader, head, require_known, source_of
 from validate.recording.types import Markers, Recording, Stream
@@ -68,7 +70,8 @@ class MotiveTable:
 
 def read_optitrack(path: Path, options: Options) -> Recording:
     """Markers as `markers` (nt, k, 3) m, where their bodies' poses put them as `solved`, each rigid
-    body's pose as `<body>/rotation` and `/translation`; blank cells are "not seen".
+    body's pose as `<body>/rotation` and `/translation`; blank cells
+    and zeros throughout are "not seen".
 
     Options: `unit` in place of the file's, `sd` of a coordinate (0: not stated), `frame` (default:
     the file's coordinate space). Bodies whose rotation is no quaternion are listed as unread.
@@ -83,12 +86,14 @@ def read_optitrack(path: Path, options: Options) -> Recording:
     factor, stated = metres(options, _UNITS.get(unit, unit), path.name)
     frame = options.get("frame", header.get("Coordinate Space", "capture").lower())
     poses, unread = _poses(table, factor, frame)
-    streams = {**_points(table, factor, spread(options), frame), **poses}
+    points, zeros = _points(table, factor, spread(options), frame)
+    streams = {**points, **poses}
     if not streams:
         raise RecordingError(f"{path.name}: neither markers nor poses of bodies: {unread}")
     told = {
         "kind": "motion capture (OptiTrack CSV)", "unit": stated,
-        "header": "; ".join(f"{k} {v}" for k, v in header.items() if v), **told_left(left),
+        "header": "; ".join(f"{k} {v}" for k, v in header.items() if v), **told_zeros(zeros),
+        **told_left(left),
     }  # fmt: skip
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, unread)
@@ -120,17 +125,22 @@ def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
     return MotiveTable(held, above[0], above[1], parts, axes, rows, values), left
 
 
-def _points(table: MotiveTable, factor: float, sd: float, frame: str) -> dict[str, Stream]:
-    """Markers by topic; those of a kind that the file does not have are left out."""
+def _points(
+    table: MotiveTable, factor: float, sd: float, frame: str
+) -> tuple[dict[str, Stream], int]:
+    """Markers by topic, and how many points were three zeros; those of a kind that the file does
+    not have are left out."""
     found: dict[str, Stream] = {}
+    count = 0
     for topic, kinds in _POINTS.items():
         points = table.triples(kinds)
         if points:
             names = distinct([name for name, _ in points], len(points))
-            x = table.values[:, [at for _, at in points]]
+            x, zeros = without_zeros(table.values[:, [at for _, at in points]])
             x = factor * whole_points(table.held, x, names, table.rows)
+            count += zeros
             found[topic] = Markers(table.values[:, _TIME], names, x, sd, frame)
-    return found
+    return found, count
 
 
 def _poses(
@@ -142,7 +152,7 @@ def _poses(
     for name, at in table.triples((_BODY,)):
         q = table.turn(name)
         pose = table.values[:, [*at, *q]]
-        seen = ~np.isnan(pose).any(axis=1)
+        seen = ~np.isnan(pose).any(axis=1) & pose.any(axis=1)
         if not q:
             unread[name] = "its rotation is no quaternion; export it as Rotation Type Quaternion"
         elif not seen.any():

@@ -33,6 +33,7 @@ _NAMES = ("MARKER_NAMES", "BODY_NAMES")
 _COUNTS = ("NO_OF_MARKERS", "NO_OF_BODIES")
 _SIX, _EVENT = "6D", "EVENT"
 _WIDE, _RESIDUAL, _TURN = 16, 6, 7  # columns of a body, and where two of them begin
+_ROUNDED = 1e-3  # s: times have a few decimals
 _ROUND = 0.02  # by which a rotation may miss being one: exports have few decimals
 _OPTIONS = ("unit", "sd", "frame")
 
@@ -53,10 +54,10 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     rate = _rate(held, header)
     if header.get("DATA_INCLUDED") == _SIX:
         return _bodies(path, held, header, names, body, rate, options)
-    before = _before(body, len(names))
-    width = before + 3 * len(names)
+    before, each = _columns(body, len(names), rate)
+    width = before + each * len(names)
     values, rows, left = numbers(held, body, width, range(before, width))
-    shown, zeros = without_zeros(values.reshape(len(values), -1, 3))
+    shown, zeros = without_zeros(values.reshape(len(values), -1, each)[..., :3])
     x = whole_points(held, shown, names, rows)
     factor = length({"unit": "mm", **options}, "unit", "mm")
     t = np.arange(len(values)) / rate
@@ -169,11 +170,31 @@ def _rate(held: TextRows, header: dict[str, str]) -> float:
     return rate
 
 
-def _before(rows: list[TextRow], points: int) -> int:
-    """Columns before the first coordinate: none, or frame and time, and a code of time or none."""
-    width = max((sum(1 for _ in r.cells) for r in rows), default=0)
-    coded = any(":" in r.cell(2) for r in rows[:1])
-    return (3 if coded else 2) if width >= 3 * points + 2 else 0
+def _columns(rows: list[TextRow], points: int, rate: float) -> tuple[int, int]:
+    """Columns before the first coordinate, and those of each point: three, or its residual too.
+
+    Before them stand none, or frame and time, and a code of time or none; a line may end in a
+    separator. Where two of these are as wide, as for two points, the times decide.
+    """
+    width = max((len(r.cells) for r in rows), default=0)
+    clock = 3 if any(":" in r.cell(2) for r in rows[:1]) else 2
+    every = [(before, each) for before in (0, clock) for each in (3, 4)]
+    over = {(b, each): width - b - each * points for b, each in every}
+    open_end = not any(r.cell(width - 1) for r in rows)
+    fitting = [one for one in every if over[one] == 0 or (open_end and over[one] == 1)]
+    if len(fitting) > 1:
+        timed = _timed(rows, rate)
+        fitting.sort(key=lambda one: ((one[0] > 0) != timed, over[one]))
+    return fitting[0] if fitting else (clock if width > 3 * points else 0, 3)
+
+
+def _timed(rows: list[TextRow], rate: float) -> bool:
+    """Whether the first two columns of two rows go on as a frame's number and its time do."""
+    two = [[as_number(c) for c in r.cells[:2]] for r in rows[:2]]
+    cells = [c for row in two for c in row if c is not None]
+    if len(cells) < 4:
+        return False
+    return cells[2] - cells[0] == 1 and abs(cells[3] - cells[1] - 1 / rate) < _ROUNDED
 
 
 QUALISYS = Reader(
