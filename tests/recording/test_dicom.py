@@ -217,10 +217,24 @@ def test_every_image_with_half_of_its_colours_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(images, grey.reshape(3, 4, 6))
 
 
-def test_a_codec_that_is_not_here_is_named_with_the_tool_that_has_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("syntax", "tool"),
+    [(pydicom.uid.JPEGLSLossless, "dcmdjpls x.dcm y.dcm"),
+     (pydicom.uid.MPEG4HP41, "gdcmraw -i x.dcm -o x.mp4")],
+)  # fmt: skip
+def test_a_codec_that_is_not_here_is_named_with_the_tool_that_has_it(
+    tmp_path: Path, syntax: str, tool: str
+) -> None:
     packed = pydicom.encaps.encapsulate([bytes(8)] * 3)
-    ds = of_pixels(pydicom.uid.JPEGLSLossless, packed)
+    ds = of_pixels(syntax, packed)
     ds["PixelData"].is_undefined_length = True
     ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
-    with pytest.raises(RecordingError, match=r"as by `dcmdjpls x\.dcm"):
+    with pytest.raises(RecordingError, match=f"as by `{tool}`"):
+        read_dicom(tmp_path / "x.dcm", {})
+
+
+def test_more_images_than_stated_are_not_cut_off(tmp_path: Path) -> None:
+    ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(4 * 24))
+    ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
+    with pytest.raises(RecordingError, match="more images than the 3 that its header tells of"):
         read_dicom(tmp_path / "x.dcm", {})

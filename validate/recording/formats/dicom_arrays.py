@@ -140,6 +140,8 @@ def _images(sets: list[pydicom.Dataset]) -> NDArray[Any]:
     out = np.empty(shape, np.uint8)
     made = 0
     for made, image in enumerate((_grey(ds, i) for ds in sets for i in _frames(ds)), start=1):
+        if made > count:
+            raise RecordingError(f"more images than the {count} that its header tells of; damaged")
         if made == 1:
             out = out.astype(image.dtype)
         out[made - 1] = image
@@ -160,12 +162,19 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
     except (NotImplementedError, RuntimeError) as error:
         lacks = any(words in str(error) for words in _LACKS)
         if lacks or isinstance(error, NotImplementedError):
-            tool = "dcmdjpls" if "JPEG-LS" in name else "dcmdjpeg"  # of DCMTK
             raise UsageError(
                 f"its pixels are in '{name}', which no permissively licensed library here decodes; "
-                f"make it uncompressed first, as by `{tool} x.dcm y.dcm` or `gdcmconv --raw`"
+                f"{_unpacked_by(name)}"
             ) from None
         raise
+
+
+def _unpacked_by(name: str) -> str:
+    """What a user can do about pixels in a transfer syntax of that name: by DCMTK, by GDCM."""
+    if "MPEG" in name or "HEVC" in name:
+        return "they are a video: take it out, as by `gdcmraw -i x.dcm -o x.mp4`, and import that"
+    tool = "dcmdjpls" if "JPEG-LS" in name else "dcmdjpeg"
+    return f"make it uncompressed first, as by `{tool} x.dcm y.dcm` or `gdcmconv --raw`"
 
 
 def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
