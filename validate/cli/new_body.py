@@ -25,7 +25,7 @@ from validate.cli.new_body_questions import (
     three_of,
     unit_of,
 )
-from validate.cli.new_kind import NewKind, quantity_in
+from validate.cli.new_kind import FEW_CELLS, NewKind, quantity_in
 from validate.cli.rendered import rendered
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
@@ -40,7 +40,6 @@ from validate.scene.named_place import axis_of
 
 _LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "linear"}
 _SHAPES = ("file", "block", "cylinder")
-_FEW = 150  # cells of a mesh file whose quadratic ones are halved twice in some minutes
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
              "contour": ("m", "distance of the outlines, as 0.5mm")}  # fmt: skip
 _PATHS = {p.path for p in describe(MeasuredBody())}
@@ -245,7 +244,9 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         raise UsageError("held.all, .x, .y, .z and .slides are all empty: the body is not held")
     if not _judged(found):
         raise UsageError("nothing is judged: seen.force, seen.markers and seen.outline are none")
-    order = 2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= _FEW else 1
+    order = (
+        2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= FEW_CELLS else 1
+    )
     parameters = _card(source, folder, found)
     return {
         "cards": ",\n    ".join(sorted(_classes(parameters))) + ",",

@@ -9,6 +9,8 @@ from validate.errors import UsageError
 from validate.recording.types import Recording
 from validate.units import in_si, split
 
+FEW_CELLS = 150  # of a mesh file whose quadratic ones are halved twice in some minutes
+
 
 @dataclass(frozen=True)
 class NewKind:

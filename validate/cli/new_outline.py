@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from validate.cli.asking import Answers, Question
-from validate.cli.new_kind import quantity_in
+from validate.cli.new_kind import FEW_CELLS, quantity_in
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of
 
 _EDGE, _WALL, _OTHER, _RECORDED = "edge", "inclusion", "other", "recorded"
@@ -100,6 +101,9 @@ def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
     if recording.frames and not recording.contours:
         return ("no outlines are recorded, so that nothing of the images is judged: find them "
                 "with `validate outline`",)  # fmt: skip
+    if (cells := _cells(found)) > FEW_CELLS:
+        return (f"{found['specimen.mesh']} has {cells} cells: linear ones are proposed (order=1), "
+                "as quadratic ones take over ten minutes on the two finer meshes",)  # fmt: skip
     return ()
 
 
@@ -115,8 +119,21 @@ def fields(found: Answers) -> dict[str, str]:
         "accept_outline": f'\n        Accept("contour", {limit:.6g}, "answered, m"),',
         "body": _mesh(found) if inside else "",
         "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside else "None",
-        "fluid": ", fluid=True" if inside and found["outline.fluid"] == "true" else "",
+        "fluid": _of_the_model(found) if inside else "",
     }
+
+
+def _of_the_model(found: Answers) -> str:
+    """What the models of a mesh file are given: linear cells where it has many, and the fluid."""
+    order = ", order=1" if _cells(found) > FEW_CELLS else ""
+    return order + (", fluid=True" if found["outline.fluid"] == "true" else "")
+
+
+def _cells(found: Answers) -> int:
+    """How many cells the specimen's mesh file has; 0 without one."""
+    if not found.get("specimen.mesh"):
+        return 0
+    return len(read_mesh(Path(found["specimen.mesh"]), found.get("specimen.mesh_unit")).cells)
 
 
 def _card(found: Answers) -> str:

@@ -132,7 +132,10 @@ def _body(
             chosen = cells_of(mesh, part, _named(found))
             used, mesh = used[np.unique(mesh.cells[chosen])], only(mesh, chosen)
         mesh, turned = _turned(mesh) if turn else (mesh, 0)
-        require_positive_cells(mesh, "write their nodes the other way round, or mesh it again")
+        require_positive_cells(
+            mesh,
+            "write their nodes the other way round, or save it as .vtu, where they are turned",
+        )
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
     told = {
