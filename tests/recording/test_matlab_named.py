@@ -17,6 +17,7 @@ from validate.recording.formats.matlab import read_matlab
 from validate.recording.formats.matlab_named import listing
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_file
+from validate.recording.types import Markers, Signal
 
 T = 0.01 * np.arange(5)
 LOAD = np.array([0.0, 1.5, -2.25, 3.0, 4.125])
@@ -202,3 +203,42 @@ def test_numbers_that_matlab_wrote_are_read_with_their_class() -> None:
     got = read_matlab(matlab_s("testmulti_7.4_GLNX86"), said)
     assert got.signal("theta", "1").y.ravel() == pytest.approx(np.pi / 4 * np.arange(9))
     assert got.signal("a", "V").y.T.tolist() == [[1, 2, 3, 4, 5], [2, 0, 0, 0, 0], [3, 0, 0, 0, 0]]
+
+
+def told_of(path: Path, **said: str) -> tuple[object, str]:
+    got = read_matlab(path, said)
+    (name,) = got.streams
+    return got.streams[name], str(got.metadata["provenance"][name])
+
+
+def test_residuals_beside_the_coordinates_of_qualisys_are_left_out_and_told(
+    tmp_path: Path,
+) -> None:
+    """Points, (x, y, z, residual), frames; which axis is which must be said."""
+    data = np.arange(24.0).reshape(2, 4, 3)
+    savemat(tmp_path / "x.mat", {"q": {"Data": data}})
+    with pytest.raises(UsageError, match="x coordinates, r those and a residual"):
+        read_matlab(tmp_path / "x.mat", {"m": "q.Data:mm", "rate": "9"})
+    said = {"m": "q.Data:mm", "rate": "9", "axes.m": "prt"}
+    markers, told = told_of(tmp_path / "x.mat", **said)
+    assert isinstance(markers, Markers)
+    np.testing.assert_allclose(1e3 * markers.x, data[:, :3].transpose(2, 0, 1))
+    assert told == "q.Data:mm: the last of 4 numbers of each point left out"
+
+
+def test_three_channels_in_mm_may_be_a_point_and_it_is_said(tmp_path: Path) -> None:
+    savemat(tmp_path / "x.mat", {"tip": np.arange(12.0).reshape(4, 3), "t": np.arange(4.0)})
+    made, told = told_of(tmp_path / "x.mat", tip="tip:mm", time="t:s")
+    assert isinstance(made, Signal)
+    assert told.endswith("if they are a point's coordinates: --map axes.tip=tx")
+    made, told = told_of(tmp_path / "x.mat", tip="tip:mm", rate="9", **{"axes.tip": "tx"})
+    assert isinstance(made, Markers)
+    assert told == "tip:mm"
+
+
+def test_samples_without_a_number_are_left_out_and_told(tmp_path: Path) -> None:
+    savemat(tmp_path / "x.mat", {"f": np.array([1.0, np.nan, 3.0])})
+    made, told = told_of(tmp_path / "x.mat", f="f:N", rate="10")
+    assert isinstance(made, Signal)
+    assert (made.t.tolist(), made.y.ravel().tolist()) == ([0, 0.2], [1, 3])
+    assert told == "f:N: 1 samples without a number left out"

@@ -18,6 +18,7 @@ from validate.recording.formats.matlab_named import (
     listing,
     named_array,
     named_stream,
+    note_on,
     numeric,
 )
 from validate.recording.formats.options import above_zero, length, spread
@@ -52,34 +53,36 @@ def read_matlab(path: Path, options: Options) -> Recording:
         if key.startswith(AXES) and key.removeprefix(AXES) not in asked:
             raise UsageError(f"--map {key}=...: no stream of that name; {sorted(asked) or 'none'}")
     if asked:
-        streams, used = _named(path, asked, found, options)
+        streams, used, notes = _named(path, asked, found, options)
     else:
-        streams, used = _unnamed(path, found, options)
+        (streams, used), notes = _unnamed(path, found, options), {}
     unread = {name: said for name, said in listing(found).items() if name not in used}
-    told = {"kind": _version(path), **options}
+    told = {"kind": _version(path), **options, **notes}
     return recorded(path.stem, source_of(path, integrity), begun(streams), told, unread)
 
 
 def _named(
     path: Path, asked: Options, found: Arrays, options: Options
-) -> tuple[dict[str, Stream], set[str]]:
-    """The streams that the user names, and the paths of their arrays."""
+) -> tuple[dict[str, Stream], set[str], dict[str, str]]:
+    """The streams that the user names, the paths of their arrays, and what is to be told."""
     if "unit" in options:
         raise UsageError("--map unit=...: each named array says its own, as --map tip=x.tip:mm")
     streams: dict[str, Stream] = {}
+    notes: dict[str, str] = {}
     said = {key: named_array(key, text, found) for key, text in asked.items()}
     for key, array in said.items():
         try:
             image = array.unit == "px"
-            streams[key] = (
-                _frames(f"{path.name}: {array.path}", found[array.path], options)
-                if image
-                else named_stream(key, array, found, options)
-            )
+            if image:
+                streams[key] = _frames(f"{path.name}: {array.path}", found[array.path], options)
+                continue
+            made = streams[key] = named_stream(key, array, found, options)
+            if note := note_on(key, array, found, made, options):
+                notes[key] = f"{asked[key]}: {note}"
         except RecordingError as error:
             raise RecordingError(f"{path.name}: {array.path}: {error}") from None
     time = {options["time"].split(":")[0]} if "time" in options else set()
-    return streams, {array.path for array in said.values()} | time
+    return streams, {array.path for array in said.values()} | time, notes
 
 
 def _unnamed(path: Path, found: Arrays, options: Options) -> tuple[dict[str, Stream], set[str]]:

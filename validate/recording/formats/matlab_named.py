@@ -22,6 +22,7 @@ from validate.units import in_si, si_of
 
 Arrays = Mapping[str, NDArray[Any]]
 AXES = "axes."  # --map axes.STREAM=LETTERS
+_RESIDUAL = 4  # numbers of a point with its residual, as Qualisys has them
 _SHOWN = 12  # arrays in a message
 _ORDERS = {1: ("t",), 2: ("tc", "ct"), 3: tuple(map("".join, permutations("tpx")))}
 _KNOWN = {*(order for all_ in _ORDERS.values() for order in all_), "tx", "xt", "px", "xp"}
@@ -101,16 +102,43 @@ def named_stream(key: str, said: NamedArray, found: Arrays, options: Options) ->
     if "x" in order:
         return _markers(key, scaled, order, unit, t, options, frame)
     y = scaled.reshape(len(scaled), -1) if order[0] == "t" else scaled.T
-    return Signal(_times(key, len(y), t, options), y, unit, 0.0, frame)
+    times, kept = _times(key, len(y), t, options), ~np.isnan(y).any(axis=1)
+    return (
+        Signal(times[kept], y[kept], unit, 0.0, frame)
+        if kept.any()
+        else Signal(times, y, unit, 0.0, frame)
+    )
+
+
+def note_on(
+    key: str, said: NamedArray, found: Arrays, made: Signal | Markers, options: Options
+) -> str:
+    """What was taken in a way that the array does not state, or left out; empty where nothing."""
+    given = found[said.path]
+    if isinstance(made, Markers):
+        wide = made.x.size < given.size
+        return f"the last of {_RESIDUAL} numbers of each point left out" if wide else ""
+    gone = given.size // made.y.shape[1] - len(made.t)
+    notes = [f"{gone} samples without a number left out"] if gone else []
+    point = made.unit == "m" and made.y.shape[1] in (2, 3) and f"{AXES}{key}" not in options
+    if point:
+        notes.append(f"channels; if they are a point's coordinates: --map {AXES}{key}=tx")
+    return "; ".join(notes)
 
 
 def _order(key: str, shape: tuple[int, ...], nt: int | None, options: Options) -> str:
-    """Which axis is which: t times, c channels, p points, x coordinates."""
+    """Which axis is which: t times, c channels, p points, x coordinates; r, which they
+    have with a residual, is told as x."""
     told = options.get(f"{AXES}{key}", "")
     if told:
-        if told not in _KNOWN or len(told) != len(shape) or not _fits(told, shape, nt):
+        order = told.replace("r", "x")
+        plain = tuple(
+            3 if (c, n) == ("r", _RESIDUAL) else 0 if c == "r" else n
+            for c, n in zip(told, shape, strict=False)
+        )
+        if order not in _KNOWN or len(told) != len(shape) or not _fits(order, plain, nt):
             raise UsageError(f"--map {AXES}{key}={told}: {_misfit(key, shape, nt)}")
-        return told
+        return order
     fitting = [order for order in _ORDERS.get(len(shape), ()) if _fits(order, shape, nt)]
     if len(fitting) != 1:
         raise UsageError(f"{key}: {_misfit(key, shape, nt)}")
@@ -126,8 +154,8 @@ def _misfit(key: str, shape: tuple[int, ...], nt: int | None) -> str:
     times = "no times are named" if nt is None else f"{nt} times"
     return (
         f"an array of {shape} and {times} leave open which axis is which; say --map time=PATH:s, "
-        f"or --map {AXES}{key}=tpx (t times, p points, x coordinates, c channels; one letter an "
-        "axis)"
+        f"or --map {AXES}{key}=tpx (t times, p points, x coordinates, r those and a residual, "
+        "c channels; one letter an axis)"
     )
 
 
@@ -137,8 +165,8 @@ def _markers(
     if unit != "m":
         raise UsageError(f"{key}: coordinates in '{unit}'; expected a length, as :mm")
     whole = np.transpose(x, [order.index(c) for c in "tpx" if c in order])
-    whole = whole.reshape(
-        whole.shape[0] if "t" in order else 1, -1 if "p" in order else 1, whole.shape[-1]
+    whole = whole[..., :3].reshape(
+        whole.shape[0] if "t" in order else 1, -1 if "p" in order else 1, min(whole.shape[-1], 3)
     )
     names = tuple(str(i + 1) for i in range(whole.shape[1]))
     times = _times(key, len(whole), t, options) if "t" in order else np.zeros(1)
