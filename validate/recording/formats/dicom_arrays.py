@@ -1,4 +1,4 @@
-"""What DICOM images hold, by pydicom, in a process of its own; JPEG by Pillow.
+"""What DICOM images hold, by pydicom, in a process of its own; JPEG by Pillow, lossless by GDCM.
 
 Colour is made grey by ITU-R BT.601's luma, as a screen's operator sees it.
 """
@@ -6,6 +6,7 @@ Colour is made grey by ITU-R BT.601's luma, as a screen's operator sees it.
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,15 @@ import pydicom
 from numpy.typing import NDArray
 from pydicom.pixels.processing import apply_color_lut
 from pydicom.pixels.utils import iter_pixels, pixel_array
-from pydicom.uid import DeflatedExplicitVRLittleEndian
+from pydicom.uid import (
+    DeflatedExplicitVRLittleEndian,
+    JPEG2000TransferSyntaxes,
+    JPEGLossless,
+    JPEGLosslessSV1,
+    JPEGLSLossless,
+    JPEGLSNearLossless,
+    JPEGTransferSyntaxes,
+)
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.dicom_files import files_of
@@ -22,6 +31,7 @@ from validate.recording.formats.sequence import MAX_PIXELS
 from validate.recording.images.levels import luma
 
 _LACKS = ("missing dependencies", "does not support")  # as a codec says that it is none for these
+_LOSSLESS = (JPEGLossless, JPEGLosslessSV1, JPEGLSLossless, JPEGLSNearLossless)
 _HALF = "YBR_FULL_422"  # half of the colours
 _META = 144  # bytes before the group of meta information that states its length, and of that
 _PACKED = 2**28  # bytes of a file that is packed as a whole
@@ -158,7 +168,7 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
             count = int(ds.get("NumberOfFrames") or 1)
             yield from (pixel_array(ds, index=i) for i in range(count))
         else:
-            yield from iter_pixels(ds)
+            yield from iter_pixels(ds, decoding_plugin=_codec(ds))
     except (NotImplementedError, RuntimeError) as error:
         lacks = any(words in str(error) for words in _LACKS)
         if lacks or isinstance(error, NotImplementedError):
@@ -169,12 +179,20 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
         raise
 
 
+def _codec(ds: pydicom.Dataset) -> str:
+    """By which library, whatever else is installed; none for pydicom's own."""
+    syntax = ds.file_meta.get("TransferSyntaxUID")
+    if syntax in _LOSSLESS:
+        import_module("gdcm")  # its absence is told with what to install
+        return "gdcm"
+    return "pillow" if syntax in (*JPEGTransferSyntaxes, *JPEG2000TransferSyntaxes) else ""
+
+
 def _unpacked_by(name: str) -> str:
-    """What a user can do about pixels in a transfer syntax of that name: by DCMTK, by GDCM."""
+    """What a user can do about pixels in a transfer syntax of that name."""
     if "MPEG" in name or "HEVC" in name:
         return "they are a video: take it out, as by `gdcmraw -i x.dcm -o x.mp4`, and import that"
-    tool = "dcmdjpls" if "JPEG-LS" in name else "dcmdjpeg"
-    return f"make it uncompressed first, as by `{tool} x.dcm y.dcm` or `gdcmconv --raw`"
+    return "make it uncompressed first, as by `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
 
 
 def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
