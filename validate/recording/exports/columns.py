@@ -154,10 +154,11 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
     found = [column for column in table.columns if role_of(column) == role]
     if not found:
         labels = ", ".join(repr(c.label) for c in table.columns)
-        synthetic = " or, at a constant rate, --map time=every:0.1s" if role == "time" else ""
+        other = _by_unit(role, table) or f" or, where it was not logged, --map {role}=none"
+        if role == "time":
+            other = " or, at a constant rate, --map time=every:0.1s"
         raise MissingColumnError(
-            f"no {role} column among {labels}; name it with --map {role}=COLUMN{synthetic}"
-            f"{_by_unit(role, table)}"
+            f"no {role} column among {labels}; name it with --map {role}=COLUMN{other}"
         )
     able = [column for column in found if not _unusable(role, column)] or found
     return _one_of(_moving([picked(role, column, table, None) for column in able]), role)

@@ -11,6 +11,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks import clock_of
+from validate.recording.exports.alone import NONE, alone
 from validate.recording.exports.blocks import parse_tables
 from validate.recording.exports.columns import (
     KEYS,
@@ -20,7 +21,6 @@ from validate.recording.exports.columns import (
     Said,
     derived_pick,
     left_columns,
-    needed_pick,
     parse_mapping,
     role_of,
 )
@@ -47,12 +47,12 @@ from validate.recording.exports.sized import (
     with_sizes,
 )
 from validate.recording.exports.specimens import chosen, specimen_tables
-from validate.recording.exports.table import Column, Table
+from validate.recording.exports.stepped import timed_pick
+from validate.recording.exports.table import Table
 from validate.recording.exports.vocabulary import tells_a_stop
 from validate.recording.formats.text_rows import ASSUMED, told_left
 from validate.recording.reader import Reader, head, require_known
 from validate.recording.types import Record, Recording, Signal, Source
-from validate.units import si_factor
 
 _SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space"}
 
@@ -71,6 +71,7 @@ def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Record
         force=COLUMN[:UNIT][:-]          UNIT replaces the declared unit, `:-` flips the sign,
         displacement=COLUMN[:UNIT][:-]   `:+` keeps it; COLUMN is the header text, with or without
         time=COLUMN[:UNIT]               its unit, or #3 for the third column
+        displacement=none, force=none    it was not logged: the other comes in alone, as written
         time=every:STEP UNIT             no or useless time column: constant step, `every:0.1s`
         strain=, stress=, stretch=       COLUMN[:UNIT], where force or displacement is not written:
         area=314mm2, length=20mm         sizes before the test that make them of stress and strain
@@ -107,6 +108,8 @@ def recording_of(
     written_as: str = "text file",
 ) -> Recording:
     """The recording of the table of one specimen; `data` are the bytes of the file."""
+    if NONE in (mapping.get("force"), mapping.get("displacement")):
+        return alone(path, data, table, mapping, label, written_as)
     said = parse_mapping(mapping, table)
     table = without_repeats(table, said.get("time"), mapping.get("repeated"))
     if len(table.lines) < MIN_SAMPLES:
@@ -157,7 +160,7 @@ def _found(
             if is_derived(role, table, said):
                 found[role] = derived(role, table, said, sizes, kind)
             else:
-                found[role] = Sized(_needed(role, table, said.get(role)), "")
+                found[role] = Sized(timed_pick(role, table, said.get(role)), "")
         except RecordingError as error:
             wrong.append(error)
     if wrong:
@@ -197,29 +200,6 @@ def _made(found: Mapping[str, Sized]) -> dict[str, Sized]:
 
 def _by_sizes(made: Mapping[str, Sized]) -> Record:
     return {"sizes": "; ".join(one.words for one in made.values())} if made else {}
-
-
-def _needed(role: str, table: Table, said: Said | None) -> Pick:
-    if said is None or said.column != "every":
-        return needed_pick(role, table, said)
-    step, unit = _step(said)
-    values = np.arange(len(table.lines), dtype=np.float64) * step
-    factor = si_factor(unit, "time")
-    return Pick(
-        role, Column(f"every {said.unit}", "", unit, ()), unit, factor, values * factor, said
-    )
-
-
-def _step(said: Said) -> tuple[float, str]:
-    text = (said.unit or "").strip()
-    digits = text.rstrip("abcdefghijklmnopqrstuvwxyz ")
-    try:
-        step = float(digits)
-    except ValueError:
-        step = 0.0
-    if not (np.isfinite(step) and step > 0) or digits == text:
-        raise UsageError(f"--map time=every:{text}: expected a step with its unit, as every:0.1s")
-    return step, text[len(digits) :].strip()
 
 
 def _checked(
