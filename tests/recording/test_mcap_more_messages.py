@@ -14,6 +14,7 @@ from mcap.writer import Writer as TheirWriter
 from rosbags.typesys import Stores, get_typestore
 
 from validate.errors import RecordingError
+from validate.recording.chain import chain_faults
 from validate.recording.mcap.read import read_all
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -31,7 +32,7 @@ def plain(path: Path, message: dict[str, Any], schema: str = "") -> Path:
     return path
 
 
-def ros(path: Path, kind: str, **fields: Any) -> Path:
+def ros(path: Path, kind: str, topic: str = "/x", **fields: Any) -> Path:
     """One message as rosbags packs it."""
     types = STORE.types
     stamp = types["builtin_interfaces/msg/Time"](sec=5, nanosec=500_000_000)
@@ -41,7 +42,7 @@ def ros(path: Path, kind: str, **fields: Any) -> Path:
         writer = TheirWriter(stream)
         writer.start()  # type: ignore[no-untyped-call]
         schema = writer.register_schema(kind, "ros2msg", definition.encode())
-        channel = writer.register_channel("/x", "cdr", schema)
+        channel = writer.register_channel(topic, "cdr", schema)
         data = bytes(STORE.serialize_cdr(types[kind](header=header, **fields), kind))
         writer.add_message(channel, 0, data, 0)
         writer.finish()  # type: ignore[no-untyped-call]
@@ -68,6 +69,22 @@ def test_a_pose_with_its_covariance_is_a_pose(tmp_path: Path) -> None:
     assert got.t0_ns == 5_500_000_000
 
 
+def test_odometry_is_the_pose_of_its_body_and_its_topic_no_frame(tmp_path: Path) -> None:
+    """A topic that is called as its frame is: no pose of a frame in itself."""
+    types = STORE.types
+    zero = types["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
+    still = types["geometry_msgs/msg/TwistWithCovariance"](
+        twist=types["geometry_msgs/msg/Twist"](linear=zero, angular=zero), covariance=np.zeros(36)
+    )
+    more = {"child_frame_id": "tool", "pose": pose(), "twist": still}
+    got = read_all(ros(tmp_path / "x.mcap", "nav_msgs/msg/Odometry", "/lab", **more), {})
+    assert got.signal("/lab/tool/translation", "m").y.tolist() == [[1, 2, 3]]
+    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    same = read_all(ros(tmp_path / "y.mcap", kind, "/lab", pose=pose()), {})
+    assert same.signal("/lab/translation", "m").frame == "lab"
+    assert not list(chain_faults(same))
+
+
 def test_a_pressure_is_in_pascal(tmp_path: Path) -> None:
     kind = "sensor_msgs/msg/FluidPressure"
     got = read_all(ros(tmp_path / "x.mcap", kind, fluid_pressure=640.0, variance=0.0), {})
@@ -82,10 +99,12 @@ def test_points_and_odometry_of_foxglove_are_read(tmp_path: Path) -> None:
         )
         turn = fox.Quaternion(x=0, y=0, z=0, w=1)
         where = fox.Pose(position=fox.Vector3(x=4, y=5, z=6), orientation=turn)
-        OdometryChannel("/body").log(fox.Odometry(timestamp=at, frame_id="lab", pose=where))
+        OdometryChannel("/body").log(
+            fox.Odometry(timestamp=at, frame_id="lab", body_frame_id="b", pose=where)
+        )
     got = read_all(tmp_path / "x.mcap", {})
     assert got.marker("/point").x.tolist() == [[[1, 2, 3]]]
-    assert got.signal("/body/translation", "m").y.tolist() == [[4, 5, 6]]
+    assert got.signal("/body/b/translation", "m").y.tolist() == [[4, 5, 6]]
 
 
 def in_frame(stamp: Any) -> dict[str, Any]:

@@ -46,7 +46,8 @@ class Link:
 
 
 def links(recording: Recording) -> tuple[Link, ...]:
-    """Every pose of the recording that has both of its signals at the same times."""
+    """Every pose of the recording that has both of its signals at the same times, and names two
+    frames."""
     found = []
     for topic, turned in recording.signals.items():
         tool = topic.removesuffix(f"/{ROTATION}")
@@ -55,6 +56,8 @@ def links(recording: Recording) -> tuple[Link, ...]:
             continue
         name, _, to = tool.strip("/").rpartition("To")
         child, parent = (name, to) if name else (tool.strip("/"), turned.frame)
+        if not name and child == parent:
+            continue  # a topic that is called as its frame is: /odom in odom
         R = turned.y.reshape(-1, 3, 3)
         found.append(Link(child, parent, turned.t, R, moved.y, moved.sd))
     return tuple(found)

@@ -106,6 +106,17 @@ def _pose_with_covariance(m: Plain) -> Sequence[MessagePart]:
     return _pose("", *_header(m), inner["position"], inner["orientation"])
 
 
+def _odometry(m: Plain) -> Sequence[MessagePart]:
+    inner = m["pose"]["pose"]
+    return _pose(f"/{m['child_frame_id']}", *_header(m), inner["position"], inner["orientation"])
+
+
+def _foxglove_odometry(m: Plain) -> Sequence[MessagePart]:
+    name, inner = str(m.get("body_frame_id", "")), m["pose"]
+    where = inner["position"], inner["orientation"]
+    return _pose(f"/{name}" if name else "", *_own(m), *where)
+
+
 def _transform_stamped(m: Plain) -> Sequence[MessagePart]:
     inner = m["transform"]
     name = f"/{m['child_frame_id']}"
@@ -250,13 +261,13 @@ _KNOWN: Mapping[str, Parts] = {
     "geometry_msgs/msg/PointStamped": _point_stamped,
     "geometry_msgs/msg/TransformStamped": _transform_stamped,
     "geometry_msgs/msg/WrenchStamped": _wrench,
-    "nav_msgs/msg/Odometry": _pose_with_covariance,
+    "nav_msgs/msg/Odometry": _odometry,
     "sensor_msgs/msg/FluidPressure": _pressure,
     "tf2_msgs/msg/TFMessage": _tf,
     "foxglove.RawImage": _foxglove_image,
     "foxglove.CompressedImage": _foxglove_picture,
     "foxglove.PoseInFrame": _pose_in_frame,
-    "foxglove.Odometry": _pose_in_frame,
+    "foxglove.Odometry": _foxglove_odometry,
     "foxglove.Point3InFrame": _point_in_frame,
     "foxglove.PosesInFrame": _poses_in_frame,
     "foxglove.PointCloud": _foxglove_cloud,
