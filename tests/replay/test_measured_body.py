@@ -298,6 +298,20 @@ def test_places_in_words() -> None:
         axis_of("up")
 
 
+def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path) -> None:
+    """A node at its edge stayed where none is in the middle, and all markers were off by that."""
+    for cells in (3, 4, 5):
+        x = body_of(Solid(block=SIZE, cells=cells), folder=tmp_path).nodes
+        assert np.isclose(x[:, :2], (0.02, 0.015)).all(axis=1).any()
+    write_mesh(box(SIZE, (1, 1, 2)), tmp_path / "b.npz")
+    p = replace(BASE, body=Solid("b.npz"), held=HeldAt(slides="zmin"))
+    with pytest.raises(SceneError, match=r"middle .the nearest is 25 mm off.*halvings=1"):
+        compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    p = replace(p, body=Solid("b.npz", halvings=1))
+    result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    assert set(verdicts(result).values()) == {"agrees"}
+
+
 @pytest.mark.parametrize("words", ["near 20mm,15mm,50mm", "box 5mm,5mm,49mm to 36mm,26mm,51mm"])
 def test_a_place_in_words_is_as_large_on_every_mesh_of_a_file(words: str, tmp_path: Path) -> None:
     """A point's nearest facet was a quarter, a sixteenth of it on the halved ones, and a box took

@@ -48,6 +48,7 @@ from validate.solve.quasi_static import QuasiStatic
 
 _UNIT = 1e3  # Pa: a modulus to scale
 _FLAT = 5e-3  # of a sliding place's width
+_OFF = 0.25  # of a sliding place's width: how far off its middle the node is that stays
 _AXES = {"all": (0, 1, 2), "x": (0,), "y": (1,), "z": (2,)}
 
 
@@ -163,13 +164,24 @@ def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Suppor
 
 
 def _pins(p: MeasuredBody, mesh: Mesh) -> tuple[Pin, ...]:
-    """Two nodes of a place that slides keep the body from sliding off and turning on it."""
+    """Two nodes of a place that slides keep the body from sliding off and turning on it.
+
+    Raises `SceneError` without a node near its middle: the body would widen about another point.
+    """
     if not p.held.slides:
         return ()
     across = _across(p.held.slides, mesh)
     one, other = (c for c in range(3) if c != across)
     x = mesh.nodes[nodes_of(mesh, place_of(p.held.slides, mesh))]
-    middle = x[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()]
+    centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    middle = x[np.linalg.norm(x - centre, axis=1).argmin()]
+    off, width = float(np.linalg.norm(middle - centre)), float(np.ptp(x, axis=0).max())
+    if off > _OFF * width:
+        raise SceneError(
+            f"held.slides = {p.held.slides}: no node within {1e3 * _OFF * width:.3g} mm of its "
+            f"middle (the nearest is {1e3 * off:.3g} mm off), about which the body widens; a finer "
+            "mesh has one: --set body.halvings=1"
+        )
     rim = x[np.abs((x - middle)[:, one]).argmax()]
     return Pin(tuple(middle), (one, other)), Pin(tuple(rim), (other,))
 
@@ -238,7 +250,7 @@ def _meshed(card: Solid, folder: Path, places: tuple[str, ...]) -> Mesh:
     if card.block:
         edge = max(card.block) / card.cells
         x, y, z = card.block
-        cells = tuple(max(2, round(size / edge)) for size in (x, y, z))
+        cells = tuple(2 * max(1, round(size / edge / 2)) for size in (x, y, z))  # a middle
         return box((x, y, z), cells)
     if card.cylinder:
         diameter, height = card.cylinder
