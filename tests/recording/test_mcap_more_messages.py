@@ -145,3 +145,50 @@ def test_a_field_that_is_no_number_says_what_it_is(tmp_path: Path, field: str, w
     path = plain(tmp_path / "x.mcap", {"pos": {"x": 1, "y": 2}, "name": "cell"})
     with pytest.raises(RecordingError, match=why):
         read_all(path, {f"/x.{field}": "m"})
+
+
+def poses(path: Path, *messages: dict[str, Any]) -> Path:
+    """foxglove.PoseInFrame as JSON, a second apart from 2023 on; fields in place of the usual."""
+    usual = {"timestamp": {"sec": 0, "nsec": 0}, "frame_id": "lab", "x": 1.0, "w": 1.0}
+    with path.open("wb") as stream:
+        writer = TheirWriter(stream)
+        writer.start()  # type: ignore[no-untyped-call]
+        number = writer.register_schema("foxglove.PoseInFrame", "jsonschema", b"{}")
+        channel = writer.register_channel("/x", "json", number)
+        for i, message in enumerate(messages):
+            m = usual | message
+            place = {"x": m.pop("x"), "y": 0, "z": 0}
+            turn = {"x": 0, "y": 0, "z": 0, "w": m.pop("w")}
+            m["pose"] = {"position": place, "orientation": turn}
+            at = (1_700_000_000 + i) * 10**9
+            writer.add_message(channel, at, json.dumps(m).encode(), at)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+@pytest.mark.parametrize("lost", [{"w": 0}, {"x": float("nan")}, {"w": float("nan")}])
+def test_a_pose_that_was_lost_is_left_out_and_told(tmp_path: Path, lost: dict[str, Any]) -> None:
+    got = read_all(poses(tmp_path / "x.mcap", {}, lost, {}), {})
+    for part in ("rotation", "translation"):
+        assert got.signals[f"/x/{part}"].t.tolist() == [0, 2]
+        told = got.metadata["provenance"][f"/x/{part}"]
+        assert told.startswith("1 samples without numbers left out")
+    with pytest.raises(RecordingError, match="numbers that are not finite"):
+        read_all(poses(tmp_path / "y.mcap", lost), {})
+
+
+def test_stamps_that_were_never_set_are_no_times(tmp_path: Path) -> None:
+    """All messages stood at one instant in 1970."""
+    at = {"timestamp": {"sec": 1_700_000_009, "nsec": 0}}
+    got = read_all(poses(tmp_path / "x.mcap", {}, {}), {})
+    assert got.t0_ns == 1_700_000_000 * 10**9
+    assert got.signal("/x/translation", "m").t.tolist() == [0, 1]
+    assert got.metadata["provenance"]["/x/translation"] == "2 stamps of 0: when published"
+    some = read_all(poses(tmp_path / "y.mcap", {}, at), {}).signal("/x/translation", "m")
+    assert some.t.tolist() == [0, 9]
+
+
+def test_a_clock_that_begins_at_0_is_one(tmp_path: Path) -> None:
+    got = read_all(poses(tmp_path / "x.mcap", {}, {"timestamp": {"sec": 2, "nsec": 0}}), {})
+    assert got.t0_ns == 0
+    assert got.signal("/x/translation", "m").t.tolist() == [0, 2]

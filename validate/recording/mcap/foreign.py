@@ -5,7 +5,7 @@ Of a type that is not known a field becomes a signal by `--map /topic.field.sub=
 put in the order of their stamps; how many were not is told. What is no stream is listed with why.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,6 +26,7 @@ from validate.recording.reader import Options
 from validate.recording.types import Clock, Frames, Markers, Signal, Stream
 from validate.units import si_of
 
+_DATE = 10**17  # ns: three years; clocks that count from a start stay below
 SCALE, WHITE = "m_per_px", "white"
 
 
@@ -183,13 +184,14 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
         if one.error:
             never[one.channel.topic] = one.error
             continue
-        for name, samples in _by_size(one.samples):
+        for name, whole in _by_size(one.samples):
             topic = f"{one.channel.topic}{name}"
+            samples, gone = _with_numbers(whole)
             why = _why_none([part for part, _, _ in samples], side)
             if why or topic in make:
                 never[topic] = why or "two channels have this topic"
                 continue
-            times = np.array([p if part.ns is None else part.ns for part, p, _ in samples])
+            times, unset = _times(samples)
             order = np.argsort(times, kind="stable")
             moved = int((order != np.arange(len(order))).sum())
             try:
@@ -198,15 +200,34 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
                 never[topic] = str(error)
                 continue
             late = f"{moved} of {len(order)} samples were not in order of their stamps"
-            if levels or moved:
-                told[topic] = "; ".join(filter(None, (levels, late if moved else "")))
-            ns[topic] = times[order].astype(np.int64)
+            if notes := [*filter(None, (levels, late if moved else "", gone, unset))]:
+                told[topic] = "; ".join(notes)
+            ns[topic] = times[order]
             make[topic] = _maker(parts, ns[topic], side)
             clocks[topic] = clock_of(
                 topic, ns[topic], *(np.array([s[k] for s in samples], np.int64)[order]
                                     for k in (1, 2)),
             )  # fmt: skip
     return ForeignStreams(make, ns, clocks, told, never)
+
+
+def _with_numbers(samples: list[Sample]) -> tuple[list[Sample], str]:
+    """Samples without those of numbers that hold NaN, as where a tool was lost; all where none is
+    left."""
+    kept = [s for s in samples if s[0].names or not np.isnan(s[0].values).any()]
+    gone = len(samples) - len(kept)
+    return (kept, f"{gone} samples without numbers left out") if kept and gone else (samples, "")
+
+
+def _times(samples: Sequence[Sample]) -> tuple[Ints, str]:
+    """When the samples were measured, ns: by their stamps; where those were never set, which makes
+    them 0, by when they were published."""
+    stamps = np.array([p if part.ns is None else part.ns for part, p, _ in samples], np.int64)
+    zero = stamps == 0
+    if not zero.any() or 0 < stamps.max() < _DATE:
+        return stamps, ""
+    published = np.array([p for _, p, _ in samples], np.int64)
+    return np.where(zero, published, stamps), f"{int(zero.sum())} stamps of 0: when published"
 
 
 def _shallow(parts: list[MessagePart], options: Options) -> tuple[list[MessagePart], str]:

@@ -82,9 +82,12 @@ def _xyz(value: Mapping[str, Any]) -> list[float]:
 
 
 def _pose(name: str, ns: int, frame: str, place: Any, turn: Any) -> list[MessagePart]:
+    """Both parts; NaN where the tool was lost: a number that is none, or four zeros."""
     q = np.array([[*_xyz(turn), float(turn["w"])]])
-    R = rotations(q, name or "pose").reshape(9)
     x = np.array(_xyz(place))
+    lost = np.isnan(q).any() or np.isnan(x).any() or not q.any()
+    R = np.full(9, np.nan) if lost else rotations(q, name or "pose").reshape(9)
+    x = np.full(3, np.nan) if lost else x
     return [
         MessagePart(f"{name}/{ROTATION}", ns, frame, R, unit="1"),
         MessagePart(f"{name}/{TRANSLATION}", ns, frame, x, unit="m"),
