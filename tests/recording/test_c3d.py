@@ -154,6 +154,10 @@ def test_events_of_a_trial_are_told(tmp_path: Path) -> None:
     file.write(str(tmp_path / "y.c3d"))
     told = read_c3d(tmp_path / "y.c3d", {}).metadata["provenance"]
     assert told["events"].startswith("contact 0.05 s; lift 62.5 s")
+    file.add_parameter("EVENT", "CONTEXTS", ["Left", "Right"])
+    file.write(str(tmp_path / "z.c3d"))
+    sided = read_c3d(tmp_path / "z.c3d", {}).metadata["provenance"]
+    assert sided["events"].startswith("Left contact 0.05 s; Right lift 62.5 s")
     assert told["first_frame"].startswith("1 of the trial")
 
 

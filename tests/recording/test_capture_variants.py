@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from commands import here
 
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
 
@@ -252,3 +252,12 @@ def test_zeros_of_optitrack_are_not_seen(tmp_path: Path) -> None:
     assert x[2, 1].tolist() == B
     assert got.metadata["provenance"]["three zeros"].startswith("1 points")
     assert len(got.signals["Box/rotation"].t) == 2
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_text_of_nexus_1_is_called_so(tmp_path: Path, end: str) -> None:
+    """It was taken for two tests of a testing machine."""
+    path = tmp_path / "x.csv"
+    path.write_bytes(f"TRAJECTORIES{end}100,Hz{end},s:A,,{end}Field #,X,Y,Z{end}".encode())
+    with pytest.raises(UsageError, match=r"export of Vicon Nexus 1, .* export the trial as C3D"):
+        recognised(path)

@@ -57,7 +57,7 @@ def _held(path: Path, part: Path) -> dict[str, NDArray[Any]]:
         "outputs": _outputs(parameters),
         "first_frame": np.array(header["points"]["first_frame"] + 1),
         "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
-        "events": _words(parameters, "EVENT", "LABELS"),
+        "events": _event_names(parameters),
         "event_times": _event_times(parameters),
     }
 
@@ -112,6 +112,15 @@ def _outputs(parameters: Any) -> NDArray[Any]:
         unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
         pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
     return np.array(pairs, dtype=str).reshape(-1, 2)
+
+
+def _event_names(parameters: Any) -> NDArray[Any]:
+    """Labels, each after its context (Left, Right), where as many are stated."""
+    labels, sides = (_words(parameters, "EVENT", name) for name in ("LABELS", "CONTEXTS"))
+    if len(sides) != len(labels):
+        return labels
+    pairs = zip(sides.tolist(), labels.tolist(), strict=True)
+    return np.array([f"{side} {label}".strip() for side, label in pairs], dtype=str)
 
 
 def _event_times(parameters: Any) -> NDArray[np.float64]:

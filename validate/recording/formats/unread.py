@@ -19,6 +19,8 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
     (b"\0\0\1\xb3", "a video (MPEG)", _FFMPEG),
     (b"\x89HDF", "an HDF5 file that is none of MATLAB",
      "save its arrays, as by h5py and `scipy.io.savemat('{stem}.mat', ...)`"),
+    *((title, "a text export of Vicon Nexus 1", "export the trial as C3D")
+      for title in (b"TRAJECTORIES\r", b"TRAJECTORIES\n", b"ANALOG\r", b"ANALOG\n")),
     (b"FLV\1", "a video (Flash)", _FFMPEG),
     (b"\x1f\x8b", "packed by gzip", "gunzip -k {name}"),
     (b"PK\3\4", "a ZIP archive", "unzip {name} -d {stem}, then name the folder or a file in it"),
