@@ -355,6 +355,10 @@ def test_a_body_that_slides_on_its_plate_neither_drifts_nor_turns(tmp_path: Path
     p = replace(BASE, held=HeldAt(slides="zmin"))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"agrees"}
+    method = result.methods[0]
+    x, u = method.scene.mesh.nodes, method.run.u[-1]
+    widened = 0.3 * 0.02 * (x[:, :2] - (0.02, 0.015))  # nu, strain, from the middle
+    assert np.allclose(u[:, :2], widened, rtol=0, atol=1e-8)
     top = replace(BASE, held=HeldAt(all="zmin", slides="zmin+xmin"))
     with pytest.raises(SceneError, match="slides in a plane across"):
         compare(experiment(tmp_path, top, recording(signals=log()), "force"))

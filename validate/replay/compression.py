@@ -51,6 +51,7 @@ from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element, refined
 from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
+from validate.scene.slippery import resting_pins
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
@@ -197,11 +198,8 @@ def between(contact: Contact) -> tuple[Support, ...]:
 
 
 def _pins(mesh: Mesh) -> tuple[Pin, ...]:
-    """Two nodes of the lower plate that keep a slipping body from sliding and turning."""
     x = mesh.nodes[mesh.facet_nodes("lower_plate")]
-    centre = x[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()]
-    rim = x[(x - centre)[:, 0].argmax()]
-    return (Pin(tuple(centre), (0, 1)), Pin(tuple(rim), (1,)))
+    return resting_pins(x, 0, 1, "lower_plate", "mesh the file with more cells")
 
 
 # --- the recording in it --------------------------------------------------------------------------

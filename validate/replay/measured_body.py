@@ -43,12 +43,12 @@ from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import linear, of_element, refined
 from validate.scene.scene import Drive, Load, Pin, Scene, Support, Weight
 from validate.scene.select import facets_of, nodes_of
+from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
 _UNIT = 1e3  # Pa: a modulus to scale
 _FLAT = 5e-3  # of a sliding place's width
-_OFF = 0.25  # of a sliding place's width: how far off its middle the node is that stays
 _AXES = {"all": (0, 1, 2), "x": (0,), "y": (1,), "z": (2,)}
 
 
@@ -164,26 +164,13 @@ def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Suppor
 
 
 def _pins(p: MeasuredBody, mesh: Mesh) -> tuple[Pin, ...]:
-    """Two nodes of a place that slides keep the body from sliding off and turning on it.
-
-    Raises `SceneError` without a node near its middle: the body would widen about another point.
-    """
     if not p.held.slides:
         return ()
     across = _across(p.held.slides, mesh)
     one, other = (c for c in range(3) if c != across)
     x = mesh.nodes[nodes_of(mesh, place_of(p.held.slides, mesh))]
-    centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
-    middle = x[np.linalg.norm(x - centre, axis=1).argmin()]
-    off, width = float(np.linalg.norm(middle - centre)), float(np.ptp(x, axis=0).max())
-    if off > _OFF * width:
-        raise SceneError(
-            f"held.slides = {p.held.slides}: no node within {1e3 * _OFF * width:.3g} mm of its "
-            f"middle (the nearest is {1e3 * off:.3g} mm off), about which the body widens; a finer "
-            "mesh has one: --set body.halvings=1"
-        )
-    rim = x[np.abs((x - middle)[:, one]).argmax()]
-    return Pin(tuple(middle), (one, other)), Pin(tuple(rim), (other,))
+    place = f"held.slides = {p.held.slides}"
+    return resting_pins(x, one, other, place, "--set body.halvings=1")
 
 
 def _across(text: str, mesh: Mesh) -> int:
