@@ -226,6 +226,60 @@ def test_masks_of_a_folder_are_one_an_image(moving: Path, tmp_path: Path) -> Non
     assert "2 masks for 3 images leave open whose they are" in refused(*given)
 
 
+def segmented(path: Path) -> Path:
+    """A small region (2) before the large one (5), as 3D Slicer names them."""
+    both = np.where(mask() > 0, 5, 0).astype(np.uint8)
+    both[4:12, 4:12] = 2
+    own = {"Segment0_Name": "skin", "Segment0_LabelValue": "2",
+           "Segment1_Name": "cyst", "Segment1_LabelValue": "5"}  # fmt: skip
+    nrrd.write(str(path), np.ascontiguousarray(both[None].T), own)
+    return path
+
+
+@pytest.mark.parametrize("label", ["cyst", "5"])
+def test_one_of_several_regions_is_said(label: str, two: Path, tmp_path: Path) -> None:
+    """Of a segmentation: not zero was inside, so that a region in another was lost unsaid."""
+    out = tmp_path / "c.mcap"
+    given = ("outline", str(two), "--from", str(segmented(tmp_path / "x.seg.nrrd")), "--sd", "1px",
+             "--name", "theirs", "-o", str(out))  # fmt: skip
+    assert "2 regions, skin (2), cyst (5): say which, as --label skin" in refused(*given)
+    assert "--label bone: not in x.seg.nrrd; there are skin (2)" in refused(
+        *given, "--label", "bone"
+    )
+    assert here(*given, "--label", label)[0] == 0
+    away = radii(read_recording(out).contour("theirs").outlines[0], CENTRE) - RADIUS
+    assert np.abs(away).max() < 0.6
+    assert read_recording(out).record("found/theirs")["label"] == label
+    assert "--label is for outlines of others" in refused("outline", str(two), "--label", "cyst")
+
+
+@pytest.mark.parametrize("coco", [True, False])
+def test_one_of_several_labels_of_polygons_is_said(coco: bool, two: Path, tmp_path: Path) -> None:
+    file, out = tmp_path / "x.json", tmp_path / "c.mcap"
+    polygons = {"skin": CIRCLE / 4, "cyst": CIRCLE}
+    if coco:
+        notes = [{"image_id": 0, "category_id": i, "segmentation": [p.ravel().tolist()]}
+                 for i, p in enumerate(polygons.values())]  # fmt: skip
+        names = [{"id": i, "name": name} for i, name in enumerate(polygons)]
+        images = [{"id": 0, "file_name": "0.png"}]
+        told = {"images": images, "annotations": notes, "categories": names}
+    else:
+        told = {"shapes": [{"label": n, "points": p.tolist()} for n, p in polygons.items()]}
+    file.write_text(json.dumps(told))
+    given = ("outline", str(two), "--from", str(file), "--sd", "1px", "--name", "theirs",
+             "-o", str(out))  # fmt: skip
+    assert "2 regions, skin, cyst: say which, as --label skin" in refused(*given)
+    assert here(*given, "--label", "cyst")[0] == 0
+    assert radii(read_recording(out).contour("theirs").outlines[0], CENTRE) == pytest.approx(RADIUS)
+
+
+def test_a_picture_is_no_mask(two: Path, tmp_path: Path) -> None:
+    levels = np.arange(mask().size).reshape(mask().shape) % 200
+    (tmp_path / "x.png").write_bytes(encode_png(levels.astype(np.uint8)))
+    given = ("outline", str(two), "--from", str(tmp_path / "x.png"), "--sd", "1px", "--name", "t")
+    assert "199 values, no mask of regions" in refused(*given, "-o", str(tmp_path / "c.mcap"))
+
+
 def test_what_is_no_outline_is_one_line(two: Path, moving: Path, tmp_path: Path) -> None:
     both = mask()
     both[:, 57:60] = 0

@@ -87,6 +87,7 @@ def import_(
               help="Of others: masks (.png, folder, .npy, .npz, .nrrd), .csv, .json.")  # fmt: skip
 @click.option("--sd", metavar="LENGTH", help="How far theirs may be off, as 0.3mm or 2px.")
 @click.option("--unit", metavar="UNIT", help="Of their points (default: px).")
+@click.option("--label", help="Which of their regions, by its value or name.")
 @click.option("--name", default="outline", show_default=True, help="The stream to write.")
 @click.option("-o", "out", type=FILE, help="The recording to write (default: FILE itself).")
 def outline(

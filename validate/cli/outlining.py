@@ -82,7 +82,7 @@ def _require_free(recording: Recording, name: str) -> None:
 def _found(
     frames: Frames, images: str, given: dict[str, Any]
 ) -> tuple[Contours, dict[str, str], tuple[PlaceSaid, ...]]:
-    for option in ("sd", "unit"):
+    for option in ("sd", "unit", "label"):
         if given[option]:
             raise UsageError(f"--{option} is for outlines of others: with --from FILE")
     hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
@@ -153,8 +153,10 @@ def _drawn(
             "0.3mm or 2px"
         )
     sd = _length("--sd", given["sd"], frames)
-    contours = foreign_outlines(path, frames, images, sd or 0.0, given["unit"] or "px")
-    return contours, {"drawn by others": path.name, "sd": f"{given['sd']}, as said"}
+    unit, label = given["unit"] or "px", given["label"] or ""
+    contours = foreign_outlines(path, frames, images, sd or 0.0, unit, label)
+    told = {"drawn by others": path.name, "sd": f"{given['sd']}, as said"}
+    return contours, {**told, "label": label} if label else told
 
 
 def _place(text: str | None, frames: Frames) -> Any:

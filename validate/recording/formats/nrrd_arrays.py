@@ -60,7 +60,7 @@ def _times(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
     """Seconds of the images, as 3D Slicer lists them where they are times; none of what is not."""
     at = kinds.index(_LIST) if _LIST in kinds else 0
     values = str(header.get(f"axis {at} index values", "")).split()
-    units = [*header.get("units", ()), *[""] * len(kinds)]
+    units = [*header.get("units", ()), *[""] * len(header["sizes"])]
     factor = in_si(1.0, str(header.get(f"axis {at} index unit") or units[at]) or "none", "s")
     try:
         t = np.array([float(v) for v in values])

@@ -4,7 +4,8 @@ Masks are PNG files (a folder, numbered; one for a single image), an array (n, h
 .npz, or an NRRD (w, h, n), as segmentations are stored: what is not zero is inside, and the outline
 runs half a pixel outside the outermost pixels' centres; an image without an outline has an empty
 mask. Tables are CSV with the columns frame, x, y;
-polygons JSON as LabelMe (`shapes`, a file an image) or COCO (`annotations`) has them. There are as
+polygons JSON as LabelMe (`shapes`, a file an image) or COCO (`annotations`) has them. Of masks of
+several values, and of polygons of several labels, one is said: by its number or name. There are as
 many masks or files as images, in the order of the numbers in their names: fewer would leave open
 whose they are. Points of tables and polygons are pixels, centres whole numbers, unless a unit is
 said.
@@ -12,7 +13,7 @@ said.
 
 import csv
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -29,20 +30,22 @@ from validate.recording.types import Contours, Frames
 from validate.units import in_si
 
 MAX_FILE = 256 * 2**20  # bytes
+_MOST = 64  # regions: pictures have more levels
 KINDS = (".png", ".npy", ".npz", ".nrrd", ".csv", ".json")
 Outlines = Mapping[int, Floats]
 
 
 def foreign_outlines(
-    path: Path, frames: Frames, images: str, sd: float, unit: str = "px"
+    path: Path, frames: Frames, images: str, sd: float, unit: str = "px", label: str = ""
 ) -> Contours:
     """Outlines in `path` for the images of topic `images`; `sd` m along the normal, as its author
-    says, `unit` that of points in tables and polygons.
+    says, `unit` that of points in tables and polygons, `label` the region of several.
 
-    Raises `UsageError` for another kind of file, `RecordingError` naming file and image: masks of
+    Raises `UsageError` for another kind of file, and where several regions leave open which is
+    meant, `RecordingError` naming file and image: masks of
     another size, several regions or none in one, fewer than 3 points, images that are not there.
     """
-    found = _read(path, frames)
+    found = _read(path, frames, label)
     beyond = [i for i in found if not 0 <= i < len(frames.images)]
     if beyond or not found:
         raise RecordingError(
@@ -64,7 +67,7 @@ def _scale(path: Path, frames: Frames, unit: str) -> Floats:
     return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
 
 
-def _read(path: Path, frames: Frames) -> Outlines:
+def _read(path: Path, frames: Frames, label: str) -> Outlines:
     try:
         files = numbered(path, (".png", ".json")) if path.is_dir() else [path]
         kind = files[0].suffix.lower()
@@ -73,16 +76,56 @@ def _read(path: Path, frames: Frames) -> Outlines:
         if (size := sum(file.stat().st_size for file in files)) > MAX_FILE:
             raise RecordingError(f"{path.name}: {size} bytes, limit {MAX_FILE}")
         if kind == ".csv":
+            if label:
+                raise UsageError(f"--label {label}: of masks and polygons; {path.name} has none")
             return _table(path)
         if kind == ".json":
-            return _polygons(path, files, len(frames.images))
-        masks = _pictures(files) if kind == ".png" else _volume(path) if kind == ".nrrd" else None
-        return _masks(path, _array(path) if masks is None else masks, frames)
+            return _polygons(path, files, len(frames.images), label)
+        named: Mapping[str, int] = {}
+        if kind == ".nrrd":
+            masks, named = _volume(path)
+        else:
+            masks = _pictures(files) if kind == ".png" else _array(path)
+        return _masks(path, _of_label(path, masks, named, label), frames)
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be read ({error.strerror})") from error
 
 
 # --- masks ----------------------------------------------------------------------------------------
+
+
+def _of_label(path: Path, masks: Any, named: Mapping[str, int], label: str) -> Any:
+    """The masks of one region: of the only value that is not zero, or of that which is said."""
+    values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
+    if len(values) > _MOST:
+        raise RecordingError(
+            f"{path.name}: {len(values)} values, no mask of regions: make it of 0 and one other"
+        )
+    names = {v: name for name, v in named.items()}
+    regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
+    meant = values[_meant(path, label, regions)] if values else 0
+    return [mask == meant for mask in masks] if values else masks
+
+
+def _meant(path: Path, label: str, regions: Sequence[tuple[str, str]]) -> int:
+    """Which of the regions, each by name and value, is said, or the only one."""
+    there = ", ".join(n if n == v else f"{n} ({v})" for n, v in regions)
+    if label:
+        at = [i for i, known in enumerate(regions) if label in known]
+        if not at:
+            raise UsageError(f"--label {label}: not in {path.name}; there are {there}")
+        return at[0]
+    if len(regions) > 1:
+        raise UsageError(
+            f"{path.name}: {len(regions)} regions, {there}: say which, as --label {regions[0][0]}"
+        )
+    return 0
+
+
+def _of_names(path: Path, label: str, names: Iterable[str]) -> str:
+    """The name that is said, or the only one; of nothing drawn the one that is said."""
+    regions = [(name, name) for name in dict.fromkeys(names)]
+    return regions[_meant(path, label, regions)][0] if regions else label
 
 
 def _masks(path: Path, masks: Any, frames: Frames) -> Outlines:
@@ -92,7 +135,7 @@ def _masks(path: Path, masks: Any, frames: Frames) -> Outlines:
         if mask.shape != shape:
             raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
         if mask.any():
-            found[i] = _edge(mask != 0, f"{path.name}: mask {i}")
+            found[i] = _edge(mask, f"{path.name}: mask {i}")
     return found
 
 
@@ -124,15 +167,22 @@ def _array(path: Path) -> Any:
     return masks if masks.ndim == 3 else masks[None]
 
 
-def _volume(path: Path) -> Any:
-    """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored."""
-    masks = decoded("nrrd_arrays", path, "nrrd")["pixels"]
+def _volume(path: Path) -> tuple[Any, Mapping[str, int]]:
+    """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored. The
+    values of regions by name, as 3D Slicer has them."""
+    held = decoded("nrrd_arrays", path, "nrrd")
+    masks = held["pixels"]
     if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
         raise RecordingError(
             f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) of "
             "whole numbers"
         )
-    return masks.T if masks.ndim == 3 else masks.T[None]
+    texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
+    values = {k.removesuffix("LabelValue"): v for k, v in texts.items() if k.endswith("LabelValue")}
+    named = {
+        texts[f"{k}Name"]: int(v) for k, v in values.items() if f"{k}Name" in texts and v.isdigit()
+    }
+    return (masks.T if masks.ndim == 3 else masks.T[None]), named
 
 
 def _edge(inside: Any, what: str) -> Floats:
@@ -157,31 +207,45 @@ def _table(path: Path) -> Outlines:
         return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
 
 
-def _polygons(path: Path, files: list[Path], images: int) -> Outlines:
+def _polygons(path: Path, files: list[Path], images: int, label: str) -> Outlines:
     try:
         told = [json.loads(f.read_text(encoding="utf-8-sig", errors="replace")) for f in files]
         if "annotations" in told[0] and len(told) == 1:
-            return _coco(path, told[0], images)
+            return _coco(path, told[0], images, label)
         _require_each(path, len(files), "files of polygons", images)
-        return _grouped(path, ((i, p) for i, one in enumerate(told) for p in _shape(path, one)))
+        meant = _of_names(path, label, (_label(s) for one in told for s in _closed(one)))
+        each = ((i, _shape(path, one, meant)) for i, one in enumerate(told))
+        return _grouped(path, ((i, p) for i, points in each for p in points))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise RecordingError(f"{path.name}: neither LabelMe nor COCO polygons ({error})") from None
 
 
-def _shape(path: Path, told: Any) -> Any:
-    """The points of the polygon of a LabelMe file; none where it has no shape."""
-    closed = [s for s in told["shapes"] if s.get("shape_type", "polygon") == "polygon"]
+def _closed(told: Any) -> list[Any]:
+    return [s for s in told["shapes"] if s.get("shape_type", "polygon") == "polygon"]
+
+
+def _label(shape: Any) -> str:
+    return str(shape.get("label") or "")
+
+
+def _shape(path: Path, told: Any, label: str) -> Any:
+    """The points of the polygon of a LabelMe file; none where it has no shape of that label."""
+    closed = [s for s in _closed(told) if _label(s) == label]
     if len(closed) > 1:
         raise RecordingError(f"{path.name}: {len(closed)} polygons in one image, expected one")
     return closed[0]["points"] if closed else []
 
 
-def _coco(path: Path, told: Any, images: int) -> Outlines:
+def _coco(path: Path, told: Any, images: int, label: str) -> Outlines:
     """One polygon an image, images in the order of the numbers in their files' names."""
     _require_each(path, len(told["images"]), "images", images)
     listed = sorted(told["images"], key=lambda image: number_key(str(image["file_name"])))
     order = {image["id"]: i for i, image in enumerate(listed)}
-    polygons = [(order[n["image_id"]], p) for n in told["annotations"] for p in n["segmentation"]]
+    names = {c["id"]: str(c["name"]) for c in told.get("categories", ())}
+    drawn = [(names.get(n.get("category_id"), ""), n) for n in told["annotations"]]
+    meant = _of_names(path, label, (name for name, _ in drawn))
+    chosen = [n for name, n in drawn if name == meant]
+    polygons = [(order[n["image_id"]], p) for n in chosen for p in n["segmentation"]]
     if len(polygons) > len({i for i, _ in polygons}):
         raise RecordingError(f"{path.name}: several polygons in one image, expected one")
     pairs = ((i, pair) for i, p in polygons for pair in np.reshape(p, (-1, 2)).tolist())
