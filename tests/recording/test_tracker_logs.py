@@ -43,7 +43,10 @@ def test_states_of_single_markers_say_nothing_of_the_tool(tmp_path: Path) -> Non
 
 def test_what_was_never_seen_is_told_with_its_states(tmp_path: Path) -> None:
     path = log(tmp_path / "x.csv", "time,state,q0,qx,qy,qz,tx,ty,tz", f"0,Far,{POSE.format(1)}")
-    with pytest.raises(RecordingError, match=r"no tool was seen: .*; states \['Far'\]"):
+    with pytest.raises(
+        RecordingError,
+        match=r"no tool was seen: .*; of the states \['Far'\] say which is seen: --map ok=",
+    ):
         read_ndi(path, {})
 
 
@@ -134,3 +137,38 @@ def test_bodies_of_an_optotrak_have_the_times_of_their_frequency(tmp_path: Path)
     got = read_ndi(path, {}).signal("Probe/translation", "m")
     assert got.t.tolist() == [0, 0.02]
     assert got.y[:, 0].tolist() == [0.01, 0.02]
+
+
+def test_each_tool_has_the_state_of_its_name_wherever_it_stands(tmp_path: Path) -> None:
+    group = "{0}_qw,{0}_qx,{0}_qy,{0}_qz,{0}_tx,{0}_ty,{0}_tz,{0}_status"
+    rows = [f"{t},{POSE.format(1)},OK,{POSE.format(2)},{'OK' if t else 'LOST'}" for t in (0, 1)]
+    path = log(tmp_path / "x.csv", f"time,{group.format('A')},{group.format('B')}", *rows)
+    got = read_ndi(path, {})
+    assert got.signal("A/translation", "m").t.tolist() == [0, 1]
+    assert got.signal("B/translation", "m").t.tolist() == [1]
+
+
+@pytest.mark.parametrize(("column", "seen", "lost"), [
+    ("Valid", "True", "False"), ("visible", "yes", "no"), ("tracking status", "1", "0"),
+])  # fmt: skip
+def test_what_counts_as_seen_is_known_or_asked_for(
+    tmp_path: Path, column: str, seen: str, lost: str
+) -> None:
+    head = f"time,{column},q0,qx,qy,qz,tx,ty,tz"
+    rows = [f"{t},{s},{POSE.format(1)}" for t, s in enumerate((seen, lost, seen))]
+    path = log(tmp_path / "x.csv", head, *rows)
+    said = {}
+    if seen == "1":  # of NDI's numbers 0, of others 1 is good
+        with pytest.raises(RecordingError, match=r"\['0', '1'\] say which is seen: --map ok="):
+            read_ndi(path, {})
+        said = {"ok": "1"}
+    assert read_ndi(path, said).signal("tool1/translation", "m").t.tolist() == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("name", "step"), [("timestamp_ms", 1e-3), ("Zeit", 1), ("Temps (ms)", 1e-3), ("time_us", 1e-6)]
+)
+def test_a_time_by_other_names_is_one(tmp_path: Path, name: str, step: float) -> None:
+    rows = [f"{t},{POSE.format(1)}" for t in (100, 120)]
+    got = read_ndi(log(tmp_path / "x.csv", f"{name},q0,qx,qy,qz,tx,ty,tz", *rows), {})
+    assert got.signal("tool1/translation", "m").t.tolist() == pytest.approx([0, 20 * step])

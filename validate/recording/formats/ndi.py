@@ -41,8 +41,8 @@ _WHOSE = re.compile(
 _MOMENT = re.compile(
     r"(?:(\d{4})-(\d\d)-(\d\d)[T ])?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)(?:Z|[+-]\d\d:?\d\d)?"
 )
-_OPTIONS = ("unit", "rate", "frame")
-_OK = ("", "ok", "enabled", "valid", "visible", "tracked")
+_OPTIONS = ("unit", "rate", "frame", "ok")
+_OK = ("", "ok", "enabled", "valid", "visible", "tracked", "true", "yes")
 _DAY = 86400.0  # s
 _MOST_TOOLS = 64
 
@@ -52,8 +52,9 @@ def read_ndi(path: Path, options: Options) -> Recording:
     tracked sequences are.
 
     Options: `unit` in place of NDI's mm, `rate` (Hz) where no column is a time, `frame` (default
-    tracker). A tool never seen is listed as unread. Raises `UsageError` without times,
-    `RecordingError` for a table without tools, one in which nothing was seen, or damaged.
+    tracker), `ok`: the state in which a tool is seen. A tool never seen is listed as unread. Raises
+    `UsageError` without times, `RecordingError` for a table without tools, one in which nothing was
+    seen, or damaged.
     """
     require_known(options, _OPTIONS)
     held = text_rows(path)
@@ -71,17 +72,19 @@ def read_ndi(path: Path, options: Options) -> Recording:
     frame = options.get("frame", "tracker")
     streams: dict[str, Stream] = {}
     told = {}
+    good = (options["ok"].lower(),) if "ok" in options else _OK
     for name, k, own in _tracks(tools, whose):
         pose = values[own, 7 * k : 7 * k + 7]
         pose = np.where(np.abs(pose) < NONE, pose, np.nan)
-        seen = _seen(pose, tools[k], [rows[i] for i in own])
+        seen = _seen(pose, tools[k], [rows[i] for i in own], good)
         told[name] = f"{int((~seen).sum())} of {len(seen)}"
         if seen.any():
             R = rotations(pose[seen, 3:], f"{path.name}: {name}")
             streams |= pose_signals(name, t[own][seen], R, factor * pose[seen, :3], frame)
     if not streams:
-        states = sorted({row.cell(tool.state) for row in rows for tool in tools if tool.state})
-        raise RecordingError(f"{path.name}: no tool was seen: {told}; states {states[:6]}")
+        states = sorted({row.cell(t.state) for row in rows for t in tools if t.state is not None})
+        which = f"; of the states {states[:6]} say which is seen: --map ok=..." if states else ""
+        raise RecordingError(f"{path.name}: no tool was seen: {told}{which}")
     said = options.get("unit", stated)
     unit = {"unit": said} if said else {ASSUMED: "lengths in mm, as NDI writes; else --map unit=m"}
     return _recording(path, streams, told, {**unit, **told_left(left)})
@@ -192,11 +195,13 @@ def _times(
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9)
 
 
-def _seen(pose: Floats, tool: Tool, rows: Sequence[TextRow]) -> NDArray[np.bool_]:
+def _seen(
+    pose: Floats, tool: Tool, rows: Sequence[TextRow], ok: Sequence[str]
+) -> NDArray[np.bool_]:
     """Which rows (n,) hold a pose."""
     good: NDArray[np.bool_] = ~np.isnan(pose).any(axis=1) & (pose != 0).any(axis=1)
     if tool.state is not None:
-        good &= np.array([row.cell(tool.state).lower() in _OK for row in rows])
+        good &= np.array([row.cell(tool.state).lower() in ok for row in rows])
     return good
 
 

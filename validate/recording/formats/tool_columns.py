@@ -2,11 +2,13 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from validate.recording.exports.table import split_unit
+from validate.recording.exports.vocabulary import role_of_name
 from validate.recording.formats.recorded import distinct
 from validate.recording.formats.text_rows import TextRow
-from validate.units import in_si
+from validate.units import in_si, si_factor
 
 _BEFORE = r"(?:(?P<before>.*?)[\W_]+)??"
 _POSITION = re.compile(
@@ -17,7 +19,7 @@ _TURN = re.compile(
     r"(?P<axis>[0owxyz])(?P<after>.*)", re.I
 )  # fmt: skip
 _PORT = re.compile(r"(port|tool|sensor)[\W_]*(\d\w*)")
-_STATE = re.compile(r".*stat(e|us)\W*")
+_STATE = re.compile(r".*(state|status|valid|visible|visibility|tracked)\W*")
 _BRACKETS = re.compile(r"[(\[](.*?)[)\]]")
 _IN_NAME = re.compile(r"[(\[].*?[)\]]|\W|_")
 _CLOCK = {
@@ -25,8 +27,8 @@ _CLOCK = {
     **dict.fromkeys(("second", "seconds"), 1.0),
     **dict.fromkeys(("ms", "millisecond", "milliseconds"), 1e-3),
 }  # fmt: skip
-_TIME = re.compile(r"(?:\w+[ _])?time[ _]?(?:stamp)?\W*(ms|us|s|sec|seconds)?\W*")
-_SECONDS = {"ms": 1e-3, "us": 1e-6}
+_TIME = re.compile(r"(?:\w+[ _])?time[ _]?(?:stamp)?[\W_]*(ns|us|ms|s|sec|seconds)?\W*")
+_SECONDS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 @dataclass(frozen=True)
@@ -52,33 +54,41 @@ def tools_of(header: TextRow) -> tuple[Tool, ...]:
             i += 1
             continue
         position, turn, name = group
-        between = range(i - 1, after - 1, -1)
-        port = next((m for j in reversed(between) if (m := _PORT.fullmatch(cells[j]))), None)
+        port = next((m for c in cells[after:i] if (m := _PORT.fullmatch(c))), None)
         found.append(
             Tool(
                 name or (f"{port[1]}{port[2]}" if port else f"tool{len(found) + 1}"),
                 tuple(i + j for j in position),
                 tuple(i + j for j in turn),
-                _state(cells, between),
+                None,
                 _unit(header.cells[i + position[0]]),
             )
         )
         i += 7
         after = i
-    if len(found) == 1 and found[0].state is None:
-        found = [_with(found[0], found[0].name, _state(cells, range(after, len(cells))))]
     labels = distinct([tool.name for tool in found], len(found))
-    return tuple(_with(t, name, t.state) for t, name in zip(found, labels, strict=True))
+    states = _states(cells, found)
+    return tuple(replace(t, name=n, state=s) for t, n, s in zip(found, labels, states, strict=True))
 
 
-def _with(tool: Tool, name: str, state: int | None) -> Tool:
-    return Tool(name, tool.position, tool.turn, state, tool.unit)
-
-
-def _state(cells: Sequence[str], among: Sequence[int]) -> int | None:
-    """The column nearest to a tool's own that is its state; those of single markers are none."""
-    named = (j for j in among if _STATE.fullmatch(cells[j]) and "marker" not in cells[j])
-    return next(named, None)
+def _states(cells: Sequence[str], tools: Sequence[Tool]) -> list[int | None]:
+    """The column of each tool's state: one that carries its name, else the nearest before its own,
+    of one tool alone also after; those of single markers are none."""
+    of = [j for j, c in enumerate(cells) if _STATE.fullmatch(c) and "marker" not in c]
+    named = [
+        next((j for j in of if tool.name.lower() in _IN_NAME.sub("", cells[j])), None)
+        for tool in tools
+    ]
+    of = [j for j in of if j not in named]
+    begins = [min(*tool.position, *tool.turn) for tool in tools]
+    ends = [0, *(begin + 7 for begin in begins)]
+    before = [
+        next((j for j in reversed(of) if end <= j < begin), None)
+        for end, begin in zip(ends, begins, strict=False)
+    ]
+    if len(tools) == 1 and before[0] is None:
+        before = [next((j for j in of if j >= ends[1]), None)]
+    return [b if n is None else n for n, b in zip(named, before, strict=True)]
 
 
 def _unit(cell: str) -> str:
@@ -118,4 +128,8 @@ def clock_of_columns(header: TextRow) -> list[tuple[int, float]]:
     for i, cell in enumerate(cells):
         if found := _TIME.fullmatch(cell):
             return [(i, _SECONDS.get(found[1] or "", 1.0))]
+    for i, cell in enumerate(header.cells):
+        name, unit = split_unit(cell)
+        if role_of_name(name) == "time":
+            return [(i, si_factor(unit, "time") if unit else 1.0)]
     return []
