@@ -172,3 +172,14 @@ def test_a_time_by_other_names_is_one(tmp_path: Path, name: str, step: float) ->
     rows = [f"{t},{POSE.format(1)}" for t in (100, 120)]
     got = read_ndi(log(tmp_path / "x.csv", f"{name},q0,qx,qy,qz,tx,ty,tz", *rows), {})
     assert got.signal("tool1/translation", "m").t.tolist() == pytest.approx([0, 20 * step])
+
+
+@pytest.mark.parametrize("name", ["acc", "gyro", "linear_velocity", "Moment", "q"])
+def test_axes_of_what_is_no_place_make_no_point(tmp_path: Path, name: str) -> None:
+    """An inertial unit's log was taken for points, and asked for their unit of length."""
+    head = f"time (s),{name}_x,{name}_y,{name}_z"
+    path = log(tmp_path / "x.csv", head, *(f"{t},1,2,3" for t in range(12)))
+    assert recognised(path).name == "instron"
+    mixed = log(tmp_path / "y.csv", f"{head},tip_x (mm),tip_y (mm),tip_z (mm)", "0,1,2,3,4,5,6")
+    markers = recognised(mixed).read(mixed, {}).marker("markers")
+    assert (markers.names, markers.x.tolist()) == (("tip",), [[[0.004, 0.005, 0.006]]])

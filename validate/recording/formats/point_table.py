@@ -38,6 +38,11 @@ _OPTIONS = ("unit", "sd", "frame", "rate", "time", "z")
 _AXES = "xyz"
 _LAST = re.compile(r"(?P<name>.*?)(?:[\s_.:-]+(?P<low>[xyzXYZ])|(?<=[a-z0-9])(?P<glued>[XYZ]))")
 _FIRST = re.compile(r"(?P<low>[xyzXYZ])[\s_.:-]*(?P<name>[0-9]+|(?<=[\s_.:-])\w+)")
+# Three numbers with axes that are no place, as an inertial unit, a force plate or a tracker logs.
+_NO_PLACE = re.compile(
+    r"(lin(ear)?|ang(ular)?)?[\W_]*(acc\w*|gyr\w*|magn\w*|vel\w*|moment\w*|torque|force|omega|"
+    r"rot\w*|quat\w*|orient\w*|euler|q)", re.I
+)  # fmt: skip
 _LABELS = {"name", "label", "marker", "point", "landmark", "id"}
 _ALONE = "point"  # the name of points whose columns are x, y, z and nothing else
 _DEEPEST = 40  # lines in which the line of names is looked for
@@ -221,7 +226,9 @@ def _axis_of(name: str) -> tuple[str, str]:
     text = name.strip()
     if text.lower() in ("x", "y", "z"):
         return text.lower(), _ALONE
-    if (last := _LAST.fullmatch(text)) and last["name"]:
+    if (last := _LAST.fullmatch(text)) and _NO_PLACE.fullmatch(last["name"]):
+        return "", ""
+    if last and last["name"]:
         return (last["low"] or last["glued"]).lower(), last["name"]
     first = _FIRST.fullmatch(text)
     return (first["low"].lower(), first["name"]) if first else ("", "")
