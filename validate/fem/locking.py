@@ -88,5 +88,5 @@ def _bending(mesh: Mesh, cells: str) -> str | None:
         return None
     return (
         f"{across:.1f} {cells} across a body {sides.max() / sides.min():.0f} times as long lock in "
-        "bending; compare with order 2"
+        "bending; compare with order 2 or a finer mesh"
     )
