@@ -99,6 +99,14 @@ def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
     assert rms["force.rms@high"] < 4e-3  # noise alone
 
 
+def test_a_test_may_be_longer_than_its_states_are_seconds(tmp_path: Path) -> None:
+    """States more than a second apart: the force was looked for at rest, where it is zero."""
+    slow = {n: replace(s, t=20 * s.t) for n, s in log().items()}
+    p = replace(BASE, seen=replace(BASE.seen, still=8.0))
+    result = compare(experiment(tmp_path, p, recording(signals=slow), "force"))
+    assert set(verdicts(result).values()) == {"agrees"}
+
+
 def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> None:
     open_ = replace(BASE, material=replace(BASE.material, E=None))
     result = compare(experiment(tmp_path, open_, recording(signals=log()), "force"))

@@ -54,8 +54,10 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
             "nothing of the recording is compared: set one of seen.force, seen.markers and "
             f"seen.outline to a topic of {sorted(recording.streams)}"
         )
+    still = [o.name for o in compared if not isinstance(o, SignalObservation)]
     return Registered(
-        (drive, *compared), _selections(p, drive, kind), Selection("rest", t[:1]),
+        (drive, *compared), _selections(p, drive, kind),
+        Selection("rest", t[:1], of=(*still, drive.name)),  # a force is counted from there
         findings=findings,
     )  # fmt: skip
 
