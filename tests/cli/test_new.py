@@ -94,6 +94,15 @@ def test_verdicts_of_a_new_experiment_are_covered(tmp_path: Path) -> None:
     assert code == 0  # blunt: the modulus is a uniform range
 
 
+def test_the_notes_of_a_pulled_body_speak_of_grips(tmp_path: Path) -> None:
+    pressed = log(**SIZES, test="tension")
+    pulled = {n: replace(s, y=-s.y) for n, s in pressed.signals.items()}
+    write_recording(replace(pressed, signals=pulled), tmp_path / "gel.mcap")
+    in_folder(tmp_path, "new", "b", "--from", "gel.mcap")
+    result = compare(load_file(tmp_path / "experiments" / "b.py"))
+    assert any("Pa for grips: they stiffen the body" in note for note in result.notes)
+
+
 def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> None:
     write_recording(log(), tmp_path / "gel.mcap")
     assert in_folder(tmp_path, "new", "bare", "--from", "gel.mcap")[0] == 0

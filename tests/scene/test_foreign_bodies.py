@@ -69,6 +69,13 @@ def gmsh4(path: Path, mesh: Mesh) -> Path:
     return path
 
 
+def test_a_body_s_corner_at_zero_is_told_as_zero() -> None:
+    """Not as what rounding left of it, -4.441e-16 mm."""
+    mesh = linear()
+    low = mesh.nodes.min(axis=0)
+    assert "from (0, 0, 0) mm" in facts(replace(mesh, nodes=mesh.nodes - low - 4e-19))["box"]
+
+
 def test_a_version_of_gmsh_may_be_written_with_zeros(tmp_path: Path) -> None:
     """As netgen writes it."""
     path = gmsh2(tmp_path / "x.msh", linear())

@@ -128,7 +128,7 @@ def _loaded(recording: Recording, test: TestKind) -> Loading:
     offset, contact = zero_of(log.d, log.force, load_noise(near), _TOE * way)
     last = int(np.argmax(log.d)) + 1
     kept = _rising(log, contact, last)
-    words = f"contact at {1e3 * contact:.4g} mm, {offset:.4g} N taken off"
+    words = f"contact at {1e3 * contact + 0.0:.4g} mm, {offset:.4g} N taken off"
     if last < len(log.d):
         words += f", {len(log.d) - last} rows after the largest displacement not in the mean"
     return Loading(

@@ -138,7 +138,8 @@ def _identify(
     material, notes = replace(p.material, E=E), [note]
     if p.material.E_bonded is None and any(m.scene.plates == "bonded" for m in methods.values()):
         material = replace(material, E_bonded=E / _stiffening(recordings[0], p))
-        notes.append(f"E = {material.E_bonded:.5g} Pa for bonded plates: they stiffen the body.")
+        held = "bonded plates" if p.test == "compression" else "grips"
+        notes.append(f"E = {material.E_bonded:.5g} Pa for {held}: they stiffen the body.")
     return Identified(replace(p, material=material), (), tuple(notes), calibrated=("force@fit",))
 
 

@@ -9,6 +9,7 @@ from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.part_of_body import pieces
 from validate.scene.shape_functions import CORNERS, brick_rule
 
+_ROUNDING = 1e-9  # mm for each metre of the body: what is left of a zero
 POOR = 0.1  # elements below such a quality shorten steps and spoil answers
 
 
@@ -35,6 +36,7 @@ def facts(mesh: Mesh) -> Mapping[str, str]:
     """Counts, box, volume, quality and facet sets, in words with units."""
     volumes, q = cell_volumes(mesh), quality(mesh)
     low, high = 1e3 * mesh.nodes.min(axis=0), 1e3 * mesh.nodes.max(axis=0)
+    low = np.where(np.abs(low) < _ROUNDING * np.ptp(mesh.nodes), 0.0, low)
     box = " x ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))
     at = ", ".join(f"{a:.4g}" for a in low)
     poor = int((q < POOR).sum())
