@@ -58,10 +58,10 @@ def _row(topic: Topic) -> list[str]:
 def _other(found: Inspection) -> str:
     source = found.source
     told = "".join(f"{line}\n" for line in found.facts)
-    return (
-        f"\nread as {found.read_as}\n{told}{source.bytes} bytes; integrity: {source.integrity}; "
-        f"sha256 {source.sha256}"
+    size, sums = (
+        (f"{source.bytes} bytes; ", f"; sha256 {source.sha256}") if source.sha256 else ("", "")
     )
+    return f"\nread as {found.read_as}\n{told}{size}integrity: {source.integrity}{sums}"
 
 
 def _head(found: Inspection) -> str:
