@@ -55,3 +55,11 @@ def test_pages_that_are_small_packed_are_counted_before_they_are_decoded(
     monkeypatch.setattr(stack_arrays, "MOST", 2 * 300 * 300)
     with pytest.raises(RecordingError, match="40 images of 300 x 300 px, more than 180000 bytes"):
         stack_arrays.arrays(path)
+
+
+def test_a_big_tiff_that_is_not_read_is_called_so(tmp_path: Path) -> None:
+    """It is whole: Pillow reads that order of classic TIFF alone."""
+    path = tmp_path / "x.tif"
+    tifffile.imwrite(path, BYTES, photometric="minisblack", bigtiff=True, byteorder=">")
+    with pytest.raises(RecordingError, match=r"x\.tif: a BigTIFF whose numbers are big-endian"):
+        read_image_stack(path, SAID)

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.recording.images.numbered import SUFFIXES, numbered
+from validate.recording.reader import head
 
 LIBRARIES = ("PIL.Image",)
 MOST = 400 * 2**20  # bytes of all images of one stack, in their own depth
+_BIG = b"MM\0\x2b"
 _DESCRIPTION = 270  # TIFF's tag of a text, in which ImageJ states scale and times
 _X_RESOLUTION, _Y_RESOLUTION = 282, 283
 _GREY = ("1", "L", "LA", "I;16", "I;16B", "I;16L", "I", "F")
@@ -47,6 +49,11 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
     """Every page in grey, and whether it was in colour."""
     from PIL import Image, ImageSequence
 
+    if head(file, len(_BIG)) == _BIG:
+        raise RecordingError(
+            f"{file.name}: a BigTIFF whose numbers are big-endian, which Pillow does not read; write "
+            "it little-endian, as by tiffcp -L x.tif y.tif"
+        )
     try:
         with Image.open(file) as opened:
             _require_few(opened)
