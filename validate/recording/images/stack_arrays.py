@@ -51,8 +51,8 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
 
     if head(file, len(_BIG)) == _BIG:
         raise RecordingError(
-            f"{file.name}: a BigTIFF whose numbers are big-endian, which Pillow does not read; write "
-            "it little-endian, as by tiffcp -L x.tif y.tif"
+            f"{file.name}: a BigTIFF whose numbers are big-endian, which Pillow does not read; "
+            "write it little-endian, as by tiffcp -L x.tif y.tif"
         )
     try:
         with Image.open(file) as opened:
