@@ -43,6 +43,8 @@ _WIDE: Mapping[str, Any] = {"color": ACCEPTED, "alpha": 0.45, "width": 0.014, "h
 _THIN: Mapping[str, Any] = {"color": MEASURED, "width": 0.005, "headwidth": 3.5, "headlength": 4}
 _PANEL, _ROOM = 2.9, 1.2  # inches of a row of panels at most, of labels and legend
 _FLAT, _TITLE = 0.8, 0.7  # inches of a row at least; of it, what is no panel
+_NARROW = 0.6  # of the longer side of a panel: the shorter is no less, as of markers in a line
+_LINE = 1 / 3  # of the spread along one axis: less along the other is a line along the one
 _BANDS = 7  # groups of neighbours that a line joins
 
 
@@ -65,6 +67,13 @@ class _Seen:
     def at(self, hold: Held) -> Floats:
         """The measured positions (k, d) m."""
         return np.asarray(self.markers.x[nearest_sample(self.markers.t, hold.t, "markers")])
+
+    @property
+    def along(self) -> int:
+        """The axis of the plane along which they are spread: the first, but for a line on the
+        other."""
+        first, second = np.ptp(self.markers.rest[:, self.plane], axis=0)
+        return self.plane[0] if first >= _LINE * second else self.plane[1]
 
 
 def markers(result: Result) -> Exhibit | None:
@@ -111,9 +120,11 @@ def _row_height(seen: _Seen) -> float:
 def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
     axes = figure.subplots(len(seen.loaded), 2, sharex=True, sharey=True, squeeze=False)
     start, rest = _MM * seen.at(seen.rest)[:, seen.plane], _MM * seen.markers.rest[:, seen.plane]
+    shown = [start, rest]
     for i, hold in enumerate(seen.loaded):
         simulated = _MM * seen.markers.simulated(judged.run.u[seen.frames[i + 1]])[:, seen.plane]
         measured = _MM * seen.at(hold)[:, seen.plane]
+        shown += [simulated, measured]
         left, right = axes[i]
         _vectors(left, rest, simulated, _WIDE, judged.label)
         _vectors(left, start, measured, _THIN, "measured")
@@ -124,9 +135,20 @@ def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
         left.set_ylabel(seen.labels[seen.plane[1]])
         for ax in (left, right):
             ax.set_aspect("equal")
+    xlim, ylim = _limits(np.concatenate(shown))
+    axes[0, 0].set(xlim=xlim, ylim=ylim)  # those of all panels
     for ax in axes[-1]:
         ax.set_xlabel(seen.labels[seen.plane[0]])
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+
+
+def _limits(points: Floats) -> Floats:
+    """From and to (2, 2) along both axes, around points (k, 2) with a margin."""
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    half = (high - low) / 2
+    half = 1.1 * np.maximum(half, max(_NARROW * half.max(), 1e-9))
+    middle = (low + high) / 2
+    return np.asarray(np.stack([middle - half, middle + half], axis=1))
 
 
 def _vectors(ax: Axes, start: Floats, end: Floats, look: Mapping[str, Any], label: str) -> None:
@@ -158,7 +180,7 @@ def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
     known = [m for m in finished(result) if m.name in own]
     on = distinct([(m, own[m.name].positions.apply(m.run.u[seen.frames[-1]])[:, c]) for m in known])
     drawn = [(m, styles[m.name]) for m in known if m.name not in on]
-    x, names = "xyz"[seen.plane[0]], ", ".join(m.label for m, _ in drawn)
+    x, names = "xyz"[seen.along], ", ".join(m.label for m, _ in drawn)
     made = Picture(
         "markers_across",
         f"Displacement of the markers along {'xyz'[c]} from rest against their {x}, mm. Bars: ± 1 "
@@ -178,7 +200,7 @@ def _across_panels(
     rows = -(-len(seen.loaded) // columns)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     axes = grid.flat[: len(seen.loaded)]
-    x, start = _MM * seen.markers.rest[:, seen.plane[0]], seen.at(seen.rest)[:, c]
+    x, start = _MM * seen.markers.rest[:, seen.along], seen.at(seen.rest)[:, c]
     for i, (ax, hold) in enumerate(zip(axes, seen.loaded, strict=True), start=1):
         ax.errorbar(x, _MM * (seen.at(hold)[:, c] - start), np.sqrt(2) * _MM * seen.markers.sd,
                     fmt=".", color=MEASURED, ecolor="#A0A0A0", ms=4, lw=0.8,
@@ -191,7 +213,7 @@ def _across_panels(
                     label=method.label)  # fmt: skip
         ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
     for ax in axes[-columns:]:
-        ax.set_xlabel(seen.labels[seen.plane[0]])
+        ax.set_xlabel(seen.labels[seen.along])
         ax.tick_params(labelbottom=True)
     for ax in grid.flat[len(seen.loaded) :]:
         ax.set_axis_off()
