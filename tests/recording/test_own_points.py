@@ -106,3 +106,104 @@ def test_a_log_with_a_force_is_a_machine_s_and_its_points_come_in_when_said(tmp_
     table("{name}_{axis} (mm)", **{"time (s)": T, "Force (N)": F}).to_csv(path, index=False)
     assert recognised(path).name == "instron"
     assert "'Force (N)'" in read_point_table(path, {}).metadata["provenance"]["left out, columns"]
+
+
+LONG = "time (s),frame,marker,x (mm),y (mm),z (mm)\n" + "".join(
+    f"{k / 10},{2 * k},{name},{x[k, 0]},{x[k, 1]},{x[k, 2]}\n"
+    for k in range(5)
+    for name, x in SEEN.items()
+    if (k, name) != (3, "base")
+)
+
+
+def long_table(path: Path, without: str = "") -> Path:
+    names = LONG.splitlines()[0].split(",")
+    keep = [i for i, name in enumerate(names) if name not in without.split("+")]
+    lines = [[line.split(",")[i] for i in keep] for line in LONG.splitlines()]
+    path.write_text("\n".join(map(",".join, lines)) + "\n")
+    return path
+
+
+def test_a_row_a_point_and_instant_is_markers_over_time(tmp_path: Path) -> None:
+    """They were landmarks called `tip (1)`, `tip (2)`, or by a rate one point that jumps."""
+    path = long_table(tmp_path / "p.csv")
+    found = read(path)
+    assert found.names == ("tip", "base")
+    assert np.allclose(found.t, np.arange(5) / 10, rtol=0, atol=1e-9)
+    expected = X[:5] / 1e3
+    expected[3, 1] = np.nan
+    assert np.allclose(found.x, expected, rtol=0, atol=1e-12, equal_nan=True)
+    counted = read(long_table(path, "time (s)"), {"rate": "20"})
+    assert np.allclose(counted.t, found.t, rtol=0, atol=1e-9)
+    assert np.array_equal(counted.x, found.x, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("without", "said"),
+    [
+        ("time (s)+frame", "every one of 2 names stands in several rows"),
+        ("marker", "1.8 rows at each|is not after the one before"),
+        ("marker+frame", "its time is not after the one before"),
+    ],
+)
+def test_rows_of_several_points_need_their_names_and_instants(
+    without: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        read(long_table(tmp_path / "p.csv", without))
+
+
+def test_two_rows_of_one_point_at_one_instant_are_refused(tmp_path: Path) -> None:
+    path = long_table(tmp_path / "p.csv")
+    path.write_text(LONG + "0.4,8,tip,0,0,0\n")
+    with pytest.raises(RecordingError, match="line 11: 'tip' has another row at this instant"):
+        read(path)
+
+
+def test_trackmates_spots_have_three_more_lines_of_names(tmp_path: Path) -> None:
+    path = tmp_path / "spots.csv"
+    path.write_text(
+        "LABEL,ID,TRACK_ID,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME\n"
+        "Label,Spot ID,Track ID,X,Y,Z,T,Frame\nLabel,Spot ID,Track ID,X,Y,Z,T,Frame\n"
+        ",,,(micron),(micron),(micron),(sec),\n"
+        + "".join(f"ID{i},{i},{i % 2},{i},{i % 2},0,{i // 2},{i // 2}\n" for i in range(8))
+    )
+    found = read(path)
+    assert found.names == ("0", "1")
+    assert np.allclose(found.t, range(4))
+    assert np.allclose(found.x[:, 1, 0], [1e-6, 3e-6, 5e-6, 7e-6])
+
+
+DEEPLABCUT = """scorer,DLC,DLC,DLC,DLC,DLC,DLC
+bodyparts,tip,tip,tip,base,base,base
+coords,x,y,likelihood,x,y,likelihood
+0,10.5,20,0.99,30,40,0.99
+1,11.5,20,0.2,30,40,0.99
+2,12.5,20,0.7,30,40,0.99
+"""
+PLACED = {"m_per_px": "0.1mm", "z": "0mm", "rate": "25"}
+
+
+def test_deeplabcuts_tables_are_markers_in_pixels(tmp_path: Path) -> None:
+    """They were called specimens of a testing machine."""
+    path = tmp_path / "dlc.csv"
+    path.write_text(DEEPLABCUT)
+    assert recognised(path).name == "points"
+    with pytest.raises(UsageError, match="in pixels; say the size of one: --map m_per_px="):
+        read(path)
+    found = read(path, PLACED)
+    assert found.names == ("tip", "base")
+    assert np.allclose(found.t, [0, 0.04, 0.08])
+    assert np.allclose(found.x[:, 0, 0], [1.05e-3, np.nan, 1.25e-3], equal_nan=True)
+    told = read_point_table(path, PLACED).metadata["provenance"]
+    assert "likelihood below 0.6 as not seen (1 of 6)" in told["assumed"]
+    sure = read(path, {**PLACED, "likelihood": "0.9"})
+    assert np.isnan(sure.x[:, 0, 0]).tolist() == [False, True, True]
+
+
+def test_deeplabcut_of_several_animals_names_them(tmp_path: Path) -> None:
+    path = tmp_path / "dlc.csv"
+    scorer, parts, *rest = DEEPLABCUT.splitlines()
+    parts = "bodyparts" + 2 * ",tip,tip,tip"
+    path.write_text("\n".join([scorer, "individuals,a,a,a,b,b,b", parts, *rest]) + "\n")
+    assert read(path, PLACED).names == ("a.tip", "b.tip")
