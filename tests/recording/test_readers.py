@@ -376,6 +376,7 @@ def test_a_standard_deviation_below_zero_or_none_is_refused(sd: float) -> None:
         (b"SQLite format 3\0", "an SQLite database.*sqlite3 -header -csv x.dat"),
         (b"GIF89a", "a GIF.*ffmpeg -i x.dat"),
         (b"TDSm", "LabVIEW.*CSV"),
+        (b"\x28\xb5\x2f\xfd", "Zstandard.*unzstd -k x.dat -o x; of a bag"),
     ],
 )
 def test_a_file_that_is_known_but_not_read_is_called_so(
@@ -386,7 +387,10 @@ def test_a_file_that_is_known_but_not_read_is_called_so(
         recognised(tmp_path / "x.dat")
 
 
-def test_a_folder_of_bags_without_its_metadata_names_one(tmp_path: Path) -> None:
-    (tmp_path / "x_0.db3").touch()
-    with pytest.raises(UsageError, match=r"metadata.yaml; name one: validate import .*/x_0\.db3"):
+@pytest.mark.parametrize("kind", ["db3", "mcap"])
+def test_a_folder_of_bags_without_its_metadata_names_one(kind: str, tmp_path: Path) -> None:
+    (tmp_path / f"x_0.{kind}").touch()
+    with pytest.raises(
+        UsageError, match=rf"metadata.yaml of rosbag2; name one: validate import .*/x_0\.{kind}"
+    ):
         recognised(tmp_path)

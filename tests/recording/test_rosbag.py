@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commands import here
 from rosbags.rosbag1 import Writer as Ros1Writer
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from test_mcap_ros2 import MADE, STORE, same
 
@@ -123,6 +123,61 @@ def test_what_is_left_in_a_log_or_cut_off_is_told(tmp_path: Path) -> None:
     path.write_bytes(whole[:-5000])
     with pytest.raises(RecordingError, match=rf"{len(whole) - 5000} bytes, .* {len(whole)}: cut"):
         read_bag(path, {})
+
+
+def split(folder: Path, storage: StoragePlugin, name: str) -> Path:
+    """A bag in two files, as rosbag2 splits one that grows too large."""
+    first = bag(folder, KIND, storage)
+    (part,) = (file for file in first.iterdir() if file.suffix != ".yaml")
+    for i in range(2):
+        (first / f"{name}_{i}{part.suffix}").write_bytes(part.read_bytes())
+    part.unlink()
+    yaml = first / "metadata.yaml"
+    names = [f"{name}_{i}{part.suffix}" for i in range(2)]
+    told = yaml.read_text()
+    assert f"- {part.name}\n" in told
+    for line in [line for line in told.splitlines() if line.endswith(f"- {part.name}")]:
+        told = told.replace(line, "\n".join(line.replace(part.name, f"'{n}'") for n in names))
+    yaml.write_text(told)
+    return first
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_a_bag_of_which_a_file_is_missing_is_refused(
+    storage: StoragePlugin, tmp_path: Path
+) -> None:
+    """Not read as far as it is there, as one of MCAP was."""
+    whole = split(tmp_path, storage, "a b")
+    assert all(len(signal.t) == 6 for signal in read_bag(whole, {}).signals.values())
+    (missing,) = whole.glob("a b_1.*")
+    missing.unlink()
+    with pytest.raises(RecordingError, match=f"names 2 files, of which {missing.name} is not"):
+        read_bag(whole, {})
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_messages_that_are_compressed_one_by_one_are_read(
+    storage: StoragePlugin, tmp_path: Path
+) -> None:
+    """By the folder; of a database alone that is said, which was called damaged."""
+    writer = Writer(tmp_path / "bag", version=9, storage_plugin=storage)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with writer:
+        to = writer.add_connection("/x", KIND.replace("/", "/msg/"), typestore=STORE)
+        for i in range(3):
+            writer.write(to, 200 * 10**9 + i, raw(KIND, i))
+    same(read_bag(tmp_path / "bag", {}), MADE[KIND][1])
+    for file in (tmp_path / "bag").glob("*.db3"):
+        with pytest.raises(RecordingError, match=r"each message is compressed.*import its folder"):
+            read_bag(file, {})
+
+
+def test_a_log_beside_a_database_of_a_folder_is_told(tmp_path: Path) -> None:
+    folder = bag(tmp_path, KIND)
+    (file,) = folder.glob("*.db3")
+    file.with_name(f"{file.name}-wal").write_bytes(b"some")
+    with pytest.raises(RecordingError, match="4 bytes of it are still in"):
+        read_bag(folder, {})
 
 
 def test_a_database_of_another_kind_is_called_so(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Bags of ROS: rosbag2's SQLite or its folder, and ROS 1's. What is in them is read as in MCAP."""
 
+import re
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,10 @@ from validate.recording.types import Recording, Source
 
 _SQLITE, _TABLES = b"SQLite format 3\0", (b"topics", b"messages")
 _PAGE = 65536  # bytes: the first page, which lists the tables, is no longer
+_NAMED = re.compile(
+    r"""^\s*-\s+(?:path:\s*)?["']?(?:.*/)?([^/\n]+?\.(?:db3|mcap)(?:\.zstd)?)["']?\s*$""", re.M
+)
+_PACKED = re.compile(r"""compression_mode:\s*["']?message""", re.I)
 _YAML, _SAYS = "metadata.yaml", b"rosbag2_bagfile_information"
 
 
@@ -27,9 +32,11 @@ def read_bag(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path}: no such file or folder")
     if not _recognises(path):
         raise RecordingError(f"{path.name}: no bag of ROS")
-    if path.is_dir() and len(one := list(path.glob("*.mcap"))) == 1:
-        return read_all(one[0], options)
-    _require_whole(path)
+    if path.is_dir() and (one := _only_mcap(path)):
+        return read_all(one, options)
+    _require_all(path)
+    for file in path.glob("*.db3") if path.is_dir() else (path,):
+        _require_whole(file)
     found = decoded("rosbag_arrays", path, "ros2")
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         whole = Path(folder) / f"{path.stem}.mcap"
@@ -39,6 +46,36 @@ def read_bag(path: Path, options: Options) -> Recording:
     said = "a bag keeps no checksum: integrity not provable"
     source = Source(path.resolve().name, "", 0, said) if path.is_dir() else source_of(path, said)
     return replace(got, source=source, unread={**got.unread, **never})
+
+
+def _told(folder: Path) -> tuple[list[str], bool]:
+    """The files of a bag as its metadata has them, and whether each message is compressed."""
+    file = folder / _YAML
+    told = file.read_text("utf-8", "replace") if file.is_file() else ""
+    return list(dict.fromkeys(_NAMED.findall(told))), bool(_PACKED.search(told))
+
+
+def _only_mcap(folder: Path) -> Path | None:
+    """The one MCAP file of a bag of one file, which its own reader knows, whatever its name."""
+    names, packed = _told(folder)
+    there = list(folder.glob("*.mcap"))
+    return there[0] if len(there) == 1 and len(names) < 2 and not packed else None
+
+
+def _require_all(path: Path) -> None:
+    """All files of a folder; of a single file, that it can be read without its metadata."""
+    names, packed = _told(path if path.is_dir() else path.parent)
+    if path.is_dir():
+        if missing := [name for name in names if not (path / name).is_file()]:
+            raise RecordingError(
+                f"{path.name}: its {_YAML} names {len(names)} files, of which {missing[0]} is not "
+                "there; copy it too, or import the others one by one"
+            )
+    elif packed and path.name in names:
+        raise RecordingError(
+            f"{path.name}: each message is compressed, as {_YAML} beside it tells; import its "
+            "folder"
+        )
 
 
 def _require_whole(path: Path) -> None:

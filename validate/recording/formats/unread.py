@@ -23,6 +23,8 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
       for title in (b"TRAJECTORIES\r", b"TRAJECTORIES\n", b"ANALOG\r", b"ANALOG\n")),
     (b"FLV\1", "a video (Flash)", _FFMPEG),
     (b"\x1f\x8b", "packed by gzip", "gunzip -k {name}"),
+    (b"\x28\xb5\x2f\xfd", "packed by Zstandard",
+     "unzstd -k {name} -o {stem}; of a bag of ROS import the folder instead"),
     (b"PK\3\4", "a ZIP archive", "unzip {name} -d {stem}, then name the folder or a file in it"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and name the file or folder in it"),
     (b"Rar!", "a RAR archive", "unpack it and name the file or folder in it"),
@@ -53,9 +55,9 @@ def _folder(folder: Path) -> str:
         return (
             f"{name} is a folder of DICOM files, read one by one: validate import {name}/{dicom[0]}"
         )
-    if bags := sorted(p.name for p in folder.glob("*.db3")):
+    if bags := sorted(p.name for kind in ("db3", "mcap") for p in folder.glob(f"*.{kind}")):
         return (
-            f"{name} holds bags of ROS 2 without their metadata.yaml; name one: validate import "
-            f"{name}/{bags[0]}"
+            f"{name} holds {'bags of ROS 2' if bags[0].endswith('db3') else 'MCAP files'} without "
+            f"metadata.yaml of rosbag2; name one: validate import {name}/{bags[0]}"
         )
     return ""
