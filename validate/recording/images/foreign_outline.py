@@ -14,6 +14,7 @@ said.
 import csv
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -30,8 +31,10 @@ from validate.recording.types import Contours, Frames
 from validate.units import in_si
 
 MAX_FILE = 256 * 2**20  # bytes
+_BEYOND = 0.1  # of its size an outline may leave the image: what is cut by its edge is drawn so
 _MOST = 64  # regions: pictures have more levels
 KINDS = (".png", ".npy", ".npz", ".nrrd", ".csv", ".json")
+_POLYGON = "polygon"
 Outlines = Mapping[int, Floats]
 
 
@@ -43,7 +46,8 @@ def foreign_outlines(
 
     Raises `UsageError` for another kind of file, and where several regions leave open which is
     meant, `RecordingError` naming file and image: masks of
-    another size, several regions or none in one, fewer than 3 points, images that are not there.
+    another size, several regions or none in one, fewer than 3 points, images that are not there,
+    points beyond the image, polygons of images of another size, shapes that are no polygons.
     """
     found = _read(path, frames, label)
     beyond = [i for i in found if not 0 <= i < len(frames.images)]
@@ -56,6 +60,7 @@ def foreign_outlines(
     scale = _scale(path, frames, unit)
     at = sorted(found)
     outlines = tuple(found[i] * scale for i in at)
+    _require_inside(path, dict(zip(at, outlines, strict=True)), frames)
     return Contours(frames.t[at], outlines, sd, frames.pose, frames.frame, images)
 
 
@@ -65,6 +70,19 @@ def _scale(path: Path, frames: Frames, unit: str) -> Floats:
         raise UsageError(f"unit {unit} of {path.name}: px, or a length as mm")
     drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
     return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
+
+
+def _require_inside(path: Path, outlines: Outlines, frames: Frames) -> None:
+    """No point far off its image: then the unit is another, or the images are."""
+    for i, outline in outlines.items():
+        at, size = outline / frames.m_per_px, np.array(frames.images[i].shape[1::-1])
+        out = ~np.all((at > -_BEYOND * size) & (at < (1 + _BEYOND) * size), axis=1)
+        if out.any():
+            x, y = at[out][0]
+            raise RecordingError(
+                f"{path.name}: image {i}: a point at ({x:.4g}, {y:.4g}) px, the image is "
+                f"{size[0]} x {size[1]}: drawn in images of another size, or --unit is another"
+            )
 
 
 def _read(path: Path, frames: Frames, label: str) -> Outlines:
@@ -80,7 +98,7 @@ def _read(path: Path, frames: Frames, label: str) -> Outlines:
                 raise UsageError(f"--label {label}: of masks and polygons; {path.name} has none")
             return _table(path)
         if kind == ".json":
-            return _polygons(path, files, len(frames.images), label)
+            return _polygons(path, files, frames, label)
         named: Mapping[str, int] = {}
         if kind == ".nrrd":
             masks, named = _volume(path)
@@ -207,21 +225,36 @@ def _table(path: Path) -> Outlines:
         return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
 
 
-def _polygons(path: Path, files: list[Path], images: int, label: str) -> Outlines:
+def _polygons(path: Path, files: list[Path], frames: Frames, label: str) -> Outlines:
+    images = len(frames.images)
     try:
         told = [json.loads(f.read_text(encoding="utf-8-sig", errors="replace")) for f in files]
         if "annotations" in told[0] and len(told) == 1:
-            return _coco(path, told[0], images, label)
+            return _coco(path, told[0], frames, label)
         _require_each(path, len(files), "files of polygons", images)
-        meant = _of_names(path, label, (_label(s) for one in told for s in _closed(one)))
+        for i, one in enumerate(told):
+            _require_size(path, i, (one.get("imageWidth"), one.get("imageHeight")), frames)
+        closed = [s for one in told for s in one["shapes"] if _kind(s) == _POLYGON]
+        others = [s for one in told for s in one["shapes"]]
+        meant = _of_names(path, label, map(_label, others if label or not closed else closed))
         each = ((i, _shape(path, one, meant)) for i, one in enumerate(told))
         return _grouped(path, ((i, p) for i, points in each for p in points))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise RecordingError(f"{path.name}: neither LabelMe nor COCO polygons ({error})") from None
 
 
-def _closed(told: Any) -> list[Any]:
-    return [s for s in told["shapes"] if s.get("shape_type", "polygon") == "polygon"]
+def _kind(shape: Any) -> str:
+    return str(shape.get("shape_type", _POLYGON))
+
+
+def _require_size(path: Path, i: int, told: tuple[Any, Any], frames: Frames) -> None:
+    """The size (w, h) px of an image, where it is told, is that of ours."""
+    h, w = frames.images[i].shape
+    if None not in told and told != (w, h):
+        raise RecordingError(
+            f"{path.name}: drawn in an image of {told[0]} x {told[1]} px, image {i} is {w} x {h}: "
+            "draw in the images as they were recorded"
+        )
 
 
 def _label(shape: Any) -> str:
@@ -230,26 +263,47 @@ def _label(shape: Any) -> str:
 
 def _shape(path: Path, told: Any, label: str) -> Any:
     """The points of the polygon of a LabelMe file; none where it has no shape of that label."""
-    closed = [s for s in _closed(told) if _label(s) == label]
+    closed = [s for s in told["shapes"] if _label(s) == label]
+    if kinds := [kind for kind in map(_kind, closed) if kind != _POLYGON]:
+        raise RecordingError(
+            f"{path.name}: '{label}' is drawn as {kinds[0]}, expected polygons in all images"
+        )
     if len(closed) > 1:
         raise RecordingError(f"{path.name}: {len(closed)} polygons in one image, expected one")
     return closed[0]["points"] if closed else []
 
 
-def _coco(path: Path, told: Any, images: int, label: str) -> Outlines:
+def _coco(path: Path, told: Any, frames: Frames, label: str) -> Outlines:
     """One polygon an image, images in the order of the numbers in their files' names."""
-    _require_each(path, len(told["images"]), "images", images)
-    listed = sorted(told["images"], key=lambda image: number_key(str(image["file_name"])))
+    _require_each(path, len(told["images"]), "images", len(frames.images))
+    listed = sorted(told["images"], key=_number)
+    for a, b in pairwise(listed):
+        if _number(a) == _number(b):
+            raise RecordingError(
+                f"{path.name}: '{a['file_name']}' and '{b['file_name']}' have the same number: "
+                "which is the earlier image is open; number them"
+            )
+    for i, image in enumerate(listed):
+        _require_size(path, i, (image.get("width"), image.get("height")), frames)
     order = {image["id"]: i for i, image in enumerate(listed)}
     names = {c["id"]: str(c["name"]) for c in told.get("categories", ())}
     drawn = [(names.get(n.get("category_id"), ""), n) for n in told["annotations"]]
     meant = _of_names(path, label, (name for name, _ in drawn))
     chosen = [n for name, n in drawn if name == meant]
+    if any(isinstance(n["segmentation"], dict) for n in chosen):
+        raise RecordingError(
+            f"{path.name}: '{meant}' is drawn as masks (RLE), expected polygons; save the masks as "
+            "PNG, one an image, and name their folder"
+        )
     polygons = [(order[n["image_id"]], p) for n in chosen for p in n["segmentation"]]
     if len(polygons) > len({i for i, _ in polygons}):
         raise RecordingError(f"{path.name}: several polygons in one image, expected one")
     pairs = ((i, pair) for i, p in polygons for pair in np.reshape(p, (-1, 2)).tolist())
     return _grouped(path, pairs)
+
+
+def _number(image: Any) -> tuple[int, ...]:
+    return number_key(str(image["file_name"]))
 
 
 def _grouped(path: Path, points: Iterable[tuple[Any, Any]]) -> Outlines:
