@@ -200,3 +200,13 @@ def test_words_that_no_run_was_aborted_are_no_remark(tmp_path: Path) -> None:
         recording = read(tmp_path, f"Aborted: {answer}\n{BARE}{rows()}", test="compression")
         assert "run" not in recording.record(ASSUMED)
     assert not tells_a_stop("Test ended at 3 mm")
+
+
+@pytest.mark.parametrize("name", ["Deflection (mm)", "Flexure extension (mm)", "Depth (mm)"])
+def test_a_bent_or_indented_body_is_told_what_to_answer(name: str, tmp_path: Path) -> None:
+    """It neither presses on a whole face nor pulls: the question alone had no true answer."""
+    path = tmp_path / "log.csv"
+    lines = "".join(f"{t},{d},{f}\n" for t, d, f in zip(T, D, F, strict=True))
+    path.write_text(BARE.replace("Displacement (mm)", name) + lines)
+    with pytest.raises(UsageError, match=ASKED + ".* say compression .* experiment = body"):
+        read_instron(path, {})

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
+from validate.recording.exports.instron import read_instron
 from validate.recording.formats.ndi import read_ndi
 from validate.recording.formats.point_table import read_point_table
 from validate.recording.readers import recognised
@@ -183,3 +184,43 @@ def test_axes_of_what_is_no_place_make_no_point(tmp_path: Path, name: str) -> No
     mixed = log(tmp_path / "y.csv", f"{head},tip_x (mm),tip_y (mm),tip_z (mm)", "0,1,2,3,4,5,6")
     markers = recognised(mixed).read(mixed, {}).marker("markers")
     assert (markers.names, markers.x.tolist()) == (("tip",), [[[0.004, 0.005, 0.006]]])
+
+
+TUM = ["1305031102.10 0.1 0.2 0.3 0 0 0 1", "1305031102.12 0.4  0.5 0.6 0 0 0 1"]
+
+
+def test_a_trajectory_of_words_and_numbers_at_spaces(tmp_path: Path) -> None:
+    """It was called no table; its lengths are in m, where a tracker of NDI writes mm."""
+    path = log(tmp_path / "t.txt", "# timestamp tx ty tz qx qy qz qw", *TUM)
+    assert recognised(path).name == "ndi"
+    with pytest.raises(UsageError, match="no unit of length; say it: --map unit=m, as"):
+        read_ndi(path, {})
+    got = read_ndi(path, {"unit": "m"}).signal("tool1/translation", "m")
+    assert np.allclose(got.y, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
+    assert np.allclose(got.t, [0, 0.02], atol=1e-6)
+
+
+def test_a_trajectory_without_names_is_told_which_to_write(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="above them: # timestamp tx ty tz qx qy qz qw"):
+        read_instron(log(tmp_path / "t.txt", *TUM), {})
+
+
+def test_points_at_spaces(tmp_path: Path) -> None:
+    path = log(tmp_path / "p.txt", "# t[s] A_x[mm] A_y[mm] A_z[mm]", "0.0  1 2 3", "0.1  4 5 6")
+    assert recognised(path).name == "points"
+    assert read_point_table(path, {}).marker("markers").x.tolist() == [
+        [[0.001, 0.002, 0.003]],
+        [[0.004, 0.005, 0.006]],
+    ]
+
+
+def test_velocities_and_quaternions_beside_a_point_are_none(tmp_path: Path) -> None:
+    """As EuRoC's ground truth has them: `--map unit=mm` was advised, for all of them."""
+    names = ["#timestamp", *(f" p_R_{c} [m]" for c in "xyz"), *(f" q_R_{c} []" for c in "wxyz")]
+    names += [f" v_R_{c} [m s^-1]" for c in "xyz"]
+    rows = [f"{1403636580838555648 + k * 5000000},{k},2,3,1,0,0,0,9,9,9" for k in range(3)]
+    found = read_point_table(log(tmp_path / "e.csv", ",".join(names), *rows), {"time": "ns"})
+    markers = found.marker("markers")
+    assert markers.names == ("p_R",)
+    assert markers.x[:, 0, 0].tolist() == [0, 1, 2]
+    assert np.allclose(markers.t, [0, 0.005, 0.01], rtol=0, atol=5e-7)  # ns since 1970 as float

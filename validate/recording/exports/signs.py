@@ -1,5 +1,6 @@
 """Which way compression points in a force-displacement table, and which columns to flip for it."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.exports.columns import Pick
 from validate.recording.exports.kinds import ASK, Kind, KindName
 
+_NEITHER = re.compile(r"bend|bieg|flex|deflection|durchbieg|indent|depth|eindring", re.I)
 _NAMES: dict[int, KindName] = {1: "compression", -1: "tension"}
 
 
@@ -40,7 +42,7 @@ def signs(
     if kind is None:
         raise UsageError(
             f"nothing says whether this test presses or pulls: '{displacement.column.label}' goes "
-            f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}"
+            f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}{_of_neither(displacement, force)}"
         )
     if kind.name == "tension" and not kind.said and d + f < 0 and d * f >= 0:
         raise RecordingError(
@@ -49,6 +51,15 @@ def signs(
         )
     wanted = 1 if kind.name == "compression" else -1
     return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, _reason(d, f, kind), kind)
+
+
+def _of_neither(displacement: Pick, force: Pick) -> str:
+    """What to say of a test that presses no plate on a whole face, by the names of its columns."""
+    text = f"{displacement.column.label} {force.column.label}"
+    if not _NEITHER.search(text):
+        return ""
+    return ("; a bent or an indented body is neither: say compression where the tool moves into it "
+            "and, in validate new, experiment = body")  # fmt: skip
 
 
 def _as_said(d: int, f: int, displacement: Pick, force: Pick, kind: Kind | None) -> Signs:

@@ -68,6 +68,9 @@ def read_ndi(path: Path, options: Options) -> Recording:
     whose = _whose(header, rows, tools)
     t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options, whose)
     stated = tools[0].unit or above.get("units", "")
+    if not stated and "unit" not in options and header.cell(0).startswith("#"):
+        raise UsageError(f"{path.name}: states no unit of length; say it: --map unit=m, as "
+                         "trajectories of TUM have it, or unit=mm")  # fmt: skip
     factor = length({"unit": stated or "mm", **options}, "unit", "mm")
     frame = options.get("frame", "tracker")
     streams: dict[str, Stream] = {}
@@ -206,9 +209,10 @@ def _seen(
 
 
 def _recognises(path: Path) -> bool:
-    text = head(path).decode("utf-8", "replace")
-    lines = [re.split(r"[,;\t]", line) for line in text.splitlines()[:12]]
-    return any(tools_of(TextRow(0, tuple(c.strip() for c in cells))) for cells in lines)
+    lines = head(path).decode("utf-8", "replace").splitlines()[:12]
+    marked = any(c in line for line in lines for c in ",;\t")
+    split = [re.split(r"[,;\t]", line) if marked else line.split() for line in lines]
+    return any(tools_of(TextRow(0, tuple(c.strip() for c in cells))) for cells in split)
 
 
 NDI = Reader(

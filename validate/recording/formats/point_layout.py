@@ -12,6 +12,7 @@ from itertools import takewhile
 from validate.recording.exports.table import split_unit
 from validate.recording.exports.vocabulary import role_of_name, words
 from validate.recording.formats.text_rows import TextRow, TextRows, as_number, fields_above
+from validate.units import in_si
 
 AXES = "xyz"
 PIXELS = ("px", "pixel", "pixels")
@@ -22,6 +23,7 @@ _NO_PLACE = re.compile(
     r"(lin(ear)?|ang(ular)?)?[\W_]*(acc\w*|gyr\w*|magn\w*|vel\w*|moment\w*|torque|force|omega|"
     r"rot\w*|quat\w*|orient\w*|euler|q)", re.I
 )  # fmt: skip
+_W = re.compile(r"[\s_.:-]+[wW]$")  # beside x, y, z of the same name it makes a quaternion
 _LABELS = {"name", "label", "marker", "point", "landmark", "id", "particle", "track", "bodypart"}
 _ALONE = "point"  # the name of points whose columns are x, y, z and nothing else
 _DEEPEST = 40  # lines in which the line of names is looked for
@@ -80,7 +82,7 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
         return None
     split = [split_unit(c) for c in cells]
     names, units = [n for n, _ in split], [u or "" for _, u in split]
-    points = _points_of(names)
+    points = _lengths(_points_of(names), units)
     if not points:
         return None
     below = [r for r in below if any(r.cells) and not r.cell(0).startswith("#")]
@@ -89,7 +91,7 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
     if said:  # of several, as below the names of TrackMate, the last are the units
         units = [u or said[-1].cell(i).strip("()[] ") for i, u in enumerate(units)]
         below = below[len(said) :]
-    time = next((i for i, n in enumerate(names) if role_of_name(n) == "time"), None)
+    time = next((i for i, n in enumerate(names) if _is_time(n)), None)
     layout = PointLayout(
         points, time, None, cells, tuple(units), below, frames=_frames(names, below)
     )
@@ -97,6 +99,17 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
         return replace(layout, whose=whose)
     label = next(iter(_labels(names)), None)
     return replace(layout, label=label if list(points) == [_ALONE] and time is None else None)
+
+
+def _is_time(name: str) -> bool:
+    return role_of_name(name) == "time" or name.strip().lower() in ("timestamp", "time stamp")
+
+
+def _lengths(points: dict[str, list[int]], units: Sequence[str]) -> dict[str, list[int]]:
+    """The points without velocities and the like: beside lengths, what has another unit."""
+    of = {n: {units[i] for i in columns} for n, columns in points.items()}
+    lengths = {n for n, own in of.items() if all(in_si(1.0, u, "m") for u in own if u) and any(own)}
+    return {n: c for n, c in points.items() if not lengths or n in lengths or not any(of[n])}
 
 
 def _is_words(row: TextRow, columns: Sequence[int]) -> bool:
@@ -157,7 +170,8 @@ def _points_of(names: Sequence[str]) -> dict[str, list[int]]:
         axis, whose = _axis_of(name)
         if axis and found.setdefault(whose, {}).setdefault(axis, i) != i:
             return {}
-    whole = {n: a for n, a in found.items() if {"x", "y"} <= a.keys()}
+    turns = {_W.sub("", n.strip()) for n in names if _W.search(n.strip())}
+    whole = {n: a for n, a in found.items() if {"x", "y"} <= a.keys() and n not in turns}
     axes = [c for c in AXES if any(c in a for a in whole.values())]
     return {n: [a[c] for c in axes] for n, a in whole.items() if len(a) == len(axes)}
 

@@ -21,6 +21,7 @@ NONE = 1e20  # NDI writes -3.7e28 for a number that is none
 ASSUMED = "assumed"  # a record: what was taken of a file and what decided, a line each
 LEFT_OUT = "left out"  # a record's key: what of the file did not become data
 ZEROS = "three zeros"  # a record's key: how many points were taken as not seen
+_FIRST = 8  # lines that tell what stands between cells
 ABSENT = {"", "nan", "NaN", "NAN", "-", "NULL", "Null", "null"}
 
 
@@ -48,7 +49,7 @@ class TextRows:
 
 def text_rows(path: Path) -> TextRows:
     """The file split at tabs, semicolons or commas, whichever most of its first lines have; before
-    commas the others, beside which a comma is a number's.
+    commas the others, beside which a comma is a number's; at spaces, where they have none.
 
     Raises `UsageError` for a file that cannot be read, `RecordingError` for one that is no text.
     """
@@ -62,7 +63,10 @@ def rows_of(name: str, data: bytes) -> TextRows:
     except RecordingError as error:
         raise RecordingError(f"{name}: {error}") from None
     lines = text.splitlines()
-    separator = max("\t;,", key=lambda mark: sum(mark in line for line in lines[:8]))
+    often = {mark: sum(mark in line for line in lines[:_FIRST]) for mark in "\t;,"}
+    separator = max(often, key=lambda mark: often[mark])
+    if not often[separator]:
+        lines, separator = [_spaced(line) for line in lines], " "
     cells = csv.reader(lines, delimiter=separator, skipinitialspace=True, quoting=csv.QUOTE_MINIMAL)
     try:
         rows = tuple(
@@ -71,6 +75,11 @@ def rows_of(name: str, data: bytes) -> TextRows:
     except csv.Error as error:
         raise RecordingError(f"{name}: no table of cells ({error})") from None
     return TextRows(name, rows, not text.endswith(("\n", "\r")))
+
+
+def _spaced(line: str) -> str:
+    """With one space between words; a mark of comments is none: `# t x` is `#t x`."""
+    return re.sub(r"^#+ ", "#", " ".join(line.split()))
 
 
 def fields_above(held: TextRows, header: TextRow) -> dict[str, str]:

@@ -121,7 +121,7 @@ def _named(found: re.Match[str]) -> str:
 
 def clock_of_columns(header: TextRow) -> list[tuple[int, float]]:
     """Columns that make up the time, and the seconds of one of their units."""
-    cells = [c.lower().strip(": ") for c in header.cells]
+    cells = [c.lower().strip("#: ") for c in header.cells]
     parts = [(i, _CLOCK[c]) for i, c in enumerate(cells) if c in _CLOCK]
     if parts:
         return parts
