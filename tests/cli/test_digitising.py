@@ -1,5 +1,6 @@
 """Landmarks that a tracked tip was held on, from a recording to points with names."""
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -145,3 +146,24 @@ def test_landmarks_of_a_body_are_taken_from_what_declares_them(
     assert record["predicted"] == "rms 0.256 mm, each landmark by the others"
     assert record["places that are no landmark"] == "2"
     assert "in millimetres" in refused(*given, "--unit", "cm", "-o", str(tmp_path / "z.mcap"))
+
+
+def test_poses_that_are_missing_are_told(tmp_path: Path) -> None:
+    """The tip seen at the ends of its time on a landmark alone, the reference not on another."""
+    whole = read_recording(recorded(tmp_path, [3, 0, 4, 1], reference=True))
+    t = whole.signals["PenToTracker/translation"].t
+    seen = {"PenToTracker": (t < 3.5) | (t > 4.8), "BaseToTracker": (t < 6.1) | (t > 6.3)}
+    keeps = {topic: seen[topic.partition("/")[0]] for topic in whole.signals}
+    signals = {
+        topic: replace(s, t=s.t[keeps[topic]], y=s.y[keeps[topic]])
+        for topic, s in whole.signals.items()
+    }
+    write_recording(replace(whole, signals=signals, clock={}), tmp_path / "gaps.mcap")
+    given = command(tmp_path / "gaps.mcap", tmp_path / "y.mcap", "--reference", "BaseToTracker")
+    code, said, err = here(*given)
+    assert code == 0
+    told = " ".join((said + err).split())
+    gone, left = int((~seen["BaseToTracker"]).sum()), int(seen["PenToTracker"].sum())
+    assert f"{gone} of {left} poses of 'PenToTracker' are left out: 'BaseToTracker' was" in told
+    assert "from 2.98 s on it was seen for 0.7 of 2.02 s" in told
+    assert told.count("it may have been elsewhere meanwhile") == 1

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.arrays import Floats, rms
+from validate.cli.arguments import complain
 from validate.cli.display import say, table
 from validate.cli.known_places import known_places
 from validate.cli.recordings import written
@@ -24,6 +25,7 @@ from validate.register.landmarks import match_landmarks
 
 RADIUS, LEAST = 3e-3, 1.0  # m, s: within which a tip that is roughly known stands, and how long
 _TOUCH, _HOLDS = 0.5, 0.75e-3  # s, m: its first touch, before the tool is turned far
+_SEEN = 0.5  # of the time on a place: less is told
 _MATCH = 5e-3  # m: within which a place is a landmark's
 _COLUMNS = ("x, mm", "y, mm", "z, mm", "from, s", "stood, s", "wander, mm")
 
@@ -54,6 +56,7 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
             f"the tip of '{how.tool}' never stands within {1e3 * RADIUS:g} mm for {LEAST:g} s: "
             "check --tip"
         )
+    _told_unseen(recording, how, t, standing)
     parts = tuple(d.touch(_TOUCH, _HOLDS) for d in standing)
     if how.known is None:
         found = _numbered(how, standing, parts)
@@ -69,6 +72,27 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
     done = _with(recording, how, streams, found.record)
     write_recording(done, out)
     written(done, out)
+
+
+def _told_unseen(
+    recording: Recording, how: HowDigitised, t: Floats, standing: tuple[Dwell, ...]
+) -> None:
+    """Poses without the reference, which may be those on a landmark, and places where the tip was
+    hardly seen: it may have been elsewhere meanwhile."""
+    poses = len(recording.signals[f"{how.tool}/{TRANSLATION}"].t)
+    if len(t) < poses:
+        complain(
+            f"{poses - len(t)} of {poses} poses of '{how.tool}' are left out: '{how.reference}' "
+            "was not seen then"
+        )
+    step = float(np.median(np.diff(t)))
+    for d in standing:
+        stood, seen = float(np.ptp(d.t)), step * (len(d.t) - 1)
+        if seen < _SEEN * stood:
+            complain(
+                f"where the tip stood from {d.t[0]:.2f} s on it was seen for {seen:.2g} of "
+                f"{stood:.3g} s: it may have been elsewhere meanwhile"
+            )
 
 
 @dataclass(frozen=True)
