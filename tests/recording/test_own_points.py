@@ -207,3 +207,11 @@ def test_deeplabcut_of_several_animals_names_them(tmp_path: Path) -> None:
     parts = "bodyparts" + 2 * ",tip,tip,tip"
     path.write_text("\n".join([scorer, "individuals,a,a,a,b,b,b", parts, *rest]) + "\n")
     assert read(path, PLACED).names == ("a.tip", "b.tip")
+
+
+def test_deeplabcuts_table_without_coordinates_names_no_points(tmp_path: Path) -> None:
+    """A point that has likelihoods alone ended in a traceback."""
+    path = tmp_path / "dlc.csv"
+    path.write_text(DEEPLABCUT.replace(",x,y,", ",likelihood,likelihood,"))
+    with pytest.raises(RecordingError, match="no line names points"):
+        read(path, PLACED)

@@ -63,3 +63,41 @@ def test_a_big_tiff_that_is_not_read_is_called_so(tmp_path: Path) -> None:
     tifffile.imwrite(path, BYTES, photometric="minisblack", bigtiff=True, byteorder=">")
     with pytest.raises(RecordingError, match=r"x\.tif: a BigTIFF whose numbers are big-endian"):
         read_image_stack(path, SAID)
+
+
+SIZED = {
+    "PhysicalSizeX": 6.5, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 6.6,
+    "PhysicalSizeYUnit": "µm", "TimeIncrement": 500, "TimeIncrementUnit": "ms",
+}  # fmt: skip
+
+
+def test_ome_states_its_scale_and_its_times(tmp_path: Path) -> None:
+    """They were asked for."""
+    path = tmp_path / "x.ome.tif"
+    tifffile.imwrite(path, BYTES, ome=True, metadata={"axes": "TYX", **SIZED})
+    recording = read_image_stack(path, {})
+    frames = recording.frame("images")
+    assert frames.m_per_px == pytest.approx((6.5e-6, 6.6e-6), rel=1e-9)
+    assert frames.t.tolist() == [0, 0.5, 1]
+    assert "stated by OME" in recording.metadata["provenance"]["m_per_px"]
+    tifffile.imwrite(path, BYTES, ome=True, metadata={"axes": "TYX", "PhysicalSizeX": 6.5})
+    with pytest.raises(UsageError, match="states no scale"):
+        read_image_stack(path, {"rate": "2"})
+
+
+def test_channels_and_planes_of_ome_are_no_times(tmp_path: Path) -> None:
+    """By a rate, both channels were images of one film."""
+    path = tmp_path / "x.ome.tif"
+    for axes in ("TCYX", "TZYX"):
+        pages = np.concatenate([BYTES, BYTES[:1]]).reshape(2, 2, 40, 50)
+        tifffile.imwrite(path, pages, ome=True, metadata={"axes": axes, **SIZED})
+        with pytest.raises(RecordingError, match="4 pages are 2 times of"):
+            read_image_stack(path, SAID)
+
+
+def test_a_damaged_number_of_ome_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "x.ome.tif"
+    tifffile.imwrite(path, BYTES, ome=True, metadata={"axes": "TYX", **SIZED})
+    path.write_bytes(path.read_bytes().replace(b'SizeX="6.5"', b'SizeX="6,5"'))
+    with pytest.raises(UsageError, match="states no scale"):
+        read_image_stack(path, {"rate": "2"})

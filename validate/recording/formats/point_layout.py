@@ -154,7 +154,9 @@ def _of_deeplabcut(rows: Sequence[TextRow]) -> PointLayout | None:
             found.setdefault(".".join(r.cell(i) for r in said), {})[coords.cell(i)] = i
     axes = [c for c in AXES if any(c in a for a in found.values())]
     points = {n: [a[c] for c in axes] for n, a in found.items() if a.keys() >= set(axes)}
-    sure = tuple(a["likelihood"] for a in found.values() if "likelihood" in a)
+    if not {"x", "y"} <= set(axes) or not points:
+        return None
+    sure = tuple(found[n]["likelihood"] for n in points if "likelihood" in found[n])
     below = [r for r in rows if r.line > coords.line and any(r.cells)]
     counted = all(_is_count(r.cell(0)) for r in below)
     return PointLayout(

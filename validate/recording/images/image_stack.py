@@ -27,10 +27,11 @@ _SECONDS = 60
 def read_image_stack(path: Path, options: Options) -> Recording:
     """Frames (h, w) in grey, in the order of the numbers in the files' names or of the pages.
 
-    Options: `m_per_px` and `rate` (Hz), where an ImageJ TIFF states none; `white`: the level that
-    becomes 255 in images deeper than 8 bits (default: the stack's largest, which is told); `lens`:
-    a file of the camera's calibration; `topic` and `frame`. Raises `UsageError` without scale or
-    times, `RecordingError` for damage. Images of several sizes are streams of their own.
+    Options: `m_per_px` and `rate` (Hz), where a TIFF of ImageJ or OME states none; `white`: the
+    level that becomes 255 in images deeper than 8 bits (default: the stack's largest, which is
+    told); `lens`: a file of the camera's calibration; `topic` and `frame`. Raises `UsageError`
+    without scale or times, `RecordingError` for damage. Images of several sizes are streams of
+    their own.
     """
     require_known(options, _OPTIONS)
     found = decoded("validate.recording.images.stack_arrays", path, "images", None, _SECONDS)
@@ -72,7 +73,7 @@ def _sides(
             f"--m-per-px 0.1mm{offered(found['dots']) if 'dots' in found else ''}"
         )
     x, y = (factor * float(side) for side in found["side"])
-    return (x, y), f"{found['side'][0]:.6g} {unit} a pixel (stated by ImageJ)"
+    return (x, y), f"{found['side'][0]:.6g} {unit} a pixel (stated by {found['by']})"
 
 
 def _times(
@@ -83,7 +84,9 @@ def _times(
         return np.arange(count) / rate, f"{rate:g} Hz (entered)"
     interval = float(found["interval"]) if "interval" in found else 0.0
     if np.isfinite(interval) and interval > 0:
-        return np.asarray(interval * np.arange(count)), f"every {interval:g} s (stated by ImageJ)"
+        return np.asarray(
+            interval * np.arange(count)
+        ), f"every {interval:g} s (stated by {found['by']})"
     if count == 1:
         return np.zeros(1), "one image"
     raise UsageError(f"{path.name}: {count} images without times; say --rate HZ")

@@ -17,13 +17,16 @@ MOST = 400 * 2**20  # bytes of all images of one stack, in their own depth
 _BIG = b"MM\0\x2b"
 _DESCRIPTION = 270  # TIFF's tag of a text, in which ImageJ states scale and times
 _X_RESOLUTION, _Y_RESOLUTION = 282, 283
+_OME = re.compile(r"<(?:\w+:)?Pixels\s[^>]*SizeT=[^>]*>")  # no parser of XML: nothing unfolds
+_ATTRIBUTE = re.compile(r"""(\w+)\s*=\s*["']([^"']*)["']""")
+_SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 _GREY = ("1", "L", "LA", "I;16", "I;16B", "I;16L", "I", "F")
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """`image.0` (h, w), `image.1`, ... in their own depth, uint8, uint16 or float64; whether any
-    was in `colour`; of ImageJ's TIFF `side` (2,) in its `unit` and `interval` s, of others
-    `dots` (2,) an inch, where stated.
+    was in `colour`; of ImageJ's TIFF and OME's `side` (2,) in its `unit` and `interval` s, stated
+    `by` whom; of others `dots` (2,) an inch, where stated.
 
     Raises `RecordingError` for images beyond `MOST` bytes, and what Pillow finds damaged.
     """
@@ -91,20 +94,60 @@ def _depth(pixels: NDArray[Any]) -> Any:
 
 
 def _stated(file: Path) -> dict[str, NDArray[Any]]:
-    """Scale and interval of ImageJ; `dots` (2,) an inch of others, which may be a printer's."""
+    """Scale and interval of ImageJ or OME; `dots` (2,) an inch of others, which may be a
+    printer's."""
     from PIL import Image
 
     with Image.open(file) as opened:
         tags: Any = getattr(opened, "tag_v2", {})
         text = str(tags.get(_DESCRIPTION, ""))
+        if pixels := _OME.search(text):
+            return _stated_by_ome(dict(_ATTRIBUTE.findall(pixels[0])), opened)
         if not text.startswith("ImageJ"):
             dots = opened.info.get("dpi")
             return {"dots": np.array(dots, dtype=np.float64)} if dots else {}
         lines = dict(re.findall(r"(?m)^(\w+)=(.*)$", text))
         sides = [1 / float(tags[k]) for k in (_X_RESOLUTION, _Y_RESOLUTION) if tags.get(k)]
-    found: dict[str, NDArray[Any]] = {}
+    found: dict[str, NDArray[Any]] = {"by": np.array("ImageJ")}
     if len(sides) == 2 and lines.get("unit", "pixel") not in ("pixel", "inch"):
         found |= {"side": np.array(sides), "unit": np.array(lines["unit"].replace("\\u00B5", "u"))}
     if "finterval" in lines:
         found["interval"] = np.array(float(lines["finterval"]))
     return found
+
+
+def _stated_by_ome(said: dict[str, str], opened: Any) -> dict[str, NDArray[Any]]:
+    """Scale and interval of OME-XML's Pixels, whose units are um and s where it says none.
+
+    Raises `RecordingError` where an instant has several pages: channels or planes are no times.
+    """
+    pages = getattr(opened, "n_frames", 1)
+    times, channels, planes = (int(_amount(said.get(f"Size{c}", "1"))) for c in "TCZ")
+    if (times > 1 and pages > times) or (channels > 1 and pages > times * planes):
+        raise RecordingError(
+            f"{pages} pages are {times} times of {channels} channels and {planes} planes (OME); "
+            "write one of each, as by ImageJ's Image > Duplicate"
+        )
+    found = {"by": np.array("OME")}
+    sides = [_amount(said.get(f"PhysicalSize{c}", "")) for c in "XY"]
+    units = {_plain(said.get(f"PhysicalSize{c}Unit", "um")) for c in "XY"}
+    if min(sides) > 0 and len(units) == 1:
+        found |= {"side": np.array(sides), "unit": np.array(units.pop())}
+    factor = _SECONDS.get(said.get("TimeIncrementUnit", "s"))
+    if factor and "TimeIncrement" in said:
+        found["interval"] = np.array(factor * _amount(said["TimeIncrement"]))
+    return found
+
+
+def _amount(text: str) -> float:
+    """A number above 0; 0 for anything else, as in a damaged file."""
+    try:
+        value = float(text)
+    except ValueError:
+        return 0.0
+    return value if 0 < value < np.inf else 0.0
+
+
+def _plain(unit: str) -> str:
+    """A unit of length, its micro in whichever bytes it was written, as `um`."""
+    return "um" if (unit.endswith("m") and not unit.isascii()) or unit == "&#181;m" else unit
