@@ -1,6 +1,7 @@
 """Bags of ROS that rosbags wrote, and one written by SQL as Humble's are: read as in MCAP."""
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -178,6 +179,24 @@ def test_a_log_beside_a_database_of_a_folder_is_told(tmp_path: Path) -> None:
     file.with_name(f"{file.name}-wal").write_bytes(b"some")
     with pytest.raises(RecordingError, match="4 bytes of it are still in"):
         read_bag(folder, {})
+
+
+def changed(path: Path, by: str) -> None:
+    with closing(sqlite3.connect(path)) as db, db:
+        db.execute(by)
+
+
+def test_types_without_a_definition_are_told(tmp_path: Path) -> None:
+    """A recorder that did not have a type writes so; by the advice the rest is read."""
+    (path,) = bag(tmp_path, KIND).glob("*.db3")
+    changed(path, "UPDATE message_definitions SET encoding = 'unknown'")
+    with pytest.raises(RecordingError, match=r"types without a definition.*DELETE FROM"):
+        read_bag(path, {})
+    changed(path, "DELETE FROM message_definitions WHERE encoding = 'unknown'")
+    same(read_bag(path, {}), MADE[KIND][1])
+    changed(path, "UPDATE topics SET type = 'lab_msgs/msg/Own'")
+    with pytest.raises(RecordingError, match="any of its 1 types: /x of type lab_msgs/msg/Own"):
+        read_bag(path, {})
 
 
 def test_a_database_of_another_kind_is_called_so(tmp_path: Path) -> None:

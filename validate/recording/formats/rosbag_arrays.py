@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from validate.errors import RecordingError
 from validate.recording.reader import head
 
 LIBRARIES = ("rosbags.rosbag1", "rosbags.rosbag2", "rosbags.typesys", "mcap.writer")
@@ -38,6 +39,9 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         with _opened(path, Path(folder)) as bag:
             known = {id(c): text for c in bag.reader.connections if (text := bag.text(c))}
             unknown = [(c.topic, c.msgtype) for c in bag.reader.connections if id(c) not in known]
+            if unknown and not known:
+                first = " of type ".join(unknown[0])
+                raise RecordingError(f"no definition of any of its {len(unknown)} types: {first}")
             _write(bag, [(c, known[id(c)]) for c in bag.reader.connections if id(c) in known], out)
         return {
             "mcap": np.fromfile(out, dtype=np.uint8),
@@ -54,7 +58,16 @@ def _opened(path: Path, folder: Path) -> Iterator[_Bag]:
     link = folder / ("bag" if path.is_dir() else "bag.bag" if one else "bag.db3")
     link.symlink_to(path.resolve())
     reader: Any = rosbag1.Reader(link) if one else rosbag2.Reader(link)
-    reader.open()
+    try:
+        reader.open()
+    except KeyError as error:  # so rosbag2 calls it where the recorder did not have the type
+        if error.args != ("unknown",):
+            raise
+        raise RecordingError(
+            "it holds types without a definition, which is not read; take them out of the bag or "
+            'of a copy: sqlite3 FILE.db3 "DELETE FROM message_definitions WHERE '
+            "encoding = 'unknown'\""
+        ) from None
     with closing(reader):
         yield _ros1(reader) if one else _Bag(reader, _defined, lambda raw, _: raw)
 
