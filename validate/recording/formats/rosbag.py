@@ -39,7 +39,7 @@ def read_bag(path: Path, options: Options) -> Recording:
         _require_whole(file)
     found = decoded("rosbag_arrays", path, "ros2")
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
-        whole = Path(folder) / f"{path.stem}.mcap"
+        whole = Path(folder) / (path.name or "bag")  # errors name it
         found["mcap"].tofile(whole)
         got = read_all(whole, options)
     never = {topic: f"no definition of its type ({kind})" for topic, kind in found["undefined"]}
