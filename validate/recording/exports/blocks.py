@@ -12,6 +12,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.exports.beside_tables import labview_units, size_lines
 from validate.recording.exports.cells import (
     Line,
+    Split,
     is_data,
     is_names,
     is_remark,
@@ -61,7 +62,7 @@ def parse_tables(
     text = decode(data, encoding)
     raw = re.split(r"\r\n|\r|\n", text.text)
     split = split_lines(raw)
-    blocks = [_even(b) for b in _blocks(split.lines, split.run)]
+    blocks = [_even(b) for b in _blocks(split)]
     if raw[-1].strip():
         refuse_cut(blocks[-1].rows)
     for block in blocks:
@@ -104,12 +105,14 @@ def _even(block: TextBlock) -> TextBlock:
 # --- where tables begin and end ------------------------------------------------------------------
 
 
-def _blocks(lines: Sequence[Line], run: int) -> list[TextBlock]:
+def _blocks(split: Split) -> list[TextBlock]:
+    lines, run = split.lines, split.run
     tops = _tops(lines)
     if not tops or tops[0] > run:
+        between = {"\t": " <tab> "}.get(split.separator, split.separator)
         raise RecordingError(
             f"the table at line {lines[run][0]} has no column names; add a line such as "
-            "'Time (s),Displacement (mm),Force (N)' above it"
+            f"'{between.join(('Time (s)', 'Displacement (mm)', 'Force (N)'))}' above it"
         )
     sizes = [_size(lines, tops, k) for k in range(len(tops))]
     least = min(MIN_ROWS, max(sizes))

@@ -11,10 +11,11 @@ from validate.recording.exports.vocabulary import UNIT_LABELS, holds
 from validate.units import is_unit
 
 Line = tuple[int, list[str]]  # line number in the file, cells
-SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
+SEPARATORS = ("\t", ";", ",", "|", "  ", " ")  # two spaces or more; one, where none else does
 NOTHING = {"nan", "-nan", "inf", "-inf", "#n/a", "n/a", "null", "none", "--", "---", "err"}
 _UNIT_CELL = re.compile(r"[(\[{<][^()\[\]]*[)\]}>]")
 _WIDE_SIGNS = str.maketrans("（）［］【】：；＃", "()[][]:;#")
+_FEW = 4  # numbers: fewer are no table
 _LONGEST_UNIT = 12  # characters
 
 
@@ -36,7 +37,7 @@ def split_lines(raw: Sequence[str]) -> Split:
     """
     best = Split(0, ",", [], [], 0)
     for separator in SEPARATORS:
-        if not any(separator in line for line in raw):
+        if not any(separator in line for line in raw) or (separator == " " and best.score >= _FEW):
             continue
         split = [(i + 1, _cells(line, separator)) for i, line in enumerate(raw)]
         filled = [(i, cells) for i, cells in split if any(cells)]
@@ -44,7 +45,7 @@ def split_lines(raw: Sequence[str]) -> Split:
         if score > best.score:
             emptied = [i for i, cells in split if len(cells) > 1 and not any(cells)]
             best = Split(score, separator, filled, emptied, run)
-    if best.score < 4:
+    if best.score < _FEW:
         raise RecordingError(
             f"no table of numbers in {len(raw)} lines of text "
             f"(looked for columns separated by comma, semicolon, tab, | or spaces){_poses(raw)}"
@@ -64,6 +65,8 @@ def _cells(line: str, separator: str) -> list[str]:
     text = line.translate(_WIDE_SIGNS) if not line.isascii() else line
     if separator == "  ":
         return [cell.strip(' "') for cell in re.split(" {2,}", text.strip())]
+    if separator == " ":  # as numpy writes tables; a unit in brackets belongs to the name before
+        return re.split(r" +(?![(\[])", text.strip().lstrip("#%").strip())
     text = text.rstrip("; \t") if separator == "," else text
     try:
         split = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])

@@ -54,7 +54,8 @@ from validate.recording.formats.text_rows import ASSUMED, told_left
 from validate.recording.reader import Reader, head, require_known
 from validate.recording.types import Record, Recording, Signal, Source
 
-_SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space"}
+_SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space",
+                    " ": "space"}  # fmt: skip
 
 
 def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Recording:
