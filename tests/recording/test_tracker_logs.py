@@ -201,7 +201,7 @@ def test_a_trajectory_of_words_and_numbers_at_spaces(tmp_path: Path) -> None:
 
 
 def test_a_trajectory_without_names_is_told_which_to_write(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="above them: # timestamp tx ty tz qx qy qz qw"):
+    with pytest.raises(RecordingError, match="are poses in time: # timestamp tx ty tz qx qy qz qw"):
         read_instron(log(tmp_path / "t.txt", *TUM), {})
 
 

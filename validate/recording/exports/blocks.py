@@ -16,6 +16,7 @@ from validate.recording.exports.cells import (
     is_data,
     is_names,
     is_remark,
+    is_row,
     is_unit_row,
     split_lines,
 )
@@ -105,6 +106,13 @@ def _even(block: TextBlock) -> TextBlock:
 # --- where tables begin and end ------------------------------------------------------------------
 
 
+def _poses(row: Sequence[str]) -> str:
+    """What to do with a trajectory without names."""
+    if not (len(row) == 8 and is_row(row, 8)):
+        return ""
+    return "; where its lines are poses in time: # timestamp tx ty tz qx qy qz qw"
+
+
 def _blocks(split: Split) -> list[TextBlock]:
     lines, run = split.lines, split.run
     tops = _tops(lines)
@@ -113,6 +121,7 @@ def _blocks(split: Split) -> list[TextBlock]:
         raise RecordingError(
             f"the table at line {lines[run][0]} has no column names; add a line such as "
             f"'{between.join(('Time (s)', 'Displacement (mm)', 'Force (N)'))}' above it"
+            f"{_poses(lines[run][1])}"
         )
     sizes = [_size(lines, tops, k) for k in range(len(tops))]
     least = min(MIN_ROWS, max(sizes))

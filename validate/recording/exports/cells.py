@@ -48,17 +48,9 @@ def split_lines(raw: Sequence[str]) -> Split:
     if best.score < _FEW:
         raise RecordingError(
             f"no table of numbers in {len(raw)} lines of text "
-            f"(looked for columns separated by comma, semicolon, tab, | or spaces){_poses(raw)}"
+            f"(looked for columns separated by comma, semicolon, tab, | or spaces)"
         )
     return best
-
-
-def _poses(raw: Sequence[str]) -> str:
-    """What to do with a trajectory of one space between its numbers and without names."""
-    if not any(len(found := line.split()) == 8 and is_row(found, 8) for line in raw):
-        return ""
-    return ("; where its lines are poses in time, write above them: "
-            "# timestamp tx ty tz qx qy qz qw")  # fmt: skip
 
 
 def _cells(line: str, separator: str) -> list[str]:
