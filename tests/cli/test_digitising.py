@@ -167,3 +167,14 @@ def test_poses_that_are_missing_are_told(tmp_path: Path) -> None:
     assert f"{gone} of {left} poses of 'PenToTracker' are left out: 'BaseToTracker' was" in told
     assert "from 2.98 s on it was seen for 0.7 of 2.02 s" in told
     assert told.count("it may have been elsewhere meanwhile") == 1
+
+
+def test_a_landmark_that_was_taken_back_is_none(tmp_path: Path) -> None:
+    """3D Slicer keeps it without coordinates."""
+    x, known = recorded(tmp_path, [3, 0, 4, 1]), listed(tmp_path)
+    rows = [f"{r},1,0" if ",top," in r else r for r in known.read_text().splitlines()]
+    known.write_text("\n".join(rows) + "\n")
+    assert here(*command(x, tmp_path / "y.mcap", "--known", str(known)))[0] == 0
+    record = read_recording(tmp_path / "y.mcap").record("landmarks/PenToTracker")
+    assert record["not touched"] == "none"
+    assert "of 4 landmarks" in record["fitted"]

@@ -153,6 +153,14 @@ def test_rows_of_several_points_need_their_names_and_instants(
         read(long_table(tmp_path / "p.csv", without))
 
 
+def test_a_rate_makes_no_motion_of_points_without_names(tmp_path: Path) -> None:
+    """Two points at each instant, by a rate one that jumps between them."""
+    lines = [f"{t:.1f},{i},{i},0" for t in (0, 0.1, 0.2) for i in (1, 9)]
+    (tmp_path / "p.csv").write_text("\n".join(["time (s),x (mm),y (mm),z (mm)", *lines]) + "\n")
+    with pytest.raises(RecordingError, match=r"2 rows at each 'time \(s\)', and no column says"):
+        read(tmp_path / "p.csv", {"rate": "20"})
+
+
 def test_two_rows_of_one_point_at_one_instant_are_refused(tmp_path: Path) -> None:
     path = long_table(tmp_path / "p.csv")
     path.write_text(LONG + "0.4,8,tip,0,0,0\n")
