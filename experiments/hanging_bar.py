@@ -55,4 +55,5 @@ EXPERIMENT = Experiment(
     published=PUBLISHED,
     ladder=Ladder(trial=trial),
     locates=("data",),
+    kind="reference",
 )

@@ -368,6 +368,7 @@ def test_outlines_stage_and_markers_become_an_experiment(
     assert (code, message.count("(m) is not set"), message.count("mine.py:")) == (2, 3, 3)
     coarse = BLOCK | {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
     mine = load_file(tmp_path / "experiments" / "mine.py")
+    assert mine.declared_kind == "twin"  # as the recording says of itself
     result = compare(mine, coarse, methods=("p1_fluid", "p1_dry"))
     rms = {m.name: {s.name: s.value for s in m.scores} for m in result.methods}
     assert rms["p1_fluid"]["contour.rms@9mm"] < rms["p1_dry"]["contour.rms@9mm"] < 0.6e-3

@@ -1,4 +1,4 @@
-"""A study's folder says what the experiment's recordings are."""
+"""A study's folder says what the experiment declares its recordings to be, present or not."""
 
 import json
 from pathlib import Path
@@ -11,8 +11,17 @@ from validate.study.study_page import Findings, write_study
 KINDS = {"hanging_bar": "reference", "fluid_phantom": "twin", "ecoflex_cylinder": "measured"}
 
 
+@pytest.mark.parametrize("present", [True, False])
 @pytest.mark.parametrize("name", KINDS)
-def test_the_kind_is_that_of_the_recordings(name: str, project_root: Path, tmp_path: Path) -> None:
+def test_the_kind_is_the_declared_one(
+    name: str,
+    present: bool,
+    project_root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if not present:
+        monkeypatch.setenv("VALIDATE_SHARED_DATA", str(tmp_path / "absent"))
     experiment = load_file(project_root / "experiments" / f"{name}.py")
     told = Findings(
         "Trade: a title", "One cell.", (), {"kind": "tradeoff"}, (("a",), ((1.0,),)), True

@@ -22,10 +22,12 @@ from validate.cli.new_inclusion import INCLUSION
 from validate.cli.new_kind import NewKind
 from validate.cli.new_plates import PLATES
 from validate.cli.recordings import ask_back
+from validate.compare.result import Kind
 from validate.errors import UsageError
 from validate.places import try_folder, write_whole
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
+from validate.replay.remade import kind_of_recordings
 
 KINDS = (PLATES, INCLUSION, BODY)
 _LARGEST = 20_000  # bytes of such a file
@@ -131,9 +133,15 @@ def written(
         title_text=repr(title),
         source=plain(Path(source).name).replace("\\", "/").replace('"', "'"),
         source_text=repr(plain(Path(source).name)),
+        kind=_declared(kind_of_recordings((recording,), same_model=False)),
         recording=repr(source),
         channels="\n".join(f"#   {line}".rstrip() for line in channels(recording)),
     )
+
+
+def _declared(kind: Kind) -> str:
+    """The argument that declares what the recording says that it is; none for a measured one."""
+    return "" if kind == "measured" else f" kind={kind!r},"
 
 
 def _called(name: str, path: Path) -> str:

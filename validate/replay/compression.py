@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.fem.system import build as build_system
@@ -97,6 +98,7 @@ def compression(
     methods: Mapping[str, Method],
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
+    kind: Kind = "measured",
 ) -> Experiment:
     """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that
     `parameters` name at images of their own."""
@@ -104,6 +106,7 @@ def compression(
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside, _build,
         partial(_place, shown=shown), sets=_sets, stated=stated_sizes, identify=_identify, frames=2,
+        kind=kind,
         uncertainty=Uncertainty(
             mesh=_MESHES,
             inputs=(

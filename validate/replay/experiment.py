@@ -12,6 +12,7 @@ from typing import Any
 from validate.compare.effects import Sensor
 from validate.compare.exhibit import Exhibit
 from validate.compare.published import Figure
+from validate.compare.result import Kind
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
@@ -210,6 +211,7 @@ class Experiment:
     `locates` are parameters that only say where recordings lie, so that `follows` judges these.
     `specimen` names the one that a recording is of: repeats of one specimen count once over all
     experiments; without it all recordings are of one.
+    `kind` is what its recordings are where no twin makes them.
     """
 
     name: str
@@ -243,10 +245,18 @@ class Experiment:
     locates: tuple[str, ...] = ()
     specimen: Callable[[Recording], str] | None = None
     quick: Change = unchanged
+    kind: Kind = "measured"
     path: Path | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "methods", MappingProxyType(dict(self.methods)))
+
+    @property
+    def declared_kind(self) -> Kind:
+        """What its recordings are, whether they are at hand or not."""
+        if self.twin is None:
+            return self.kind
+        return "same model" if self.twin.same_model else "twin"
 
     @property
     def same_model(self) -> bool:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.parameters import Ranges, known, quantity
@@ -143,10 +144,12 @@ def inclusion_test(
     methods: Mapping[str, Method],
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
+    kind: Kind = "measured",
 ) -> Experiment:
     """The experiment; the last method, the cheapest, is the one that inputs are varied with."""
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
+        kind=kind,
         uncertainty=Uncertainty(
             mesh=BLOCK_MESHES,
             inputs=INPUTS,

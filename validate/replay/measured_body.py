@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
 from validate.parameters import known
@@ -67,6 +68,7 @@ def measured_body(
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
     folder: Path,
+    kind: Kind = "measured",
 ) -> Experiment:
     """The experiment; the last method, the cheapest, is the one that inputs are varied with.
 
@@ -76,7 +78,7 @@ def measured_body(
     bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
         partial(_build, body=body, folder=folder), partial(place, folder=folder),
-        frames=parameters.seen.states + 1,
+        frames=parameters.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
             mesh=MeshLadder((_level(0.5, 1), _level(0.75, 2), _level(None, None)),
                             partial(_cell, body=body))

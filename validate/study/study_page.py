@@ -6,12 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from validate.compare.exhibit import Exhibit
-from validate.compare.result import Kind, Result
-from validate.errors import ValidateError
+from validate.compare.result import Result
 from validate.parameters import Parameter
 from validate.replay.experiment import Experiment
-from validate.replay.options import folder_of
-from validate.replay.remade import kind_of_recordings
 from validate.report.folder import MARK, replace_folder
 from validate.report.history import carried, write_lines
 from validate.report.made import Made
@@ -66,7 +63,7 @@ def write_study(
         effects=(),
         published=(),
         quick=told.quick,
-        kind=_kind(experiment, twin=twin),
+        kind=experiment.declared_kind,
         seed=told.seed,
         twin_notice=experiment.twin_notice if twin else "",
         exhibits=told.exhibits,
@@ -82,18 +79,6 @@ def write_study(
         _fill(told, result, content, by, fresh)
 
     return replace_folder(folder, fill, (CELLS,)) / "report.html"
-
-
-def _kind(experiment: Experiment, *, twin: bool) -> Kind:
-    """What the experiment's recordings are, where they are at hand; a study may do without."""
-    same = experiment.same_model
-    if twin:
-        return "same model" if same else "twin"
-    try:
-        recordings = experiment.load(experiment.parameters, folder_of(experiment))
-    except ValidateError:
-        return "measured"
-    return kind_of_recordings(recordings, same_model=same)
 
 
 def _fill(told: Findings, result: Result, content: Json, made: Made, folder: Path) -> None:
