@@ -7,7 +7,7 @@ rest to the whole weight in one step; the answer is the mean vertical motion of 
 weight is there from t = 0, no damping, over 0.25 s (two periods). Times are of the processor, the
 least of several on one thread, set-up apart, so that others on the machine count little.
 
-`--peers`: a Python that has felupe and mujoco (`pip install validate-tissue[peers]`); they run in
+`--peers`: a Python that has felupe and mujoco (the extra `peers`); they run in
 processes of their own.
 """
 

@@ -1,14 +1,16 @@
 """C3D: what another program wrote is read as it was meant; damage costs a line."""
 
+import re
 import struct
-import sys
 from pathlib import Path
 
 import ezc3d
 import numpy as np
 import pytest
 
+from validate.child_process import python
 from validate.errors import RecordingError, UsageError
+from validate.installation import install_command
 from validate.recording.formats import apart
 from validate.recording.formats.c3d import _require_whole, read_c3d
 
@@ -110,10 +112,11 @@ def test_a_library_that_crashes_costs_one_line(
 ) -> None:
     """A decoder of ours on a path of its own, that does what bad libraries do."""
     (tmp_path / "decoder.py").write_text(f"def arrays(path):\n    {source}\n    return {{}}\n")
-    monkeypatch.setattr(apart, "_RUN", (sys.executable, "-c", _RUNNER.format(str(tmp_path))))
+    start = _RUNNER.format(str(tmp_path))
+    monkeypatch.setattr(apart, "python_module", lambda _, *given: python("-c", start, *given))
     (tmp_path / "file").write_bytes(b"x")
     with pytest.raises(RecordingError, match=f"^file: .*{line}"):
-        apart.decoded("decoder", tmp_path / "file", "c3d")
+        apart.decoded("decoder", tmp_path / "file")
 
 
 _RUNNER = """
@@ -129,8 +132,8 @@ raise SystemExit(apart._decode(decoder, Path(path), Path(out), *limits))
 
 def test_a_missing_library_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"x")
-    with pytest.raises(UsageError, match=r"pip install 'validate-tissue\[c3d\]'"):
-        apart.decoded("absent_decoder", tmp_path / "file", "c3d")
+    with pytest.raises(UsageError, match=re.escape(install_command("dicom"))):
+        apart.decoded("absent_decoder", tmp_path / "file", extra="dicom")
 
 
 @pytest.mark.parametrize("name", [b"FRAMES", b"USED", b"LABELS"])

@@ -1,14 +1,16 @@
 """DICOM ultrasound that scanners wrote: the files of the package pydicom-data."""
 
-import sys
+import re
 import zlib
 from pathlib import Path
 
 import numpy as np
 import pydicom.data
 import pytest
+from children import lacking
 
 from validate.errors import RecordingError, UsageError
+from validate.installation import install_command
 from validate.recording.formats import apart
 from validate.recording.formats.dicom import read_dicom
 from validate.recording.readers import recognised
@@ -94,10 +96,8 @@ def test_what_is_no_readable_image_says_why(path: Path, why: str) -> None:
 def test_without_the_library_the_line_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    blocked = "import sys; sys.modules['pydicom'] = None; import runpy; runpy.run_module("
-    run = (sys.executable, "-c", f"{blocked}'validate.recording.formats.apart', None, '__main__')")
-    monkeypatch.setattr(apart, "_RUN", run)
-    with pytest.raises(UsageError, match=r"'pydicom'.*pip install 'validate-tissue\[dicom\]'"):
+    monkeypatch.setattr(apart, "python_module", lacking("pydicom"))
+    with pytest.raises(UsageError, match=f"'pydicom'.*{re.escape(install_command('dicom'))}"):
         read_dicom(DATA / "US1_UNCR.dcm", {"m_per_px": "1mm"})
 
 

@@ -1,6 +1,6 @@
 """A testing machine's workbook, written by openpyxl, xlwt, odfpy: the same numbers as its text."""
 
-import sys
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,12 +8,14 @@ import numpy as np
 import openpyxl
 import pytest
 import xlwt
+from children import lacking
 from exports import D, F, T, assert_test
 from odf.opendocument import OpenDocumentSpreadsheet
 from odf.table import Table, TableCell, TableRow
 from odf.text import P
 
 from validate.errors import RecordingError, UsageError
+from validate.installation import install_command
 from validate.recording.exports.every import every_specimen
 from validate.recording.exports.xlsx import read_sheets, read_xlsx
 from validate.recording.formats import apart, xlsx_arrays
@@ -113,10 +115,8 @@ def test_without_the_library_the_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path, Data=TEST)
-    blocked = "import sys; sys.modules['openpyxl'] = None; sys.argv.pop(0); import runpy; "
-    run = blocked + "runpy.run_module('validate.recording.formats.apart', run_name='__main__')"
-    monkeypatch.setattr(apart, "_RUN", (sys.executable, "-c", run, "-"))
-    with pytest.raises(UsageError, match=r"openpyxl.* pip install 'validate-tissue\[xlsx\]'"):
+    monkeypatch.setattr(apart, "python_module", lacking("openpyxl"))
+    with pytest.raises(UsageError, match=f"openpyxl.*{re.escape(install_command())}"):
         read_xlsx(path, {})
 
 

@@ -26,6 +26,7 @@ from report_samples import bare_result, small_result
 
 from validate.arrays import Floats
 from validate.compare.result import Result
+from validate.installation import install_command
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Frames
@@ -401,7 +402,7 @@ def by_rerun(path: Path, project_root: Path) -> dict[str, Any]:
     """What Rerun's own reader makes of each topic."""
     if importlib.util.find_spec("rerun") is None:
         assert os.environ.get("VALIDATE_REQUIRE_RERUN") != "1", "no rerun-sdk"
-        pytest.skip("no rerun-sdk; pip install 'validate-tissue[viewers]'")
+        pytest.skip(f"no rerun-sdk; {install_command('viewers')}")
     script = project_root / "tests" / "report" / "read_by_rerun.py"
     done = subprocess.run(
         [sys.executable, str(script), str(path)],

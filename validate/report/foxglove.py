@@ -1,4 +1,4 @@
-"""Messages in Foxglove's well-known schemas, in Protobuf. Owns foxglove-sdk.
+"""Messages in Foxglove's well-known schemas, in Protobuf. Owns foxglove-schemas-protobuf.
 
 Lengths m, colours 0..1, rotations x y z w.
 """
@@ -7,25 +7,45 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from foxglove import messages as known
+from foxglove_schemas_protobuf.Color_pb2 import Color
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.KeyValuePair_pb2 import KeyValuePair
+from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
+from foxglove_schemas_protobuf.Point3_pb2 import Point3
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
+from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
+from mcap_protobuf.schema import build_file_descriptor_set
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints
 from validate.recording.mcap.channels import MessageSchema
 
-Entity = known.SceneEntity
-_UNTURNED = known.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
-_AT_ORIGIN = known.Pose(position=known.Vector3(x=0.0, y=0.0, z=0.0), orientation=_UNTURNED)
+Entity = SceneEntity
+_UNTURNED = Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+_AT_ORIGIN = Pose(position=Vector3(x=0.0, y=0.0, z=0.0), orientation=_UNTURNED)
 _LINE_WIDTH = 2.5  # pixels on the screen
 _CLOUD = np.dtype([(name, "<f4") for name in "xyz"]
                   + [(name, "u1") for name in ("red", "green", "blue", "alpha")])  # fmt: skip
-_PACKED = {4: known.PackedElementFieldNumericType.Float32,
-           1: known.PackedElementFieldNumericType.Uint8}  # fmt: skip
-_KINDS = (known.SceneUpdate, known.FrameTransforms, known.CompressedImage, known.PointCloud)
+_PACKED = {4: PackedElementField.FLOAT32,
+           1: PackedElementField.UINT8}  # fmt: skip
+_KINDS = (SceneUpdate, FrameTransforms, CompressedImage, PointCloud)
 LAST_NS = 2**32 * 10**9 - 1  # its stamps count seconds in 32 bits
 SCHEMAS = {
-    found.name: MessageSchema(found.name, found.encoding, found.data)
-    for found in (kind.get_schema() for kind in _KINDS)
+    kind.DESCRIPTOR.full_name: MessageSchema(
+        kind.DESCRIPTOR.full_name, "protobuf", build_file_descriptor_set(kind).SerializeToString()
+    )
+    for kind in _KINDS
 }
 SCENE, TRANSFORMS, IMAGE, CLOUD = SCHEMAS  # in the order of _KINDS
 
@@ -40,43 +60,43 @@ class Rgba:
     a: float = 1.0
 
     @property
-    def message(self) -> known.Color:
-        return known.Color(r=self.r, g=self.g, b=self.b, a=self.a)
+    def message(self) -> Color:
+        return Color(r=self.r, g=self.g, b=self.b, a=self.a)
 
 
 def frame_transforms(ns: int, parent: str, children: Sequence[tuple[str, Floats]]) -> bytes:
     """`children`: frame name and T_parent_from_child (4, 4), a proper rotation and shift m."""
     transforms = [_transform(ns, parent, *child) for child in children]
-    return known.FrameTransforms(transforms=transforms).encode()
+    return FrameTransforms(transforms=transforms).SerializeToString()
 
 
-def _transform(ns: int, parent: str, child: str, pose: Floats) -> known.FrameTransform:
+def _transform(ns: int, parent: str, child: str, pose: Floats) -> FrameTransform:
     x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
-    return known.FrameTransform(
+    return FrameTransform(
         timestamp=_time(ns),
         parent_frame_id=parent,
         child_frame_id=child,
         translation=_vector(pose[:3, 3]),
-        rotation=known.Quaternion(x=x, y=y, z=z, w=w),
+        rotation=Quaternion(x=x, y=y, z=z, w=w),
     )
 
 
 def picture(ns: int, frame: str, png: bytes) -> bytes:
     """An image as PNG."""
-    return known.CompressedImage(
+    return CompressedImage(
         timestamp=_time(ns), frame_id=frame, data=png, format="png"
-    ).encode()
+    ).SerializeToString()
 
 
 def scene_update(*entities: Entity) -> bytes:
     """Each entity takes the place of the earlier one with its id."""
-    return known.SceneUpdate(entities=list(entities)).encode()
+    return SceneUpdate(entities=list(entities)).SerializeToString()
 
 
 def outline(ns: int, frame: str, name: str, points: Floats, colour: Rgba, **notes: str) -> Entity:
     """The closed line through points (k, 2) m in the plane z = 0 of `frame`."""
-    line = known.LinePrimitive(
-        type=known.LinePrimitiveLineType.LineLoop,
+    line = LinePrimitive(
+        type=LinePrimitive.LINE_LOOP,
         pose=_AT_ORIGIN,
         thickness=_LINE_WIDTH,
         scale_invariant=True,
@@ -90,10 +110,10 @@ def spheres(
     ns: int, frame: str, name: str, centres: Floats, colour: Rgba, *, diameter: float, **notes: str
 ) -> Entity:
     """Equal spheres at centres (k, 2 or 3) m; those with NaN (not seen) are left out."""
-    size = known.Vector3(x=diameter, y=diameter, z=diameter)
+    size = Vector3(x=diameter, y=diameter, z=diameter)
     drawn = [
-        known.SpherePrimitive(
-            pose=known.Pose(position=_vector(centre), orientation=_UNTURNED),
+        SpherePrimitive(
+            pose=Pose(position=_vector(centre), orientation=_UNTURNED),
             size=size,
             color=colour.message,
         )
@@ -109,7 +129,7 @@ def surface(
 
     Points are rounded to micrometres and colours to a thousandth: it is for the eye.
     """
-    drawn = known.TriangleListPrimitive(
+    drawn = TriangleListPrimitive(
         pose=_AT_ORIGIN,
         points=_points(np.round(points, 6)),
         color=Rgba(1.0, 1.0, 1.0).message,
@@ -131,20 +151,20 @@ def cloud(ns: int, frame: str, points: Floats, colours: Floats) -> bytes:
     shades = np.broadcast_to(np.rint(255 * colours), (len(points), 4))
     for name, column in zip(("red", "green", "blue", "alpha"), shades.T, strict=True):
         packed[name] = column
-    return known.PointCloud(
+    return PointCloud(
         timestamp=_time(ns),
         frame_id=frame,
         pose=_AT_ORIGIN,
         point_stride=_CLOUD.itemsize,
         fields=_fields(),
         data=packed[there].tobytes(),
-    ).encode()
+    ).SerializeToString()
 
 
-def _fields() -> list[known.PackedElementField]:
+def _fields() -> list[PackedElementField]:
     assert _CLOUD.fields is not None
     return [
-        known.PackedElementField(name=name, offset=offset, type=_PACKED[part.itemsize])
+        PackedElementField(name=name, offset=offset, type=_PACKED[part.itemsize])
         for name, (part, offset, *_) in _CLOUD.fields.items()
     ]
 
@@ -155,39 +175,39 @@ def _entity(
     name: str,
     notes: dict[str, str],
     *,
-    lines: list[known.LinePrimitive] | None = None,
-    spheres: list[known.SpherePrimitive] | None = None,
-    triangles: list[known.TriangleListPrimitive] | None = None,
+    lines: list[LinePrimitive] | None = None,
+    spheres: list[SpherePrimitive] | None = None,
+    triangles: list[TriangleListPrimitive] | None = None,
 ) -> Entity:
     return Entity(
         timestamp=_time(ns),
         frame_id=frame,
         id=name,
-        lifetime=known.Duration(sec=0, nsec=0),  # for ever
+        lifetime=Duration(),  # for ever
         frame_locked=True,
-        metadata=[known.KeyValuePair(key=key, value=value) for key, value in notes.items()],
+        metadata=[KeyValuePair(key=key, value=value) for key, value in notes.items()],
         lines=lines,
         spheres=spheres,
         triangles=triangles,
     )
 
 
-def _time(ns: int) -> known.Timestamp:
-    return known.Timestamp(sec=ns // 10**9, nsec=ns % 10**9)
+def _time(ns: int) -> Timestamp:
+    return Timestamp(seconds=ns // 10**9, nanos=ns % 10**9)
 
 
 def _seen(points: Floats) -> Floats:
     return points[np.isfinite(points).all(axis=1)]
 
 
-def _vector(point: Floats) -> known.Vector3:
+def _vector(point: Floats) -> Vector3:
     """Points in a plane get z = 0."""
     x, y, z = [*point.tolist(), 0.0][:3]
-    return known.Vector3(x=x, y=y, z=z)
+    return Vector3(x=x, y=y, z=z)
 
 
-def _points(points: Floats) -> list[known.Point3]:
-    return [known.Point3(x=x, y=y, z=z) for x, y, z, *_ in _in_space(points)]
+def _points(points: Floats) -> list[Point3]:
+    return [Point3(x=x, y=y, z=z) for x, y, z, *_ in _in_space(points)]
 
 
 def _in_space(points: Floats) -> list[list[float]]:

@@ -29,8 +29,7 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
         raise SceneError(f"{path.name}: edges of {edge:g} m; 0 or above")
     require_readable(path)
     try:
-        found = decoded("validate.scene.surface_arrays", path, "surfaces",
-                        {"edge": edge / factor}, _SECONDS)  # fmt: skip
+        found = decoded("validate.scene.surface_arrays", path, {"edge": edge / factor}, _SECONDS)
     except RecordingError as error:
         raise SceneError(str(error)) from None
     try:

@@ -24,7 +24,6 @@ from validate.scene.shape_functions import EDGES
 from validate.units import in_si
 
 SUFFIXES = (".inp", ".msh", ".vtu", ".vtk")
-EXTRA = "meshes"
 _KINDS: Mapping[str, Kind] = {"tetra": "tet4", "hexahedron": "hex8", "tetra10": "tet4",
                               "hexahedron20": "hex8", "hexahedron27": "hex8"}  # fmt: skip
 _HEX = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6),
@@ -97,7 +96,7 @@ def _abaqus(path: Path, part: str | None) -> dict[str, NDArray[Any]]:
 
 def _others(path: Path) -> dict[str, NDArray[Any]]:
     try:
-        return decoded("validate.scene.meshio_arrays", path, EXTRA)
+        return decoded("validate.scene.meshio_arrays", path)
     except RecordingError as error:
         raise SceneError(str(error)) from None
 

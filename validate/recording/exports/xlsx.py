@@ -48,19 +48,19 @@ def read_xlsx(path: Path, options: Options) -> Recording:
     and without the library, `RecordingError` where no sheet holds a table, or several hold a test
     and none is named.
     """
-    return _read(path, options, "xlsx_arrays", "xlsx")
+    return _read(path, options, "xlsx_arrays")
 
 
 def read_sheets(path: Path, options: Options) -> Recording:
     """`read_xlsx` of a workbook of old Excel or OpenDocument."""
-    return _read(path, options, "sheets_arrays", "sheets")
+    return _read(path, options, "sheets_arrays")
 
 
-def _read(path: Path, options: Options, decoder: str, extra: str) -> Recording:
+def _read(path: Path, options: Options, decoder: str) -> Recording:
     said = {key: value for key, value in options.items() if key != "sheet"}
     data = whole_file(path)
     try:
-        sheets = _sheets(path, options, decoder, extra)
+        sheets = _sheets(path, options, decoder)
         sheet = _chosen(sheets, options.get("sheet"))
         label, table = chosen(sheet.tables, said.get("specimen"))
         return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
@@ -73,9 +73,9 @@ def _read(path: Path, options: Options, decoder: str, extra: str) -> Recording:
 def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
     """What chooses each specimen, by its label: those of the sheet that is named or alone holds a
     test, else of all sheets that do; raises as `read_xlsx`."""
-    decoder = ("xlsx_arrays", "xlsx") if _is_workbook(path) else ("sheets_arrays", "sheets")
+    decoder = "xlsx_arrays" if _is_workbook(path) else "sheets_arrays"
     try:
-        tests = _tests(_sheets(path, options, *decoder), options.get("sheet"))
+        tests = _tests(_sheets(path, options, decoder), options.get("sheet"))
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
     one = len(tests) == 1
@@ -85,9 +85,9 @@ def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
     }  # fmt: skip
 
 
-def _sheets(path: Path, options: Options, decoder: str, extra: str) -> list[_Sheet]:
+def _sheets(path: Path, options: Options, decoder: str) -> list[_Sheet]:
     require_known(options, (*KEYS, "sheet"))
-    found = decoded(decoder, path, extra)
+    found = decoded(decoder, path)
     texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
     return [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
 

@@ -1,11 +1,11 @@
 """Files of others, decoded in a process of their own.
 
 A library in C that crashes on a damaged file, hangs, ends the interpreter or takes all memory then
-costs one line. What it found comes back as plain arrays, read without pickle.
+costs one line. What it found comes back as plain arrays, read without pickle. The process is
+isolated: nothing that lies beside the file, or in the current folder, is imported.
 """
 
 import json
-import os
 import resource
 import signal
 import subprocess
@@ -19,7 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from validate.child_process import clean_environment, python_module
 from validate.errors import RecordingError, UsageError, ValidateError
+from validate.files import members
+from validate.installation import install_command
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -28,17 +31,15 @@ _SAID, _MISSING = 3, 4  # exit codes of the process: a known error, a library th
 _MEMORY, _TIMES = 2**30, 40  # bytes beyond so many times the file's
 _SECONDS, _RATE = 1, 2**18  # s of the processor once it is loaded, and bytes a second beside
 _LOADING, _SHARED = 20, 5  # s of the wall, and times the processor's on a busy machine
-_RUN = (sys.executable, "-m", f"{_HOME}.apart")
 _OURS = "="  # before every name: savez has arguments called file and allow_pickle
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def decoded(
     decoder: str,
     path: Path,
-    extra: str,
     given: Mapping[str, float] | None = None,
     seconds: int = _SECONDS,
+    extra: str = "",
 ) -> dict[str, NDArray[Any]]:
     """What `arrays(path, **given)` of the module `decoder` gives, one beside this file or named in
     full, within `seconds` s of the processor and four more for each MB.
@@ -46,7 +47,7 @@ def decoded(
     Libraries that the module names in LIBRARIES are loaded before that time begins, and before
     memory is limited to its MEMORY bytes beyond them and the file's, where it names that.
 
-    Raises `UsageError` with what to install where the library of the `extra` is absent, else
+    Raises `UsageError` with what to install where a library (of the `extra`) is absent, else
     `RecordingError` naming the file: what the decoder said, or how its process ended.
     """
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
@@ -54,7 +55,7 @@ def decoded(
         done = _ended(decoder, path, out, given or {}, seconds)
         line = " ".join(done.stdout.decode("utf-8", "replace").split())[:300]
         if done.returncode == _MISSING:
-            raise UsageError(f"{path.name}: {line}; pip install 'validate-tissue[{extra}]'")
+            raise UsageError(f"{path.name}: {line}; {install_command(extra)}")
         if done.returncode == _SAID:
             raise RecordingError(f"{path.name}: {line}")
         if done.returncode == -signal.SIGPROF:
@@ -70,7 +71,7 @@ def decoded(
 
 def _bytes(path: Path) -> int:
     """Of a file, or of all files of a folder."""
-    files = path.iterdir() if path.is_dir() else (path,)
+    files = members(path) if path.is_dir() else (path,)
     return sum(file.stat().st_size for file in files if file.is_file())
 
 
@@ -91,8 +92,16 @@ def _ended(
     wall = _LOADING + _SHARED * seconds
     try:
         return subprocess.run(
-            [*_RUN, decoder, str(path), str(out), json.dumps(limits), json.dumps(dict(given))],
-            env={**os.environ, **dict.fromkeys(_THREADS, "1")},
+            python_module(
+                f"{_HOME}.apart",
+                decoder,
+                str(path.absolute()),
+                str(out),
+                json.dumps(limits),
+                json.dumps(dict(given)),
+            ),
+            cwd=out.parent,
+            env=clean_environment(out.parent),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -42,7 +42,7 @@ def read_c3d(path: Path, options: Options) -> Recording:
     """
     require_known(options, _OPTIONS)
     _require_whole(path)
-    found = decoded("c3d_arrays", path, "c3d")
+    found = decoded("c3d_arrays", path)
     rate = float(found["rates"][0])
     if not (np.isfinite(rate) and rate > 0):
         raise RecordingError(f"{path.name}: {rate:g} frames a second stated; expected above 0")

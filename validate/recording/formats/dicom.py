@@ -37,7 +37,7 @@ def read_dicom(path: Path, options: Options) -> Recording:
     require_known(options, _OPTIONS)
     if not (path.is_dir() or is_dicom(path)):
         raise RecordingError(f"{path.name}: no DICOM file, or one cut in its first 132 bytes")
-    found = decoded("dicom_arrays", path, "dicom", None, _SECONDS)
+    found = decoded("dicom_arrays", path, None, _SECONDS, "dicom")
     images, levels = shallow(list(found["images"]), options)
     height, width = images[0].shape
     t = _times(path, found, options)

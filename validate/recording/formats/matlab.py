@@ -113,7 +113,7 @@ def held_in(path: Path) -> dict[str, str]:
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     new = head(path, len(_MAGIC_73)) == _MAGIC_73
-    return decoded("matlab73_arrays" if new else "matlab_arrays", path, "matlab")
+    return decoded("matlab73_arrays" if new else "matlab_arrays", path)
 
 
 def _version(path: Path) -> str:

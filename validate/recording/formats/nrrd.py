@@ -25,7 +25,7 @@ def read_nrrd(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
     if not _recognises(path):
         raise RecordingError(f"{path.name}: no NRRD file, or one cut in its first bytes")
-    found = decoded("nrrd_arrays", path, "nrrd")
+    found = decoded("nrrd_arrays", path)
     keys, texts = found["keys"].tolist(), found["texts"].tolist()
     x, y = found["spacing"].tolist()
     fields = by_frame(zip(keys, texts, strict=True))

@@ -37,7 +37,7 @@ def read_bag(path: Path, options: Options) -> Recording:
     _require_all(path)
     for file in path.glob("*.db3") if path.is_dir() else (path,):
         _require_whole(file)
-    found = decoded("rosbag_arrays", path, "ros2")
+    found = decoded("rosbag_arrays", path)
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         whole = Path(folder) / (path.name or "bag")  # errors name it
         found["mcap"].tofile(whole)

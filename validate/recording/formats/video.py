@@ -40,7 +40,7 @@ def read_video(path: Path, options: Options) -> Recording:
     if "m_per_px" not in options:
         raise UsageError(f"{path.name}: a video states no scale; say it: --m-per-px 0.1mm")
     side, every = length(options, "m_per_px", "0.1mm"), _every(options)
-    found = decoded("video_arrays", path, "all", {"every": every}, _SECONDS)
+    found = decoded("video_arrays", path, {"every": every}, _SECONDS)
     declared, count = int(found["declared"]), int(found["decoded"])
     if count < declared and not _matroska(path):  # which declares a duration, no count
         raise RecordingError(

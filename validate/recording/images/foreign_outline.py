@@ -188,7 +188,7 @@ def _array(path: Path) -> Any:
 def _volume(path: Path) -> tuple[Any, Mapping[str, int]]:
     """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored. The
     values of regions by name, as 3D Slicer has them."""
-    held = decoded("nrrd_arrays", path, "nrrd")
+    held = decoded("nrrd_arrays", path)
     masks = held["pixels"]
     if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
         raise RecordingError(

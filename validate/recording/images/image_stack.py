@@ -34,7 +34,7 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     their own.
     """
     require_known(options, _OPTIONS)
-    found = decoded("validate.recording.images.stack_arrays", path, "images", None, _SECONDS)
+    found = decoded("validate.recording.images.stack_arrays", path, None, _SECONDS)
     deep = [found[f"image.{i}"] for i in range(sum(k.startswith("image.") for k in found))]
     if not deep:
         raise RecordingError(f"{path.name}: no image in it")

@@ -29,7 +29,7 @@ def straightened(
         return tuple(images), {}
     path = Path(options[LENS])
     require_readable(path, _LARGEST)
-    found = decoded("validate.recording.images.lens_arrays", path, "all")
+    found = decoded("validate.recording.images.lens_arrays", path)
     K, D, size = found["K"], found["D"], found["size"]
     if not (np.isfinite(K).all() and np.isfinite(D).all() and K[0, 0] > 0 and K[1, 1] > 0):
         raise RecordingError(f"{path.name}: focal lengths and distortion must be numbers, above 0")

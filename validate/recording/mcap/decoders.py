@@ -13,6 +13,7 @@ from typing import Any
 from mcap.records import Schema as TheirSchema
 
 from validate.errors import RecordingError
+from validate.installation import install_command
 from validate.recording.mcap.records import Channel, Schema
 
 Plain = dict[str, Any]
@@ -36,11 +37,7 @@ def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
         if channel.encoding == "cbor":
             return _cbor()
     except ImportError as missing:
-        extra = {"cdr": "ros2"}.get(channel.encoding, channel.encoding)
-        return (
-            f"the library '{missing.name}' that reads it is not installed; "
-            f"pip install 'validate-tissue[{extra}]'"
-        )
+        return f"the library '{missing.name}' that reads it is not installed; {install_command()}"
     except Exception as error:  # a schema that its own library cannot parse
         return f"its schema cannot be parsed ({_line(error)})"
     return f"no decoder for '{'/'.join(encodings)}'"

@@ -19,7 +19,6 @@ _HEADER_BYTES = 4096
 _NUMBER_BYTES = 32  # of a number in a .vtu, as text
 _LIST_BYTES = 1_000_000
 _SAME = 1e-9  # of the body's size: points that are the job's
-_EXTRA = "meshes"
 _SECONDS = 300  # of reading a series, whose files are beside the list
 
 
@@ -43,7 +42,7 @@ def _series(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
     for file in sorted(path.parent.glob("*.vtu")):
         regular(file, max(most, (path.parent / "mesh.vtu").stat().st_size))
     try:
-        found = decoded("validate.scene.vtu_series", path, _EXTRA, None, _SECONDS)
+        found = decoded("validate.scene.vtu_series", path, None, _SECONDS)
     except (RecordingError, UsageError) as error:
         raise NoAnswerError(plain(str(error))) from None
     points = found.pop("points")

@@ -1,0 +1,50 @@
+"""Child processes in isolated mode: nothing that lies in the current folder is imported by them.
+
+Python puts the current folder, or that of a script, first on its path, so that a `json.py` beside
+a recording would be run. Every interpreter that this package starts gets a clean environment
+(`clean_environment`), the safe path of Python 3.11, and a folder of its own as current folder.
+"""
+
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+ROOT = str(Path(__file__).resolve().parents[1])  # of the package that runs
+_PREFIX, _SAFE = "PYTHON", "PYTHONSAFEPATH"
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_TEMPORARY = ("TMPDIR", "TMP", "TEMP")
+_START = (
+    "import runpy, sys; sys.path.append({root!r}); "
+    "runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
+)
+
+
+def clean_environment(folder: Path | None = None) -> dict[str, str]:
+    """Return the user's variables without Python's own, with a safe path and one thread.
+
+    `folder` is where temporary files go: they vanish with it, also those of a child that is killed.
+    """
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(_PREFIX)}
+    places = {} if folder is None else dict.fromkeys(_TEMPORARY, str(folder))
+    return {**kept, **dict.fromkeys(_THREADS, "1"), **places, _SAFE: "1"}
+
+
+def clearing_variables() -> Mapping[str, str]:
+    """Return what makes an environment a clean one where variables can only be set: an empty value
+    of one of Python's counts as none."""
+    ours = {name: "" for name in os.environ if name.startswith(_PREFIX)}
+    return {**ours, **dict.fromkeys(_THREADS, "1"), _SAFE: "1"}
+
+
+def python(*arguments: str) -> list[str]:
+    """Return the command line of this interpreter in safe-path mode, without the user's site."""
+    return [sys.executable, "-P", *arguments]
+
+
+def python_module(module: str, *arguments: str) -> list[str]:
+    """Return the command line that runs a module of this package with `arguments`.
+
+    The package is found where this process has it, behind all that is installed.
+    """
+    return python("-c", _START.format(root=ROOT, module=module), *arguments)
