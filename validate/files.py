@@ -6,21 +6,27 @@ machine. Whatever reads a file that a user names, or that such a file names, ope
 
 import json
 import os
-from io import BytesIO
+import zipfile
+import zlib
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from stat import S_ISREG
-from typing import Any, BinaryIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 
 LARGEST = 2**29  # bytes of a file that is read as a whole
+ANY_SIZE = 2**63  # bytes: of a file that is read by parts
 MOST_MEMBERS = 100_000  # entries of a folder
 _SAFE_INTEGER = 18  # digits: more are no count and no index
 # A pipe that is opened so does not wait for a writer.
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
-def open_file(path: Path, limit: int = LARGEST) -> BinaryIO:
+def open_file(path: Path, limit: int = LARGEST) -> BufferedReader:
     """Open a regular file of at most `limit` bytes for reading.
 
     Raises `RecordingError` with the reason for a path that cannot be opened, a folder, pipe, socket
@@ -68,7 +74,7 @@ def buffered(path: Path, limit: int = LARGEST) -> BytesIO:
 def first_bytes(path: Path, count: int) -> bytes:
     """Return the first bytes of a regular file of any size; none of what cannot be read."""
     try:
-        with open_file(path, 2**63) as stream:
+        with open_file(path, ANY_SIZE) as stream:
             return stream.read(count)
     except (OSError, RecordingError):
         return b""
@@ -105,6 +111,7 @@ def inside(folder: Path, name: str) -> Path:
     try:
         path = (folder / said).resolve()
         root = folder.resolve()
+        path.exists()
     except (OSError, RuntimeError, ValueError):  # a name too long, or links in a loop
         raise RecordingError(f"'{name[:60]}' cannot be followed; expected a file name") from None
     if said.startswith("/") or said[1:2] == ":" or not path.is_relative_to(root):
@@ -120,7 +127,7 @@ def member(path: Path) -> Path:
     return inside(path.parent, path.name)
 
 
-def parse_json(data: bytes | str) -> Any:
+def json_value(data: bytes | str) -> Any:
     """Return the value of a JSON text; integers beyond 18 digits are floating-point numbers.
 
     Raises `ValueError` for what is no JSON, also for one that nests beyond the interpreter's depth.
@@ -133,6 +140,29 @@ def parse_json(data: bytes | str) -> Any:
 
 def _integer(digits: str) -> int | float:
     return int(digits) if len(digits) <= _SAFE_INTEGER else float(digits)
+
+
+def npz_arrays(path: Path, most: int) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an `npz` file by name, without pickles, at most `most` bytes unpacked.
+
+    Raises `RecordingError` for what cannot be opened, is no such file, is damaged (CRC-32), or
+    unpacks to more.
+    """
+    stream = buffered(path)
+    try:
+        with zipfile.ZipFile(stream) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+            if size > most:
+                raise RecordingError(f"{path.name}: {size} bytes unpacked, the limit is {most}")
+        stream.seek(0)
+        with np.load(stream, allow_pickle=False) as found:
+            return {name: found[name] for name in found.files}
+    except (
+        ValueError, EOFError, KeyError, OSError, MemoryError, RuntimeError, NotImplementedError,
+        zipfile.BadZipFile, zlib.error,
+    ) as error:  # fmt: skip
+        why = " ".join(str(error).split())[:80] or type(error).__name__
+        raise RecordingError(f"{path.name}: no archive of arrays, or damaged ({why})") from None
 
 
 def too_large(path: Path, size: int, limit: int) -> RecordingError:

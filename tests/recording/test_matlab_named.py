@@ -46,7 +46,7 @@ def _here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> No
     """Decoded in this process, except by the command: one of its own takes half a second."""
     if "command" not in request.node.name and "damaged" not in request.node.name:
         homes = {"matlab_arrays": matlab_arrays, "matlab73_arrays": matlab73_arrays}
-        monkeypatch.setattr(matlab, "decoded", lambda name, path, _: homes[name].arrays(path))
+        monkeypatch.setattr(matlab, "decoded", lambda name, path: homes[name].arrays(path))
 
 
 @pytest.fixture(params=[old, new])

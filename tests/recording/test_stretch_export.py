@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from validate.errors import RecordingError, UsageError
+from validate.errors import RecordingError
 from validate.recording.exports.stretch import read_stretch_stress
 
 ROWS = "1,0\n1.25,0.2\n1.5,0.31\n2,0.48\n2.5,0.7\n"
@@ -56,7 +56,7 @@ def test_what_is_no_such_curve_is_refused(tmp_path: Path, text: str, match: str)
 
 
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="cannot read"):
+    with pytest.raises(RecordingError, match="cannot be read"):
         read_stretch_stress(tmp_path / "none.csv")
 
 

@@ -67,12 +67,12 @@ def test_the_liver(shared_data: Path) -> None:
     [
         ("", "0 bytes"),
         ("no mesh at all\n", "no elements: no Abaqus input file"),
-        (inp(body("tet4"), extra="*Include, input=/etc/passwd"), r"only names from the deck's"),
-        (inp(body("tet4"), extra="*Include, input=../x.inp"), "is outside the deck's folder; copy"),
+        (inp(body("tet4"), extra="*Include, input=/etc/passwd"), "outside its folder .*line 36"),
+        (inp(body("tet4"), extra="*Include, input=../x.inp"), "outside its folder .* copy it"),
         (inp(body("tet4"), extra="*Include, input=body.inp"), "'body.inp' in line 36 includes its"),
         (inp(body("tet4"), extra="*Include, input=a.inp, password=b"), "locked; export it open"),
-        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "only names from the deck's"),
-        (inp(body("tet4"), extra=f"*Include, input={300 * 'a'}"), "no file in the deck's folder"),
+        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "is no name of a file"),
+        (inp(body("tet4"), extra=f"*Include, input={300 * 'a'}"), "cannot be followed"),
         (inp(body("tet4")).replace("*Part", "*Ngen\n1, 5\n*Part"), r"\*Ngen in line 3: is not"),
         (inp(body("tet4")).replace("*Node", "*System\n1., 0\n*Node"), r"\*System in line 4: exp"),
         (inp(body("tet4")).replace("*Node", "*System\n1,0,0,1,0,0\n*Node"), "one, or on a line"),
@@ -132,7 +132,7 @@ def test_what_a_deck_includes_stands_in_its_place(tmp_path: Path) -> None:
         read_foreign(path, "m")
     (tmp_path / "low.txt").unlink()
     (tmp_path / "low.txt").symlink_to("/etc/passwd")
-    with pytest.raises(SceneError, match=r"outside the deck's folder"):
+    with pytest.raises(SceneError, match="lies outside its folder"):
         read_foreign(path, "m")
 
 
@@ -151,7 +151,7 @@ def test_inclusions_in_a_loop_or_without_end_are_refused(tmp_path: Path) -> None
         read_foreign(path, "m")
     (tmp_path / "a.inp").unlink()
     (tmp_path / "a.inp").symlink_to("a.inp")
-    with pytest.raises(SceneError, match=r"is no file in the deck's folder"):
+    with pytest.raises(SceneError, match="cannot be followed"):
         read_foreign(path, "m")
 
 

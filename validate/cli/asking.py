@@ -14,7 +14,8 @@ from typing import Any
 import click
 
 from validate.cli.display import say
-from validate.errors import UsageError, ValidateError
+from validate.errors import RecordingError, UsageError, ValidateError
+from validate.files import read_text
 from validate.parameters import nearest_names
 
 Answers = Mapping[str, str]
@@ -66,11 +67,9 @@ def read_answers(path: Path) -> dict[str, str]:
     Raises `UsageError` for a file that is missing, too large or no TOML.
     """
     try:
-        if path.stat().st_size > _LARGEST:
-            raise UsageError(f"{path}: {path.stat().st_size} bytes; answers take {_LARGEST}")
-        return _flat(tomllib.loads(path.read_text("utf-8")))
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror or error}") from None
+        return _flat(tomllib.loads(read_text(path, _LARGEST, errors="strict")))
+    except RecordingError as error:
+        raise UsageError(str(error)) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         why = " ".join(str(error).split())[:100]
         raise UsageError(f'{path}: no TOML ({why}); a line is key = "answer"') from None

@@ -1,12 +1,14 @@
 """Tables that were marked by hand, and known places: landmarks, and wires by two places."""
 
 import csv
+import io
 from pathlib import Path
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.files import read_text
 from validate.recording.formats.device_set import read_device_set
 from validate.recording.formats.slicer import FCSV, MARKUPS
 from validate.recording.mcap.read import MCAP
@@ -88,23 +90,20 @@ def _along(file: Path, row: dict[str, str], factor: float, place: Floats) -> Flo
 
 def rows_of(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
     """The rows of a table with commas that has the `wanted` columns, among others."""
+    rows = csv.DictReader(
+        io.StringIO(read_text(file, _MAX_TABLE, "utf-8-sig"), newline=""), restval=""
+    )
     try:
-        if file.stat().st_size > _MAX_TABLE:
-            raise RecordingError(f"{file.name}: {file.stat().st_size} bytes, limit {_MAX_TABLE}")
-        with file.open(encoding="utf-8-sig", errors="replace", newline="") as opened:
-            rows = csv.DictReader(opened, restval="")
-            names = [str(n).strip().lower() for n in rows.fieldnames or ()]
-            if not set(wanted) <= set(names):
-                raise UsageError(
-                    f"{file.name}: columns {names}, expected {', '.join(wanted)}, with commas "
-                    "between them, as text in UTF-8"
-                )
-            rows.fieldnames = names
-            return list(rows)
+        names = [str(n).strip().lower() for n in rows.fieldnames or ()]
+        if not set(wanted) <= set(names):
+            raise UsageError(
+                f"{file.name}: columns {names}, expected {', '.join(wanted)}, with commas "
+                "between them, as text in UTF-8"
+            )
+        rows.fieldnames = names
+        return list(rows)
     except csv.Error as error:
         raise RecordingError(f"{file.name}: no table with commas ({error})") from None
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be read ({error.strerror})") from error
 
 
 def number(file: Path, row: dict[str, str], name: str) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 from validate.cli.arguments import complain, pairs
 from validate.cli.display import say
 from validate.errors import UsageError
+from validate.files import member, members
 from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
 from validate.recording.alignment import declared_offset, shift
@@ -56,8 +57,7 @@ def _logs(files: tuple[Path, ...], kind: str | None) -> list[Path]:
         return list(files)
     if known_unread(files[0]) or any(reader.recognises(files[0]) for reader in READERS):
         return list(files)
-    inside = sorted(p for p in files[0].iterdir() if p.is_file() and p.name[0] != ".")
-    return inside or list(files)
+    return [member(file) for file in members(files[0])] or list(files)
 
 
 def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recording]:

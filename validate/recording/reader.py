@@ -12,10 +12,9 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 
 from validate.errors import RecordingError, UsageError
+from validate.files import ANY_SIZE, LARGEST, first_bytes, open_file, too_large
 from validate.recording.types import Recording, Source
 
-LARGEST = 2**29  # bytes of a file that is read as a whole
-MAX_SIZE = 2**63  # bytes: no limit
 Options = Mapping[str, str]  # what a file does not say itself: `--map KEY=VALUE`
 
 
@@ -72,25 +71,20 @@ def require_readable(path: Path, largest: int) -> None:
     if not (S_ISREG(found.st_mode) or S_ISDIR(found.st_mode)):
         raise RecordingError(f"{path}: cannot be read (neither a file nor a folder)")
     if S_ISREG(found.st_mode) and found.st_size > largest:
-        size = f"{found.st_size} bytes, the limit is {largest}"
-        raise RecordingError(f"{path.name}: {size}; split it")
+        raise too_large(path, found.st_size, largest)
 
 
 def head(path: Path, count: int = 4096) -> bytes:
     """The first bytes of a file; none of what is no readable file."""
-    try:
-        require_readable(path, MAX_SIZE)
-        with path.open("rb") as stream:
-            return stream.read(count)
-    except (OSError, RecordingError):
-        return b""
+    return first_bytes(path, count)
 
 
 def source_of(path: Path, integrity: str) -> Source:
     """A file's name, hash and size; `integrity` says what its bytes prove."""
-    with path.open("rb") as stream:
+    with open_file(path, ANY_SIZE) as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    return Source(path.name, digest, path.stat().st_size, integrity)
+        size = stream.tell()
+    return Source(path.name, digest, size, integrity)
 
 
 def require_known(options: Iterable[str], known: Collection[str]) -> None:

@@ -5,6 +5,7 @@ Lengths m, colours 0..1, rotations x y z w.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
@@ -67,7 +68,7 @@ class Rgba:
 def frame_transforms(ns: int, parent: str, children: Sequence[tuple[str, Floats]]) -> bytes:
     """`children`: frame name and T_parent_from_child (4, 4), a proper rotation and shift m."""
     transforms = [_transform(ns, parent, *child) for child in children]
-    return FrameTransforms(transforms=transforms).SerializeToString()
+    return _encoded(FrameTransforms(transforms=transforms))
 
 
 def _transform(ns: int, parent: str, child: str, pose: Floats) -> FrameTransform:
@@ -83,14 +84,12 @@ def _transform(ns: int, parent: str, child: str, pose: Floats) -> FrameTransform
 
 def picture(ns: int, frame: str, png: bytes) -> bytes:
     """An image as PNG."""
-    return CompressedImage(
-        timestamp=_time(ns), frame_id=frame, data=png, format="png"
-    ).SerializeToString()
+    return _encoded(CompressedImage(timestamp=_time(ns), frame_id=frame, data=png, format="png"))
 
 
 def scene_update(*entities: Entity) -> bytes:
     """Each entity takes the place of the earlier one with its id."""
-    return SceneUpdate(entities=list(entities)).SerializeToString()
+    return _encoded(SceneUpdate(entities=list(entities)))
 
 
 def outline(ns: int, frame: str, name: str, points: Floats, colour: Rgba, **notes: str) -> Entity:
@@ -151,14 +150,21 @@ def cloud(ns: int, frame: str, points: Floats, colours: Floats) -> bytes:
     shades = np.broadcast_to(np.rint(255 * colours), (len(points), 4))
     for name, column in zip(("red", "green", "blue", "alpha"), shades.T, strict=True):
         packed[name] = column
-    return PointCloud(
-        timestamp=_time(ns),
-        frame_id=frame,
-        pose=_AT_ORIGIN,
-        point_stride=_CLOUD.itemsize,
-        fields=_fields(),
-        data=packed[there].tobytes(),
-    ).SerializeToString()
+    return _encoded(
+        PointCloud(
+            timestamp=_time(ns),
+            frame_id=frame,
+            pose=_AT_ORIGIN,
+            point_stride=_CLOUD.itemsize,
+            fields=_fields(),
+            data=packed[there].tobytes(),
+        )
+    )
+
+
+def _encoded(message: Any) -> bytes:
+    encoded: bytes = message.SerializeToString()
+    return encoded
 
 
 def _fields() -> list[PackedElementField]:

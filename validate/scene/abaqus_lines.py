@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from validate.errors import SceneError
+from validate.errors import RecordingError, SceneError
+from validate.files import inside, read_bytes, read_text
 
 _NAMED = re.compile(rb'(?im)^\s*\*[^\r\n]*?\binput\s*=\s*"?([^",\r\n]+)')
 _MOST, _TIMES = 64 * 2**20, 200  # bytes of all files together; how often one is included
@@ -52,28 +53,11 @@ class Deck:
         yield from self._of(path, f" of '{name}'", inside)
 
     def _found(self, name: str, where: str) -> Path:
-        folder = self.path.resolve().parent
-        said = name.replace("\\", "/")
-        if (
-            not said.isprintable()
-            or not said.strip()
-            or said.startswith("/")
-            or re.match(r"[A-Za-z]:", said)
-        ):
-            raise SceneError(
-                f"{name[:80]!r} in {where}: only names from the deck's folder are followed; put "
-                "the file beside it and write its name alone"
-            )
         try:
-            path = (folder / said).resolve()
-            there = path.is_file()
-        except (OSError, RuntimeError):  # a name too long, or links in a loop
-            path, there = folder / "none", False
-        if not path.is_relative_to(folder):
-            raise SceneError(
-                f"'{name[:80]}' in {where} is outside the deck's folder; copy the file into it"
-            )
-        if not there:
+            path = inside(self.path.resolve().parent, name)
+        except RecordingError as error:
+            raise SceneError(f"{error} ({where})") from None
+        if not path.is_file():
             raise SceneError(
                 f"'{name[:80]}' in {where} is no file in the deck's folder; put it there, or "
                 "delete the line if it has no nodes, elements or sets"
@@ -92,7 +76,7 @@ class Deck:
         self._bytes += path.stat().st_size
         if self._bytes > _MOST:
             raise SceneError(f"more than {_MOST} bytes with what it includes")
-        return path.read_bytes().decode("utf-8", "replace")
+        return read_text(path, _MOST)
 
 
 def files_named(path: Path) -> tuple[Path, ...]:
@@ -106,11 +90,17 @@ def files_named(path: Path) -> tuple[Path, ...]:
             continue
         found.append(file)
         if path.suffix.lower() == ".inp" and file.stat().st_size <= _MOST:
-            names = (
-                n.decode("utf-8", "replace").strip() for n in _NAMED.findall(file.read_bytes())
-            )
-            left += [p for n in names if (p := path.parent / n.replace("\\", "/")).is_file()]
+            names = (n.decode("utf-8", "replace") for n in _NAMED.findall(read_bytes(file, _MOST)))
+            left += [p for n in names if (p := _beside(path, n.strip())) is not None]
     return tuple(found)
+
+
+def _beside(path: Path, name: str) -> Path | None:
+    try:
+        found = inside(path.parent, name)
+    except RecordingError:
+        return None
+    return found if found.is_file() else None
 
 
 def words_of(text: str) -> tuple[str, dict[str, str]]:

@@ -4,18 +4,17 @@ Arrays: "kind" (text), "nodes" (n, d) float64 m, "cells" (e, k) int32, one "face
 int32 per facet set, and "provenance" (text), which is for people.
 """
 
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.errors import SceneError
+from validate.errors import RecordingError, SceneError
+from validate.files import npz_arrays
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.foreign_mesh import metres, read_foreign, require_readable
+from validate.scene.foreign_mesh import metres, read_foreign
 from validate.scene.mesh import Kind, Mesh, require_positive_cells
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
@@ -59,30 +58,18 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
             f"{path.name}: a surface; fill it first: validate body {path.name} --unit mm "
             "-o body.npz"
         )
-    require_readable(path)
     if unit is not None and metres(path.name, unit) != 1.0:
         raise SceneError(f"{path.name}: npz is in metres, not in {unit}; leave the unit away")
     try:
-        mesh = _mesh(_arrays(path))
+        arrays = npz_arrays(path, MAX_BYTES)
+    except RecordingError as error:
+        raise SceneError(str(error)) from None
+    try:
+        mesh = _mesh(arrays)
         require_positive_cells(mesh)
         return mesh
     except SceneError as error:
         raise SceneError(f"{path.name}: {error}") from error
-    except OSError as error:
-        raise SceneError(f"{path.name}: cannot be read ({error.strerror or error})") from error
-
-
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Every array of the file, once their declared sizes are known to be small."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > MAX_BYTES:
-            raise SceneError(f"{size} bytes unpacked, the limit is {MAX_BYTES}")
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except (ValueError, EOFError, KeyError, zipfile.BadZipFile, RuntimeError, zlib.error) as error:
-        raise SceneError(f"no mesh file, or a damaged one ({_line(error)})") from error
 
 
 def _mesh(arrays: dict[str, NDArray[Any]]) -> Mesh:
@@ -107,7 +94,3 @@ def _kind(value: NDArray[Any]) -> Kind:
         if value.dtype.kind == "U" and value.shape == () and str(value) == kind:
             return kind
     raise SceneError(f"kind {str(value)[:40]!r}: one of {', '.join(kinds)}")
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:80] or type(error).__name__

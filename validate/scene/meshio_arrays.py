@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import SceneError
+from validate.files import open_file
 
 LIBRARIES, MEMORY = ("meshio",), 2**26  # bytes beyond it and the file's
 _READ = ("2", "2.1", "2.2", "4.1")  # of Gmsh's formats
@@ -73,7 +74,7 @@ def read_quietly(path: Path, name: str) -> Any:
     """meshio's mesh; what it prints, and that it ends the interpreter, becomes one error."""
     import meshio
 
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(4096)
     if b"vtkLZ4DataCompressor" in head:
         raise SceneError("packed by LZ4, which is not unpacked; save it with zlib or unpacked")
@@ -90,7 +91,7 @@ def read_quietly(path: Path, name: str) -> Any:
 
 def _require_version(path: Path) -> None:
     """Raises `SceneError` for Gmsh's older and in-between formats, which no reader here takes."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(200).decode("latin-1").split()
     version = head[1] if len(head) > 1 and head[0] == "$MeshFormat" else "1"
     gmsh = bool(head) and head[0] in ("$MeshFormat", "$NOD")

@@ -3,7 +3,6 @@
 Read in a process of its own. Text, binary, appended and compressed arrays alike, by meshio.
 """
 
-import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -12,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import SceneError
+from validate.files import inside, open_file, read_bytes
 from validate.scene.meshio_arrays import read_quietly
 
 LIBRARIES = ("meshio",)
 DISPLACEMENTS = ("displacement", "Displacement", "displacements", "u", "U", "DISP")
 REACTIONS = ("reaction", "Reaction", "reactions", "RF", "reaction_forces")
-_NAME = re.compile(r"[\w.-]{1,200}")  # of a file beside the list: no folder, no way out of it
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -28,7 +27,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     of points, and points without a displacement.
     """
     listed = _listed(path)
-    found = [_fields(path.parent / name) for _, name in listed]
+    found = [_fields(file) for _, file in listed]
     if len({len(one["points"]) for one in found}) != 1:
         raise SceneError("files of different numbers of points")
     series = {
@@ -41,9 +40,9 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     return series
 
 
-def _listed(path: Path) -> list[tuple[float, str]]:
+def _listed(path: Path) -> list[tuple[float, Path]]:
     """Time and file of every step, in order of time."""
-    text = path.read_bytes()
+    text = read_bytes(path)
     if b"<!" in text.replace(b"<!--", b""):
         raise SceneError("declares entities: no list of files needs that")
     try:
@@ -51,15 +50,13 @@ def _listed(path: Path) -> list[tuple[float, str]]:
         found = sorted((float(s.attrib["timestep"]), s.attrib["file"]) for s in sets)
     except (ET.ParseError, KeyError, ValueError) as error:
         raise SceneError(f"no list of files ({' '.join(str(error).split())[:100]})") from None
-    odd = [name for _, name in found if not _NAME.fullmatch(name) or name.startswith(".")]
-    if odd or not found:
-        raise SceneError(f"names {odd[0][:60]!r}: files beside it" if odd else "lists no file")
-    return found
+    if not found:
+        raise SceneError("lists no file")
+    return [(t, inside(path.parent, name)) for t, name in found]
 
 
 def _fields(file: Path) -> dict[str, NDArray[Any]]:
-    if file.is_symlink() or not file.is_file():
-        raise SceneError(f"{file.name}: no ordinary file")
+    open_file(file).close()
     mesh = read_quietly(file, file.name)
     u = _of_points(mesh, DISPLACEMENTS)
     if u is None:

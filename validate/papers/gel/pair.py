@@ -11,6 +11,7 @@ from validate.arrays import Floats
 from validate.datasets.home import found
 from validate.datasets.registry import named
 from validate.errors import RecordingError, UsageError
+from validate.files import read_bytes, read_text
 from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording, Source
 from validate.register.link import Linked, link
@@ -45,10 +46,10 @@ def side_of(voxel: float | None, before: Path) -> float:
     if voxel is not None:
         return voxel
     text = before.parent / "SOURCE.txt"
-    said = _SAYS.search(text.read_text("utf-8", "replace")) if text.is_file() else None
+    said = _SAYS.search(read_text(text)) if text.is_file() else None
     if said:
         return float(said[1]) * _UNITS[said[2].lower()]
-    mark = sha256(before.read_bytes()).hexdigest()
+    mark = sha256(read_bytes(before)).hexdigest()
     if any(mark == f.sha256 for f in named(FOLDER).files):
         return _KNOWN
     raise UsageError(

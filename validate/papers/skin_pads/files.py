@@ -16,6 +16,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
+from validate.files import buffered, read_bytes, read_text
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.units import SYMBOLIC
 
@@ -94,10 +95,8 @@ def numbers(path: Path) -> Floats:
     """A matrix (rows, columns) of finite numbers; raises `RecordingError` naming the file."""
     if not path.is_file():
         raise RecordingError(f"no {path.name} in {path.parent}; pass --set data=FOLDER with it")
-    if path.stat().st_size > _LARGEST:
-        raise RecordingError(f"{path.name}: {path.stat().st_size} bytes of numbers, at most 64 MB")
     try:
-        found = np.loadtxt(path, ndmin=2)
+        found = np.loadtxt(buffered(path, _LARGEST), ndmin=2)
     except ValueError as error:
         raise RecordingError(f"{path.name}: no matrix of numbers ({error})"[:200]) from error
     if found.size == 0 or not np.isfinite(found).all():
@@ -196,7 +195,7 @@ def _geometry(folder: Path) -> Mapping[str, str]:
     scripts = sorted(folder.glob("*.geo"))
     if not scripts:
         return {}
-    text = re.sub(r"//[^\n]*", "", scripts[0].read_text("utf-8", errors="replace")[:100_000])
+    text = re.sub(r"//[^\n]*", "", read_text(scripts[0])[:100_000])
     found = dict(re.findall(r"\b(\w+)\s*=\s*([0-9.]+)\s*;", text))
     return {path: f"{1e-3 * float(found[n]):.9g}" for n, path in _GEO.items() if n in found}
 
@@ -205,7 +204,7 @@ def _source(folder: Path) -> Source:
     """The folder's hash is that of its files of numbers, by name."""
     whole, size = sha256(), 0
     for path in sorted((*folder.glob("*.dat"), *folder.glob("*.out"), *folder.glob("*.geo"))):
-        content = path.read_bytes()
+        content = read_bytes(path)
         whole.update(path.name.encode() + content)
         size += len(content)
     return Source(str(folder), whole.hexdigest(), size, "integrity not provable: plain text")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from validate.errors import RecordingError, UsageError
+from validate.files import read_bytes
 from validate.recording.exports.vocabulary import evidence, is_ideographic, plain
 
 MAX_BYTES = 256 * 1024 * 1024
@@ -69,14 +70,8 @@ def decode(data: bytes, said: str | None = None) -> Text:
 
 
 def whole_file(path: Path) -> bytes:
-    """The bytes of a text of bounded size; `UsageError` where it cannot be read."""
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise RecordingError(f"{path.name}: {size} bytes, the limit is {MAX_BYTES}")
-        return path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror}") from error
+    """The bytes of a text of bounded size; raises `RecordingError` where it cannot be read."""
+    return read_bytes(path, MAX_BYTES)
 
 
 def _named(said: str) -> str:

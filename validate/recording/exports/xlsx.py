@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.errors import RecordingError, UsageError
+from validate.files import open_file
 from validate.recording.exports.blocks import parse_tables
 from validate.recording.exports.columns import KEYS, role_of
 from validate.recording.exports.encoding import whole_file
@@ -160,7 +161,7 @@ def _is_other_workbook(path: Path) -> bool:
 
 def _first_names(path: Path) -> list[str]:
     """Names in the first directory sector of a compound file ([MS-CFB] 2.2, 2.6)."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         start = file.read(52)
         size = 1 << min(int.from_bytes(start[30:32], "little"), 12)
         file.seek((int.from_bytes(start[48:52], "little") + 1) * size)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from validate.files import read_bytes
 from validate.recording.reader import head
 
 BLOCK = 512  # bytes
@@ -63,7 +64,7 @@ def _negative(processor: int, first: bytes) -> bool:
 def parts_beyond(path: Path, frames: int, copy: Path) -> Iterator[Path]:
     """The frames after those that the header counts, up to `frames`, as whole files that are
     written to `copy` one after the other."""
-    raw = path.read_bytes()
+    raw = read_bytes(path)
     lies = layout(path, raw[:BLOCK])
     for begin in range(lies.frames, frames, MOST):
         count = min(MOST, frames - begin)

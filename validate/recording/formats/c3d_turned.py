@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from math import prod
 from pathlib import Path
 
+from validate.files import read_bytes
 from validate.recording.formats.c3d_bytes import BIG, BLOCK, INTEL, layout, records
 
 _HEADER = ((2, 12, 2), (12, 16, 4), (16, 20, 2), (20, 24, 4), (294, 302, 2), (304, 376, 4))
@@ -16,7 +17,7 @@ def turned(path: Path, copy: Path) -> Path:
     C3D user guide: header, parameter section, data. Whole numbers and floats are turned each in
     its place, so that a file of whole numbers stays one.
     """
-    raw = bytearray(path.read_bytes())
+    raw = bytearray(read_bytes(path))
     lies = layout(path, bytes(raw[:BLOCK]))
     if lies.processor != BIG:
         return path

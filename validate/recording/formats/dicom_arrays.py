@@ -26,6 +26,7 @@ from pydicom.uid import (
 )
 
 from validate.errors import RecordingError, UsageError
+from validate.files import read_bytes
 from validate.recording.formats.dicom_files import files_of
 from validate.recording.formats.sequence import MAX_PIXELS
 from validate.recording.images.levels import luma
@@ -126,7 +127,7 @@ def _require_few_bytes(path: Path) -> None:
     meta = pydicom.filereader.read_file_meta_info(path)
     if meta.get("TransferSyntaxUID") != DeflatedExplicitVRLittleEndian:
         return
-    packed = path.read_bytes()[_META + int(meta.get("FileMetaInformationGroupLength", 0)) :]
+    packed = read_bytes(path)[_META + int(meta.get("FileMetaInformationGroupLength", 0)) :]
     unpack, size = zlib.decompressobj(-zlib.MAX_WBITS), 0
     while packed and not unpack.eof and size <= _PACKED:
         size += len(unpack.decompress(packed, 2**20))

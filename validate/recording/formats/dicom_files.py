@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from validate.errors import RecordingError
+from validate.files import member, members
 from validate.recording.reader import head
 
 MAGIC, AT = b"DICM", 128
@@ -19,8 +20,8 @@ def begins_as_dicom(path: Path) -> bool:
     try:
         if not path.is_dir():
             return is_dicom(path)
-        first = min((f for f in path.iterdir() if _may_be(f)), default=None)
-    except OSError:
+        first = min((f for f in members(path) if _may_be(f)), default=None)
+    except (OSError, RecordingError):  # a name too long; a folder of too many entries
         return False
     return first is not None and is_dicom(first)
 
@@ -28,7 +29,7 @@ def begins_as_dicom(path: Path) -> bool:
 def files_of(folder: Path) -> list[Path]:
     """The DICOM files of a folder by name; raises `RecordingError` where others lie beside them, or
     there are more than `_MOST`."""
-    files = sorted(f for f in folder.iterdir() if _may_be(f))
+    files = [member(f) for f in members(folder) if _may_be(f)]
     others = [f.name for f in files if not is_dicom(f)]
     if others:
         said = f"{len(others)} of {len(files)} files are no DICOM ({', '.join(others[:3])})"
@@ -39,4 +40,4 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def _may_be(path: Path) -> bool:
-    return path.is_file() and not path.name.startswith(".") and path.name != "DICOMDIR"
+    return path.name != "DICOMDIR"

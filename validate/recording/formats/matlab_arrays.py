@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import open_file
 
 LIBRARIES = ("scipy.io",)
 MAGIC = b"MATLAB 5.0 MAT-file"
@@ -27,7 +28,7 @@ def elements(path: Path) -> list[tuple[int, int, int]]:
     Raises `RecordingError` for what ends before it or is no variable.
     """
     size, found, at = path.stat().st_size, [], HEADER
-    with path.open("rb") as file:
+    with open_file(path) as file:
         first = file.read(HEADER)
         order = _ORDERS.get(first[-2:])
         if len(first) < HEADER or not first.startswith(MAGIC) or order is None:
@@ -95,7 +96,7 @@ def _word(value: Any, dtype: np.dtype[Any]) -> str:
 def _require_sums(path: Path) -> None:
     """Every packed variable unpacks to the size that it states itself, and to its checksum."""
     parts = elements(path)
-    with path.open("rb") as file:
+    with open_file(path) as file:
         order = _ORDERS[file.read(HEADER)[-2:]]
         for kind, at, count in parts:
             file.seek(at)

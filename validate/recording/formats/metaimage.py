@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import ANY_SIZE, inside, open_file
 from validate.recording.formats.sequence import MAX_PIXELS, Sequence, by_frame, recorded
 from validate.recording.images.levels import luma
 from validate.recording.reader import Options, Reader, head
@@ -101,20 +102,16 @@ def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
     """The bytes of the pixels as they lie in the file, or in one of that name beside it."""
     name = fields[_LAST]
     local = name.upper() == "LOCAL"
-    if not local and (Path(name).name != name or name in ("", ".", "..") or "%" in name):
+    if not local and (name.upper().startswith("LIST") or "%" in name):
         raise RecordingError(
             f"{path.name}: its pixels lie in '{name[:60]}'; one file beside it is read"
         )
-    held = path if local else path.with_name(name)
     try:
-        with held.open("rb") as stream:
+        with open_file(path if local else inside(path.parent, name), ANY_SIZE) as stream:
             stream.seek(after if local else 0)
             return stream.read(2 * size + 4096)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        why = getattr(error, "strerror", error)
-        raise RecordingError(
-            f"{path.name}: its pixels in '{name[:60]}' cannot be read ({why})"
-        ) from error
+    except (OSError, RecordingError) as error:
+        raise RecordingError(f"{path.name}: its pixels cannot be read ({error})") from error
 
 
 def _unpacked(path: Path, fields: dict[str, str], packed: bytes, size: int) -> bytes:

@@ -4,9 +4,7 @@ The unit stands at the end of the file's name (`points3d_mm.npz`), or is asked f
 read without pickles: they hold arrays and nothing else.
 """
 
-import hashlib
 import re
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,8 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import RecordingError, UsageError
+from validate.files import npz_arrays
+from validate.recording.reader import source_of
 from validate.recording.types import Markers, Recording, Source
 from validate.units import si_factor
 
@@ -35,10 +35,10 @@ class StageTest:
 def read_points(path: Path, unit: str | None = None) -> Recording:
     """Markers `points` (nt, n, 3) m, NaN = not seen, of an array `points`; states count as seconds.
 
-    Raises `UsageError` for a missing file and a unit that nobody states, `RecordingError` for an
-    archive that is damaged or holds no such array.
+    Raises `UsageError` for a unit that nobody states, `RecordingError` for an archive that is
+    missing, damaged or holds no such array.
     """
-    data, arrays = _archive(path)
+    arrays = npz_arrays(path, _MOST)
     factor = si_factor(unit or _said(path), "length")
     x = factor * _array(path, arrays, "points", (None, None, 3))
     markers = Markers(
@@ -47,7 +47,7 @@ def read_points(path: Path, unit: str | None = None) -> Recording:
     )  # fmt: skip
     return Recording(
         path.stem,
-        _source(path, data),
+        source_of(path, "verified (CRC-32)"),
         0,
         markers={"points": markers},
         metadata={"provenance": {"file": path.name, "unit": unit or f"{_said(path)}, of the name"}},
@@ -57,7 +57,7 @@ def read_points(path: Path, unit: str | None = None) -> Recording:
 
 def read_stage(path: Path) -> StageTest:
     """Arrays `points` (nt, n, 2) px and `stage_mm` (nt,); raises as `read_points` does."""
-    _, arrays = _archive(path)
+    arrays = npz_arrays(path, _MOST)
     x = _array(path, arrays, "points", (None, None, 2))
     stage = 1e-3 * _array(path, arrays, "stage_mm", (len(x),), nan=False)
     return StageTest(path.stem, x, stage)
@@ -67,30 +67,9 @@ def read_arrays(
     path: Path, shapes: Mapping[str, tuple[int | None, ...]]
 ) -> tuple[Source, dict[str, Floats]]:
     """Arrays of these names and shapes, and where they came from; raises as `read_points` does."""
-    data, arrays = _archive(path)
+    arrays = npz_arrays(path, _MOST)
     found = {name: _array(path, arrays, name, shape, nan=False) for name, shape in shapes.items()}
-    return _source(path, data), found
-
-
-def _source(path: Path, data: bytes) -> Source:
-    return Source(path.name, hashlib.sha256(data).hexdigest(), len(data), "verified (CRC-32)")
-
-
-def _archive(path: Path) -> tuple[bytes, dict[str, np.ndarray]]:
-    if not path.is_file():
-        raise UsageError(f"cannot read {path}: no such file")
-    try:
-        with zipfile.ZipFile(path) as zipped:
-            size = sum(i.file_size for i in zipped.infolist())
-            if size > _MOST:
-                raise RecordingError(f"{path.name}: {size} bytes unpacked, the limit is {_MOST}")
-            bad = zipped.testzip()
-        if bad:
-            raise RecordingError(f"{path.name}: '{bad}' is damaged (CRC-32); copy the file again")
-        with np.load(path, allow_pickle=False) as found:
-            return path.read_bytes(), {name: found[name] for name in found.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError) as error:
-        raise RecordingError(f"{path.name}: no archive of arrays ({error})") from error
+    return source_of(path, "verified (CRC-32)"), found
 
 
 def _array(

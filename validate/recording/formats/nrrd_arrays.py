@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import inside, open_file, read_bytes
 from validate.recording.formats.sequence import MAX_PIXELS
 from validate.recording.images.levels import luma
 from validate.units import in_si
@@ -27,12 +28,15 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     (n,) s of the images, none where they are not stated."""
     import nrrd
 
-    with path.open("rb") as lines:  # a name with a line break is taken for the header itself
+    with open_file(path) as lines:  # a name with a line break is taken for the header itself
         header = nrrd.read_header(lines)
+    named = header.get("data file", header.get("datafile"))
+    if named is not None:
+        open_file(inside(path.parent, str(named))).close()
     count = prod(map(int, header["sizes"]))
     if count > MAX_PIXELS:
         raise RecordingError(f"{count} pixels, limit {MAX_PIXELS}; split it")
-    if header["encoding"] in ("gz", "gzip") and "data file" not in header:
+    if header["encoding"] in ("gz", "gzip") and named is None:
         _require_end(path, _WIDEST * count)
     pixels, header = nrrd.read(str(path))
     own = {key: text for key, text in header.items() if isinstance(text, str)}
@@ -85,7 +89,7 @@ def _spacing(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
 def _require_end(path: Path, most: int) -> None:
     """The library takes a stream without its end, which holds the checksum, and unpacks all of one
     that holds more than the sizes say: more than `most` bytes are refused before it does."""
-    packed = path.read_bytes().partition(b"\n\n")[2]
+    packed = read_bytes(path).partition(b"\n\n")[2]
     unpacker = zlib.decompressobj(_GZIP)
     found = 0
     while packed and not unpacker.eof:

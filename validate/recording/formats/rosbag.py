@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from validate.errors import RecordingError
+from validate.files import ANY_SIZE, member, members, open_file, read_text
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.rosbag_arrays import ROS1
 from validate.recording.mcap.read import read_all
@@ -35,9 +36,11 @@ def read_bag(path: Path, options: Options) -> Recording:
     if path.is_dir() and (one := _only_mcap(path)):
         return read_all(one, options)
     _require_all(path)
-    for file in path.glob("*.db3") if path.is_dir() else (path,):
-        _require_whole(file)
-    found = decoded("rosbag_arrays", path)
+    for file in map(member, members(path)) if path.is_dir() else (path,):
+        open_file(file, ANY_SIZE).close()
+        if file.suffix != ".mcap":
+            _require_whole(file)
+    found = decoded("rosbag_arrays", path, extra="ros2")
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         whole = Path(folder) / (path.name or "bag")  # errors name it
         found["mcap"].tofile(whole)
@@ -51,14 +54,14 @@ def read_bag(path: Path, options: Options) -> Recording:
 def _told(folder: Path) -> tuple[list[str], bool]:
     """The files of a bag as its metadata has them, and whether each message is compressed."""
     file = folder / _YAML
-    told = file.read_text("utf-8", "replace") if file.is_file() else ""
+    told = read_text(member(file)) if file.is_file() else ""
     return list(dict.fromkeys(_NAMED.findall(told))), bool(_PACKED.search(told))
 
 
 def _only_mcap(folder: Path) -> Path | None:
     """The one MCAP file of a bag of one file, which its own reader knows, whatever its name."""
     names, packed = _told(folder)
-    there = list(folder.glob("*.mcap"))
+    there = [member(f) for f in members(folder) if f.suffix == ".mcap"]
     return there[0] if len(there) == 1 and len(names) < 2 and not packed else None
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import read_bytes
 from validate.recording.formats.xlsx_arrays import require_unpacked, sheet_text
 
 LIBRARIES = ("python_calamine",)
@@ -17,7 +18,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """As `xlsx_arrays.arrays`, of a workbook of old Excel (.xls) or OpenDocument (.ods)."""
     import python_calamine
 
-    data = path.read_bytes()
+    data = read_bytes(path)
     if data[:4] == b"PK\x03\x04":
         require_unpacked(path)
     elif len(data) % _SECTOR:

@@ -1,6 +1,5 @@
 """Landmarks of 3D Slicer: FCSV, and markups as JSON (.mrk.json). Points at one instant, in mm."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from validate.errors import RecordingError
+from validate.files import json_value
 from validate.recording.exports.encoding import whole_file
 from validate.recording.formats.options import length, spread
 from validate.recording.formats.recorded import distinct, recorded
@@ -75,7 +75,7 @@ def _point(held: TextRows, row: TextRow, names: Sequence[str]) -> _Point:
 def _three(what: str, values: Any) -> Sequence[float]:
     try:
         x = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         x = np.zeros(0)
     if x.shape != (3,) or not np.isfinite(x).all():
         raise RecordingError(f"{what}: {str(values)[:60]} is no point of 3 finite numbers; damaged")
@@ -110,10 +110,10 @@ def _lists(path: Path) -> list[Mapping[str, Any]]:
     try:
         if len(data) > _LARGEST:
             raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
-        found = json.loads(data)["markups"]
+        found = json_value(data)["markups"]
         if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
             raise ValueError("its 'markups' is no list of lists")
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError) as error:
         raise RecordingError(f"{path.name}: no markups JSON ({error}); damaged") from None
     return found
 

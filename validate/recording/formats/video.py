@@ -11,6 +11,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.files import ANY_SIZE, open_file
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import above_zero, length
 from validate.recording.formats.recorded import recorded
@@ -130,7 +131,7 @@ def _sized(data: bytes, at: int) -> tuple[int | None, int]:
 def _last_box(path: Path, size: int) -> int:
     """Where the last of an MP4's boxes ends; raises `RecordingError` for what is no box."""
     at = 0
-    with path.open("rb") as file:
+    with open_file(path, ANY_SIZE) as file:
         while at < size:
             file.seek(at)
             tag = file.read(16)

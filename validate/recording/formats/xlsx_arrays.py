@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import open_file
 
 LIBRARIES = ("openpyxl",)
 MOST_BYTES = 512 * 2**20  # unpacked
@@ -26,7 +27,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     import openpyxl
 
     require_unpacked(path)
-    with path.open("rb") as file:  # by its content: openpyxl refuses names of other endings
+    with open_file(path) as file:  # by its content: openpyxl refuses names of other endings
         book = openpyxl.load_workbook(file, read_only=True, data_only=True)
         texts = [sheet_text(sheet.iter_rows(values_only=True)) for sheet in book.worksheets]
     found = {str(i): np.frombuffer(text.encode(), np.uint8) for i, text in enumerate(texts)}

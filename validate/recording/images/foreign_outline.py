@@ -12,18 +12,18 @@ said.
 """
 
 import csv
-import json
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import contourpy
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.files import buffered, json_value, npz_arrays, read_bytes, read_text
 from validate.recording.formats.apart import decoded
 from validate.recording.images.image import decode_png
 from validate.recording.images.numbered import number_key, numbered
@@ -166,20 +166,20 @@ def _require_each(path: Path, count: int, what: str, images: int) -> None:
 
 
 def _pictures(files: list[Path]) -> list[Any]:
-    return [decode_png(file.read_bytes()) for file in files]
+    return [decode_png(read_bytes(file, MAX_FILE)) for file in files]
 
 
 def _array(path: Path) -> Any:
-    try:
-        masks = np.load(path, allow_pickle=False)
-        if not isinstance(masks, np.ndarray):
-            with masks as archive:
-                held = {name: archive[name] for name in archive.files}
-            if len(held) != 1:
-                raise RecordingError(f"{path.name}: arrays {sorted(held)}; keep the masks alone")
-            masks = next(iter(held.values()))
-    except (ValueError, EOFError, BadZipFile) as error:
-        raise RecordingError(f"{path.name}: no array of masks ({error})") from None
+    if path.suffix.lower() == ".npz":
+        held = npz_arrays(path, MAX_FILE)
+        if len(held) != 1:
+            raise RecordingError(f"{path.name}: arrays {sorted(held)}; keep the masks alone")
+        masks = next(iter(held.values()))
+    else:
+        try:
+            masks = np.load(buffered(path, MAX_FILE), allow_pickle=False)
+        except (ValueError, EOFError) as error:
+            raise RecordingError(f"{path.name}: no array of masks ({error})") from None
     if masks.ndim not in (2, 3):
         raise RecordingError(f"{path.name}: {masks.shape}, expected masks (n, h, w) or (h, w)")
     return masks if masks.ndim == 3 else masks[None]
@@ -216,19 +216,19 @@ def _edge(inside: Any, what: str) -> Floats:
 
 
 def _table(path: Path) -> Outlines:
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        rows = csv.DictReader(file)
-        names = [str(name).strip().lower() for name in rows.fieldnames or ()]
-        if not {"frame", "x", "y"} <= set(names):
-            raise RecordingError(f"{path.name}: columns {names}, expected frame, x, y")
-        rows.fieldnames = names
-        return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
+    text = read_text(path, MAX_FILE, "utf-8-sig")
+    rows = csv.DictReader(io.StringIO(text, newline=""))
+    names = [str(name).strip().lower() for name in rows.fieldnames or ()]
+    if not {"frame", "x", "y"} <= set(names):
+        raise RecordingError(f"{path.name}: columns {names}, expected frame, x, y")
+    rows.fieldnames = names
+    return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
 
 
 def _polygons(path: Path, files: list[Path], frames: Frames, label: str) -> Outlines:
     images = len(frames.images)
     try:
-        told = [json.loads(f.read_text(encoding="utf-8-sig", errors="replace")) for f in files]
+        told = [json_value(read_text(f, MAX_FILE, "utf-8-sig")) for f in files]
         if "annotations" in told[0] and len(told) == 1:
             return _coco(path, told[0], frames, label)
         _require_each(path, len(files), "files of polygons", images)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import read_text
 
 LIBRARIES = ("cv2",)
 _MOST = 1_000_000  # bytes
@@ -41,9 +42,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _text(path: Path) -> str:
-    if path.stat().st_size > _MOST:
-        raise RecordingError(f"{path.stat().st_size} bytes; a calibration has at most {_MOST}")
-    text = path.read_text("utf-8")
+    text = read_text(path, _MOST)
     plain = text.lstrip()
     return text if plain.startswith(("%YAML", "<", "{")) else f"%YAML:1.0\n---\n{plain}"
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from validate.errors import RecordingError
+from validate.files import ANY_SIZE, member, members, open_file
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
 OTHERS = tuple(s for s in SUFFIXES if s != ".png")
@@ -12,7 +13,7 @@ OTHERS = tuple(s for s in SUFFIXES if s != ".png")
 
 def pictures(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
     """Files of these endings; hidden ones, as macOS leaves on foreign disks, are none."""
-    return [f for f in folder.iterdir() if f.suffix.lower() in kinds and not f.name.startswith(".")]
+    return [f for f in members(folder) if f.suffix.lower() in kinds]
 
 
 def number_key(stem: str) -> tuple[int, ...]:
@@ -23,12 +24,10 @@ def number_key(stem: str) -> tuple[int, ...]:
 def numbered(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
     """Its files of these kinds in the order of the numbers in their names.
 
-    Raises `RecordingError` for a folder without any, and for numbers that are alike.
+    Raises `RecordingError` for a folder without any, for numbers that are alike, and for a pipe, a
+    device or a link out of the folder.
     """
-    try:
-        files = pictures(folder, kinds)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be read ({error.strerror})") from error
+    files = pictures(folder, kinds)
     if not files:
         raise RecordingError(f"{folder}: no {' or '.join(f'*{kind}' for kind in kinds)} files")
     keys = {f: number_key(f.stem) for f in files}
@@ -39,4 +38,6 @@ def numbered(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
                 f"{folder.name}: '{a.name}' and '{b.name}' have the same number; "
                 "number the files in order of time"
             )
+    for file in files:
+        open_file(member(file), ANY_SIZE).close()
     return files

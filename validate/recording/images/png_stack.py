@@ -7,6 +7,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
+from validate.files import read_bytes
 from validate.recording.clocks import clock_of
 from validate.recording.formats.options import above_zero
 from validate.recording.images.image import Pixels, decode_png
@@ -133,11 +134,7 @@ def _images(folder: Path) -> tuple[Pixels, ...]:
 
 def _read(file: Path) -> Pixels:
     try:
-        if file.stat().st_size > MAX_FILE:
-            raise RecordingError(f"{file.name}: {file.stat().st_size} bytes, limit {MAX_FILE}")
-        return decode_png(file.read_bytes())
-    except OSError as error:
-        raise RecordingError(f"{file.name}: cannot be read ({error.strerror})") from error
+        return decode_png(read_bytes(file, MAX_FILE))
     except RecordingError as error:
         raise RecordingError(f"{file.name}: {error}; --as image-stack reads others") from None
 
@@ -145,7 +142,7 @@ def _read(file: Path) -> Pixels:
 def _recognises(path: Path) -> bool:
     try:
         return path.is_dir() and bool(pictures(path)) and not pictures(path, OTHERS)
-    except OSError:
+    except (OSError, RecordingError):  # a name too long; a folder of too many entries
         return False
 
 

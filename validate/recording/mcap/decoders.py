@@ -5,7 +5,6 @@ Numbers stay numbers, texts texts, bytes bytes, lists lists; times of Protobuf b
 
 import base64
 import io
-import json
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from mcap.records import Schema as TheirSchema
 
 from validate.errors import RecordingError
+from validate.files import json_value
 from validate.installation import install_command
 from validate.recording.mcap.records import Channel, Schema
 
@@ -112,7 +112,7 @@ def _plain_protobuf(message: Any) -> Any:
 
 
 def _json(data: bytes) -> Any:
-    return json.loads(data.decode("utf-8"))
+    return json_value(data.decode("utf-8"))
 
 
 def _cbor() -> Decoder:

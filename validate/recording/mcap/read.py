@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from validate.errors import RecordingError
+from validate.files import ANY_SIZE
 from validate.recording.alignment import moved
 from validate.recording.clocks import clock_of
 from validate.recording.mcap.foreign import ForeignStreams, found_streams, gatherers
@@ -23,7 +24,7 @@ from validate.recording.mcap.metadata import by_name, name_of, own_records
 from validate.recording.mcap.records import MAGIC
 from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
-from validate.recording.reader import MAX_SIZE, Options, Reader, head
+from validate.recording.reader import Options, Reader, head
 from validate.recording.types import Clock, Recording, by_kind
 
 
@@ -134,5 +135,5 @@ MCAP = Reader(
     lambda path: head(path, len(MAGIC)) == MAGIC,
     read_all,
     "its first 8 bytes are MCAP's",
-    largest=MAX_SIZE,  # read piece by piece
+    largest=ANY_SIZE,  # read piece by piece
 )

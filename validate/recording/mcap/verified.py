@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from validate.arrays import Ints
-from validate.errors import RecordingError
+from validate.files import ANY_SIZE, open_file, unreadable
 from validate.recording.mcap.records import (
     Attachment,
     Channel,
@@ -19,7 +19,6 @@ from validate.recording.mcap.records import (
     Schema,
     records_in,
 )
-from validate.recording.reader import MAX_SIZE, require_readable
 from validate.recording.types import Source
 
 
@@ -71,12 +70,11 @@ class Verified:
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
     """The file for reading; every failure of the disk is a `RecordingError`."""
-    require_readable(path, MAX_SIZE)
     try:
-        with path.open("rb") as stream:
+        with open_file(path, ANY_SIZE) as stream:
             yield stream
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
+        raise unreadable(path, error) from error
 
 
 def messages_of(stream: BinaryIO, verified: Verified, wanted: Set[int]) -> Iterator[Message]:

@@ -1,8 +1,6 @@
 """The fields of a guest's answer: `fields.npz`, or .vtu files listed in `fields.pvd`."""
 
 import stat
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError, ValidateError
+from validate.files import npz_arrays
 from validate.recording.formats.apart import decoded
 from validate.solve.guests.job import GuestJob
 from validate.solve.guests.ran import plain
@@ -60,19 +59,11 @@ def _arrays(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
     room = 8 * most * (2 * nodes + 1) + 3 * _HEADER_BYTES
     regular(path, room + _HEADER_BYTES)
     try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-            if size > room:
-                raise NoAnswerError(f"fields.npz: {size} bytes unpacked, the job has {room}")
-        with np.load(path, allow_pickle=False) as file:
-            wanted = [name for name in ("t", "u", "reactions") if name in file.files]
-            found = {name: _number_array(file[name], name) for name in wanted}
-    except (
-        ValueError, EOFError, KeyError, OSError, MemoryError, zipfile.BadZipFile, RuntimeError,
-        NotImplementedError, zlib.error,
-    ) as error:  # fmt: skip
-        raise NoAnswerError(f"fields.npz: damaged ({plain(str(error))})") from None
-    return found
+        found = npz_arrays(path, room)
+    except RecordingError as error:
+        raise NoAnswerError(plain(str(error))) from None
+    wanted = [name for name in ("t", "u", "reactions") if name in found]
+    return {name: _number_array(found[name], name) for name in wanted}
 
 
 def _shaped(found: dict[str, NDArray[Any]], file: str, job: GuestJob) -> dict[str, NDArray[Any]]:
