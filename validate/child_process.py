@@ -7,7 +7,8 @@ a recording would be run. Every interpreter that this package starts gets a clea
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = str(Path(__file__).resolve().parents[1])  # of the package that runs
@@ -30,15 +31,31 @@ def clean_environment(folder: Path | None = None) -> dict[str, str]:
     return {**kept, **dict.fromkeys(_THREADS, "1"), **places, _SAFE: "1"}
 
 
-def clearing_variables() -> Mapping[str, str]:
-    """Return what makes an environment a clean one where variables can only be set: an empty value
-    of one of Python's counts as none."""
-    ours = {name: "" for name in os.environ if name.startswith(_PREFIX)}
-    return {**ours, **dict.fromkeys(_THREADS, "1"), _SAFE: "1"}
+@contextmanager
+def isolating_environment() -> Iterator[dict[str, str]]:
+    """Make this process's own environment a clean one, for a library that starts interpreters.
+
+    Yields the variables that such a child sets once it has started, so that programs that *it*
+    starts for the user see the user's own.
+    """
+    before = dict(os.environ)
+    theirs = {name: value for name, value in before.items() if name.startswith(_PREFIX)}
+    clean = clean_environment()
+    try:
+        _replace(clean)
+        yield {_SAFE: "", **theirs}  # Python takes an empty value for none
+    finally:
+        _replace(before)
+
+
+def _replace(variables: Mapping[str, str]) -> None:
+    for name in set(os.environ) - set(variables):
+        del os.environ[name]
+    os.environ.update(variables)
 
 
 def python(*arguments: str) -> list[str]:
-    """Return the command line of this interpreter in safe-path mode, without the user's site."""
+    """Return the command line of this interpreter in safe-path mode."""
     return [sys.executable, "-P", *arguments]
 
 

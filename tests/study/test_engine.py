@@ -1,7 +1,10 @@
 """The engine under all studies: nothing is lost, nothing is done twice, timed cells run alone."""
 
+import importlib.util
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,11 +13,16 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
+import distributed
 import pytest
 from engine_samples import Waited, Waiting, logged, waiting
 
 from validate.errors import UsageError
+from validate.replay.find import module_name
+from validate.report.made import PACKAGE
+from validate.seals import sealed, unsealed
 from validate.study import engine
+from validate.study.code_identity import OtherCodeError, digest, identity_of, require_same
 from validate.study.engine import finish
 from validate.study.job import Where, file_sha256
 from validate.study.store import Record, key_of, read_records, write_record
@@ -22,7 +30,9 @@ from validate.study.store import Record, key_of, read_records, write_record
 HERE = Where(workers=0)
 
 
-def test_every_cell_is_kept_and_a_second_call_runs_only_what_is_missing(tmp_path: Path) -> None:
+def test_every_cell_is_kept_and_a_second_call_runs_only_what_is_missing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     cells = tuple(Waiting(f"c{i}") for i in range(4))
     kept = tmp_path / "cells"
     done = finish(waiting(tmp_path, cells), kept, HERE)
@@ -32,6 +42,7 @@ def test_every_cell_is_kept_and_a_second_call_runs_only_what_is_missing(tmp_path
     (kept / "c2.json").unlink()
     again = finish(waiting(tmp_path, cells), kept, HERE)
     assert again.reused == 2
+    assert re.search(r"c1\.json: not believed .* computed again", caplog.text)
     assert [row.key for row in logged(tmp_path)[4:]] == ["c1", "c2"]
     assert {r.value for r in again.records.values()} == {Waited(os.getpid(), 0.0)}
 
@@ -66,14 +77,26 @@ def test_a_key_knows_all_that_is_put_in() -> None:
     assert len({key_of(one, {"b": (1, 2)}), *others}) == 3
 
 
-def test_a_record_that_is_not_whole_is_not_read(tmp_path: Path) -> None:
-    record = Record("k", Waited(1, 0.5), seconds=2.0)
+def test_a_record_is_believed_where_its_seal_and_its_code_hold(tmp_path: Path) -> None:
+    record = Record("k", Waited(1, 0.5), seconds=2.0, code="ours")
+    file = tmp_path / "k.json"
+
+    def read(code: str = "ours") -> tuple[dict[str, Record[Waited]], str]:
+        found = read_records(tmp_path, ["k", "absent"], Waited, code)
+        return found.records, "".join(found.doubts)
+
     write_record(tmp_path, Waiting("k"), record)
-    assert read_records(tmp_path, ["k"], Waited) == {"k": record}
-    content = json.loads((tmp_path / "k.json").read_text("utf-8"))
-    del content["record"]["value"]["pid"]
-    (tmp_path / "k.json").write_text(json.dumps(content), encoding="utf-8")
-    assert read_records(tmp_path, ["k"], Waited) == {}
+    assert read() == ({"k": record}, "")
+    assert read("other") == ({}, "k.json: made by other code; the cell is computed again")
+    written = file.read_text("utf-8")
+    file.write_text(written.replace('"seconds": 0.5', '"seconds": 0.6'), encoding="utf-8")
+    assert file.read_text("utf-8") != written
+    assert read()[0] == {}
+    assert "not believed (its content does not fit its checksum" in read()[1]
+    lacking = unsealed(json.loads(written))
+    del lacking["record"]["value"]["pid"]
+    file.write_text(json.dumps(sealed(lacking)), encoding="utf-8")
+    assert read() == ({}, "k.json: no record; the cell is computed again")
 
 
 # --- a scheduler of its own -----------------------------------------------------------------------
@@ -84,18 +107,24 @@ class Cluster:
 
     def __init__(self, folder: Path) -> None:
         file = folder / "scheduler.json"
-        paths = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
-        self._environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+        self._paths = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
         at = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file))
         self.all = [self._started("scheduler", "--port", "0", *at)]
-        self.workers = [self._started("worker", "--no-nanny", "--nthreads", "1", *at)
-                        for _ in range(2)]  # fmt: skip
+        self._of_worker = ("worker", "--no-nanny", "--nthreads", "1", *at)
+        self.workers = [self._started(*self._of_worker) for _ in range(2)]
         self.address = self._address(file)
 
-    def _started(self, *arguments: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", *arguments]
+    def worker_with(self, package: Path) -> subprocess.Popen[bytes]:
+        """One more worker, whose package is another."""
+        return self._started(*self._of_worker, first=str(package))
+
+    def _started(self, *arguments: str, first: str = "") -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-P", "-m", "dask", *arguments]
         quiet = subprocess.DEVNULL
-        started = subprocess.Popen(command, env=self._environment, stdout=quiet, stderr=quiet)
+        paths = os.pathsep.join([first, *self._paths] if first else self._paths)
+        started = subprocess.Popen(
+            command, env={**os.environ, "PYTHONPATH": paths}, stdout=quiet, stderr=quiet
+        )
         self.all = [*getattr(self, "all", []), started]
         return started
 
@@ -160,6 +189,70 @@ def test_a_killed_worker_loses_no_cell_and_none_is_done_twice(
     killed = [row.key for row in logged(tmp_path) if row.pid == cluster.workers[0].pid]
     assert 0 < len(killed) < len(cells)  # it had its share, and the other one finished
     assert finish(waiting(tmp_path, cells), tmp_path / "cells", where).reused == len(cells)
+
+
+@pytest.mark.slow
+def test_a_worker_with_other_code_is_refused_in_a_line_and_computes_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    copy = tmp_path / "other"
+    shutil.copytree(PACKAGE, copy / "validate", ignore=shutil.ignore_patterns("__pycache__"))
+    with (copy / "validate" / "fem" / "elastic.py").open("a") as file:
+        file.write("\nOTHER = 1.5\n")
+    own = Cluster(tmp_path)
+    try:
+        other = own.worker_with(copy)
+        with distributed.Client(own.address) as client:
+            client.wait_for_workers(3, timeout=60)
+        cells = tuple(Waiting(f"c{i:02d}", 0.05) for i in range(24))
+        where = Where(scheduler=own.address)
+        done = finish(waiting(tmp_path, cells), tmp_path / "cells", where)
+        assert len(done.records) == 24
+        assert {row.pid for row in logged(tmp_path)} == {w.pid for w in own.workers}
+        here = identity_of(tmp_path)
+        assert {r.code for r in done.records.values()} == {digest(here)}
+        (line,) = [r.getMessage() for r in caplog.records if "refused" in r.getMessage()]
+        assert re.search(
+            rf"worker tcp://\S+ is refused: .*validate {here['validate'][:12]}, ", line
+        )
+        for worker in own.workers:
+            worker.kill()
+            worker.wait()
+        more = waiting(tmp_path, (*cells, Waiting("late")))
+        with pytest.raises(UsageError, match="all 1 workers are refused"):
+            finish(more, tmp_path / "cells", where)
+        assert other.poll() is None
+    finally:
+        own.stop()
+
+
+def test_what_differs_is_named_and_an_answer_of_other_code_is_thrown_away() -> None:
+    here = {"validate": "a" * 64, "numpy": "2.4.0"}
+    require_same(here, {**here, "more": "1"}, "w")
+    with pytest.raises(OtherCodeError, match=r"^w is refused: .*\(numpy 2\.4\.0, there 1\.26\)$"):
+        require_same(here, {**here, "numpy": "1.26"}, "w")
+    with pytest.raises(OtherCodeError, match=r"validate aaaaaaaaaaaa, there not known; numpy"):
+        require_same(here, {}, "w")
+
+
+def test_the_user_s_own_modules_are_part_of_the_identity(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "deep_law.py").write_text("K = 1\n")
+    (tmp_path / "my_law.py").write_text("import deep_law\ndef law(): return deep_law.K\n")
+    path = tmp_path / "mine.py"
+    path.write_text("from my_law import law\nimport numpy\n")
+    spec = importlib.util.spec_from_file_location(module_name(path), path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, module_name(path), module)
+    spec.loader.exec_module(module)
+    first = identity_of(path)
+    (tmp_path / "deep_law.py").write_text("K = 1.5\n")
+    assert identity_of(path)["modules"] != first["modules"]
+    assert {**identity_of(path), "modules": ""} == {**first, "modules": ""}
 
 
 @pytest.mark.slow

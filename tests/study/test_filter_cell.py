@@ -124,10 +124,12 @@ def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
     assert found.value is not None
     assert found.value.scores == first(pulled).scores
     key = made.cells[0].key
-    assert read_records(tmp_path, [key], FilterScores) == {key: found}
+    stored = read_records(tmp_path, [key], FilterScores, found.code)
+    assert (stored.records, stored.doubts) == ({key: found}, ())
     file = tmp_path / f"{key}.json"
     file.write_text(file.read_text("utf-8")[:-20], encoding="utf-8")
-    assert read_records(tmp_path, [key], FilterScores) == {}
+    stored = read_records(tmp_path, [key], FilterScores, found.code)
+    assert (stored.records, len(stored.doubts)) == ({}, 1)
 
 
 def test_a_worker_keeps_few_systems_and_many_recordings(pulled: Experiment) -> None:

@@ -1,5 +1,6 @@
 """Commands and exit codes: 0 all checks hold, 1 a check failed, 2 usage or bad input, 70 a bug."""
 
+import logging
 import os
 import sys
 from pathlib import Path
@@ -28,6 +29,7 @@ def main(argv: list[str] | None = None) -> None:
 
 def run(argv: list[str]) -> int:
     """The exit code of a command; known errors print one line, a bug its traceback."""
+    _tell_warnings()
     try:
         given = tuple(argv)
         return int(cli.main(argv, prog_name="validate", standalone_mode=False, obj=given) or 0)
@@ -57,6 +59,19 @@ def run(argv: list[str]) -> int:
     except Exception:
         return _bug()
     return BAD_INPUT
+
+
+class _OneLine(logging.Handler):
+    """A warning of the package as a line on standard error, as errors are."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        complain(record.getMessage())
+
+
+def _tell_warnings() -> None:
+    log = logging.getLogger("validate")
+    if not any(isinstance(handler, _OneLine) for handler in log.handlers):
+        log.addHandler(_OneLine())
 
 
 def _bug() -> int:

@@ -51,9 +51,14 @@ def load_file(path: Path) -> Experiment:
     return replace(experiment, path=path.resolve())
 
 
+def module_name(path: Path) -> str:
+    """The name of the module that an experiment's file is loaded as."""
+    return f"validate_experiment_{path.stem}"
+
+
 def _executed(path: Path) -> ModuleType:
     # Not by its bare name: a file called random.py would be everybody's module of that name.
-    name = f"validate_experiment_{path.stem}"
+    name = module_name(path)
     spec = importlib.util.spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:
         raise UsageError(f"{path} cannot be loaded as Python")

@@ -6,9 +6,12 @@ first window is opened in a process of its own. `VALIDATE_NO_GL=1` answers no at
 
 import os
 import subprocess
-import sys
+import tempfile
 from functools import cache
+from pathlib import Path
 from threading import Lock, Thread
+
+from validate.child_process import clean_environment, python
 
 HOW_TO_GET = (
     "Three-dimensional renders are missing: this machine has no OpenGL library. On Debian or "
@@ -54,15 +57,17 @@ def _working_window(chosen: str) -> str | None:
 
 
 def _opens(window: str) -> bool:
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", _PROBE],
-            env={**os.environ, _VARIABLE: window},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=_TIMEOUT,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return False
+    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
+        try:
+            done = subprocess.run(
+                python("-c", _PROBE),
+                cwd=folder,
+                env={**clean_environment(Path(folder)), _VARIABLE: window},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=_TIMEOUT,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return False
     return done.returncode == 0

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from validate.report.environment import file_name, without_folder
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).resolve().parents[1]
 _LIBRARIES = ("numpy", "scipy", "numba", "scikit-fem")
 _PATIENCE = 10.0  # s that git may take: a run is worth more than its commit's name
 _LEFT_OUT = "…/"  # of an absolute path in a command: reports name files, not places
@@ -59,7 +59,7 @@ def made(
     """`arguments` of the command line, `sources` the experiment's file and its helpers, `meshes`
     with layouts of markers."""
     command = shlex.join(["validate", *map(_told, arguments)]) if arguments else ""
-    ours, theirs = commit_of([_PACKAGE]), commit_of(sources)
+    ours, theirs = commit_of([PACKAGE]), commit_of(sources)
     same = theirs is None or (ours is not None and theirs.sha == ours.sha and not theirs.dirty)
     files = (*(("experiment", f) for f in sources), *((_role(f), f) for f in meshes))
     return Made(
@@ -116,8 +116,8 @@ def _git(folder: Path, *arguments: str) -> str | None:
 def code_sha256() -> str:
     """Of this package's sources and the libraries' versions: what a stored result rests on."""
     found = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        found.update(path.relative_to(_PACKAGE).as_posix().encode())
+    for path in sorted(PACKAGE.rglob("*.py")):
+        found.update(path.relative_to(PACKAGE).as_posix().encode())
         found.update(path.read_bytes())
     found.update(platform.python_version().encode())
     found.update(" ".join(f"{name} {version(name)}" for name in _LIBRARIES).encode())

@@ -2,44 +2,55 @@
 
 import logging
 import signal
+import tempfile
 import threading
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import dask
 import distributed
 from distributed.scheduler import KilledWorker
 
-from validate.errors import UsageError
+from validate.child_process import isolating_environment
+from validate.errors import UsageError, ValidateError
 from validate.fem.threads import cores
-from validate.study.job import C, Done, Plan, R, Where, run_batch
+from validate.study.code_identity import Identity, OtherCodeError, digest, require_same
+from validate.study.job import C, Done, Plan, R, Where, prove, run_batch
 from validate.study.store import Record
 
 TASK_S = 0.5  # s of work in one task: a kill loses so much, and Dask's 2 ms a task vanish in it
 CONNECT_S = 10.0  # s until a scheduler counts as absent
+_MOMENT = 1.0  # s between looks at which workers are there
+_DEATHS = 4  # of workers under one cell alone
 _AHEAD = 2  # tasks a worker: one that runs and one that waits
-# One thread each: two workers with two BLAS threads would only stand in each other's way.
-_BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
+LOG = logging.getLogger(__name__)
 _dask: Any = distributed  # its calls carry no annotations
 
 
-def run_beside(plan: Plan[C, R], cells: Sequence[C], where: Where, done: Done) -> str:
+def run_beside(
+    plan: Plan[C, R], cells: Sequence[C], where: Where, done: Done, here: Identity
+) -> str:
     """Calls `done` with every cell as it is finished, in no order; returns where they ran.
 
-    Raises `UsageError` when the scheduler cannot be reached, or what opening the experiment raises
-    on a worker.
+    Only workers that prove the identity `here` of the code get cells; each other one is refused in
+    a line. Raises `UsageError` when the scheduler cannot be reached or none is left, or what
+    opening the experiment raises on a worker.
     """
     with _client(where, len(cells)) as client:
-        _Drain(plan, client, cells, done, ahead=_AHEAD).run()
+        _Drain(plan, client, cells, done, here, ahead=_AHEAD).run()
         return _named(where, client)
 
 
-def run_in_turn(plan: Plan[C, R], cells: Sequence[C], where: Where, done: Done) -> str:
+def run_in_turn(
+    plan: Plan[C, R], cells: Sequence[C], where: Where, done: Done, here: Identity
+) -> str:
     """One at a time, in order, on one worker as long as it lives: their times are measured."""
     with _client(where, len(cells)) as client:
-        _Drain(plan, client, cells, done, ahead=0).run()
+        _Drain(plan, client, cells, done, here, ahead=0).run()
         return _named(where, client)
 
 
@@ -60,19 +71,24 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
             yield client
         return
     settings = {
-        "distributed.nanny.pre-spawn-environ": dict.fromkeys(_BLAS_THREADS, "1"),
         # In the workers only: numba rereads its own settings, and a process keeps to its first.
         "distributed.nanny.environ": {"NUMBA_NUM_THREADS": "1"},
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.worker.profile.enabled": False,  # a thread that looks a hundred times a second
     }
-    with dask.config.set(settings):
+    with (
+        dask.config.set(settings),
+        isolating_environment() as theirs,
+        tempfile.TemporaryDirectory(prefix="validate-") as folder,
+    ):
         with _deaf_to_interrupts():
             cluster = _dask.LocalCluster(
                 n_workers=where.workers or min(cores(), cells),
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
+                local_directory=folder,
+                env=theirs,
                 dashboard_address="127.0.0.1:0",  # None would take a fixed port
                 silence_logs=logging.CRITICAL,
             )
@@ -93,34 +109,107 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-class _Drain:
-    """Keeps every worker busy with tasks of about `TASK_S`, single cells at first.
+@dataclass(frozen=True)
+class _Sent:
+    """A task that is out: its cells, and the workers that it may run on."""
 
-    `ahead` tasks a worker; 0: one task in all.
+    future: Any
+    batch: tuple[Any, ...]
+    workers: frozenset[str]
+
+
+class _Drain:
+    """Keeps every proven worker busy with tasks of about `TASK_S`, single cells at first.
+
+    `ahead` tasks a worker; 0: one task in all. A task runs on workers that proved their code and
+    nowhere else, so that one whose workers are gone is sent again from here.
     """
 
     def __init__(
-        self, plan: Plan[C, R], client: Any, cells: Sequence[C], done: Done, ahead: int
-    ) -> None:
+        self, plan: Plan[C, R], client: Any, cells: Sequence[C], done: Done, here: Identity,
+        ahead: int,
+    ) -> None:  # fmt: skip
         self._plan, self._client, self._done, self._ahead = plan, client, done, ahead
-        self._waiting: list[Any] = list(reversed(cells))
-        self._sent: dict[str, tuple[Any, ...]] = {}
-        self._pool = _dask.as_completed()
+        self._here, self._code = here, digest(here)
+        self._waiting: list[tuple[Any, ...]] = [(cell,) for cell in reversed(cells)]
+        self._sent: list[_Sent] = []
         self._spent, self._finished = 0.0, 0
+        self._proven: set[str] = set()
+        self._refused: set[str] = set()
+        self._deaths: Counter[str] = Counter()
 
     def run(self) -> None:
-        self._refill()
-        for future in self._pool:
-            self._collect(future)
+        while self._waiting or self._sent:
             self._refill()
+            self._wait([one.future for one in self._sent])
+            there = frozenset(self._there())
+            for one in tuple(self._sent):
+                if one.future.status in ("finished", "error"):
+                    self._sent.remove(one)
+                    self._collect(one)
+                elif not one.workers & there:
+                    self._sent.remove(one)
+                    one.future.cancel()
+                    self._bury(one.batch)
+
+    def _wait(self, futures: list[Any]) -> None:
+        """Until one of them ends, or a moment, after which who is there is looked at again."""
+        try:
+            _dask.wait(futures, timeout=_MOMENT, return_when="FIRST_COMPLETED")
+        except TimeoutError:
+            return
 
     def _refill(self) -> None:
-        workers = list(self._client.scheduler_info(n_workers=-1)["workers"])
+        workers = self._workers() if self._waiting else []
         most = max(1, self._ahead * len(workers))
         size = self._size(most)
-        while self._waiting and len(self._sent) < most:
-            batch = tuple(self._waiting.pop() for _ in range(min(size, len(self._waiting))))
+        while workers and self._waiting and len(self._sent) < most:
+            batch = self._waiting.pop()
+            while len(batch) < size and self._waiting and not self._deaths:
+                batch += self._waiting.pop()
             self._send(batch, workers)
+
+    def _there(self) -> list[str]:
+        return sorted(self._client.scheduler_info(n_workers=-1)["workers"])
+
+    def _workers(self) -> list[str]:
+        """Workers that proved their code, new ones asked for it; raises `UsageError` where all are
+        refused."""
+        there = self._there()
+        for worker in there:
+            if worker not in self._proven | self._refused:
+                self._ask(worker)
+        trusted = [worker for worker in there if worker in self._proven]
+        if there and not trusted and self._refused.issuperset(there):
+            raise UsageError(
+                f"all {len(there)} workers are refused; give them the study's own installation"
+            )
+        return trusted
+
+    def _ask(self, worker: str) -> None:
+        """Has a worker prove its code, in a task of its own; one that goes away did not."""
+        asked = self._client.submit(
+            prove, self._plan.open, self._plan.job, self._here, pure=False, workers=[worker],
+            allow_other_workers=False,
+        )  # fmt: skip
+        while asked.status == "pending":
+            self._wait([asked])
+            if worker not in self._there():
+                asked.cancel()
+                return
+        error = asked.exception() if asked.status == "error" else None
+        if isinstance(error, ValidateError):
+            raise error  # of the experiment: any worker's
+        if asked.status == "cancelled":
+            return
+        try:
+            there = asked.result() if error is None else {}
+            require_same(self._here, there, f"worker {worker}")
+        except OtherCodeError as other:
+            self._refused.add(worker)
+            LOG.warning(str(other))
+            return
+        self._proven.add(worker)
 
     def _size(self, most: int) -> int:
         if not (self._ahead and self._spent):
@@ -128,35 +217,38 @@ class _Drain:
         size = int(TASK_S * self._finished / self._spent)
         return max(1, min(size, len(self._waiting) // most))
 
-    def _send(self, batch: tuple[Any, ...], workers: Sequence[str] = ()) -> None:
+    def _send(self, batch: tuple[Any, ...], workers: Sequence[str]) -> None:
         """In turn: on the first worker while it is there, so that one machine measures all."""
-        pinned = {"workers": sorted(workers)[:1], "allow_other_workers": True}
+        on = list(workers if self._ahead else workers[:1])
         future = self._client.submit(
             run_batch, self._plan.open, self._plan.run, self._plan.job, batch, pure=False,
-            **({} if self._ahead or not workers else pinned),
+            workers=on, allow_other_workers=False,
         )  # fmt: skip
-        self._sent[future.key] = batch
-        self._pool.add(future)
+        self._sent.append(_Sent(future, batch, frozenset(on)))
 
-    def _collect(self, future: Any) -> None:
-        batch = self._sent.pop(future.key)
-        for cell, record in zip(batch, _records(future, batch), strict=True):
-            if record is None:
-                self._send((cell,))
+    def _collect(self, one: _Sent) -> None:
+        """Takes the records that proven code made; others are asked for again, of all workers."""
+        error = one.future.exception() if one.future.status == "error" else None
+        if isinstance(error, KilledWorker):
+            self._bury(one.batch)
+            return
+        if error is not None:
+            raise error
+        for cell, record in zip(one.batch, one.future.result(), strict=True):
+            if record.code != self._code:
+                self._proven.clear()
+                self._waiting.append((cell,))
                 continue
             self._spent, self._finished = self._spent + record.seconds, self._finished + 1
             self._done(cell, record)
 
-
-def _records(future: Any, batch: tuple[Any, ...]) -> Sequence[Record[Any] | None]:
-    """The batch's records; None for cells to be sent alone, as one of them kills its worker."""
-    error = future.exception() if future.status == "error" else None
-    if error is None:
-        found: Sequence[Record[Any]] = future.result()
-        return found
-    if not isinstance(error, KilledWorker):
-        raise error
-    if len(batch) > 1:
-        return [None] * len(batch)
-    why = f"its worker died {error.allowed_failures + 1} times: out of memory?"
-    return [Record(batch[0].key, failed=why, lasting=False)]
+    def _bury(self, batch: tuple[Any, ...]) -> None:
+        """The workers of a batch died: its cells are sent again one by one, and one that dies
+        `_DEATHS` times is a failure."""
+        for cell in batch:
+            self._deaths[cell.key] += len(batch) == 1
+            if self._deaths[cell.key] < _DEATHS:
+                self._waiting.append((cell,))
+                continue
+            why = f"its worker died {_DEATHS} times: out of memory?"
+            self._done(cell, Record(cell.key, failed=why, lasting=False))

@@ -4,6 +4,7 @@ A study plans its cells, says how a worker opens the experiment and runs a cell,
 of the records. Cells whose time is measured run one at a time with nothing else beside them.
 """
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +17,12 @@ from validate.replay.experiment import Experiment
 from validate.replay.named_run import reports_of
 from validate.replay.options import Report
 from validate.solve.march import Tell
+from validate.study.code_identity import Identity, digest, identity_of
 from validate.study.job import C, Done, Plan, R, Where, run_batch
 from validate.study.store import Record, read_records, write_record
 
 CELLS = "cells"
+LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,11 @@ def finish(
     start, where = perf_counter(), where or Where()
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    records = read_records(folder, (c.key for c in plan.cells), plan.kind)
-    reused = len(records)
+    here = identity_of(Path(plan.job.path))
+    found = read_records(folder, (c.key for c in plan.cells), plan.kind, digest(here))
+    records, reused = found.records, len(found.records)
+    for line in found.doubts:
+        LOG.warning(line)
 
     def done(cell: C, record: Record[R]) -> None:
         records[cell.key] = record
@@ -65,11 +71,13 @@ def finish(
 
     left = [c for c in plan.cells if c.key not in records]
     tell("starts the workers" if left else "all were finished before")
-    said = _run(plan, left, where, done, tell)
+    said = _run(plan, left, where, done, tell, here)
     return Finished(records, reused, perf_counter() - start, said)
 
 
-def _run(plan: Plan[C, R], left: Sequence[C], where: Where, done: Done, tell: Tell) -> str:
+def _run(
+    plan: Plan[C, R], left: Sequence[C], where: Where, done: Done, tell: Tell, here: Identity
+) -> str:
     """Side by side, then those that are timed one by one; on this machine, in this process."""
     beside, timed = [c for c in left if not c.timed], [c for c in left if c.timed]
     if where.workers is not None and where.workers < 0:
@@ -77,9 +85,9 @@ def _run(plan: Plan[C, R], left: Sequence[C], where: Where, done: Done, tell: Te
     if where.scheduler or (beside and where.workers != 0):
         from validate.study.cluster import run_beside, run_in_turn  # Dask takes a second
 
-        said = run_beside(plan, beside, where, done) if beside else ""
+        said = run_beside(plan, beside, where, done, here) if beside else ""
         if where.scheduler:
-            return run_in_turn(plan, timed, where, done) if timed else said
+            return run_in_turn(plan, timed, where, done, here) if timed else said
         _run_here(plan, timed, done, tell)
         return said
     _run_here(plan, left, done, tell)

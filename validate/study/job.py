@@ -12,6 +12,7 @@ from validate.errors import UsageError, ValidateError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file, sources_of
 from validate.replay.options import folder_of
+from validate.study.code_identity import Identity, digest, identity_of, proven_installation
 from validate.study.store import Record
 
 
@@ -95,9 +96,27 @@ class Plan(Generic[C, R]):
 def run_batch(
     open_: Callable[[Job], Any], run: Callable[[Any, C], R], job: Job, cells: Sequence[C]
 ) -> list[Record[R]]:
-    """On a worker: the records of some cells. Raises what opening the experiment raises."""
+    """On a worker: the records of some cells, each with the hash of the code that made it. Raises
+    what opening the experiment raises."""
     bench = _opened(open_, job)
-    return [_guarded(run, bench, cell) for cell in cells]
+    code = digest(_identity(job))
+    return [replace(_guarded(run, bench, cell), code=code) for cell in cells]
+
+
+def prove(open_: Callable[[Job], Any], job: Job, here: Identity) -> Identity:
+    """On a worker: its identity; the experiment is opened only where the installation is `here`'s.
+    Raises what opening the experiment raises."""
+    mine = proven_installation()
+    if any(here[name] != mine[name] for name in mine):
+        return mine
+    _opened(open_, job)
+    return _identity(job)
+
+
+@lru_cache(maxsize=2)
+def _identity(job: Job) -> Identity:
+    """Of the code that is loaded, so that a file that is edited meanwhile changes nothing."""
+    return identity_of(Path(job.path))
 
 
 @lru_cache(maxsize=2)

@@ -10,8 +10,10 @@ from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
+from validate.errors import RecordingError
 from validate.places import write_whole
 from validate.report.made import code_sha256
+from validate.seals import read_sealed, sealed
 
 R = TypeVar("R")
 
@@ -21,7 +23,8 @@ class Record(Generic[R]):
     """What a cell gave: its `value`, or why there is none.
 
     `refused` is a known error's line, `failed` a bug's or a dead worker's. `seconds` is what the
-    whole cell took. `lasting` is False for a failure that another try may not have.
+    whole cell took. `lasting` is False for a failure that another try may not have. `code` is the
+    hash of the code that made it, as its worker proved it.
     """
 
     key: str
@@ -30,6 +33,7 @@ class Record(Generic[R]):
     failed: str = ""
     seconds: float = 0.0
     lasting: bool = True
+    code: str = ""
 
     @property
     def why(self) -> str:
@@ -44,29 +48,49 @@ def key_of(*content: Any) -> str:
 
 
 def write_record(folder: Path, cell: Any, record: Record[Any]) -> None:
-    """Writes <key>.json whole or not at all; `cell` is for whoever reads the file."""
+    """Writes <key>.json whole or not at all, sealed; `cell` is for whoever reads the file."""
     content = {"cell": cell, "record": record}
-    text = json.dumps(content, default=_plain, allow_nan=False, ensure_ascii=False)
+    plain = json.loads(json.dumps(content, default=_plain, allow_nan=False))
+    text = json.dumps(sealed(plain), ensure_ascii=False)
     write_whole(folder / f"{record.key}.json", text)
 
 
-def read_records(folder: Path, keys: Iterable[str], kind: type[R]) -> dict[str, Record[R]]:
-    """By key, those that were finished before; a damaged file counts as not finished."""
-    found = {}
+@dataclass(frozen=True)
+class Found(Generic[R]):
+    """Records by key that were finished before, and a line for each file that is not believed."""
+
+    records: dict[str, Record[R]]
+    doubts: tuple[str, ...]
+
+
+def read_records(folder: Path, keys: Iterable[str], kind: type[R], code: str) -> Found[R]:
+    """The records that the code of that hash finished before.
+
+    A file that is not whole, or was changed after it was written, counts as not finished, and so
+    does one of another code.
+    """
+    found: dict[str, Record[R]] = {}
+    doubts = []
     for key in keys:
-        record = _read(folder / f"{key}.json", kind)
-        if record is not None and record.key == key:
+        path = folder / f"{key}.json"
+        if not path.exists():
+            continue
+        try:
+            record = _record(read_sealed(path)["record"], kind)
+        except (RecordingError, ValueError, TypeError, KeyError, AttributeError) as error:
+            why = str(error) if isinstance(error, RecordingError) else f"{path.name}: no record"
+            doubts.append(f"{why}; the cell is computed again")
+            continue
+        if record.key == key and record.code == code:
             found[key] = record
-    return found
+        else:
+            doubts.append(f"{path.name}: made by other code; the cell is computed again")
+    return Found(found, tuple(doubts))
 
 
-def _read(path: Path, kind: type[R]) -> Record[R] | None:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))["record"]
-        value = content.pop("value")
-        return Record(value=None if value is None else _made(kind, value), **content)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
-        return None
+def _record(content: dict[str, Any], kind: type[R]) -> Record[R]:
+    value = content.pop("value")
+    return Record(value=None if value is None else _made(kind, value), **content)
 
 
 def _plain(value: Any) -> Any:
