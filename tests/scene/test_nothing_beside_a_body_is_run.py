@@ -1,0 +1,17 @@
+"""Opening a body runs no code that lies beside it."""
+
+from pathlib import Path
+
+import pytest
+from canaries import folder, ran
+from commands import here
+from test_bodies_robust import MAKE
+
+__all__ = ["folder"]  # a fixture
+
+
+@pytest.mark.parametrize("name", MAKE)
+def test_beside_a_body(name: str, folder: Path) -> None:
+    MAKE[name](folder / name)
+    here("body", name, "--unit", "mm", "-o", "out.npz", cwd=folder)
+    assert ran(folder) == ""
