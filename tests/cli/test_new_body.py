@@ -203,6 +203,15 @@ def test_markers_alone_and_a_mesh_of_ones_own(here: Path) -> None:
     assert "body=Solid(file='../body.npz')," in text
     result = compare(load_file(here / "experiments" / "mine.py"))
     assert [c.name for c in result.checks] == ["marker.rms@low", "marker.rms@high"]
+    (here / "answers").mkdir()
+    for name in ("../body.npz", str(here / "body.npz"), "link.npz"):
+        (here / "answers" / "link.npz").unlink(missing_ok=True)
+        (here / "answers" / "link.npz").symlink_to(here / "body.npz")
+        text = (here / "a.toml").read_text("utf-8").replace('"body.npz"', f'"{name}"')
+        (here / "answers" / "a.toml").write_text(text, "utf-8")
+        code, said = called("new", "other", "--from", "seen.mcap", "--answers", "answers/a.toml")
+        assert code == 2
+        assert f"body.file: '{name[:60]}' lies outside its folder 'answers'" in said
 
 
 def test_outlines_without_a_pose_are_asked_where_they_lie(here: Path) -> None:

@@ -4,6 +4,7 @@ A question is asked where the recording does not tell. One whose default stands 
 where nobody is there; without a default it is open, and all open ones are named at once.
 """
 
+import os
 import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +16,7 @@ import click
 
 from validate.cli.display import say
 from validate.errors import RecordingError, UsageError, ValidateError
-from validate.files import read_text
+from validate.files import inside, read_text
 from validate.parameters import nearest_names
 
 Answers = Mapping[str, str]
@@ -32,7 +33,7 @@ class Question:
     """`key` is how a file of answers spells it; `check` raises `ValidateError` for a wrong answer.
 
     `default` answers it where nobody does, `why` says what the default rests on; `open` ones need
-    an answer of the user.
+    an answer of the user. The answer to one with `words` is the name of a file, or one of them.
     """
 
     key: str
@@ -42,6 +43,7 @@ class Question:
     open: bool = False
     choices: tuple[str, ...] = ()
     check: Callable[[str], Any] = _anything
+    words: tuple[str, ...] | None = None
 
     def checked(self, answer: str) -> str:
         """The answer, stripped; raises `UsageError` that names the question for a wrong one."""
@@ -91,11 +93,13 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def answered(asks: Asks, given: Answers, *, terminal: bool) -> dict[str, str]:
+def answered(
+    asks: Asks, given: Answers, *, terminal: bool, folder: Path | None = None
+) -> dict[str, str]:
     """Every question answered: by what is given, on the terminal, or by its default.
 
-    Raises `UsageError` for a wrong answer, for one to no question, and, naming all, where open
-    questions are left.
+    Files that are named in a file of answers lie in its `folder` or below. Raises `UsageError` for
+    a wrong answer, for one to no question, and, naming all, where open questions are left.
     """
     found: dict[str, str] = {}
     left: dict[str, Question] = {}
@@ -105,7 +109,7 @@ def answered(asks: Asks, given: Answers, *, terminal: bool) -> dict[str, str]:
             break
         question = pending[0]
         if question.key in given:
-            found[question.key] = question.checked(given[question.key])
+            found[question.key] = question.checked(_beside(question, given[question.key], folder))
         elif terminal:
             found[question.key] = _prompted(question)
         elif question.open:
@@ -116,6 +120,16 @@ def answered(asks: Asks, given: Answers, *, terminal: bool) -> dict[str, str]:
         raise UsageError(_missing(tuple(left.values())))
     _require_known(given, found)
     return found
+
+
+def _beside(question: Question, answer: str, folder: Path | None) -> str:
+    """The name of a file as it is from here, where a file of answers in `folder` gives it."""
+    if folder is None or question.words is None or not answer or answer in question.words:
+        return answer
+    try:
+        return os.path.relpath(inside(folder, answer))
+    except RecordingError as error:
+        raise UsageError(f"{question.key}: {error}") from None
 
 
 def on_a_terminal() -> bool:

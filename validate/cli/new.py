@@ -52,7 +52,8 @@ def new(
     if questions:
         click.echo(listed(asks, given))
         return
-    found = answered(asks, given, terminal=answers is None and on_a_terminal())
+    terminal, folder = answers is None and on_a_terminal(), answers and answers.parent
+    found = answered(asks, given, terminal=terminal, folder=folder)
     kind = _chosen(kinds, found)
     text = written(name, recording, beside(source, path), path.parent, kind, found)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -70,7 +70,8 @@ def _of_the_body(found: Answers) -> list[Question]:
     asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
     if shape == "file":
         asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (of a surface: "
-                              "`validate body` fills it)", open=True, check=there))  # fmt: skip
+                              "`validate body` fills it)", open=True, check=there,
+                              words=()))  # fmt: skip
         if Path(file).suffix.lower() in FOREIGN:
             asked.append(Question("body.unit", "unit of its lengths, as mm", open=True))
     elif shape == "block":
@@ -158,7 +159,7 @@ def _of_the_markers(recording: Recording, found: Answers) -> list[Question]:
                  f"of landmarks (four or more), or '{AS_SEEN}' (they were recorded in that frame; "
                  "one will do)",
                  RECORDED if known else "", "the record marker_layout", open=not known,
-                 check=a_layout),
+                 check=a_layout, words=(RECORDED, AS_SEEN)),
         by_path("seen.still", "seconds from the start in which the body is unloaded", "0",
               "the first sample alone"),
     ]  # fmt: skip

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from validate.cli.asking import Answers, Question
+from validate.cli.new_body_questions import there
 from validate.cli.new_kind import FEW_CELLS, quantity_in
-from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression
@@ -45,7 +45,8 @@ def asks(recording: Recording, found: Answers) -> Sequence[Question]:
 def _of_the_inclusion(found: Answers) -> list[Question]:
     asked = [
         Question("specimen.mesh", 'mesh file of the specimen, axis z, with the facet sets '
-                 '"lower_plate", "upper_plate" and the inclusion\'s wall', open=True, check=_there),
+                 '"lower_plate", "upper_plate" and the inclusion\'s wall', open=True, check=there,
+                 words=()),
         Question("outline.surface", "facet set of the inclusion's wall", open=True),
         Question("outline.fluid", "whether fluid fills it, of constant volume", open=True,
                  choices=("true", "false")),
@@ -82,11 +83,6 @@ def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
 
 def _path(path: str) -> Callable[[str], Any]:
     return lambda text: None if text == _RECORDED else with_values(Compression(), {path: text})
-
-
-def _there(text: str) -> None:
-    if not Path(text).is_file():
-        raise UsageError("no such file here")
 
 
 def used(recording: Recording, found: Answers) -> set[str]:
