@@ -124,7 +124,7 @@ def test_one_byte_of_the_code_makes_it_anew(
         (tmp_path / name / "module.py").write_text(f"x = {byte}\n", "utf-8")
     hashes = []
     for name in ("one", "two"):
-        monkeypatch.setattr(made, "_PACKAGE", tmp_path / name)
+        monkeypatch.setattr(made, "PACKAGE", tmp_path / name)
         made.code_sha256.cache_clear()
         hashes.append(made.code_sha256())
     assert hashes[0] != hashes[1]

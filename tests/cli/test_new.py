@@ -220,7 +220,10 @@ def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path) -> None:
     assert in_folder(tmp_path, *arguments)[0] == 0
     before = (tmp_path / "mine.py").read_bytes()
     code, message = in_folder(tmp_path, *arguments)
-    assert (code, "exists and is left alone" in message) == (2, True)
+    assert (code, "exists; name another file" in message) == (2, True)
+    assert (tmp_path / "mine.py").read_bytes() == before
+    (tmp_path / "mine.py").write_text("x = 1")
+    assert in_folder(tmp_path, *arguments, "--force")[0] == 0
     assert (tmp_path / "mine.py").read_bytes() == before
     for name in ("Mine", "json", "a-b", "../x"):
         assert in_folder(tmp_path, "new", name, "--from", "gel.mcap")[0] == 2

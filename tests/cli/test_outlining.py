@@ -199,7 +199,7 @@ def test_coco_images_are_in_the_order_of_their_files(moving: Path, tmp_path: Pat
              for i in range(3)]  # fmt: skip
     file, out = tmp_path / "drawn.json", tmp_path / "c.mcap"
     given = ("outline", str(moving), "--from", str(file), "--sd", "1px", "--name", "theirs",
-             "-o", str(out))  # fmt: skip
+             "-o", str(out), "--force")  # fmt: skip
     file.write_text(json.dumps({"images": images, "annotations": notes}))
     assert here(*given)[0] == 0
     for i, outline in enumerate(read_recording(out).contour("theirs").outlines):
@@ -217,7 +217,7 @@ def test_masks_of_a_folder_are_one_an_image(moving: Path, tmp_path: Path) -> Non
     for i in (2, 10, 1):  # in the order of numbers, not of letters
         (folder / f"{i}.png").write_bytes(encode_png(np.roll(mask() * (i != 2), i, axis=1)))
     given = ("outline", str(moving), "--from", str(folder), "--sd", "1px", "--name", "theirs",
-             "-o", str(out))  # fmt: skip
+             "-o", str(out), "--force")  # fmt: skip
     assert here(*given)[0] == 0
     found = read_recording(out).contour("theirs")
     assert found.t == pytest.approx([0.0, 0.2])

@@ -131,5 +131,5 @@ def test_the_command_saves_and_a_run_still_refuses(tmp_path: Path) -> None:
     assert code == 0
     assert "missing:" in said
     assert read_recording(out).signals["/s"].y[0, 0] == 0.0
-    wrong = refused("import", str(path), "--recover", "-o", str(out), "--rate", "5")
+    wrong = refused("import", str(path), "--recover", "-o", str(out), "--force", "--rate", "5")
     assert "FILE and -o only" in wrong

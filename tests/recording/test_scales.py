@@ -67,7 +67,7 @@ def test_asked_back_wherever_images_enter(tmp_path: Path) -> None:
     folder = tmp_path / "Bilder ä"
     folder.mkdir()
     (folder / "1.png").write_bytes(encode_png(IMAGE))
-    to = ("-o", str(tmp_path / "a.mcap"), "--as", "png-stack", "--rate", "10")
+    to = ("-o", str(tmp_path / "a.mcap"), "--force", "--as", "png-stack", "--rate", "10")
     line = refused("import", str(folder), *to, "--m-per-px", "8")
     assert "an image of 3.2e+03 x 2.4e+03 m; a factor 1000 (8mm)" in line
     assert line.endswith("With its unit it is taken")

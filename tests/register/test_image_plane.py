@@ -148,7 +148,8 @@ def test_the_command_writes_images_that_know_where_they_lie(tmp_path: Path) -> N
     files(tmp_path, wired(np.random.default_rng(3), 8, 0.5))
     out = tmp_path / "y.mcap"
     given = ["calibrate", str(tmp_path / "x.mcap"), "--points", str(tmp_path / "points.csv"),
-             "--targets", str(tmp_path / "wires.csv"), "--unit", "mm", "-o", str(out)]  # fmt: skip
+             "--targets", str(tmp_path / "wires.csv"), "--unit", "mm", "-o", str(out),
+             "--force"]  # fmt: skip
     code, said, err = here(*given, "--probe", "ProbeToReference")
     assert (code, err) == (0, "")
     assert "72 points in 8 images" in said

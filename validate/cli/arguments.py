@@ -1,7 +1,10 @@
 """What the commands share: exit codes, kinds of options, and texts of the form PATH=VALUE."""
 
 import sys
+from collections.abc import Callable, Iterable, Iterator
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -14,6 +17,7 @@ EXPERIMENTS = click.option(
     "--experiments", "named", multiple=True, type=FOLDER, metavar="DIR",
     help="A folder of experiment files to look at too.",
 )  # fmt: skip
+FORCE = click.option("--force", is_flag=True, help="Replace an output that exists.")
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 
@@ -39,3 +43,42 @@ def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:
             raise UsageError(f"{option} {text}: expected PATH=VALUE")
         found[key.strip()] = value.strip()
     return found
+
+
+def output(text: str, *, required: bool = True) -> Callable[[Callable[..., Any]], Any]:
+    """The options `-o` and `--force` of a command that writes one file, `out`.
+
+    The command is called where `require_new` lets it be; all other paths that it is given are its
+    inputs.
+    """
+
+    def decorated(command: Callable[..., Any]) -> Any:
+        @wraps(command)
+        def checked(*, force: bool, out: Path | None, **given: Any) -> Any:
+            if out is not None:
+                require_new((out,), _paths(given.values()), force=force)
+            return command(out=out, **given)
+
+        return click.option("-o", "out", required=required, type=FILE, help=text)(FORCE(checked))
+
+    return decorated
+
+
+def _paths(values: Iterable[Any]) -> Iterator[Path]:
+    for value in values:
+        if isinstance(value, Path):
+            yield value
+        elif isinstance(value, tuple):
+            yield from _paths(value)
+
+
+def require_new(outputs: Iterable[Path], inputs: Iterable[Path] = (), *, force: bool) -> None:
+    """Raises `UsageError` for an output that exists, unless it may be replaced by `force`, and for
+    one that is an input in any case."""
+    sources = [path for path in inputs if path.exists()]
+    for out in outputs:
+        there = out.exists() or out.is_symlink()
+        if there and any(source.samefile(out) for source in sources if out.exists()):
+            raise UsageError(f"-o {out}: it is an input of this command; name another file")
+        if there and not force:
+            raise UsageError(f"-o {out}: it exists; name another file, or replace it with --force")

@@ -45,10 +45,13 @@ def job(
     experiments: tuple[Path, ...],
     *,
     inertia: bool,
+    force: bool,
 ) -> None:
-    """Writes what a guest is given of one method's scene to an empty `folder`."""
-    if folder.exists() and any(folder.iterdir()):
-        raise UsageError(f"{folder} is not empty; a job takes a folder of its own")
+    """Writes what a guest is given of one method's scene to an empty `folder`; `force`: to any."""
+    if folder.exists() and any(folder.iterdir()) and not force:
+        raise UsageError(
+            f"-o {folder}: it is not empty; name another folder, or write there with --force"
+        )
     own = own_body(find(name, Path.cwd(), experiments))
     experiment, key = own.experiment, method or own.experiment.accepted[0]
     if key not in experiment.methods:

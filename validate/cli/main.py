@@ -9,7 +9,18 @@ from typing import Any
 import click
 
 from validate import __version__
-from validate.cli.arguments import BAD_INPUT, BUG, EXPERIMENTS, FILE, FOLDER, INTERRUPTED, complain
+from validate.cli.arguments import (
+    BAD_INPUT,
+    BUG,
+    EXPERIMENTS,
+    FILE,
+    FOLDER,
+    FORCE,
+    INTERRUPTED,
+    complain,
+    output,
+    require_new,
+)
 from validate.cli.of_guests import guest
 from validate.cli.of_recordings import COMMANDS
 from validate.errors import UsageError, ValidateError
@@ -192,10 +203,12 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--junit", type=FILE, help="JUnit XML of its checks and printed figures.")
 @click.option("--latex", type=FILE, help="A tabular of its checks.")
-def export_(run: Path, junit: Path | None, latex: Path | None) -> None:
+@FORCE
+def export_(run: Path, junit: Path | None, latex: Path | None, *, force: bool) -> None:
     """A stored run (a report folder) for other programs; nothing is run again."""
     from validate.cli import exporting
 
+    require_new((file for file in (junit, latex) if file is not None), (run,), force=force)
     exporting.export(run, junit, latex)
 
 
@@ -333,7 +346,7 @@ def identify(name: str, **options: Any) -> int:
 @click.option(
     "--realtime", is_flag=True, help="Before all other processes (Linux, with the right)."
 )
-@click.option("-o", "out", type=FILE, help="What it did (default: NAME-live.mcap in reports/).")
+@output("What it did (default: NAME-live.mcap in reports/).", required=False)
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def live_(name: str, **options: Any) -> int:
     """A model under a tool against the clock, from its recorded path or packets on loopback."""

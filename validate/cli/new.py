@@ -13,7 +13,7 @@ from string import Template
 
 import click
 
-from validate.cli.arguments import complain
+from validate.cli.arguments import complain, require_new
 from validate.cli.asking import Answers, Question, answered, listed, on_a_terminal, read_answers
 from validate.cli.display import say
 from validate.cli.holdings import beside, channels, plain, topics
@@ -34,7 +34,13 @@ _LARGEST = 20_000  # bytes of such a file
 
 
 def new(
-    name: str, source: Path, out: Path | None, answers: Path | None, *, questions: bool = False
+    name: str,
+    source: Path,
+    out: Path | None,
+    answers: Path | None,
+    *,
+    questions: bool = False,
+    force: bool = False,
 ) -> None:
     """Writes `out` (default experiments/NAME.py); refuses names that no module may have.
 
@@ -43,6 +49,7 @@ def new(
     """
     path = _checked_path(name, out)
     if not questions:
+        require_new((path,), (source, *((answers,) if answers else ())), force=force)
         try_folder(path, _LARGEST)
     given = read_answers(answers) if answers else {}
     recording = read_recording(source)
@@ -77,8 +84,6 @@ def _checked_path(name: str, out: Path | None) -> Path:
     path = out or Path("experiments") / f"{name}.py"
     if path.name != f"{name}.py":
         raise UsageError(f"-o {path}: an experiment's file is called as it is, {name}.py")
-    if path.exists():
-        raise UsageError(f"{path} exists and is left alone; give another NAME or -o")
     return path
 
 

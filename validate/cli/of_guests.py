@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from validate.cli.arguments import EXPERIMENTS, FOLDER
+from validate.cli.arguments import EXPERIMENTS, FOLDER, FORCE
 
 
 @click.group("guest")
@@ -31,7 +31,8 @@ def check(command: tuple[str, ...], **options: Any) -> int:
 @guest.command("job")
 @click.argument("name", metavar="NAME|FILE.py")
 @EXPERIMENTS
-@click.option("-o", "folder", required=True, type=FOLDER, help="The folder to write.")
+@click.option("-o", "folder", required=True, type=FOLDER, help="The folder to write, new or empty.")
+@FORCE
 @click.option("--method", metavar="NAME", help="Whose scene (default: the first judged one's).")
 @click.option("--times", type=click.IntRange(min=1), default=10, show_default=True,
               help="Of a static one, evenly spaced.")  # fmt: skip

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from validate.cli.arguments import EXPERIMENTS, FILE
+from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, output, require_new
 
 
 @click.command()
@@ -35,7 +35,7 @@ def inspect(
     metavar="KIND",
     help="As mcap, c3d, trc, vicon, ndi, instron (an unknown one lists all); else as it shows.",
 )
-@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@output("The MCAP recording to write.")
 @click.option(
     "--map",
     "mapping",
@@ -89,7 +89,7 @@ def import_(
 @click.option("--unit", metavar="UNIT", help="Of their points (default: px).")
 @click.option("--label", help="Which of their regions, by its value or name.")
 @click.option("--name", default="outline", show_default=True, help="The stream to write.")
-@click.option("-o", "out", type=FILE, help="The recording to write (default: FILE itself).")
+@output("The recording to write (default: FILE itself).", required=False)
 def outline(
     file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, **given: Any
 ) -> None:
@@ -101,7 +101,7 @@ def outline(
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=FILE)
-@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@output("The MCAP recording to write.")
 @click.option(
     "--shift",
     "shifts",
@@ -129,7 +129,7 @@ def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
               show_default=True, metavar="SHARE",
               help="Of a file's samples that meet the first file; less is refused.")  # fmt: skip
 @click.option("--drift", "straighten", is_flag=True, help="Stretch the further files' clocks.")
-@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@output("The MCAP recording to write.")
 def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: Any) -> None:
     """Put files of one test on the clock of the first, and say how sure that is."""
     from validate.cli import aligning
@@ -149,7 +149,7 @@ def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: An
 @click.option("--reference", default="", metavar="TOOL", help="--pivot: tracked, and may move.")
 @click.option("--tip", "rough", default="", metavar="X,Y,Z",
               help="--pivot: roughly, as 108mm,8mm,3mm: several points.")  # fmt: skip
-@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@output("The MCAP recording to write.")
 def calibrate(
     file: Path, out: Path, tool: str | None, reference: str, rough: str, **given: Any
 ) -> None:
@@ -184,7 +184,7 @@ def calibrate(
 @click.option("--reference", default="", metavar="TOOL", help="A tracked tool, in whose frame.")
 @click.option("--known", type=FILE, help="A file of landmarks, or CSV: target, x, y, z.")
 @click.option("--unit", metavar="UNIT", help="Of a table's landmarks, as mm.")
-@click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@output("The MCAP recording to write.")
 def digitise(file: Path, out: Path, **how: Any) -> None:
     """Find the landmarks that the tip of a tracked tool was held on.
 
@@ -201,8 +201,9 @@ def digitise(file: Path, out: Path, **how: Any) -> None:
 @click.option("--answers", type=FILE, help="TOML answers to what the recording does not tell.")
 @click.option("--questions", is_flag=True, help="List the questions as such a file; write nothing.")
 @click.option("-o", "out", type=FILE, help="The file (default: experiments/NAME.py).")
+@FORCE
 def new(
-    name: str, source: Path, out: Path | None, answers: Path | None, *, questions: bool
+    name: str, source: Path, out: Path | None, answers: Path | None, *, questions: bool, force: bool
 ) -> None:
     """Write a commented experiment file, filled with what a recording holds.
 
@@ -210,7 +211,7 @@ def new(
     """
     from validate.cli import new as writing
 
-    writing.new(name, source, out, answers, questions=questions)
+    writing.new(name, source, out, answers, questions=questions, force=force)
 
 
 @click.command()
@@ -223,7 +224,7 @@ def new(
     help="A facet set by place: top=zmax, side=x=20mm, or box A to B, near P (docs/new.md).",
 )  # fmt: skip
 @click.option("--quadratic", "curved", is_flag=True, help="A node in the middle of every edge.")
-@click.option("-o", "out", type=FILE, help="The npz to write, as experiments take it.")
+@output("The npz to write, as experiments take it.", required=False)
 def body(file: Path, **given: Any) -> None:
     """A body of another program: .inp, .msh, .vtu, .vtk, or a closed surface .stl, .obj, .ply."""
     from validate.cli import bodies
@@ -234,12 +235,16 @@ def body(file: Path, **given: Any) -> None:
 @click.command()
 @click.argument("name")
 @click.option("-o", "out", required=True, type=FILE, help="The MCAP recording to write.")
+@FORCE
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @EXPERIMENTS
-def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...]) -> None:
+def record(
+    name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...], *, force: bool
+) -> None:
     """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
     from validate.cli import making
 
+    require_new((out, out.with_suffix(".json")), force=force)
     making.record(name, out, values, named)
 
 
