@@ -15,6 +15,9 @@ from validate.errors import RecordingError
 from validate.recording.images.image import MAX_SIDE
 
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
+# Whatever Pillow raises on damage; a bomb is none of its other errors.
+_DAMAGE = (OSError, ValueError, SyntaxError, Warning, EOFError, MemoryError,
+           Image.DecompressionBombError)  # fmt: skip
 _DEEP = "I;16"  # Pillow's mode, in either order of bytes
 
 
@@ -36,7 +39,7 @@ def decode_picture(data: bytes) -> NDArray[Any]:
         raise RecordingError(f"no picture of {', '.join(FORMATS)} in {len(data)} bytes") from None
     except RecordingError:
         raise
-    except (OSError, ValueError, SyntaxError, Warning, EOFError, MemoryError) as error:
+    except _DAMAGE as error:
         raise RecordingError(f"damaged picture ({' '.join(str(error).split())[:120]})") from None
 
 

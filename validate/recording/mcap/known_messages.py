@@ -55,7 +55,10 @@ def stamp_ns(stamp: Any) -> int:
     if not isinstance(stamp, Mapping):
         raise RecordingError(f"{type(stamp).__name__} is no time")
     sec, nsec = stamp["sec"], stamp.get("nanosec", stamp.get("nsec"))
-    return int(sec) * 10**9 + int(nsec)
+    try:
+        return int(sec) * 10**9 + int(nsec)
+    except OverflowError:
+        raise RecordingError(f"{sec} s is no time") from None
 
 
 def _moment_ns(text: str) -> int:
