@@ -24,8 +24,8 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
     """The lines below `names` as rows of its length.
 
     Short rows are filled up where many rows lack these columns, or where a group of columns ends.
-    Raises `RecordingError` with the line for every other row that is too short or too long, for text
-    amid the rows, and where no line is a row.
+    Raises `RecordingError` with the line for every other row that is too short or too long, for
+    text amid the rows, and where no line is a row.
     """
     count = max(i + 1 for i, cell in enumerate(names[1]) if cell)
     rows, footer = _rows(lines, count)
