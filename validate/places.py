@@ -5,11 +5,14 @@ alone say nothing for the superuser, for a mounted or a full disk.
 """
 
 import errno
+import fcntl
+import glob
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 from uuid import uuid4
 
 from validate.errors import UsageError
@@ -59,17 +62,58 @@ def try_file(path: Path, needed: int = RECORDING_BYTES) -> None:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Writes a file beside its place and renames it: whole or not at all; `UsageError` if not."""
-    fresh = path.with_name(f".{path.name[:200]}.new-{uuid4().hex[:8]}")
+    """Writes a text file whole or not at all, on the disk; `UsageError` if not."""
     try:
-        fresh.write_text(text, encoding="utf-8")
-        fresh.replace(path)
+        with replacing(path) as stream:
+            stream.write(text.encode("utf-8"))
     except OSError as error:
         why = why_not(error, path, need=len(text.encode()))
         raise UsageError(f"{path}: cannot be written ({why})") from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file beside `path` that takes its place once all is written and on the disk; else nothing
+    is left. Those that ended processes left there are removed."""
+    for old in path.parent.glob(f".{glob.escape(path.name[:200])}.????????.part"):
+        _remove_unheld(old)
+    part = path.with_name(f".{path.name[:200]}.{uuid4().hex[:8]}.part")
+    try:
+        with part.open("xb") as stream:
+            fcntl.flock(stream, fcntl.LOCK_EX)  # ends with this process
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            part.replace(path)
+        sync(path.parent)
     finally:
-        with suppress(OSError):
-            fresh.unlink()
+        with suppress(OSError):  # no folder, no leftover
+            part.unlink(missing_ok=True)
+
+
+def _remove_unheld(part: Path) -> None:
+    with suppress(OSError), part.open("rb") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        part.unlink()
+
+
+def sync(folder: Path) -> None:
+    """Has the names in a folder on the disk, where the system syncs folders."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def sync_tree(folder: Path) -> None:
+    """Has all files and names below a folder on the disk; raises `OSError` where a file is not."""
+    for where, _, names in os.walk(folder):
+        for name in names:
+            with (Path(where) / name).open("rb") as stream:
+                os.fsync(stream.fileno())
+        sync(Path(where))
 
 
 def why_not(error: OSError, place: Path, written: int = 0, need: int = 0) -> str:

@@ -17,8 +17,9 @@ LARGEST = 500_000_000  # bytes of a document: more is none of ours
 
 
 def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the document with its seal, as it will be read again."""
+    """Return the document with its seal (another that it had is left out), as it is read again."""
     plain: dict[str, Any] = json_value(json.dumps(content, allow_nan=False))
+    plain.pop(SEAL, None)
     return {**plain, SEAL: seal_of(plain)}
 
 

@@ -19,6 +19,7 @@ from validate.replay.reused import rests_on
 from validate.replay.road import compare
 from validate.report import made
 from validate.report.store import document, write_json
+from validate.seals import sealed
 
 _LOADS = re.compile(r"load=lambda p, folder: .*,\n")
 _READS = 'load=lambda p, folder: (read_recording(folder.parent / "pulled.mcap"),),\n'
@@ -150,7 +151,7 @@ def test_whatever_else_differs_makes_it_anew(
 ) -> None:
     content = json.loads((stored / "reports/pulled/results.json").read_text("utf-8"))
     (tmp_path / "pulled").mkdir()
-    text = json.dumps(content | members)
+    text = json.dumps(sealed(content | members))
     (tmp_path / "pulled" / "results.json").write_text(text, "utf-8")
     taken, said = checked(stored, "--out", str(tmp_path))
     assert not taken
@@ -160,7 +161,7 @@ def test_whatever_else_differs_makes_it_anew(
 def test_a_damaged_one_is_made_anew(stored: Path, tmp_path: Path) -> None:
     (tmp_path / "pulled").mkdir()
     (tmp_path / "pulled" / "results.json").write_text("{", "utf-8")
-    assert "cannot be read" in checked(stored, "--out", str(tmp_path))[1]
+    assert "pulled/results.json: not believed" in checked(stored, "--out", str(tmp_path))[1]
 
 
 def test_a_recording_without_a_hash_is_never_reused(tmp_path: Path) -> None:

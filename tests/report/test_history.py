@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from report_samples import small_result
 
-from validate.errors import UsageError
 from validate.report import write
 from validate.report.folder import MARK
 from validate.report.history import LINES, replaced
 from validate.report.made import Commit, Made
 from validate.report.since import history, since
 from validate.report.write import write_report
+from validate.seals import sealed
 
 DAYS = [f"2026-11-2{i}T04:00:00+00:00" for i in range(1, 6)]
 
@@ -62,7 +62,7 @@ def test_a_report_of_before_has_a_history_too(tmp_path: Path) -> None:
     folder = wrote(tmp_path / "cube", 0, made("a"))
     content = json.loads((folder / MARK).read_text("utf-8"))
     del content["made"], content["changed"]
-    (folder / MARK).write_text(json.dumps(content), "utf-8")
+    (folder / MARK).write_text(json.dumps(sealed(content)), "utf-8")
     wrote(folder, 1, made("a"))
     first, second = history(tmp_path, "cube")
     assert (first.commit, second.commit) == ("unknown", "cccccccccc")
@@ -82,12 +82,31 @@ def test_only_the_experiments_own_folders_count(tmp_path: Path) -> None:
     assert history(tmp_path / "nowhere", "cube") == ()
 
 
-def test_a_damaged_line_is_one_line(tmp_path: Path) -> None:
+def test_a_line_that_was_edited_or_damaged_is_told_and_left_out(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     folder = wrote(tmp_path / "cube", 0, made("a"))
-    for damage in ("{", '{"experiment": "cube"}', "[]"):
+    wrote(folder, 1, made("b"))
+    line = (folder / LINES).read_text("utf-8")
+    assert len(history(tmp_path, "cube")) == 2
+    edited = line.replace('"passed": true', '"passed": false')
+    assert edited != line
+    for damage in ("{", '{"experiment": "cube"}', "[]", edited):
+        caplog.clear()
         (folder / LINES).write_text(damage, "utf-8")
-        with pytest.raises(UsageError, match="none of ours"):
-            history(tmp_path, "cube")
+        assert len(history(tmp_path, "cube")) == 1
+        assert "cube/history.jsonl, line 1: not believed" in caplog.text
+
+
+def test_an_edited_result_is_told_and_no_run(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = wrote(tmp_path / "cube", 0, made("a"))
+    text = (folder / MARK).read_text("utf-8")
+    (folder / MARK).write_text(text.replace('"kind": "twin"', '"kind": "measured"'), "utf-8")
+    assert (folder / MARK).read_text("utf-8") != text
+    assert history(tmp_path, "cube") == ()
+    assert "cube/results.json: not believed (its content does not fit its checksum" in caplog.text
 
 
 def pair(tmp_path: Path, value: float, *, hashed: str | None = None, u_num: float = 0.01) -> Any:

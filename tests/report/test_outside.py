@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -15,6 +16,7 @@ from pylatexenc.macrospec import EnvironmentSpec
 
 from validate.cli.main import cli
 from validate.report.outside import junit, latex
+from validate.seals import sealed
 
 
 def check(name: str, verdict: str, value: float | None = 1.5e-5) -> dict[str, Any]:
@@ -140,7 +142,7 @@ def test_latex_typesets_it(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_what_is_asked_for(tmp_path: Path) -> None:
-    (tmp_path / "results.json").write_text(json.dumps(content(check("a", "agrees"))))
+    (tmp_path / "results.json").write_text(json.dumps(sealed(content(check("a", "agrees")))))
     run = CliRunner()
     nothing = run.invoke(cli, ["export", str(tmp_path)])
     assert "say what: --junit" in str(nothing.exception)
@@ -155,4 +157,4 @@ def test_the_command_writes_what_is_asked_for(tmp_path: Path) -> None:
 def test_what_is_no_stored_run_is_one_line(broken: str, tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text(broken)
     done = CliRunner().invoke(cli, ["export", str(tmp_path), "--junit", str(tmp_path / "x.xml")])
-    assert "is no results.json of validate" in str(done.exception)
+    assert re.search(r"results\.json: not believed \(.*\); run it again", str(done.exception))

@@ -10,6 +10,7 @@ import pytest
 from validate.cli.arguments import BAD_INPUT
 from validate.cli.main import run
 from validate.errors import ComparisonError, UsageError
+from validate.seals import sealed
 from validate.study.stored import pairs, read_run, side_by_side
 
 
@@ -25,7 +26,9 @@ def stored(folder: Path, **changes: Any) -> Path:
         "methods": [{"name": "kf", "scores": scores}],
     }
     folder.mkdir(parents=True)
-    (folder / "results.json").write_text(json.dumps({**content, **changes}), encoding="utf-8")
+    (folder / "results.json").write_text(
+        json.dumps(sealed({**content, **changes})), encoding="utf-8"
+    )
     return folder
 
 

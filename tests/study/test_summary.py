@@ -9,6 +9,7 @@ import pytest
 from commands import here, refused
 
 from validate.errors import UsageError
+from validate.seals import sealed
 from validate.study.predictions import predictions, stored_runs
 from validate.study.summary import Summary, summary
 from validate.study.summary_page import document
@@ -35,7 +36,7 @@ def stored(reports: Path, name: str, *checks: dict[str, Any], **more: Any) -> No
         **more,
     }  # fmt: skip
     (reports / name).mkdir(parents=True)
-    (reports / name / "results.json").write_text(json.dumps(content), encoding="utf-8")
+    (reports / name / "results.json").write_text(json.dumps(sealed(content)), encoding="utf-8")
 
 
 def whys(reports: Path) -> dict[str, str]:
@@ -72,7 +73,7 @@ def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None
     path = tmp_path / "old" / "results.json"
     content = json.loads(path.read_text())
     del content["domain"]
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps(sealed(content)))
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "results.json").write_text('{"kind": "meas')
     found = whys(tmp_path)

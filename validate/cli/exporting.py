@@ -4,7 +4,7 @@ from pathlib import Path
 
 from validate.cli.display import say
 from validate.errors import UsageError
-from validate.places import try_file
+from validate.places import try_file, write_whole
 from validate.report.outside import junit, latex
 from validate.study.stored import read_as
 
@@ -16,5 +16,5 @@ def export(run: Path, junit_file: Path | None, latex_file: Path | None) -> None:
         raise UsageError("export: say what: --junit checks.xml, --latex checks.tex")
     for file, make in wanted:
         try_file(file)
-        file.write_text(read_as(run, make), "utf-8")
+        write_whole(file, read_as(run, make))
         say(f"{file}: {file.stat().st_size / 1e3:.1f} kB", indent="  ")

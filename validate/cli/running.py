@@ -30,7 +30,7 @@ from validate.replay.options import Options, Report
 from validate.replay.reused import rests_on
 from validate.replay.road import compare
 from validate.report import gl
-from validate.report.folder import STUDIES, try_results
+from validate.report.folder import STUDIES, locked, try_results
 from validate.report.history import replaced
 from validate.report.store import check_members, figure_members
 from validate.report.write import write_report
@@ -80,9 +80,9 @@ def _reported(
 ) -> tuple[Result, Path]:
     folder = run_folder(experiment, options, out)
     by = rests_on(experiment, options, command_line())
-    try_results(folder, (STUDIES,))
     ask_about(experiment, options.values)
-    with progress(experiment.name) as report:
+    with locked(folder), progress(experiment.name) as report:
+        try_results(folder, (STUDIES,))
         result = compare(experiment, options, report, _identify(experiment, options, out, report))
         created = datetime.now(UTC).isoformat(timespec="seconds")
         page = write_report(

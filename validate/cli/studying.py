@@ -15,7 +15,7 @@ from validate.replay.experiment import Experiment
 from validate.replay.find import find, sources_of
 from validate.replay.named_run import differences, tag
 from validate.replay.options import Options, Report
-from validate.report.folder import try_results
+from validate.report.folder import locked, try_results
 from validate.report.made import made
 from validate.report.numbers import MISSING, significant
 from validate.study import filter_page, stability_page, still_page, trade_page
@@ -185,10 +185,12 @@ def running(
     experiment: Experiment, place: str, title: str, common: StudyOptions
 ) -> Iterator[Report]:
     """A progress bar, once the place was tried; an interruption says that cells are kept."""
-    try_results(study_folder(experiment, place, common.out), (CELLS,))
+    folder = study_folder(experiment, place, common.out)
     try:
-        with progress(f"{experiment.name}: {title}") as report:
-            yield report
+        with locked(folder):
+            try_results(folder, (CELLS,))
+            with progress(f"{experiment.name}: {title}") as report:
+                yield report
     except KeyboardInterrupt:
         kind = place.partition("+")[0].replace("choose", "tradeoff")  # whose cells it climbs over
         cells = study_folder(experiment, kind, common.out) / CELLS

@@ -4,12 +4,12 @@ Everything is held by its content: code and libraries, the machine, the experime
 helpers, meshes, recordings and every parameter. What has no hash is never taken as unchanged.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from validate.errors import RecordingError
 from validate.parameters import describe
 from validate.recording.types import Recording
 from validate.replay.calibrated import apart
@@ -21,6 +21,7 @@ from validate.report.environment import environment
 from validate.report.folder import MARK
 from validate.report.made import Made, UsedFile, made
 from validate.report.plain import recorded
+from validate.seals import read_sealed
 
 Json = dict[str, Any]
 
@@ -51,12 +52,14 @@ def stored_run(experiment: Experiment, folder: Path) -> tuple[Json | None, str]:
 
     Raises what loading the experiment's recordings does.
     """
-    try:
-        content: Json = json.loads((folder / MARK).read_text(encoding="utf-8"))
-        when = f"the stored run of {content['created']}"
-    except FileNotFoundError:
+    if not (folder / MARK).exists():
         return None, ""
-    except (OSError, ValueError, KeyError, TypeError):
+    try:
+        content: Json = read_sealed(folder / MARK)
+        when = f"the stored run of {content['created']}"
+    except RecordingError as error:
+        return None, str(error)
+    except KeyError:
         return None, f"{folder / MARK} cannot be read"
     try:
         differing = next(_differences(experiment, content), "")

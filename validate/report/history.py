@@ -5,13 +5,18 @@ run is carried over unless all that made it (code, files, parameters) is equal.
 """
 
 import json
+import logging
 from pathlib import Path
 from typing import Any
 
+from validate.errors import RecordingError
+from validate.files import json_value
 from validate.report.folder import MARK
 from validate.report.plain import Json
+from validate.seals import read_sealed, sealed, unsealed
 
 LINES = "history.jsonl"
+LOG = logging.getLogger(__name__)
 _WHOLE = (
     "experiment", "created", "sentence", "passed", "quick", "kind", "overall", "parameters",
     "changed", "made",
@@ -56,24 +61,34 @@ def write_lines(lines: list[str], folder: Path) -> None:
 def replaced(folder: Path, created: str) -> Json | None:
     """The run that gave way to the one created then; None where that replaced none, or its like."""
     lines = _texts(folder)
-    last: Json = json.loads(lines[-1]) if lines else {}
+    last = unsealed(json_value(lines[-1])) if lines else {}
     return last if last.get("replaced") == created else None
 
 
 def lines_of(folder: Path) -> list[Json]:
-    """Every run that a report folder knows of, the current one last.
-
-    Raises `ValueError` for a line that is no JSON.
-    """
+    """Every run that a report folder knows of, the current one last; of a line that does not fit
+    its seal only a warning is left."""
+    found: list[Json] = []
+    for number, text in enumerate(_texts(folder), start=1):
+        try:
+            found.append(unsealed(json_value(text)))
+        except ValueError as error:
+            LOG.warning(f"{folder.name}/{LINES}, line {number}: not believed ({error})")
     now = current(folder)
-    return [*map(json.loads, _texts(folder)), *([] if now is None else [now])]
+    return [*found, *([] if now is None else [now])]
 
 
 def current(folder: Path) -> Json | None:
-    """The line of the run that lies there; None for a folder without one, or a damaged one."""
+    """The line of the run that lies there; None for a folder without one, or, with a warning, one
+    that is not believed."""
+    if not (folder / MARK).exists():
+        return None
     try:
-        return line_of(json.loads((folder / MARK).read_text(encoding="utf-8")))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return line_of(read_sealed(folder / MARK))
+    except (KeyError, TypeError, AttributeError):
+        return None
+    except RecordingError as error:
+        LOG.warning(str(error))
         return None
 
 
@@ -86,7 +101,7 @@ def _texts(folder: Path) -> list[str]:
 
 
 def _text(line: Json) -> str:
-    return json.dumps(line, ensure_ascii=False, allow_nan=False)
+    return json.dumps(sealed(line), ensure_ascii=False, allow_nan=False)
 
 
 def _alike(one: Json, other: Json) -> bool:

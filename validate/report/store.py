@@ -28,6 +28,7 @@ from validate.report.made import Made
 from validate.report.observed import timed
 from validate.report.plain import Json, members, recorded
 from validate.report.store_exhibits import exhibits, rounded
+from validate.seals import sealed
 from validate.solve.types import Run
 
 SCHEMA_VERSION = 1
@@ -100,8 +101,8 @@ def _domains(result: Result) -> tuple[Domain, ...]:
 
 
 def write_json(content: Json, path: Path) -> None:
-    """The document as text; a NaN that slipped through is a bug and raises `ValueError`."""
-    text = json.dumps(content, allow_nan=False, ensure_ascii=False, indent=1)
+    """The document as text, sealed; a NaN that slipped through is a bug: `ValueError`."""
+    text = json.dumps(sealed(content), allow_nan=False, ensure_ascii=False, indent=1)
     # No string holds a line break, so only arrays match.
     text = _NUMBERS_ONLY.sub(lambda m: "[" + " ".join(m.group(1).split()) + "]", text)
     path.write_text(text + "\n", encoding="utf-8")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError, SceneError
 from validate.files import npz_arrays
+from validate.places import replacing
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.foreign_mesh import metres, read_foreign
@@ -34,7 +35,7 @@ def write_mesh(mesh: Mesh, path: Path, provenance: str = "") -> None:
     size = sum(a.nbytes for a in arrays.values())
     if size > MAX_BYTES:
         raise SceneError(f"mesh of {size} bytes, the limit of a mesh file is {MAX_BYTES}")
-    with path.open("wb") as file:
+    with replacing(path) as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 

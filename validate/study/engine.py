@@ -16,12 +16,12 @@ from validate.places import try_folder
 from validate.replay.experiment import Experiment
 from validate.replay.named_run import reports_of
 from validate.replay.options import Report
+from validate.report.folder import CELLS as CELLS
 from validate.solve.march import Tell
 from validate.study.code_identity import Identity, digest, identity_of
 from validate.study.job import C, Done, Plan, R, Where, run_batch
 from validate.study.store import Record, read_records, write_record
 
-CELLS = "cells"
 LOG = logging.getLogger(__name__)
 
 

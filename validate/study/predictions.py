@@ -5,7 +5,6 @@ parameters, then the newest: other settings are no other experiment. Runs of oth
 the same settings are repeats: where the specimen is one, their predictions are one.
 """
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -14,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from validate.errors import RecordingError
 from validate.report.folder import MARK
+from validate.seals import read_sealed
 
 Json = dict[str, Any]
 # Parameters that say where recordings lie: which ones they are, their hashes say.
@@ -68,11 +69,13 @@ def stored_runs(reports: Path) -> tuple[Seen, ...]:
 def _read(folder: Path) -> Seen | None:
     """None for what is no run: a comparison, a summary, a study."""
     try:
-        content = json.loads((folder / MARK).read_text("utf-8"))
+        content = read_sealed(folder / MARK)
         if "kind" not in content or not content["methods"]:
             return None
         return Seen(folder.name, content, _unfit(content))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except RecordingError as error:
+        return Seen(folder.name, {}, str(error))
+    except (KeyError, TypeError, AttributeError) as error:
         return Seen(folder.name, {}, f"its results.json cannot be read: {error!r:.60}")
 
 

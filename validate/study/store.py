@@ -56,14 +56,14 @@ def write_record(folder: Path, cell: Any, record: Record[Any]) -> None:
 
 
 @dataclass(frozen=True)
-class Found(Generic[R]):
+class StoredRecords(Generic[R]):
     """Records by key that were finished before, and a line for each file that is not believed."""
 
     records: dict[str, Record[R]]
     doubts: tuple[str, ...]
 
 
-def read_records(folder: Path, keys: Iterable[str], kind: type[R], code: str) -> Found[R]:
+def read_records(folder: Path, keys: Iterable[str], kind: type[R], code: str) -> StoredRecords[R]:
     """The records that the code of that hash finished before.
 
     A file that is not whole, or was changed after it was written, counts as not finished, and so
@@ -85,7 +85,7 @@ def read_records(folder: Path, keys: Iterable[str], kind: type[R], code: str) ->
             found[key] = record
         else:
             doubts.append(f"{path.name}: made by other code; the cell is computed again")
-    return Found(found, tuple(doubts))
+    return StoredRecords(found, tuple(doubts))
 
 
 def _record(content: dict[str, Any], kind: type[R]) -> Record[R]:

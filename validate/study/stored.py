@@ -1,16 +1,15 @@
 """Stored runs side by side: results.json files read again, nothing is run."""
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
 
-from validate.errors import ComparisonError, UsageError
+from validate.errors import ComparisonError, RecordingError, UsageError
+from validate.seals import read_sealed
 
 T = TypeVar("T")
-_LARGEST = 500_000_000  # bytes of a results.json: more is none of ours
 
 
 @dataclass(frozen=True)
@@ -83,19 +82,16 @@ def read_run(path: Path) -> StoredRun:
 def read_as(path: Path, make: Callable[[Any], T]) -> T:
     """What `make` makes of a stored results.json; raises as `read_run`."""
     file = path / "results.json" if path.is_dir() else path
+    if not file.exists():
+        raise UsageError(f"no stored run at {path}; name a report folder or its results.json")
     try:
-        if file.stat().st_size > _LARGEST:
-            raise UsageError(f"{file}: {file.stat().st_size} bytes, at most {_LARGEST}")
-        return make(json.loads(file.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise UsageError(
-            f"no stored run at {path}: {error.strerror}; name a report folder or its results.json"
-        ) from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        return make(read_sealed(file))
+    except RecordingError as error:
         from validate.recording.readers import told_apart  # all formats: only where needed
 
-        said = told_apart(file) or f"{file} is no results.json of validate: {error!r:.80}"
-        raise UsageError(said) from error
+        raise UsageError(told_apart(file) or f"{error}; run it again") from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(f"{file} is no results.json of validate: {error!r:.80}") from error
 
 
 def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:

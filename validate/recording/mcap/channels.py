@@ -5,17 +5,17 @@ replay. `enable_data_crcs` is off by default in the `mcap` package. Equal channe
 metadata give equal bytes.
 """
 
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
+from validate import places
 from validate.errors import RecordingError
-from validate.places import size_of, why_not
+from validate.places import why_not
 from validate.recording.mcap.schemas import ENCODINGS, JSON_SCHEMA, Json, to_bytes
 
 LIBRARY = "validate"  # without a version: two versions write the same bytes
@@ -73,25 +73,16 @@ def write_channels(
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A file beside `path` that takes its place once all is written; else nothing is left.
-
-    Raises `RecordingError` for a path that cannot be written, or text that is no UTF-8.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    """As `places.replacing`; raises `RecordingError` for a path that cannot be written, or text
+    that is no UTF-8."""
     try:
-        with part.open("xb") as stream:
+        with places.replacing(path) as stream:
             yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
     except OSError as error:
-        why = why_not(error, path, size_of(part))
+        why = why_not(error, path)
         raise RecordingError(f"{path.name}: cannot be written ({why})") from error
     except UnicodeEncodeError as error:
         raise RecordingError(f"{path.name}: text that is no UTF-8 ({error.reason})") from error
-    finally:
-        with suppress(OSError):  # no folder, no leftover
-            part.unlink(missing_ok=True)
 
 
 def _check(path: Path, channels: Sequence[WrittenChannel]) -> None:
