@@ -7,6 +7,7 @@ alone say nothing for the superuser, for a mounted or a full disk.
 import errno
 import fcntl
 import glob
+import logging
 import os
 import shutil
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from validate.errors import UsageError
 
 REPORT_BYTES = 20_000_000  # reports of the shipped experiments take 7 to 17 MB
 RECORDING_BYTES = 1_000_000  # twins take up to 550 kB
+LOG = logging.getLogger(__name__)
 _TRIED = 4096  # bytes that are written for trial
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -52,7 +54,7 @@ def try_file(path: Path, needed: int = RECORDING_BYTES) -> None:
     if not path.parent.is_dir():
         raise UsageError(f"{path}: no folder {path.parent}; make it, or name another file")
     with _parents(path, "name another file"):
-        trial = path.with_name(f".{path.name[:200]}.try-{uuid4().hex[:8]}")
+        trial = _part_of(path)
         try:
             _written(trial)
         finally:
@@ -77,7 +79,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     is left. Those that ended processes left there are removed."""
     for old in path.parent.glob(f".{glob.escape(path.name[:200])}.????????.part"):
         _remove_unheld(old)
-    part = path.with_name(f".{path.name[:200]}.{uuid4().hex[:8]}.part")
+    part = _part_of(path)
     try:
         with part.open("xb") as stream:
             fcntl.flock(stream, fcntl.LOCK_EX)  # ends with this process
@@ -91,10 +93,15 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             part.unlink(missing_ok=True)
 
 
+def _part_of(path: Path) -> Path:
+    return path.with_name(f".{path.name[:200]}.{uuid4().hex[:8]}.part")
+
+
 def _remove_unheld(part: Path) -> None:
     with suppress(OSError), part.open("rb") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         part.unlink()
+        LOG.warning(f"{part.name}: left by an interrupted command, removed")
 
 
 def sync(folder: Path) -> None:

@@ -96,26 +96,6 @@ def test_failing_figure_leaves_the_old_report(
     assert [p.name for p in tmp_path.iterdir()] == ["cube"]
 
 
-@pytest.mark.slow
-def test_failed_move_puts_the_old_report_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = tmp_path / "cube"
-    write_report(small_result(), folder, created=CREATED)
-    rename = Path.rename
-
-    def only_old(self: Path, target: Path) -> Path:
-        if ".new-" in self.name:
-            raise OSError("disk is gone")
-        return rename(self, target)
-
-    monkeypatch.setattr(Path, "rename", only_old)
-    with pytest.raises(OSError, match="disk is gone"):
-        write_report(replace(small_result(), title="Second"), folder, created=CREATED)
-    assert "A cube &lt;between&gt; plates" in (folder / "report.html").read_text()
-    assert [p.name for p in tmp_path.iterdir()] == ["cube"]
-
-
 def test_a_folder_of_the_user_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(UsageError, match=r"holds 1 entries and no results\.json"):

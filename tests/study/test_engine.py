@@ -192,6 +192,24 @@ def test_a_killed_worker_loses_no_cell_and_none_is_done_twice(
 
 
 @pytest.mark.slow
+def test_a_scheduler_that_dies_is_one_line_and_the_cells_are_kept(tmp_path: Path) -> None:
+    own = Cluster(tmp_path)
+    cells = tuple(Waiting(f"c{i:02d}", 0.2) for i in range(16))
+
+    def kill(done: int, total: int, what: str) -> None:
+        if done == 4:
+            own.all[0].kill()
+
+    try:
+        with pytest.raises(UsageError, match=r"^the scheduler at tcp://\S+ went away .* goes on"):
+            finish(waiting(tmp_path, cells), tmp_path / "cells", Where(scheduler=own.address), kill)
+    finally:
+        own.stop()
+    again = finish(waiting(tmp_path, cells), tmp_path / "cells", HERE)
+    assert (again.reused >= 4, len(again.records)) == (True, 16)
+
+
+@pytest.mark.slow
 def test_a_worker_with_other_code_is_refused_in_a_line_and_computes_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

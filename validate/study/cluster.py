@@ -4,6 +4,7 @@ import logging
 import signal
 import tempfile
 import threading
+from asyncio import CancelledError
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ from typing import Any
 
 import dask
 import distributed
+from distributed.client import FuturesCancelledError
+from distributed.comm import CommClosedError
 from distributed.scheduler import KilledWorker
 
 from validate.child_process import isolating_environment
@@ -27,6 +30,7 @@ _MOMENT = 1.0  # s between looks at which workers are there
 _DEATHS = 4  # of workers under one cell alone
 _AHEAD = 2  # tasks a worker: one that runs and one that waits
 
+_LOST = (CommClosedError, CancelledError, FuturesCancelledError)  # before the client knows it
 LOG = logging.getLogger(__name__)
 _dask: Any = distributed  # its calls carry no annotations
 
@@ -67,7 +71,7 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
             client = _dask.Client(where.scheduler, timeout=CONNECT_S)
         except (OSError, ValueError) as error:
             raise UsageError(f"no scheduler at {where.scheduler}: {error}") from error
-        with client:
+        with client, _silent(), _until_it_is_gone(client, where.scheduler):
             yield client
         return
     settings = {
@@ -94,6 +98,32 @@ def _client(where: Where, cells: int) -> Iterator[Any]:
             )
         with cluster, _dask.Client(cluster) as client:
             yield client
+
+
+@contextmanager
+def _until_it_is_gone(client: Any, address: str) -> Iterator[None]:
+    """An error beside a scheduler that no longer answers is that, in a line."""
+    try:
+        yield
+    except (Exception, CancelledError) as error:
+        if client.status == "running" and not isinstance(error, _LOST):
+            raise
+        raise UsageError(
+            f"the scheduler at {address} went away ({type(error).__name__}); finished cells are "
+            "kept, and the same command with one that runs goes on from there"
+        ) from error
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Without the log of a client that loses its scheduler."""
+    log = logging.getLogger("distributed")
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 @contextmanager
