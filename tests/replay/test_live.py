@@ -30,6 +30,7 @@ from validate.replay.live import (
     realtime,
     written,
 )
+from validate.replay.live.listener import RESYNC
 from validate.replay.live.packets import (
     CONTACT,
     FADED,
@@ -206,6 +207,54 @@ def test_bad_packets_are_counted_and_end_nothing() -> None:
               "out of order": 1, "late": 2, "taken": 3}  # fmt: skip
     assert {k: done.findings[k] for k in wanted} == wanted
     assert done.x[:, 1].tolist() == [0.003, -0.001, -0.002]
+
+
+@pytest.mark.parametrize(
+    "jump",
+    ["stamp far ahead", "number far ahead", "clock set back", "device restarted", "two at once"],
+)
+def test_the_loop_takes_a_clock_that_jumped_anew(jump: str) -> None:
+    """One packet, or a clock, must not end it: it resynchronises, and gives no force until then."""
+
+    def sent(sequence: int, tick: float, y: float = -0.003, ns: int | None = None) -> bytes:
+        when = round(tick * 1e9 / 512) if ns is None else ns
+        return position_bytes(Position(sequence, when, np.array([REST[0], y])))
+
+    first = [sent(1000 + k, k, y) for k, y in enumerate((0.003, -0.001, -0.003, -0.003))]
+    odd = {
+        "stamp far ahead": [sent(1005, 5, ns=2**62)],
+        "number far ahead": [sent(2**31, 5)],
+        "two at once": [sent(2**31, 5, ns=2**62)],
+    }.get(jump, [])
+    back = 51.2 if jump == "clock set back" else 0  # ticks: 100 ms
+    start, n = 0 if jump == "device restarted" else 1010, RESYNC + 30
+
+    def later(k: int) -> bytes:
+        return sent(start + k, k + 5 - back)
+
+    given: list[float] = []
+
+    class Heard(Listener):
+        def give(self, force: Floats, flags: int) -> None:
+            given.append(float(np.linalg.norm(force)))
+            super().give(force, flags)
+
+    listener = Heard(*made().reach, 512.0)
+    packets = iter([*first, *odd, *(later(k) for k in range(n))])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as device:
+
+        def send(now: float) -> None:
+            if (packet := next(packets, None)) is not None:
+                device.sendto(packet, listener.address)
+
+        clock = Turned(device=send)
+        done = live(made().stepper, listener, (n + 7) / 512, clock, clock.wait)
+    listener.close()
+    refused = done.findings.get("late", 0) + done.findings.get("out of order", 0)
+    assert (done.findings["resynchronised"], refused) == (1, RESYNC - 1)
+    assert done.findings["taken"] == len(first) + len(odd) + n - refused
+    assert given[-1] > 1
+    assert given[len(first) + len(odd) + RESYNC - 3] == 0.0  # passive until then
 
 
 def test_without_packets_the_force_is_held_fades_and_is_nothing() -> None:

@@ -19,6 +19,7 @@ from validate.recording.mcap.write import write_recording
 from validate.replay.find import find
 from validate.replay.live import Listener, Lived, Prepared, live, prepared, written
 from validate.replay.live import realtime as scheduled
+from validate.replay.live.listener import RESYNC
 from validate.replay.named_run import reports_of
 from validate.replay.options import Options
 from validate.solve.haptic import QUANTILES, TickTimes
@@ -103,6 +104,11 @@ def _told(done: Lived, said: dict[str, Any]) -> None:
             for k, v in said["times"].items()]  # fmt: skip
     heads = ["microseconds", "n", *(f"{100 * q:g} %" for q in QUANTILES), "longest"]
     table("Times of a tick", heads, rows)
+    if jumps := said["findings"].get("resynchronised"):
+        complain(
+            f"resynchronised {jumps} times, each after {RESYNC} packets in a row that were late or "
+            "out of order: a clock that jumped, or a device that was restarted"
+        )
     if said["findings"]:
         table("Found", ["what", "count"], [[k, str(v)] for k, v in said["findings"].items() if v])
     if said["recording"]:

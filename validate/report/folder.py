@@ -298,8 +298,10 @@ def _left_overs(folder: Path) -> list[Path]:
 
 
 def _inside(folder: Path) -> list[Path]:
-    """Of studies inside a report's folder."""
-    return sorted(p for what in _LEFT for p in folder.glob(f".{STUDIES}.{what}-????????"))
+    """Of studies inside a report's folder, and of their cells."""
+    names = [f".{STUDIES}.{what}-????????" for what in _LEFT]
+    names += [f".{CELLS}.try-????????", f"{STUDIES}/.{CELLS}.try-????????"]
+    return sorted(p for name in names for p in folder.glob(name))
 
 
 def _escaped(name: str) -> str:

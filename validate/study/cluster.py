@@ -14,7 +14,7 @@ from typing import Any
 import dask
 import distributed
 from distributed.client import FuturesCancelledError
-from distributed.comm import CommClosedError
+from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 
 from validate.child_process import isolating_environment

@@ -1,7 +1,9 @@
 """Positions from UDP packets on loopback; forces go back to whoever sends them.
 
-Nothing that arrives ends the loop: what is no sound packet is counted by its fault. The socket is
-bound to 127.0.0.1 and nothing else, and at most `_AT_ONCE` packets are read in a tick.
+Nothing that arrives ends the loop: what is no sound packet is counted by its fault. After `RESYNC`
+packets in a row that are late or out of order the sender's clock and numbers are taken anew; until
+then no place is given, so that the force fades. The socket is bound to 127.0.0.1 and nothing else,
+and at most `_AT_ONCE` packets are read in a tick.
 """
 
 import socket
@@ -15,6 +17,9 @@ from validate.replay.live.packets import LARGEST, Position, force_bytes, newer, 
 LOOPBACK = "127.0.0.1"
 _AT_ONCE = 64
 _LATE_NS = 50_000_000  # behind the quickest packet so far
+RESYNC = (
+    128  # packets in a row that are late or out of order: a clock jumped; the force is 0 by then
+)
 _GONE = 1.0  # s without a packet: another sender may take over
 
 
@@ -34,6 +39,7 @@ class Listener:
         self._last: Position | None = None
         self._heard = 0.0
         self._quickest: int | None = None
+        self._lost = 0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((LOOPBACK, port))
@@ -87,15 +93,25 @@ class Listener:
         if sender != self._peer:
             if self._peer is not None and now - self._heard < _GONE:
                 return "another sender"
-            self._peer, self._last, self._quickest = sender, None, None
-        if self._last is not None and not newer(position.sequence, self._last.sequence):
-            return "out of order"
-        behind = round(now * 1e9) - position.ns
+            self._peer, self._last, self._quickest, self._lost = sender, None, None, 0
+        fault, behind = self._timed(position, now)
+        if fault and self._lost + 1 < RESYNC:
+            self._lost += 1
+            return fault
+        if fault:
+            self.counts["resynchronised"] += 1
+            self._quickest = None
         self._quickest = behind if self._quickest is None else min(behind, self._quickest)
-        if behind - self._quickest > _LATE_NS:
-            return "late"
-        self._last, self._heard = position, now
+        self._last, self._heard, self._lost = position, now, 0
         return ""
+
+    def _timed(self, position: Position, now: float) -> tuple[str, int]:
+        """What is wrong with a packet's number or stamp, and how far it is behind, ns."""
+        behind = round(now * 1e9) - position.ns
+        if self._last is not None and not newer(position.sequence, self._last.sequence):
+            return "out of order", behind
+        quickest = behind if self._quickest is None else min(behind, self._quickest)
+        return ("late" if behind - quickest > _LATE_NS else ""), behind
 
     def give(self, force: Floats, flags: int) -> None:
         """Sends the force (d,) N to the sender of the last position."""
