@@ -10,6 +10,7 @@ from validate.cli.arguments import complain
 from validate.cli.display import say
 from validate.cli.progress import progress
 from validate.errors import RecordingError, UsageError
+from validate.file_names import safe_name
 from validate.places import try_file
 from validate.recording.images.followed import EXPERTS, FollowedOutline, Hint, followed
 from validate.recording.images.foreign_outline import foreign_outlines
@@ -46,7 +47,7 @@ def outline(
     write_recording(replace(recording, contours=streams, metadata=records), out)
     for key, text in told.items():
         say(f"{key}: {text}", indent="  ")
-    _pictured(frames, contours, out.with_name(f"{out.stem}-{name}.png"), marks)
+    _pictured(frames, contours, out.with_name(f"{out.stem}-{safe_name(name)}.png"), marks)
     say(
         f"{out}: {name} ({len(contours.t)} outlines); {out.stat().st_size / 1e3:.0f} kB",
         indent="  ",

@@ -8,6 +8,7 @@ from pathlib import Path
 from validate.compare.exhibit import Animation, Exhibit, NodeMap, Picture
 from validate.compare.result import Result
 from validate.errors import ComparisonError
+from validate.file_names import safe_name
 from validate.report import charts, gl, heat, regime_map
 from validate.report.encode import gif, png
 from validate.report.maps import Range, drawn, legible, ranges
@@ -86,6 +87,6 @@ def write_files(shown: DrawnExhibit, folder: Path) -> None:
         write_chart(chart, tables)
     for picture in shown.pictures:
         if isinstance(picture, Animation):
-            (figures / f"{picture.name}.gif").write_bytes(gif(picture))
+            (figures / f"{safe_name(picture.name)}.gif").write_bytes(gif(picture))
         else:
-            (figures / f"{picture.name}.png").write_bytes(png(picture))
+            (figures / f"{safe_name(picture.name)}.png").write_bytes(png(picture))

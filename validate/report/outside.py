@@ -23,10 +23,10 @@ def junit(content: Json) -> str:
     correction passes and says so. What is no evidence (fitted, repeats itself) is skipped with its
     reason; an accepted method that did not finish is an error; nothing compared is a failure.
     """
-    name = str(content["experiment"])
+    name = _clean(str(content["experiment"]))
     root = ElementTree.Element("testsuites", name=name)
     suites = [(f"{name}.verdict", [_verdict(content)])]
-    suites += [(f"{name}.{m['name']}", _cases(content, m)) for m in content["methods"]]
+    suites += [(_clean(f"{name}.{m['name']}"), _cases(content, m)) for m in content["methods"]]
     suites += [(f"{name}.published", [_figure(p) for p in content["published"]])]
     for suite, cases in suites:
         if cases:
@@ -74,8 +74,8 @@ def _cases(content: Json, method: Json) -> list[ElementTree.Element]:
 
 
 def _case(content: Json, method: Json, name: str) -> ElementTree.Element:
-    classname = f"{content['experiment']}.{method['name']}"
-    return ElementTree.Element("testcase", name=name, classname=classname)
+    classname = _clean(f"{content['experiment']}.{method['name']}")
+    return ElementTree.Element("testcase", name=_clean(name), classname=classname)
 
 
 def _check(content: Json, method: Json, check: Json) -> ElementTree.Element:

@@ -10,6 +10,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
 from validate.fem.cell_fields import cell_fields
+from validate.file_names import safe_name
 from validate.register.markers import MarkerObservation
 from validate.report.observed import markers_seen
 from validate.scene.scene import Scene
@@ -37,7 +38,8 @@ def _series(method: MethodResult, folder: Path) -> Path:
 
     scene, run = method.scene, method.run
     assert isinstance(scene, Scene)
-    parts = folder / method.name
+    name = safe_name(method.name)
+    parts = folder / name
     parts.mkdir(parents=True)
     seen = markers_seen(method)
     entries = []
@@ -50,8 +52,8 @@ def _series(method: MethodResult, folder: Path) -> Path:
             points = _points(pv, seen, run.u[frame], t)
             if points is not None:
                 entries.append((t, 1, _saved(points, parts / f"markers_{k:04d}.vtp")))
-    path = folder / f"{method.name}.pvd"
-    path.write_text(_collection(entries, method.name), "utf-8")
+    path = folder / f"{name}.pvd"
+    path.write_text(_collection(entries, name), "utf-8")
     return path
 
 

@@ -23,6 +23,7 @@ from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Check
+from validate.file_names import safe_name
 from validate.report.environment import environment, file_name
 from validate.report.made import Made
 from validate.report.observed import timed
@@ -125,7 +126,7 @@ def write_runs(result: Result, folder: Path) -> None:
             arrays |= {f"trace:{name}{end}": trace.y for name, trace in run.traces.items()}
             if run.sd is not None:
                 arrays[f"sd{end}"] = run.sd
-        with (folder / f"{method.name}.npz").open("wb") as out:
+        with (folder / f"{safe_name(method.name)}.npz").open("wb") as out:
             np.savez_compressed(out, allow_pickle=False, **arrays)
 
 

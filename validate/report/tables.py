@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
+from validate.file_names import safe_name
 from validate.report.numbers import MISSING, shown_unit, significant, text
 
 Row = Iterable[Entry | TableCell]
@@ -51,13 +52,13 @@ def caption(table: NumberTable) -> str:
 def write_table(table: NumberTable, folder: Path) -> None:
     """The table as a CSV file of its name, entries as they are, empty where there is none."""
     if table.name and table.rows:
-        write_csv(folder / f"{table.name}.csv", table.headings, table.rows)
+        write_csv(folder / f"{safe_name(table.name)}.csv", table.headings, table.rows)
 
 
 def write_chart(chart: Chart, folder: Path) -> None:
     """Every point of every series as a CSV file."""
     head = ("series", "style", f"x: {chart.x}", f"y: {chart.y}", f"upper: {chart.y}")
-    write_csv(folder / f"chart_{chart.name}.csv", head, _points(chart))
+    write_csv(folder / f"chart_{safe_name(chart.name)}.csv", head, _points(chart))
 
 
 def write_csv(path: Path, head: tuple[str, ...], rows: Iterable[Row]) -> None:

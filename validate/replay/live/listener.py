@@ -17,9 +17,7 @@ from validate.replay.live.packets import LARGEST, Position, force_bytes, newer, 
 LOOPBACK = "127.0.0.1"
 _AT_ONCE = 64
 _LATE_NS = 50_000_000  # behind the quickest packet so far
-RESYNC = (
-    128  # packets in a row that are late or out of order: a clock jumped; the force is 0 by then
-)
+RESYNC = 128  # packets in a row that are late or out of order; the force is nothing by then
 _GONE = 1.0  # s without a packet: another sender may take over
 
 
