@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import here
 from mcap.writer import IndexType
 from mcap_samples import T0, markers_json, sample_recording, signal_json, write_foreign
 
@@ -123,3 +124,43 @@ def test_contradictions_of_the_summary_are_defects(
 
 def test_a_file_without_an_index_is_no_defect(tmp_path: Path) -> None:
     assert _defects(tmp_path, _stamped(0, 10), index_types=IndexType.NONE) == []
+
+
+def _cut(file: Path, share: float) -> str:
+    """The path of the first `share` of a file, beside it."""
+    data = file.read_bytes()
+    path = file.with_name(f"cut{file.suffix}")
+    path.write_bytes(data[: int(share * len(data))])
+    return str(path)
+
+
+@pytest.mark.parametrize("flags", [(), ("--json",)])
+def test_the_exit_code_tells_of_defects(tmp_path: Path, flags: tuple[str, ...]) -> None:
+    file = tmp_path / "a.mcap"
+    for sums, integrity in ((False, "not provable"), (True, "verified")):
+        write_foreign(file, _stamped(*range(100)), chunk_size=1000, enable_data_crcs=sums)
+        code, out, _ = here("inspect", str(file), *flags)
+        assert (code, integrity in " ".join(out.split())) == (0, True)
+    code, out, _ = here("inspect", _cut(file, 0.6), *flags)
+    assert (code, "messages; the writer was ended" in " ".join(out.split())) == (1, True)
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 4
+    file.write_bytes(data)
+    code, out, error = here("inspect", str(file), *flags)
+    assert (code, out) == (2, "")
+    assert "CRC" in error
+
+
+def test_the_exit_code_tells_of_defects_of_other_formats(tmp_path: Path) -> None:
+    """No checksum is no defect; a last line that is cut, or a gap, is one."""
+    rows = "".join(f"{t / 10:.1f},{t},2.00,3.00\n" for t in range(9))
+    file = tmp_path / "a.csv"
+    file.write_text(f"time (s),tip_x (mm),tip_y (mm),tip_z (mm)\n{rows}", "utf-8")
+    code, out, _ = here("inspect", str(file))
+    assert (code, "integrity not provable" in " ".join(out.split())) == (0, True)
+    code, out, _ = here("inspect", _cut(file, 0.98), "--json")
+    assert (code, json.loads(out)["defects"]) == (1, ["line 10, cut: its last number is '3'"])
+    file.write_text(file.read_text("utf-8") + "9.0,9,2.00,3.00\n", "utf-8")
+    code, out, _ = here("inspect", str(file), "--json")
+    gap = "'markers': 1 gaps over 3 x the median step, longest 8.200000 s"
+    assert (code, json.loads(out)["defects"]) == (1, [gap])

@@ -115,7 +115,9 @@ def test_inspect_lists_the_arrays_before_anything_is_said(file: Path) -> None:
         "data.name": "not read: char", "I": "not read: (6, 7, 5) uint8",
         "file": "not read: (4, 4) float64",
     }  # fmt: skip
-    assert "m_per_px" in got.defects[0]
+    assert got.defects == ()
+    assert got.facts[0].startswith("still needed: x.mat: I states no unit of length")
+    assert "m_per_px" in got.facts[0]
     with pytest.raises(UsageError, match="is no array"):
         inspect_file(file, "matlab", {"force": "nothing:N"})
 

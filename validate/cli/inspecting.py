@@ -4,19 +4,20 @@ import json
 from datetime import UTC, datetime
 from pathlib import Path
 
-from validate.cli.arguments import pairs
+from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.display import say, table
 from validate.recording.mcap.peek import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
 
 
-def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> None:
-    """Prints what a file of any format holds."""
+def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> int:
+    """Print what a file of any format holds; return 1 where it has a defect, else 0."""
     found = inspect_file(file, kind, pairs(mapping, "--map"))
     if as_json:
         print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
     else:
         _print(found)
+    return FAILED if found.defects else OK
 
 
 def messages(file: Path, topic: str, most: int, as_json: bool) -> None:

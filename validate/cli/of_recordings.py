@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, output, require_new
+from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, OK, output, require_new
 
 
 @click.command()
@@ -17,14 +17,17 @@ from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, output, require_new
 @click.option("--most", type=int, default=10, show_default=True, help="So many of them.")
 def inspect(
     file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...], topic: str, most: int
-) -> None:
-    """What a recording of any format holds: topics, clocks, rates, gaps, units, defects."""
+) -> int:
+    """What a recording of any format holds: topics, clocks, rates, gaps, units, defects.
+
+    The exit code is 1 where it has a defect.
+    """
     from validate.cli import inspecting
 
     if topic:
         inspecting.messages(file, topic, most, as_json)
-    else:
-        inspecting.inspect(file, as_json, kind, mapping)
+        return OK
+    return inspecting.inspect(file, as_json, kind, mapping)
 
 
 @click.command("import")

@@ -20,7 +20,7 @@ from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.chain import chain_faults
 from validate.recording.clocks import GAP_FACTOR, clock_of
 from validate.recording.formats.poses import ROTATION
-from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.formats.text_rows import ASSUMED, cut_lines
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP, read_recording
@@ -85,7 +85,7 @@ class Inspection:
     defects: tuple[str, ...]
     clock_offsets: tuple[str, ...] = ()  # streams that were moved, one line each
     read_as: str = "mcap"
-    facts: tuple[str, ...] = ()  # what the reader of another format told or assumed, one line each
+    facts: tuple[str, ...] = ()  # what its reader assumed, noted and still needs, a line each
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts, lists, texts and finite numbers for JSON; None where nothing is known."""
@@ -120,7 +120,11 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
         attachments=0,
         metadata=tuple(recording.metadata),
         topics=(*(topic for topic, _ in topics), *never),
-        defects=(*(line for _, found in topics for line in found), *chain_faults(recording)),
+        defects=(
+            *cut_lines(recording.metadata.values()),
+            *(line for _, found in topics for line in found),
+            *chain_faults(recording),
+        ),
         read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
         facts=tuple(facts),
     )  # fmt: skip
@@ -132,7 +136,8 @@ def _not_said(reader: Reader, path: Path, held: Mapping[str, str], asks: str) ->
         source=source_of(path, "not checked"),
         profile="", library="", compressions=(), chunks=0, messages=0, attachments=0, metadata=(),
         topics=tuple(_unread_topic(name, what) for name, what in held.items()),
-        defects=(asks,),
+        defects=(),
+        facts=(f"still needed: {asks}",),
         read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ and the recording says so; every other odd line is an error that names it.
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +21,7 @@ NONE = 1e20  # NDI writes -3.7e28 for a number that is none
 ASSUMED = "assumed"  # a record: what was taken of a file and what decided, a line each
 LEFT_OUT = "left out"  # a record's key: what of the file did not become data
 ZEROS = "three zeros"  # a record's key: how many points were taken as not seen
+_CUT = ", cut: "  # in the entry of a last line that was left out
 _FIRST = 8  # lines that tell what stands between cells
 ABSENT = {"", "nan", "NaN", "NAN", "-", "NULL", "Null", "null"}
 
@@ -174,10 +175,10 @@ def _whole(
     last, others = rows[-1], rows[:-1]
     fewest = min((len(r.cells) for r in others), default=width)
     if len(last.cells) < min(fewest, width):
-        return others, (f"line {last.line}, cut: {len(last.cells)} of {width} cells",)
+        return others, (f"line {last.line}{_CUT}{len(last.cells)} of {width} cells",)
     cells = [r.cell(len(last.cells) - 1) for r in others]
     if cells and _decimals(last.cells[-1]) < min(map(_decimals, cells)):
-        return others, (f"line {last.line}, cut: its last number is '{last.cells[-1]}'",)
+        return others, (f"line {last.line}{_CUT}its last number is '{last.cells[-1]}'",)
     return rows, ()
 
 
@@ -202,6 +203,12 @@ def whole_points(
             f"{int((~absent[i, k]).sum())} of {x.shape[2]} coordinates; damaged"
         )
     return x
+
+
+def cut_lines(records: Iterable[Mapping[str, str]]) -> list[str]:
+    """Return the last lines that were left out because the file is cut there."""
+    told = (line for record in records for line in record.get(LEFT_OUT, "").split("; "))
+    return [line for line in told if _CUT in line]
 
 
 def told_left(left: Sequence[str]) -> dict[str, str]:
