@@ -178,7 +178,7 @@ def peer_rows(python: str, truth: float, moving: Floats) -> Iterator[Row]:
             z, hz = np.array(found["trace"], dtype=float), float(str(found["hz"]))
             apart = float(np.sqrt(((z - moving) ** 2).mean()))
             seconds = len(z) / hz
-            name = f"MuJoCo flex {name}, nu .45, 1 ms"
+            name = f"MuJoCo linear tetrahedra {name}, nu .45, 1 ms"
             yield Row(name, nodes, apart, seconds, DURATION / seconds)
 
 

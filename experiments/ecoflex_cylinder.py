@@ -56,13 +56,17 @@ METHODS: Mapping[str, Method] = {
     ),
     "svk_bonded": Method("SVK, bonded plates", TABLE, Model("bonded", "bonded", "svk", 5, 6, 1)),
     "felupe": Method(
-        "FElupe, neo-Hooke, slipping plates",
+        "FElupe, quadratic tetrahedra, 125 nodes, neo-Hooke, slipping plates",
         Guest(FELUPE, levels=10),
         Model("slip", "neo_slip", "neo_hooke", 2, 2),
     ),
-    "calculix": Method("CalculiX, linear, slipping plates", Guest(CALCULIX, levels=5), COARSE),
+    "calculix": Method(
+        "CalculiX, quadratic tetrahedra, 729 nodes, linear, slipping plates",
+        Guest(CALCULIX, levels=5),
+        COARSE,
+    ),
     "mujoco": Method(
-        "MuJoCo, SVK, slipping plates",
+        "MuJoCo, linear tetrahedra, 27 nodes, SVK, slipping plates",
         Guest(MUJOCO, levels=10),
         Model("slip", "svk_slip", "svk", 2, 2, 1),
     ),

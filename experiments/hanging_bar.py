@@ -30,7 +30,11 @@ METHODS = {
     "felupe_tetrahedra": Method("FElupe, linear tetrahedra, dolfinx's mesh", FELUPE, THEIRS),
     "calculix": Method("CalculiX, hexahedra of incompatible modes, 9 x 9 x 24", CALCULIX, WHOLE),
     "calculix_tetrahedra": Method("CalculiX, linear tetrahedra, dolfinx's mesh", CALCULIX, THEIRS),
-    "mujoco": Method("MuJoCo, linear tetrahedra, dolfinx's mesh", MUJOCO, THEIRS),
+    "mujoco": Method(
+        "MuJoCo, linear tetrahedra, 833 nodes (dolfinx's mesh), St. Venant-Kirchhoff",
+        MUJOCO,
+        THEIRS,
+    ),
 }
 EXPERIMENT = Experiment(
     name="hanging_bar",

@@ -82,12 +82,14 @@ METHODS = {
         Model(order=1, mixed=False, along=8, across=2, damping=BETA),
     ),
     "mujoco": Method(
-        "MuJoCo, linear tetrahedra (lock), St. Venant-Kirchhoff",
+        "MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff",
         GuestLetGo(MUJOCO),
         CUT,
     ),
     "mujoco_45": Method(
-        "MuJoCo, the same at nu .45 (locks less)", GuestLetGo(MUJOCO), replace(CUT, nu=0.45)
+        "MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff, nu .45",
+        GuestLetGo(MUJOCO),
+        replace(CUT, nu=0.45),
     ),
 }
 

@@ -1,6 +1,7 @@
 """The README's tables of guests: what they are made by, and that they are today's."""
 
 import importlib.util
+import json
 import re
 import shutil
 import sys
@@ -9,8 +10,10 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from commands import here
 
 from validate.compare.result import Result
+from validate.replay import load
 from validate.report.numbers import significant
 
 
@@ -53,21 +56,58 @@ def test_at_an_error_stands_the_least_time_on_a_line_of_one_kind(rates: ModuleTy
     assert rates.at_error(points, "other", 1e-3) is None  # near by accident: a finer one is not
     assert rates.at_error(points, "other", 5e-2) == (3.0, "a")
     (row,) = rates.rows("bar", points, (5e-2,))
-    assert row == ["bar", "5 %", f"{significant(2000.0)} (a)", *["-"] * len(rates.GUESTS), "ours"]
+    assert row == ["bar", "5 %", f"{significant(2000.0)} (a)", *["-"] * len(rates.GUESTS)]
 
 
-def test_who_is_first_is_who_takes_least(project_root: Path, rates: ModuleType) -> None:
+def test_the_rates_name_the_cells_that_were_tried_and_no_winner(
+    project_root: Path, rates: ModuleType
+) -> None:
     head, _, *rows = cells(project_root, rates)
-    assert tuple(head) == rates.HEAD
-    scenes = {row[0] for row in rows}
-    assert scenes == {"beam at rest", "hanging bar", "beam let go"}
+    assert head == rates.head()
+    assert head[2:] == [
+        "ours, ms: hex8, tet10, hex27", "FElupe: hex8, tet10", "CalculiX: hex8, tet10",
+        "MuJoCo: tet4",
+    ]  # fmt: skip
+    assert {row[0] for row in rows} == {"beam at rest", "hanging bar", "beam let go"}
     for row in rows:
-        times = {
-            who: float(re.sub(r"\s|\(.*", "", cell))
-            for who, cell in zip(("ours", *rates.GUESTS), row[2:-1], strict=True)
-            if cell != "-"
-        }
-        assert row[-1] == (min(times, key=lambda who: times[who]) if times else "-")
+        assert len(row) == len(head)
+        for column, cell in zip(head[2:], row[2:], strict=True):
+            kind = re.fullmatch(r"[\d\s.]+ \((\w+)(?:/\d)?\)", cell)
+            assert cell == "-" or (kind and kind[1] in column.partition(": ")[2].split(", "))
+
+
+def test_a_row_is_called_as_its_experiment_calls_the_method(
+    project_root: Path, shared_data: Path, table: ModuleType
+) -> None:
+    printed = cells(project_root, table)[2:]
+    for one in table.judged():
+        own = load(str(project_root / "experiments" / f"{one.name}.py")).methods
+        named = [r[2] for r in printed if r[0] == f"`{one.name}` {one.called}".strip()]
+        assert named
+        for name in named:
+            assert any(name == (label := own[key].label) or name.startswith(f"{label} (")
+                       for key in one.methods), name  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "cells"),
+    [
+        ("silicone_beam", "mujoco", "hex8"),  # each cut into six linear tetrahedra
+        pytest.param("ecoflex_cylinder", "felupe", "tet10", marks=pytest.mark.slow),
+        pytest.param("ecoflex_cylinder", "calculix", "tet10", marks=pytest.mark.slow),
+        pytest.param("ecoflex_cylinder", "mujoco", "tet4", marks=pytest.mark.slow),
+        ("hanging_bar", "mujoco", "tet4"),
+    ],
+)
+def test_a_label_names_the_nodes_that_are_solved(
+    shared_data: Path, project_root: Path, tmp_path: Path, name: str, method: str, cells: str
+) -> None:
+    file = project_root / "experiments" / f"{name}.py"
+    code, _, error = here("guest", "job", str(file), "-o", str(tmp_path / "j"), "--method", method)
+    assert code == 0, error
+    mesh = json.loads((tmp_path / "j" / "job.json").read_text("utf-8"))["mesh"]
+    assert mesh["kind"] == cells
+    assert f" tetrahedra, {mesh['nodes']} nodes" in load(str(file)).methods[method].label
 
 
 @pytest.mark.slow

@@ -67,7 +67,7 @@ def test_calculix_solves_all_and_says_that_its_volume_term_is_another(project_ro
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
-def test_mujoco_has_one_law_and_says_so(project_root: Path) -> None:
+def test_the_guest_of_mujoco_uses_one_law_and_says_so(project_root: Path) -> None:
     """Exact where St. Venant-Kirchhoff's law is asked's own answer; far off where it is not."""
     found = checked(project_root, "mujoco_guest.py")
     for name in ("rigid turn", "patch test"):
@@ -107,6 +107,36 @@ def test_mujoco_bends_a_beam_as_our_tetrahedra_of_its_law_do(project_root: Path,
             assert np.abs(run.u[0] - own).max() < 1e-5 * np.abs(own).max()
     assert ends[0] == pytest.approx(ends[1], rel=1e-9)
     assert 1e3 * ends[0] == pytest.approx({0.45: -3.445, 0.499: -0.880}[nu], abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
+@pytest.mark.parametrize(("count", "end"), [((4, 1, 1), -6.438), ((5, 2, 2), -6.641)])
+def test_quadratic_cells_of_mujoco_do_not_lock(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: tuple[int, int, int], end: float
+) -> None:
+    """The same beam at nu .45 by cells that its guest does not use; mean motion of the end, mm."""
+    mujoco = pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # it leaves a log where it runs
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 -9.80709" timestep="0.03" integrator="discrete"/>
+        <worldbody><flexcomp name="beam" type="grid" dim="3" count="21 7 7" radius="1e-4"
+        spacing=".005 .005 .005" mass="{0.1 * 0.03 * 0.03 * 1070.0}" dof="quadratic"
+        cellcount="{" ".join(map(str, count))}"><elasticity young="263824" poisson="0.45"/>
+        <contact selfcollide="none" contype="0" conaffinity="0"/>
+        <pin gridrange="0 0 0 0 {2 * count[1]} {2 * count[2]}"/></flexcomp></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    x = data.flexvert_xpos.copy()
+    for _ in range(100):  # long steps that keep no velocity
+        mujoco.mj_step(model, data)
+        data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)
+    moved = data.flexvert_xpos - x
+    held, free = (np.isclose(x[:, 0], at, atol=1e-9) for at in (x[:, 0].min(), x[:, 0].max()))
+    assert np.abs(moved[held]).max() == 0
+    assert 1e3 * moved[free, 2].mean() == pytest.approx(end, abs=2e-3)
 
 
 @pytest.mark.slow
