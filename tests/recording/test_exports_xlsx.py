@@ -168,3 +168,17 @@ def test_other_documents_in_such_containers_are_none(tmp_path: Path) -> None:
     whole.write_bytes(data[:20])
     with pytest.raises(UsageError, match="not recognised"):
         recognised(whole)
+
+
+def test_a_displacement_field_is_no_test(tmp_path: Path) -> None:
+    """Its displacements were a signal over time, by following the advice."""
+    cells = [["X [mm]", "Y [mm]", "displacement [mm]", "exx"]]
+    cells += [[float(x), float(y), 0.1 * x, 0.01] for y in range(4) for x in range(5)]
+    path = written(tmp_path, Data=cells)
+    for said in ({}, {"time": "every:0.1s", "force": "none"}):
+        with pytest.raises(RecordingError, match="20 rows of X, Y, displacement, exx: a field of"):
+            read_xlsx(path, said)
+    timed = [["Time [s]", *cells[0]], *([0.1 * i, *row] for i, row in enumerate(cells[1:]))]
+    assert read_xlsx(written(tmp_path, Data=timed), {"force": "none"}).signals.keys() == {
+        "displacement"
+    }

@@ -223,3 +223,110 @@ def test_deeplabcuts_table_without_coordinates_names_no_points(tmp_path: Path) -
     path.write_text(DEEPLABCUT.replace(",x,y,", ",likelihood,likelihood,"))
     with pytest.raises(RecordingError, match="no line names points"):
         read(path, PLACED)
+
+
+PX, PY = (a.ravel() for a in np.meshgrid(np.arange(5) * 5.0, np.arange(4) * 5.0))
+FIELD = (PX, PY, 0.01 * PX, -0.003 * PY, 0 * PX + 0.01, 0 * PY - 0.003, 0 * PX)
+ADVICE = {"unit": "mm", "z": "0mm", "rate": "10"}  # as such a table was answered with
+
+
+def field_table(path: Path, names: str, separator: str = ",", before: str = "") -> Path:
+    """A row a point of a grid of 5 x 4, columns of those names, after a column of a time."""
+    count = len(names.split(separator))
+    rows = (separator.join(f"{c:.4f}" for c in row[:count]) for row in zip(*FIELD, strict=True))
+    first = before and f"{before}{separator}"
+    lines = [f"{first}{names}", *(f"{first and '0' + separator}{row}" for row in rows)]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        ("x,y,u,v,exx", "x, y, u, v, exx"),
+        ("x,y,u,v", "x, y, u, v"),
+        ('"x", "y", "u", "v", "exx", "eyy", "exy"', "x, y, u, v, exx, eyy, exy"),  # Vic-2D
+        ("X [mm],Y [mm],U [mm],V [mm],exx,eyy", "X, Y, U, V, exx, eyy"),
+        ("x [px];y [px];u [px];v [px]", "x, y, u, v"),
+        ("x (mm),y (mm),disp_x (mm),disp_y (mm),strain_xx", "x, y, disp_x, disp_y, strain_xx"),
+        ("x,y,displacement", "x, y, displacement"),
+        ("x [mm]\ty [mm]\tEpsilon X [%]", "x, y, Epsilon X"),
+        ("COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA,VSG_STRAIN_XX",
+         "COORDINATE_X, COORDINATE_Y, DISPLACEMENT_X, DISPLACEMENT_Y, VSG_STRAIN_XX"),  # DICe
+        ("X [mm];Y [mm];Verschiebung X [mm];Verschiebung Y [mm];Dehnung X",
+         "X, Y, Verschiebung X, Verschiebung Y, Dehnung X"),
+        ("Xpos,Ypos,Ux,Uy,Exx", "Xpos, Ypos, Ux, Uy, Exx"),  # no names of points: a machine's text
+    ],
+)  # fmt: skip
+def test_a_displacement_field_is_no_motion_of_one_point(
+    names: str, columns: str, tmp_path: Path
+) -> None:
+    """It was read as one point that jumps from place to place, by following the advice."""
+    separator = next((s for s in ";\t" if s in names), ",")
+    path = field_table(tmp_path / "p.csv", names, separator)
+    reader = recognised(path)
+    said = ADVICE if reader.name == "points" else {"time": "every:0.1s", "force": "none"}
+    for options in ({}, said):
+        with pytest.raises(RecordingError) as raised:
+            reader.read(path, options)
+        assert str(raised.value) == (
+            f"p.csv: 20 rows of {columns}: a field of displacements or strains at one instant, not "
+            "the motion of one point; export chosen points over time, a row an instant, as time "
+            "(s), p1_x (mm), p1_y (mm), p2_x (mm), p2_y (mm)"
+        )
+
+
+@pytest.mark.parametrize("before", ["time (s)", "frame"])
+def test_a_field_at_each_instant_is_told_no_way_to_be_one_point(
+    before: str, tmp_path: Path
+) -> None:
+    path = field_table(tmp_path / "p.csv", "x (mm),y (mm),u (mm),v (mm),exx", before=before)
+    said = f"20 rows at each '{before}' of x, y, u, v, exx: a field".replace("(", r"\(")
+    with pytest.raises(RecordingError, match=said.replace(")", r"\)")):
+        read(path, {"z": "0mm"})
+
+
+def test_one_point_with_displacements_over_time_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "p.csv"
+    path.write_text("time (s),x (mm),y (mm),u (mm),v (mm)\n0,1,2,0,0\n0.1,1.5,2,0.5,0\n", "utf-8")
+    assert read(path, {"z": "0mm"}).x[:, 0, 0].tolist() == [1e-3, 1.5e-3]
+
+
+def test_rows_on_a_grid_are_no_motion_of_one_point(tmp_path: Path) -> None:
+    """No name tells it; a point that moves along a line or a circle is on no grid."""
+    path = field_table(tmp_path / "p.csv", "x (mm),y (mm)")
+    with pytest.raises(
+        RecordingError, match="20 rows on a grid of 5 x 4 places at one instant, not"
+    ):
+        read(path, ADVICE)
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    for x, y in ((np.cos(angle), np.sin(angle)), (angle, angle), (angle, 0 * angle)):
+        rows = "".join(f"{a:.3f},{b:.3f}\n" for a, b in zip(x, y, strict=True))
+        path.write_text(f"x (mm),y (mm)\n{rows}", "utf-8")
+        assert len(read(path, {"z": "0mm", "rate": "10"}).t) == 24
+
+
+def test_one_point_on_a_grid_that_comes_back_or_has_times_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "p.csv"
+    nine = [f"{x},{y}" for x in range(3) for y in range(3)]
+    path.write_text("\n".join(["x (mm),y (mm)", *nine, *nine]) + "\n", "utf-8")
+    assert len(read(path, {"z": "0mm", "rate": "10"}).t) == 18
+    timed = [f"{i},{row}" for i, row in enumerate(nine)]
+    path.write_text("\n".join(["time (s),x (mm),y (mm)", *timed]) + "\n", "utf-8")
+    assert len(read(path, {"z": "0mm"}).t) == 9
+
+
+@pytest.mark.parametrize(("more", "is_read"), [("u,v", True), ("exx", False)])
+def test_tracks_may_have_velocities_but_grid_points_have_strains(
+    more: str, is_read: bool, tmp_path: Path
+) -> None:
+    """Places of a field stay where they were at first: read, they would be points at rest."""
+    path = tmp_path / "p.csv"
+    values = ",0" * len(more.split(","))
+    rows = [f"{t},{i},{i + 0.1 * t},0{values}" for t in range(3) for i in range(4)]
+    path.write_text("\n".join([f"frame,id,x (mm),y (mm),{more}", *rows]) + "\n", "utf-8")
+    if is_read:
+        assert read(path, {"z": "0mm", "rate": "10"}).names == ("0", "1", "2", "3")
+        return
+    with pytest.raises(RecordingError, match="4 rows at each 'frame' of x, y, exx: a field"):
+        read(path, {"z": "0mm", "rate": "10"})

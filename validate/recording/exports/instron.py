@@ -32,6 +32,7 @@ from validate.recording.exports.consistency import (
     check_swapped,
     check_time,
 )
+from validate.recording.exports.displacement_field import field_columns
 from validate.recording.exports.encoding import whole_file
 from validate.recording.exports.geometry import loaded_area, specimen_of
 from validate.recording.exports.kinds import ASK, Kind, kind_of_test
@@ -109,6 +110,7 @@ def recording_of(
     written_as: str = "text file",
 ) -> Recording:
     """The recording of the table of one specimen; `data` are the bytes of the file."""
+    _require_test(table)
     if NONE in (mapping.get("force"), mapping.get("displacement")):
         return alone(path, data, table, mapping, label, written_as)
     said = parse_mapping(mapping, table)
@@ -143,6 +145,13 @@ def recording_of(
             "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
         },
     )
+
+
+def _require_test(table: Table) -> None:
+    """Refuse rows of a displacement field; with times or a force they may be a test."""
+    field = field_columns([c.name for c in table.columns])
+    if field and not {"time", "force"} & {role_of(c) for c in table.columns}:
+        raise RecordingError(field.refusal(f"{len(table.lines)} rows"))
 
 
 def _labels(table: Table) -> list[str]:

@@ -13,6 +13,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError, ValidateError
+from validate.recording.exports.displacement_field import field_columns, is_grid
+from validate.recording.exports.table import split_unit
 from validate.recording.exports.vocabulary import role_of_name
 from validate.recording.formats.options import above_zero, length, metres, spread
 from validate.recording.formats.point_layout import AXES, PIXELS, PointLayout, layout_of
@@ -59,6 +61,7 @@ def read_point_table(path: Path, options: Options) -> Recording:
     instant = [] if layout.instant is None else [layout.instant]
     columns = [*layout.columns, *layout.sure, *instant]
     values, rows, left = numbers(held, layout.rows, len(layout.names), columns)
+    _require_motion(held, layout, values)
     x = _points(held, layout, values, rows)
     x, unsure = _without_unsure(layout, x, values, options)
     factor, stated = _scale(held, layout, options)
@@ -76,6 +79,25 @@ def read_point_table(path: Path, options: Options) -> Recording:
     topic = "landmarks" if landmarks else "markers"
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, {topic: markers}, told)
+
+
+def _require_motion(held: TextRows, layout: PointLayout, values: Floats) -> None:
+    """Refuse points of a grid at one instant: over time, one point would jump between them."""
+    moves = layout.instant is not None
+    count = len(values) // len(np.unique(values[:, -1])) if moves else len(values)
+    field = field_columns([split_unit(name)[0] for name in layout.names])
+    rows = f"{held.name}: {count} rows" + (
+        f" at each '{layout.names[layout.instant or 0]}'" * moves
+    )
+    if count > 1 and field and (layout.whose is None or field.strains):
+        raise RecordingError(field.refusal(rows))
+    one = len(layout.points) == 1 and layout.label is None and layout.whose is None
+    if one and not moves and is_grid(values):
+        raise RecordingError(
+            f"{rows} on a grid of {len(np.unique(values[:, 0]))} x {len(np.unique(values[:, 1]))} "
+            "places at one instant, not the motion of one point; add a column called name (a "
+            "landmark a row), or of one point a column of time"
+        )
 
 
 def _points(
