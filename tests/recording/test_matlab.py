@@ -63,7 +63,7 @@ def test_what_is_neither_points_nor_images_is_listed(tmp_path: Path) -> None:
         "note": "char", "s.a": "(1, 1) float64", "plane": "(4, 5) float64",
         "c": "(4, 2) complex128",
     }  # fmt: skip
-    with pytest.raises(UsageError, match=r"--map force=plane:N .* it holds .*'note': 'char'"):
+    with pytest.raises(UsageError, match=r"--map force=PATH:N .* it holds .*'note': 'char'"):
         read_matlab(written(tmp_path / "x.mat", **other), {})
     words = {"note": "a text", "c": np.ones((4, 2)) * 1j}
     with pytest.raises(RecordingError, match=r"x\.mat: neither points .* {'note': 'char'"):

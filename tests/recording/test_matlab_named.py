@@ -1,5 +1,6 @@
 """Arrays of MATLAB files as the streams that a user names: both versions, axes, units, contents."""
 
+import re
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import hdf5storage
 import numpy as np
 import pytest
 from scipy.io import savemat
+from scipy.spatial import ConvexHull
 
 from validate.cli.main import main
 from validate.errors import RecordingError, UsageError
@@ -244,3 +246,119 @@ def test_samples_without_a_number_are_left_out_and_told(tmp_path: Path) -> None:
     assert isinstance(made, Signal)
     assert (made.t.tolist(), made.y.ravel().tolist()) == ([0, 0.2], [1, 3])
     assert told == "f:N: 1 samples without a number left out"
+
+
+V = np.random.default_rng(5).normal(size=(12, 3))
+FACES = ConvexHull(V / np.linalg.norm(V, axis=1)[:, None]).simplices + 1.0  # (20, 3), 1 to 12
+EDGES = np.array([[i, i % 12 + 1] for i in range(1, 13)], dtype=float)
+POINTS = {"unit": "mm"}
+
+
+def file_of(folder: Path, **arrays: Any) -> Path:
+    savemat(folder / "x.mat", arrays)
+    return folder / "x.mat"
+
+
+@pytest.mark.parametrize("kind", ["int8", "uint8", "int32", "uint16", "uint64", "float64"])
+@pytest.mark.parametrize(("values", "what"), [(FACES, "triangles"), (EDGES, "edges")])
+def test_a_list_of_indices_is_no_points(
+    tmp_path: Path, values: np.ndarray, what: str, kind: str
+) -> None:
+    """It was read as points in mm, and one of uint8 as an image three px wide."""
+    shape = f"{values.shape} {kind}".replace("(", r"\(").replace(")", r"\)")
+    why = rf"{shape}: a list of {what} by the rows of another array \(whole numbers 1 to 12\), not"
+    path = file_of(tmp_path, K=values.astype(kind))
+    named = {"tip": "K:mm", "axes.tip": "px"}
+    for options in ({}, POINTS, {"m_per_px": "1mm"}, named):
+        with pytest.raises(RecordingError, match=rf"x\.mat: K:? {why}"):
+            read_matlab(path, options)
+    turned = file_of(tmp_path, K=values.astype(kind).T)
+    with pytest.raises(RecordingError, match=f"a list of {what} by the rows"):
+        read_matlab(turned, {"tip": "K:mm", "axes.tip": "xp"})
+    got = read_matlab(turned, {"counts": "K:V", "axes.counts": "ct", "rate": "10"})
+    assert got.signal("counts", "V").y.shape == values.shape
+
+
+def test_whole_numbers_of_a_whole_type_are_no_points(tmp_path: Path) -> None:
+    path = file_of(tmp_path, P=np.array([[101, 33], [57, 240]], dtype="int16"))
+    with pytest.raises(
+        RecordingError, match=r"numbers 33 to 240\), not points; if they are coordinates, save"
+    ):
+        read_matlab(path, POINTS)
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"V": V, "K": FACES.astype("int32")},
+        {"V": V, "K": FACES[(FACES != 3).all(axis=1)]},  # a part of the surface
+        {"V": V, "T": FACES[:2]},
+        {"V": V, "surface": {"faces": FACES[:2]}},
+    ],
+)
+def test_vertices_beside_their_triangles_are_points(tmp_path: Path, arrays: dict[str, Any]) -> None:
+    got = read_matlab(file_of(tmp_path, **arrays), POINTS)
+    assert list(got.markers) == ["V"]
+    (told,) = got.unread.values()
+    assert ": a list of triangles by the rows of another array (whole numbers" in told
+
+
+@pytest.mark.parametrize(
+    "X",
+    [
+        np.array([[101.0, 33.0], [57.0, 240.0], [12.0, 8.0]]),  # whole px
+        np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3),  # a lattice, in mm
+        FACES - 3,
+        FACES + 0.5,
+    ],
+)
+def test_whole_numbers_may_be_coordinates(tmp_path: Path, X: np.ndarray) -> None:
+    got = read_matlab(file_of(tmp_path, X=X, V=V), POINTS)
+    assert set(got.markers) == {"X", "V"}
+
+
+@pytest.mark.parametrize(
+    ("arrays", "why"),
+    [
+        ({"vol": IMAGE}, "it is called so"),
+        ({"mri_2": IMAGE}, "it is called so"),
+        ({"I": IMAGE, "info": {"PixelSpacing": np.ones((1, 3))}}, "info.PixelSpacing has three"),
+    ],
+)
+def test_a_volume_is_no_film(tmp_path: Path, arrays: dict[str, Any], why: str) -> None:
+    """Its slices were images over time, by the rate that was asked for."""
+    path, scale = file_of(tmp_path, **arrays), {"m_per_px": "0.1mm", "rate": "10"}
+    for options in ({}, scale, {**scale, "images": f"{next(iter(arrays))}:px"}):
+        with pytest.raises(RecordingError, match=rf"\(6, 7, 5\) uint8: a volume \({why}"):
+            read_matlab(path, options)
+
+
+def test_a_stack_that_may_be_a_film_is_never_taken_for_one_unasked(tmp_path: Path) -> None:
+    path = file_of(tmp_path, I=IMAGE, spacing=np.ones((1, 2)), volume=3.5)
+    with pytest.raises(UsageError, match=r"if the last of its axes is time \(a volume is not read"):
+        read_matlab(path, {"m_per_px": "0.1mm"})
+    assert len(read_matlab(path, {"m_per_px": "0.1mm", "rate": "10"}).frame("I").images) == 5
+
+
+@pytest.mark.parametrize("shape", [(20, 1), (4, 5)])
+def test_a_displacement_field_is_no_signal(tmp_path: Path, shape: tuple[int, int]) -> None:
+    """Its coordinates were a force over time, by the example that was printed."""
+    columns = {name: np.arange(20.0).reshape(shape) for name in ("x", "y", "u", "v", "exx")}
+    path = file_of(tmp_path, dic=columns)
+    field = rf"{re.escape(str(shape))} of x, y, u, v, exx: a field of displacements or strains"
+    for options in (
+        {},
+        {"force": "dic.x:N", "rate": "100", "axes.force": "tc"[: 1 + shape[1] // 5]},
+    ):
+        with pytest.raises(RecordingError, match=field):
+            read_matlab(path, options)
+    with pytest.raises(UsageError, match=r"--map force=PATH:N"):
+        read_matlab(file_of(tmp_path, x=np.arange(4.0), y=np.arange(4.0)), {})
+
+
+def test_displacements_of_one_point_have_times(tmp_path: Path) -> None:
+    names = ("t", "x", "y", "u", "v")
+    path = file_of(tmp_path, **{name: np.arange(4.0) for name in names})
+    assert read_matlab(path, {"u": "u:mm", "rate": "10"}).signal("u", "m").t[1] == 0.1
+    path = file_of(tmp_path, s=np.arange(4.0), **{name: np.arange(4.0) for name in names[1:]})
+    assert read_matlab(path, {"u": "u:mm", "time": "s:s"}).signal("u", "m").t[1] == 1

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
+from validate.recording.formats.array_kinds import field_at, no_stream
 from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
 from validate.recording.formats.matlab_named import (
     AXES,
@@ -56,7 +57,11 @@ def read_matlab(path: Path, options: Options) -> Recording:
         streams, used, notes = _named(path, asked, found, options)
     else:
         (streams, used), notes = _unnamed(path, found, options), {}
-    unread = {name: said for name, said in listing(found).items() if name not in used}
+    unread = {
+        name: f"{said}: {why}" if (why := no_stream(name, found)) else said
+        for name, said in listing(found).items()
+        if name not in used
+    }
     told = {"kind": _version(path), **options, **notes}
     return recorded(path.stem, source_of(path, integrity), begun(streams), told, unread)
 
@@ -72,11 +77,15 @@ def _named(
     said = {key: named_array(key, text, found) for key, text in asked.items()}
     for key, array in said.items():
         try:
-            image = array.unit == "px"
-            if image:
+            if array.unit == "px":
+                _require_stream(array.path, found)
                 streams[key] = _frames(f"{path.name}: {array.path}", found[array.path], options)
                 continue
             made = streams[key] = named_stream(key, array, found, options)
+            if isinstance(made, Markers):
+                _require_stream(array.path, found)
+            if "time" not in options and (field := field_at(array.path, found)):
+                raise RecordingError(field.refusal(f"an array {found[array.path].shape}"))
             if note := note_on(key, array, found, made, options):
                 notes[key] = f"{asked[key]}: {note}"
         except RecordingError as error:
@@ -88,21 +97,33 @@ def _named(
 def _unnamed(path: Path, found: Arrays, options: Options) -> tuple[dict[str, Stream], set[str]]:
     """Points and images, which show by their shape."""
     require_known(options, _OPTIONS)
-    made = {name: _stream(path, name, values, options) for name, values in found.items()}
+    none = {name: why for name in found if (why := no_stream(name, found))}
+    made = {n: _stream(path, n, values, options) for n, values in found.items() if n not in none}
     streams: dict[str, Stream] = {name: s for name, s in made.items() if s is not None}
     if streams:
         return streams, set(streams)
     have = numeric(found)
+    for name, why in none.items():
+        raise RecordingError(f"{path.name}: {name} {found[name].shape} {found[name].dtype}: {why}")
+    for name in have:
+        if field := field_at(name, found):
+            raise RecordingError(field.refusal(f"{path.name}: arrays {have[name].shape}"))
     if not have:
         raise RecordingError(
             f"{path.name}: neither points (n, 2 or 3) nor uint8 images (h, w, nt), nor other "
             f"numbers; it holds {listing(found) or 'nothing'}"
         )
-    one = max(have, key=lambda name: have[name].size)
     raise UsageError(
-        f"{path.name}: no array shows what it is; name what is meant, as --map force={one}:N "
+        f"{path.name}: no array shows what it is; name what is meant, as --map force=PATH:N "
         f"--map rate=100 or --map time=PATH:s; it holds {listing(found)}"
     )
+
+
+def _require_stream(name: str, found: Arrays) -> None:
+    """Refuse what is neither points nor images, whichever of its axes is the first."""
+    turned = {**found, name: found[name].T}
+    if why := no_stream(name, found) or no_stream(name, turned):
+        raise RecordingError(f"{found[name].shape} {found[name].dtype}: {why}")
 
 
 def held_in(path: Path) -> dict[str, str]:
@@ -162,8 +183,11 @@ def _frames(what: str, values: Variable, options: Options) -> Frames:
     _said(what, "m_per_px", "0.1mm", options, "unit of length")
     side = length(options, "m_per_px", "0.1mm")
     images = tuple(np.moveaxis(np.atleast_3d(values), -1, 0))
-    if len(images) > 1:
-        _said(what, "rate", "10", options, "times")
+    if len(images) > 1 and "rate" not in options:
+        raise UsageError(
+            f"{what} states no times; if the last of its axes is time (a volume is not read), say "
+            "--map rate=10"
+        )
     t = np.arange(len(images)) / (above_zero(options, "rate") if len(images) > 1 else 1.0)
     return Frames(t, images, (side, side), np.eye(4), options.get("frame", "matlab"))
 

@@ -36,9 +36,14 @@ def read_points(path: Path, unit: str | None = None) -> Recording:
     """Markers `points` (nt, n, 3) m, NaN = not seen, of an array `points`; states count as seconds.
 
     Raises `UsageError` for a unit that nobody states, `RecordingError` for an archive that is
-    missing, damaged or holds no such array.
+    missing, damaged or holds no such array, or one of whole numbers.
     """
     arrays = npz_arrays(path, _MOST)
+    if "points" in arrays and (held := arrays["points"]).dtype.kind in "iu":
+        raise RecordingError(
+            f"{path.name}: points {held.shape} {held.dtype}: a list of indices (whole "
+            "numbers), not points; if they are coordinates, save them as float"
+        )
     factor = si_factor(unit or _said(path), "length")
     x = factor * _array(path, arrays, "points", (None, None, 3))
     markers = Markers(
