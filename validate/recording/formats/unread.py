@@ -8,6 +8,8 @@ from pathlib import Path
 from validate.recording.reader import head
 
 _FFMPEG = "ffmpeg -i {name} -c:v libx264 -crf 0 {stem}.mp4"
+_SAVED = "`scipy.io.savemat('{{stem}}.mat', dict({}))`"
+_NPZ = b"PK\3\4 .npy"  # an archive whose first file is so called
 _FIRST: tuple[tuple[bytes, str, str], ...] = (
     (b"SQLite format 3\0", "an SQLite database (no bag of ROS)",
      "sqlite3 -header -csv {name} 'SELECT * FROM ...' > {stem}.csv"),
@@ -25,6 +27,8 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
     (b"\x1f\x8b", "packed by gzip", "gunzip -k {name}"),
     (b"\x28\xb5\x2f\xfd", "packed by Zstandard",
      "unzstd -k {name} -o {stem}; of a bag of ROS import the folder instead"),
+    (b"\x93NUMPY", "an array of NumPy", _SAVED.format("x=numpy.load('{name}')")),
+    (_NPZ, "an archive of NumPy's arrays", _SAVED.format("numpy.load('{name}')")),
     (b"PK\3\4", "a ZIP archive", "unzip {name} -d {stem}, then name the folder or a file in it"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and name the file or folder in it"),
     (b"Rar!", "a RAR archive", "unpack it and name the file or folder in it"),
@@ -36,7 +40,9 @@ def known_unread(path: Path) -> str:
     """What a path is that no reader takes, and what to do; empty where nothing shows."""
     if path.is_dir():
         return _folder(path)
-    first = head(path, 16)
+    first = head(path, 64)
+    if first.startswith(b"PK\3\4") and b".npy" in first:
+        first = _NPZ
     return next(
         (
             f"{path.name} is {what}, which is not read here; make it one that is: "
