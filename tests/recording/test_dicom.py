@@ -147,6 +147,7 @@ def test_a_folder_of_one_series_is_one_sequence(tmp_path: Path) -> None:
         ({"InstanceNumber": {2: 1}}, "3 instance numbers of 4 files"),
         ({"NumberOfFrames": {2: 2}}, "1 files of several images each; import them one by one"),
         ({"ContentTime": {2: "125959.10"}}, "4 images without times; say --map rate=HZ"),
+        ({"SliceLocation": {i: 1.5 * i for i in range(4)}}, "4 images of 4 places: slices of a"),
         ({"SeriesInstanceUID": {0: "1.2.3"}}, r"2 series in one folder, of \[1, 3\] files"),
     ],
 )
@@ -219,17 +220,45 @@ def test_every_image_with_half_of_its_colours_is_read(tmp_path: Path) -> None:
 SCALED = {"m_per_px": "0.1mm"}
 
 
-def test_lossless_jpeg_is_read_bit_for_bit() -> None:
-    """By the values of pydicom's own tests, and an MR in JPEG-LS by its uncompressed twin."""
+def test_lossless_jpeg_is_read_bit_for_bit(tmp_path: Path) -> None:
+    """By the values of pydicom's own tests, and an MR in JPEG-LS by its uncompressed twin, both
+    without what makes them slices of a volume."""
     (image,) = read_dicom(DATA / "JPGLosslessP14SV1_1s_1f_8b.dcm", SCALED).frame("images").images
     assert image.shape == (768, 1024)
     assert image[300, 512:520].tolist() == [26, 26, 25, 22, 19, 16, 14, 15]
     assert image[600, 512:520].tolist() == [45, 43, 41, 38, 33, 30, 26, 21]
-    packed, plain = (
-        read_dicom(DATA / f"emri_small{kind}.dcm", {**SCALED, "rate": "10"}).frame("images").images
-        for kind in ("_jpeg_ls_lossless", "")
-    )
-    np.testing.assert_array_equal(packed, plain)
+    found = []
+    for kind in ("_jpeg_ls_lossless", ""):
+        ds = pydicom.dcmread(DATA / f"emri_small{kind}.dcm")
+        del ds.SpacingBetweenSlices
+        ds.save_as(tmp_path / "x.dcm")
+        found.append(read_dicom(tmp_path / "x.dcm", {**SCALED, "rate": "10"}).frame("images"))
+    np.testing.assert_array_equal(found[0].images, found[1].images)
+
+
+@pytest.mark.parametrize(
+    ("file", "why"),
+    [
+        (DATA / "emri_small.dcm", r"10 slices of a volume \(1.2 mm apart, without times\)"),
+        (BESIDE / "rtdose.dcm", r"15 slices of a volume \(counted by their distance\)"),
+        (DATA / "eCT_Supplemental.dcm", r"2 slices of a volume \(of 2 places\)"),
+    ],
+)
+def test_slices_in_one_file_are_no_film(file: Path, why: str) -> None:
+    """They were images over time, by the rate that was asked for."""
+    for options in ({}, {**SCALED, "rate": "10"}):
+        with pytest.raises(RecordingError, match=f"{why}, not images over time"):
+            read_dicom(file, options)
+
+
+def test_images_at_a_distance_with_times_are_a_film(tmp_path: Path) -> None:
+    ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72), SpacingBetweenSlices=1.0)
+    ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
+    assert len(read_dicom(tmp_path / "x.dcm", SCALED).frame("images").images) == 3
+    ds.DimensionOrganizationType = "3D"
+    ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
+    with pytest.raises(RecordingError, match=r"3 slices of a volume \(organised in 3D\)"):
+        read_dicom(tmp_path / "x.dcm", SCALED)
 
 
 def test_a_codec_that_is_not_here_is_named_with_the_tool_that_has_it(tmp_path: Path) -> None:

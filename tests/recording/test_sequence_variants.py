@@ -83,3 +83,71 @@ def test_a_list_of_images_before_their_axes_is_one_of_times(tmp_path: Path) -> N
         np.testing.assert_array_equal(got.images, images(3))
         assert got.t.tolist() == [0, 0.5, 1.5]
         assert got.m_per_px == pytest.approx((1e-4, 2e-4))
+
+
+AXES = np.diag([0.1, 0.2, 0.3])
+SPACE = {"space": "left-posterior-superior", "space origin": [0, 0, 0], "space directions": AXES}
+BY = {"rate": "10", "m_per_px": "0.1mm"}
+
+
+@pytest.mark.parametrize(
+    ("header", "why"),
+    [
+        ({"kinds": ["domain"] * 3, **SPACE}, "its three axes are of space"),
+        ({"kinds": ["space"] * 3}, "its three axes are of space"),
+        ({"spacings": [0.1, 0.2, 0.3]}, "spacings 0.1 0.2 0.3"),
+        (SPACE, "three space directions"),
+        ({"kinds": ["domain", "domain", "list"]}, ""),
+        ({"kinds": ["domain", "domain", "time"], "spacings": [0.1, 0.2, 0.5]}, ""),
+        ({"spacings": [0.1, 0.2, 0.5], "units": ["mm", "mm", "s"]}, ""),
+        ({"spacings": [0.1, 0.2, np.nan]}, ""),
+        ({}, ""),
+    ],
+)
+def test_an_nrrd_with_three_axes_of_space_is_no_film(
+    tmp_path: Path, header: dict[str, object], why: str
+) -> None:
+    """Its slices were images over time, by the rate that was asked for."""
+    path = tmp_path / "x.nrrd"
+    nrrd.write(str(path), images(3).transpose(2, 1, 0).copy(), header)
+    if not why:
+        assert len(read_nrrd(path, BY).frame("images").images) == 3
+        with pytest.raises(UsageError, match=r"say --map rate=HZ \(a volume is not read\)"):
+            read_nrrd(path, {"m_per_px": "0.1mm"})
+        return
+    for options in ({}, BY):
+        with pytest.raises(RecordingError, match=rf"x\.nrrd: 3 slices of a volume \({why}\), not"):
+            read_nrrd(path, options)
+
+
+def test_an_nrrd_of_four_axes_and_no_depth_is_a_film(tmp_path: Path) -> None:
+    """As SimpleITK writes it, which calls every axis one of space."""
+    pixels = images(3).transpose(2, 1, 0)[:, :, None].copy()
+    nrrd.write(str(tmp_path / "x.nrrd"), pixels, {"kinds": ["domain"] * 4})
+    assert len(read_nrrd(tmp_path / "x.nrrd", BY).frame("images").images) == 3
+
+
+@pytest.mark.parametrize(
+    ("lines", "is_read"),
+    [
+        ("NDims = 3\nDimSize = 5 4 3", False),
+        ("NDims = 3\nKinds = domain domain domain\nDimSize = 5 4 3", False),
+        ("NDims = 3\nKinds = domain domain list\nDimSize = 5 4 3", True),
+        ("NDims = 4\nDimSize = 5 4 1 3", True),
+        ("NDims = 3\nSeq_Frame0000_ImageStatus = OK\nDimSize = 5 4 3", True),
+    ],
+)
+def test_a_metaimage_of_three_axes_is_a_film_where_it_lists_images(
+    tmp_path: Path, lines: str, is_read: bool
+) -> None:
+    head = f"ObjectType = Image\n{lines}\nElementSpacing = 0.1 0.2 0.3\nElementType = MET_UCHAR\n"
+    path = tmp_path / "x.mha"
+    path.write_bytes(f"{head}ElementDataFile = LOCAL\n".encode() + images(3).tobytes())
+    if is_read:
+        assert len(read_metaimage(path, BY).frame("images").images) == 3
+        return
+    for options in ({}, BY):
+        with pytest.raises(
+            RecordingError, match=r"3 slices of a volume \(spacing 0.1 0.2 0.3\), not"
+        ):
+            read_metaimage(path, options)

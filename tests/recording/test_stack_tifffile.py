@@ -95,6 +95,36 @@ def test_channels_and_planes_of_ome_are_no_times(tmp_path: Path) -> None:
             read_image_stack(path, SAID)
 
 
+@pytest.mark.parametrize("how", [{"imagej": True}, {"ome": True}])
+def test_planes_of_a_volume_are_no_times(how: dict[str, Any], tmp_path: Path) -> None:
+    """By a rate, they were images over time."""
+    path, by = tmp_path / "x.tif", {"imagej": "ImageJ", "ome": "OME"}[next(iter(how))]
+    tifffile.imwrite(path, BYTES, metadata={"axes": "ZYX"}, **how)
+    for options in ({}, SAID):
+        with pytest.raises(
+            RecordingError,
+            match=rf"3 pages are 3 planes of a volume \({by}\), not images over time",
+        ):
+            read_image_stack(path, options)
+
+
+def test_planes_of_imagej_at_each_time_are_no_times(tmp_path: Path) -> None:
+    path = tmp_path / "x.tif"
+    pages = np.concatenate([BYTES, BYTES]).reshape(2, 3, 40, 50)
+    tifffile.imwrite(path, pages, imagej=True, metadata={"axes": "TZYX"})
+    with pytest.raises(RecordingError, match=r"6 pages are 2 times .* 3 planes \(ImageJ\)"):
+        read_image_stack(path, SAID)
+
+
+@pytest.mark.parametrize(
+    "said", [{"axes": "TYX"}, {"axes": "ZYX", "finterval": 0.5}, {"axes": "ZYX", "fps": 2}]
+)
+def test_a_film_of_imagej_is_no_volume(said: dict[str, Any], tmp_path: Path) -> None:
+    """ImageJ calls the images of a film that it imports slices, and states their rate."""
+    tifffile.imwrite(tmp_path / "x.tif", BYTES, imagej=True, metadata=said)
+    assert len(read_image_stack(tmp_path / "x.tif", SAID).frame("images").images) == 3
+
+
 def test_a_damaged_number_of_ome_is_none(tmp_path: Path) -> None:
     path = tmp_path / "x.ome.tif"
     tifffile.imwrite(path, BYTES, ome=True, metadata={"axes": "TYX", **SIZED})

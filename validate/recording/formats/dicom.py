@@ -64,7 +64,9 @@ def _times(path: Path, found: Mapping[str, Any], options: Options) -> Floats:
     if "rate" in options:
         return np.arange(count) / above_zero(options, "rate")
     if len(found["t"]) != count:
-        raise UsageError(f"{path.name}: {count} images without times; say --map rate=HZ")
+        raise UsageError(
+            f"{path.name}: {count} images without times; say --map rate=HZ (a volume is not read)"
+        )
     return np.asarray(np.rint(1e9 * found["t"]) / 1e9)
 
 

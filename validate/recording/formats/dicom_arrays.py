@@ -36,6 +36,7 @@ _LOSSLESS = (JPEGLossless, JPEGLosslessSV1, JPEGLSLossless, JPEGLSNearLossless)
 _HALF = "YBR_FULL_422"  # half of the colours
 _META = 144  # bytes before the group of meta information that states its length, and of that
 _PACKED = 2**28  # bytes of a file that is packed as a whole
+_BY_PLACE = (0x3004000C, 0x00540080)  # GridFrameOffsetVector, SliceVector
 _CM = 3  # PS3.3 C.8.5.5.1.15: physical units, cm
 _CONFIG = pydicom.config
 _CONFIG.settings.reading_validation_mode = _CONFIG.IGNORE
@@ -49,6 +50,8 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     spatial format and data type. Raises `RecordingError` for what is no such image, or no series.
     """
     sets = _series(path) if path.is_dir() else [_read(path)]
+    if len(sets) == 1:
+        _require_no_volume(sets[0])
     images = _images(sets)
     t, timed = _moments(sets) if len(sets) > 1 else _times(sets[0], len(images))
     ds = sets[0]
@@ -82,15 +85,34 @@ def _series(folder: Path) -> list[pydicom.Dataset]:
     many = sum(int(ds.get("NumberOfFrames") or 1) > 1 for ds in sets)
     if many and len(sets) > 1:
         raise RecordingError(f"{many} files of several images each; import them one by one")
-    places = {str(ds.get("ImagePositionPatient")) for ds in sets}
+    places = {str(ds.get("ImagePositionPatient") or ds.get("SliceLocation")) for ds in sets}
     if len(places) > 1:
         raise RecordingError(
-            f"{len(sets)} images of {len(places)} places: slices of a volume, no images over time"
+            f"{len(sets)} images of {len(places)} places: slices of a volume, not images over time"
         )
     numbers = [ds.get("InstanceNumber") for ds in sets]
     if None in numbers or len(set(numbers)) < len(sets):
         raise RecordingError(f"{len(set(numbers))} instance numbers of {len(sets)} files")
     return sorted(sets, key=lambda ds: int(ds.InstanceNumber))
+
+
+def _require_no_volume(ds: pydicom.Dataset) -> None:
+    """Refuse images of one file that lie behind each other: by the vector that counts them (PS3.3
+    C.7.6.6.1), their dimensions or places (C.7.6.16, C.7.6.17), or a distance without times."""
+    count = int(ds.get("NumberOfFrames") or 1)
+    frames = ds.get("PerFrameFunctionalGroupsSequence", ())
+    places = {str(p.get("ImagePositionPatient")) for f in frames
+              for p in f.get("PlanePositionSequence", ())}  # fmt: skip
+    distance = float(ds.get("SpacingBetweenSlices") or 0)
+    why = {
+        "counted by their distance": ds.get("FrameIncrementPointer") in _BY_PLACE,
+        "organised in 3D": ds.get("DimensionOrganizationType") == "3D",
+        f"of {len(places)} places": len(places) > 1,
+        f"{distance:g} mm apart, without times": distance > 0 and not len(_times(ds, count)[0]),
+    }
+    found = next((text for text, holds in why.items() if holds), "")
+    if count > 1 and found:
+        raise RecordingError(f"{count} slices of a volume ({found}), not images over time")
 
 
 def _moments(sets: list[pydicom.Dataset]) -> tuple[NDArray[np.float64], str]:

@@ -7,6 +7,7 @@ limit to a line, within one to the whole. Pixels are raw or one zlib stream.
 
 import re
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,16 @@ def read_metaimage(path: Path, options: Options) -> Recording:
     kind = "MetaImage sequence"
     way = fields.get("UltrasoundImageOrientation", "")
     spacing = _spacing(path, fields)
-    return recorded(path, Sequence(by_frame(fields.items()), images, spacing, kind, way), options)
+    held = Sequence(by_frame(fields.items()), images, spacing, kind, way, deep=_deep(fields))
+    return recorded(path, held, options)
+
+
+def _deep(fields: Mapping[str, str]) -> str:
+    """Three axes of space, which MetaImage has where no kind says another."""
+    of_space = set(fields.get("Kinds", "").split()) <= {"domain", "space"}
+    if not of_space or fields.get("NDims") != "3":
+        return ""
+    return f"spacing {fields.get('ElementSpacing', 'not stated')}"
 
 
 def _header(path: Path) -> tuple[dict[str, str], int]:

@@ -32,7 +32,8 @@ def read_nrrd(path: Path, options: Options) -> Recording:
     images = _images(path, found["pixels"])
     way = dict(zip(keys, texts, strict=True)).get("UltrasoundImageOrientation", "")
     times = found["times"] if len(found["times"]) == len(images) else None
-    return recorded(path, Sequence(fields, images, (x, y), "NRRD", way, times), options)
+    deep = str(found["deep"])
+    return recorded(path, Sequence(fields, images, (x, y), "NRRD", way, times, deep), options)
 
 
 def _images(path: Path, pixels: NDArray[Any]) -> tuple[NDArray[Any], ...]:

@@ -24,8 +24,9 @@ _WIDEST = 8  # bytes of a number
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Pixels (w, h, n), the texts of all keys, the sides (2,) of a pixel as stated, and `times`
-    (n,) s of the images, none where they are not stated."""
+    """Pixels (w, h, n), the texts of all keys, the sides (2,) of a pixel as stated, `times` (n,) s
+    of the images, none where they are not stated, and what makes all axes those of space, `deep`.
+    """
     import nrrd
 
     with open_file(path) as lines:  # a name with a line break is taken for the header itself
@@ -47,6 +48,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         "texts": np.array(list(own.values()), dtype=str),
         "spacing": _spacing(header, kinds),
         "times": _times(header, kinds),
+        "deep": np.array(_deep(header, kinds)),
     }
 
 
@@ -71,6 +73,23 @@ def _times(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
     except ValueError:
         return np.empty(0)
     return t * factor if factor is not None and (np.diff(t) > 0).all() else np.empty(0)
+
+
+def _deep(header: dict[str, Any], kinds: list[str]) -> str:
+    """Three axes of space, by their kinds, else by their directions or spacings; empty where one of
+    three is another, or there are more."""
+    axes = [i for i in range(len(header["sizes"])) if not kinds or kinds[i] not in _COLOUR]
+    if len(axes) != 3:
+        return ""
+    if kinds:
+        return "its three axes are of space" * all(kinds[i] in _SPACE for i in axes)
+    units = [str(unit) for unit in header.get("units", ())]
+    sides = np.array(header.get("spacings", ()), dtype=np.float64)
+    if np.isfinite(sides).sum() == 3 and not any(in_si(1.0, u, "s") for u in units if u):
+        return f"spacings {' '.join(f'{side:g}' for side in sides)}"
+    given = header.get("space directions")
+    rows = [] if given is None else [row for row in given if row is not None]
+    return "three space directions" * (len(rows) == 3 and bool(np.isfinite(rows).all()))
 
 
 def _spacing(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:

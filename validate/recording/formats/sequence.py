@@ -36,7 +36,8 @@ _OPTIONS = ("m_per_px", "rate", "images", "white")
 class Sequence:
     """What a file holds: texts by frame and field, images n x (h, w) of 8 or 16 bits or none,
     `spacing` (2,) as the file states it, `kind` in words; how the image lies to the transducer,
-    `orientation`, and `times` (n,) s of a file that has them apart, where it says so."""
+    `orientation`, and `times` (n,) s of a file that has them apart, where it says so; what of its
+    header makes the third axis one of space, `deep`: empty where nothing does."""
 
     fields: Mapping[int, Mapping[str, str]]
     images: tuple[NDArray[Any], ...]
@@ -44,6 +45,7 @@ class Sequence:
     kind: str
     orientation: str = ""
     times: Floats | None = None
+    deep: str = ""
 
 
 def by_frame(pairs: Iterable[tuple[str, str]]) -> dict[int, dict[str, str]]:
@@ -66,6 +68,7 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
     was seen.
     """
     require_known(options, _OPTIONS)
+    _require_no_volume(path, held)
     t = _times(path, held, options)
     streams: dict[str, Stream] = {}
     never = []
@@ -98,6 +101,16 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
     return of_streams(path.name.partition(".")[0], source, streams, told, unread)
 
 
+def _require_no_volume(path: Path, held: Sequence) -> None:
+    """Refuse slices of a volume; images with fields of their own, or times, are a film."""
+    count = len(held.images)
+    if held.deep and count > 1 and not held.fields and held.times is None:
+        raise RecordingError(
+            f"{path.name}: {count} slices of a volume ({held.deep}), not images over time; save a "
+            "film with its images on an axis of the kind list, or as TIFF or MP4"
+        )
+
+
 def _times(path: Path, held: Sequence, options: Options) -> Floats:
     """Seconds (n,) of every frame from the first."""
     count = max(len(held.images), max(held.fields, default=-1) + 1)
@@ -122,7 +135,9 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
 
 def _rate(path: Path, options: Options) -> float:
     if "rate" not in options:
-        raise UsageError(f"{path.name}: its frames have no times; say --map rate=HZ")
+        raise UsageError(
+            f"{path.name}: its frames have no times; say --map rate=HZ (a volume is not read)"
+        )
     return above_zero(options, "rate")
 
 

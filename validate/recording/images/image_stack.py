@@ -89,7 +89,9 @@ def _times(
         ), f"every {interval:g} s (stated by {found['by']})"
     if count == 1:
         return np.zeros(1), "one image"
-    raise UsageError(f"{path.name}: {count} images without times; say --rate HZ")
+    raise UsageError(
+        f"{path.name}: {count} images without times; say --rate HZ (a volume is not read)"
+    )
 
 
 def _recognises(path: Path) -> bool:

@@ -108,6 +108,9 @@ def _stated(file: Path) -> dict[str, NDArray[Any]]:
             return {"dots": np.array(dots, dtype=np.float64)} if dots else {}
         lines = dict(re.findall(r"(?m)^(\w+)=(.*)$", text))
         sides = [1 / float(tags[k]) for k in (_X_RESOLUTION, _Y_RESOLUTION) if tags.get(k)]
+        if "finterval" not in lines and "fps" not in lines:
+            times, planes = (int(_amount(lines.get(key, "1"))) for key in ("frames", "slices"))
+            _require_times(getattr(opened, "n_frames", 1), times, 1, planes, "ImageJ")
     found: dict[str, NDArray[Any]] = {"by": np.array("ImageJ")}
     if len(sides) == 2 and lines.get("unit", "pixel") not in ("pixel", "inch"):
         found |= {"side": np.array(sides), "unit": np.array(lines["unit"].replace("\\u00B5", "u"))}
@@ -123,11 +126,7 @@ def _stated_by_ome(said: dict[str, str], opened: Any) -> dict[str, NDArray[Any]]
     """
     pages = getattr(opened, "n_frames", 1)
     times, channels, planes = (int(_amount(said.get(f"Size{c}", "1"))) for c in "TCZ")
-    if (times > 1 and pages > times) or (channels > 1 and pages > times * planes):
-        raise RecordingError(
-            f"{pages} pages are {times} times of {channels} channels and {planes} planes (OME); "
-            "write one of each, as by ImageJ's Image > Duplicate"
-        )
+    _require_times(pages, times, channels, planes, "OME")
     found = {"by": np.array("OME")}
     sides = [_amount(said.get(f"PhysicalSize{c}", "")) for c in "XY"]
     units = {_plain(said.get(f"PhysicalSize{c}Unit", "um")) for c in "XY"}
@@ -137,6 +136,20 @@ def _stated_by_ome(said: dict[str, str], opened: Any) -> dict[str, NDArray[Any]]
     if factor and "TimeIncrement" in said:
         found["interval"] = np.array(factor * _amount(said["TimeIncrement"]))
     return found
+
+
+def _require_times(pages: int, times: int, channels: int, planes: int, by: str) -> None:
+    """Refuse pages that are no times alone: channels of an instant, or planes of a volume."""
+    if times == 1 and planes > 1:
+        raise RecordingError(
+            f"{pages} pages are {planes} planes of a volume ({by}), not images over time; of a "
+            "film call them frames, as by ImageJ's Image > Properties"
+        )
+    if (times > 1 and pages > times) or (channels > 1 and pages > times * planes):
+        raise RecordingError(
+            f"{pages} pages are {times} times of {channels} channels and {planes} planes ({by}); "
+            "write one of each, as by ImageJ's Image > Duplicate"
+        )
 
 
 def _amount(text: str) -> float:
