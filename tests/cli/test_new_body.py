@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
+import meshio
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -82,6 +83,30 @@ def test_a_body_of_hexahedra_is_solved_as_its_methods_say(here: Path) -> None:
     found = compare(load_file(here / "experiments" / "hexa.py"), quick=True)
     method = found.methods[0]
     assert {s.name: s.value for s in method.scores}["force.rms@high"] < 0.03  # of 0.48 N: exact
+
+
+def test_a_body_of_an_unusual_size_is_a_question(here: Path) -> None:
+    """Read in mm, a file in metres is a twentieth of a millimetre high."""
+    nodes = grid(SIZE, (2, 2, 2))
+    meshio.Mesh(nodes.nodes, [("hexahedron", nodes.cells)]).write(here / "h.vtu")
+    block = 'body = {shape = "block", block = "40mm,30mm,50mm"}'
+
+    def new(name: str, body: str) -> tuple[int, str]:
+        text = PRESSED.replace(block, f'body = {{shape = "file", file = "h.vtu", {body}}}')
+        (here / "h.toml").write_text(text, "utf-8")
+        return called("new", name, "--from", "all.mcap", "--answers", "h.toml")
+
+    code, said = new("small", 'unit = "mm"')
+    assert (code, "1 question is open: body.size (largest side of the body" in said) == (2, True)
+    assert "0.04 x 0.03 x 0.05 mm (lengths in mm)" in said
+    assert "40 x 30 x 50 mm in m" in said
+    code, said = new("small", 'unit = "mm", size = "5mm"')
+    assert (code, "body.size = 5mm: the largest side is 0.05 mm; change" in said) == (2, True)
+    assert new("small", 'unit = "mm", size = "0.05mm"')[0] == 0
+    assert new("right", 'unit = "m"')[0] == 0
+    (here / "h.toml").write_text(PRESSED.replace("40mm,30mm,50mm", "40,30,50"), "utf-8")
+    said = called("new", "block", "--from", "all.mcap", "--answers", "h.toml")[1]
+    assert "(lengths in m); 40 x 30 x 50 mm in mm" in said
 
 
 def test_answers_make_an_experiment_that_runs(here: Path) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from commands import here, refused
@@ -96,3 +97,17 @@ def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> No
     assert len(text.splitlines()) <= 60
     mine = load_file(seen / "experiments" / "mine.py")
     assert [m.scene.order for m in mine.methods.values()] == [1, 1]
+
+
+def test_a_specimen_of_an_unusual_size_is_a_question(seen: Path) -> None:
+    mesh = box((0.02, 0.02, 0.03), (2, 2, 2))
+    meshio.Mesh(mesh.nodes, [("tetra", mesh.cells)]).write(seen / "cyst.vtu")
+    lines = ["experiment = 'plates'", "outline.shows = 'inclusion'", "specimen.mesh = 'cyst.vtu'"]
+    for unit, is_asked in (("mm", True), ("m", False)):
+        text = "\n".join([*lines, f"specimen.mesh_unit = '{unit}'"])
+        (seen / "a.toml").write_text(text, "utf-8")
+        told = refused("new", "mine", "--from", "gel.mcap", "--answers", "a.toml")
+        said = (
+            "specimen.mesh_size (largest side of the body, as 3mm, if its unit is right: it is 0.02"
+        )
+        assert (said in told) == is_asked

@@ -12,8 +12,8 @@ import pyvista as pv
 from click.testing import CliRunner
 
 from validate.cli.main import cli
-from validate.errors import SceneError
-from validate.scene.body_facts import facts, quality
+from validate.errors import SceneError, UsageError
+from validate.scene.body_facts import facts, odd_size, quality
 from validate.scene.box import grid
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import read_foreign
@@ -273,6 +273,37 @@ def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path
         SceneError, match=r"a surface; fill it first: validate body s.stl --unit mm"
     ):
         read_mesh(tmp_path / "s.stl", "mm")
+
+
+def test_a_body_of_an_unusual_size_is_asked_about_its_unit(tmp_path: Path) -> None:
+    """One in metres that was read in mm was 0.03 mm high, and nothing was said."""
+    path, mesh, run = tmp_path / "x.vtu", linear(), CliRunner()
+    meshio.Mesh(6 * mesh.nodes, [("tetra", mesh.cells)]).write(path)
+    out = tmp_path / "b.npz"
+    odd = run.invoke(cli, ["body", str(path), "--unit", "mm", "-o", str(out)])
+    assert isinstance(odd.exception, UsageError)
+    assert str(odd.exception) == (
+        "x.vtu: the body is 0.06 x 0.12 x 0.18 mm (lengths in mm); 0.6 x 1.2 x 1.8 mm in cm, "
+        "1.524 x 3.048 x 4.572 mm in inch, 60 x 120 x 180 mm in m: give another --unit, or confirm "
+        "its largest side: --size 0.18mm"
+    )
+    assert not out.exists()
+    for said in (["--unit", "m"], ["--unit", "mm", "--size", "180um"], ["--unit", "cm"]):
+        assert run.invoke(cli, ["body", str(path), *said]).exit_code == 0
+    other = run.invoke(cli, ["body", str(path), "--unit", "m", "--size", "18mm"])
+    assert "--size 18mm: its largest side is 180 mm in m; check" in str(other.exception)
+    write_mesh(replace(mesh, nodes=1e3 * mesh.nodes), out)
+    large = run.invoke(cli, ["body", str(out)])
+    assert "3e+04 mm (lengths in m); 10 x 20 x 30 mm in mm" in str(large.exception)
+    assert ": give nodes in m, or confirm its largest side" in str(large.exception)
+
+
+@pytest.mark.parametrize(("side", "unit"), [(1e-3, "mm"), (10.0, "m"), (0.18, "mm")])
+def test_a_body_of_a_usual_size_is_not_asked_about(side: float, unit: str) -> None:
+    mesh = linear()
+    assert odd_size(replace(mesh, nodes=mesh.nodes * (side / SIZE[2])), unit) == ""
+    for beyond in (0.99e-3, 10.1):
+        assert odd_size(replace(mesh, nodes=mesh.nodes * (beyond / SIZE[2])), unit)
 
 
 def test_a_surface_of_vtk_is_told_how_to_come_in(tmp_path: Path) -> None:

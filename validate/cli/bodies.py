@@ -8,7 +8,7 @@ from validate.cli.arguments import complain, pairs
 from validate.cli.display import say, table
 from validate.errors import SceneError, UsageError
 from validate.places import try_file
-from validate.scene.body_facts import POOR, facts, quality
+from validate.scene.body_facts import POOR, SAME, facts, largest_side, odd_size, quality
 from validate.scene.filled import SUFFIXES as SURFACES
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
@@ -28,6 +28,7 @@ def body(
     edge: str | None,
     part: str | None,
     faces: tuple[str, ...],
+    size: str | None,
     out: Path | None,
     *,
     curved: bool,
@@ -36,6 +37,7 @@ def body(
     if out is not None:
         try_file(out)
     found = _read(file, unit, edge, part)
+    _require_size(file, found.mesh, unit, size)
     mesh = _named(found.mesh, pairs(faces, "--face"))
     mesh = quadratic(mesh) if curved else mesh
     say(str(file), "bold")
@@ -83,7 +85,25 @@ def _read(file: Path, unit: str | None, edge: str | None, part: str | None) -> F
         raise UsageError(f"{file.name}: a file of this kind states no unit; say it: --unit mm")
     if suffix in FOREIGN:
         return read_foreign(file, unit, part)
-    return _part(file, filled(file, unit, _metres(edge) if edge else 0.0), part)
+    return _part(file, filled(file, unit, _metres("edge", edge) if edge else 0.0), part)
+
+
+def _require_size(file: Path, mesh: Mesh, unit: str | None, size: str | None) -> None:
+    """Refuse a body of an unusual size that is not confirmed, and of another size than said."""
+    side = largest_side(mesh)
+    if size is not None:
+        if abs(_metres("size", size) / side - 1) > SAME:
+            raise UsageError(
+                f"{file.name}: --size {size}: its largest side is {1e3 * side:.4g} mm in "
+                f"{unit or 'm'}; check --unit and --size"
+            )
+        return
+    if odd := odd_size(mesh, unit or "m"):
+        other = "another --unit" if unit else "nodes in m"
+        raise UsageError(
+            f"{file.name}: the body is {odd}: give {other}, or confirm its largest side: "
+            f"--size {1e3 * side:.4g}mm"
+        )
 
 
 def _part(file: Path, found: ForeignBody, part: str | None) -> ForeignBody:
@@ -98,9 +118,9 @@ def _part(file: Path, found: ForeignBody, part: str | None) -> ForeignBody:
     return ForeignBody(only(found.mesh, chosen), {**found.told, **told})
 
 
-def _metres(text: str) -> float:
+def _metres(option: str, text: str) -> float:
     number, unit = split(text) or (0.0, "")
     value = in_si(number, unit, "m") if unit else None
     if value is None or value <= 0:
-        raise UsageError(f"--edge {text}: expected a length with its unit, as 2mm")
+        raise UsageError(f"--{option} {text}: expected a length with its unit, as 2mm")
     return value

@@ -19,6 +19,7 @@ from validate.cli.new_body_questions import (
     by_path,
     by_topic,
     facets_of,
+    known_size,
     named_place,
     parsed,
     there,
@@ -56,6 +57,7 @@ def _fits(recording: Recording) -> bool:
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
     asked = _of_the_body(found)
     mesh = _mesh_of(found)
+    asked += known_size("body.size", mesh, found.get("body.unit", "m"))
     asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]

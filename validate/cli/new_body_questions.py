@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.asking import Question
+from validate.cli.new_kind import quantity_in
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_drive import FEWEST, NOTED
 from validate.replay.measured_markers import AS_SEEN
+from validate.scene.body_facts import SAME, largest_side, odd_size
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import GRAMMAR, place_of
 
@@ -66,6 +68,20 @@ def there(text: str) -> None:
 def a_layout(text: str) -> None:
     if text not in (RECORDED, AS_SEEN):
         there(text)
+
+
+def known_size(key: str, mesh: Mesh | None, unit: str) -> list[Question]:
+    """Return the question about the largest side of a body, where it is unusual."""
+    if mesh is None or not (odd := odd_size(mesh, unit)):
+        return []
+    side = largest_side(mesh)
+
+    def check(text: str) -> None:
+        if abs(quantity_in("m")(text) / side - 1) > SAME:
+            raise UsageError(f"the largest side is {1e3 * side:.4g} mm; change the unit instead")
+
+    return [Question(key, f"largest side of the body, as 3mm, if its unit is right: it is {odd}",
+                     open=True, check=check)]  # fmt: skip
 
 
 def facets_of(mesh: Mesh | None) -> Callable[[str], Any]:

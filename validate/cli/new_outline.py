@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from validate.cli.asking import Answers, Question
-from validate.cli.new_body_questions import there
+from validate.cli.new_body_questions import known_size, there
 from validate.cli.new_kind import FEW_CELLS, quantity_in
 from validate.parameters import with_values
 from validate.recording.types import Recording
@@ -55,6 +55,9 @@ def _of_the_inclusion(found: Answers) -> list[Question]:
     ]  # fmt: skip
     if Path(found.get("specimen.mesh", "")).suffix.lower() in FOREIGN:
         asked.insert(1, Question("specimen.mesh_unit", "unit of its lengths, as mm", open=True))
+        if unit := found.get("specimen.mesh_unit"):
+            mesh = read_mesh(Path(found["specimen.mesh"]), unit)
+            asked[2:2] = known_size("specimen.mesh_size", mesh, unit)
     return asked
 
 

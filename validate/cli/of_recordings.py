@@ -226,6 +226,7 @@ def new(
     "--face", "faces", multiple=True, metavar="NAME=WORDS",
     help="A facet set by place: top=zmax, side=x=20mm, or box A to B, near P (docs/new.md).",
 )  # fmt: skip
+@click.option("--size", metavar="LENGTH", help="Its largest side: confirms an unusual one.")
 @click.option("--quadratic", "curved", is_flag=True, help="A node in the middle of every edge.")
 @output("The npz to write, as experiments take it.", required=False)
 def body(file: Path, **given: Any) -> None:

@@ -1,4 +1,4 @@
-"""What a body's mesh is like: size, shape of its elements, facet sets. For people, with units."""
+"""Size, shape of the elements and facet sets of a body's mesh. For people, with units."""
 
 from collections.abc import Mapping
 
@@ -8,8 +8,12 @@ from validate.arrays import Floats
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.part_of_body import pieces
 from validate.scene.shape_functions import CORNERS, brick_rule
+from validate.units import in_si
 
 _ROUNDING = 1e-9  # mm for each metre of the body: what is left of a zero
+USUAL = (1e-3, 10.0)  # m: the largest side of a body; beyond, its unit is doubtful
+SAME = 0.05  # relative: a side that is known and one that was read
+_UNITS = ("um", "mm", "cm", "inch", "m")
 POOR = 0.1  # elements below such a quality shorten steps and spoil answers
 
 
@@ -30,6 +34,27 @@ def quality(mesh: Mesh) -> Floats:
     if d == 2:
         return np.asarray(4 * np.sqrt(3) * size / squares)
     return np.asarray(12 * (3 * size) ** (2 / 3) / squares)
+
+
+def largest_side(mesh: Mesh) -> float:
+    """Return the largest side of the box around a body, m."""
+    return float(np.ptp(mesh.nodes, axis=0).max())
+
+
+def odd_size(mesh: Mesh, unit: str) -> str:
+    """Return the box of a body whose largest side is unusual, as read in `unit` and as it would be
+    in others; empty where it is usual."""
+    sides = np.ptp(mesh.nodes, axis=0)
+    if USUAL[0] <= sides.max() <= USUAL[1]:
+        return ""
+    factors = {u: in_si(1.0, u, "m") or 1.0 for u in (unit, *_UNITS)}
+    scaled = {u: sides * factor / factors[unit] for u, factor in factors.items()}
+    may = [f"{_box(x)} in {u}" for u, x in scaled.items() if USUAL[0] <= x.max() <= USUAL[1]]
+    return f"{_box(sides)} (lengths in {unit}); {', '.join(may) or 'usual in no unit'}"
+
+
+def _box(sides: Floats) -> str:
+    return f"{' x '.join(f'{1e3 * side:.4g}' for side in sides)} mm"
 
 
 def facts(mesh: Mesh) -> Mapping[str, str]:
