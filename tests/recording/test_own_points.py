@@ -63,7 +63,8 @@ def test_what_the_table_does_not_say_is_asked_for(tmp_path: Path) -> None:
     frame.to_csv(path, index=False)
     with pytest.raises(UsageError, match="--map unit=mm"):
         read(path)
-    with pytest.raises(UsageError, match="--map rate=HZ"):
+    asks = "if its rows are instants, say --map rate=HZ; if they are points at one instant, name"
+    with pytest.raises(UsageError, match=asks):
         read(path, {"unit": "mm"})
     assert read(path, {"unit": "mm", "rate": "10"}).t[1] == 0.1
     frame.rename(columns={"frame": "t"}).to_csv(path, index=False)

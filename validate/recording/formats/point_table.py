@@ -243,7 +243,10 @@ def _frequency(held: TextRows, layout: PointLayout, options: Options) -> float:
         return above_zero(options, "rate")
     stated = as_number(layout.above.get("frequency", "")) or 0.0
     if not 0 < stated < np.inf:
-        raise UsageError(f"{held.name}: no column of time; say --map rate=HZ")
+        raise UsageError(
+            f"{held.name}: no column of time; if its rows are instants, say --map rate=HZ; if they "
+            "are points at one instant, name each in a column called name"
+        )
     return stated
 
 
