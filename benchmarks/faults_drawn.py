@@ -3,7 +3,7 @@
 import ast
 import random
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +21,8 @@ _QUIET = frozenset((
     "linewidth", "linewidths", "line_width", "lw", "markersize", "ms", "ncols", "pad",
     "rotation", "shrink", "zorder",
 ))  # fmt: skip
+_CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]*")
+_DECLARED = ("quantity", "field")  # calls that declare a field with its default
 _DRAWING = "validate/report/"  # what its modules name at their top is how a page looks
 _WORDS = (ast.JoinedStr, ast.Raise, ast.Import, ast.ImportFrom)  # what only speaks
 
@@ -47,13 +49,14 @@ class Fault:
 
 
 def faults_of(root: Path, path: Path, quiet: frozenset[str] = _QUIET) -> list[Fault]:
-    """Every fault of a file; words, annotations, imports, `quiet` arguments and
-    the sizes of drawings are left alone."""
+    """Every fault of a file; words, annotations, imports, `quiet` arguments, tuning constants and
+    the sizes of drawings are left alone. Without `quiet`, only words, annotations and imports."""
     source = path.read_text(encoding="utf-8")
     lines, told, tree = source.splitlines(), str(path.relative_to(root)), ast.parse(source)
     left = _sizes(tree) if quiet and told.startswith(_DRAWING) else set()
+    tuning = set(_tuning(tree)) if quiet else set()
     found = []
-    for start, end, text, kind in _edits(tree, lines, quiet):
+    for start, end, text, kind in _edits(tree, lines, quiet, tuning):
         (line, a), (last, b) = start, end
         if line == last and line not in left and lines[line - 1].isascii():
             found.append(Fault(told, line, a, b, text, lines[line - 1], kind))
@@ -66,12 +69,62 @@ def _sizes(tree: ast.Module) -> set[int]:
     return {line for n in named for line in range(n.lineno, (n.end_lineno or 0) + 1)}
 
 
+def _tuning(tree: ast.Module) -> Iterator[ast.expr]:
+    """Values of tuning constants: numbers that a module or a class names in capital letters, and
+    numbers that are defaults of fields. Formulas, tables and named objects are none."""
+    classes = [n for n in ast.walk(tree) if isinstance(n, ast.ClassDef)]
+    for body in (tree.body, *(kind.body for kind in classes)):
+        for statement in body:
+            match statement:
+                case ast.Assign(targets=[target], value=value):
+                    named = _constants(target)
+                case ast.AnnAssign(target=target, annotation=kind, value=ast.expr() as value):
+                    is_field = body is not tree.body and "ClassVar" not in ast.unparse(kind)
+                    named = is_field or _constants(target)
+                    value = _default(value) if is_field else value
+                case _:
+                    continue
+            if named and _numbers(value):
+                yield value
+
+
+def _constants(target: ast.expr) -> bool:
+    parts = target.elts if isinstance(target, ast.Tuple) else [target]
+    return all(isinstance(p, ast.Name) and _CONSTANT.fullmatch(p.id) for p in parts)
+
+
+def _default(value: ast.expr) -> ast.expr:
+    """The default in the declaration of a field."""
+    match value:
+        case ast.Call(func=ast.Name(id=name), args=[default, *_]) if name in _DECLARED:
+            return default
+        case ast.Call(func=ast.Name(id=name), keywords=given) if name in _DECLARED:
+            return next((k.value for k in given if k.arg == "default"), value)
+    return value
+
+
+def _numbers(value: ast.expr) -> bool:
+    """A number, arithmetic of numbers, or a tuple of them."""
+    match value:
+        case ast.Constant(value=number):
+            return type(number) in (int, float)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return _numbers(operand)
+        case ast.BinOp(left=left, right=right):
+            return _numbers(left) and _numbers(right)
+        case ast.Tuple(elts=parts):
+            return all(not isinstance(p, ast.Tuple) and _numbers(p) for p in parts)
+    return False
+
+
 Place = tuple[int, int]
 Edit = tuple[Place, Place, str, str]
 
 
-def _edits(tree: ast.AST, lines: list[str], quiet: frozenset[str]) -> Iterator[Edit]:
-    for node in _code(tree, quiet):
+def _edits(
+    tree: ast.AST, lines: list[str], quiet: frozenset[str], tuning: Set[ast.expr]
+) -> Iterator[Edit]:
+    for node in _code(tree, quiet, tuning):
         if isinstance(node, ast.BinOp):
             yield from _between(node.left, node.right, _COMBINED, "operator", lines)
             if isinstance(node.op, ast.Add | ast.Sub):
@@ -96,17 +149,17 @@ def _edits(tree: ast.AST, lines: list[str], quiet: frozenset[str]) -> Iterator[E
                                 "/=": "*=", "|=": "="}, "operator", lines)  # fmt: skip
 
 
-def _code(tree: ast.AST, quiet: frozenset[str]) -> Iterator[ast.AST]:
+def _code(tree: ast.AST, quiet: frozenset[str], tuning: Set[ast.expr]) -> Iterator[ast.AST]:
     """The nodes that compute."""
     for name, value in ast.iter_fields(tree):
         if name in ("annotation", "returns", "decorator_list"):
             continue
         for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.keyword) and child.arg in quiet:
+            if child in tuning or (isinstance(child, ast.keyword) and child.arg in quiet):
                 continue
             if isinstance(child, ast.AST) and not isinstance(child, _WORDS):
                 yield child
-                yield from _code(child, quiet)
+                yield from _code(child, quiet, tuning)
 
 
 def _other(value: float) -> str:

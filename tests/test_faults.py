@@ -43,6 +43,53 @@ def test_faults_of_a_line(one_file: Path, line: str, expected: set[str]) -> None
     assert {f.after.rstrip() for f in found} == expected
 
 
+TUNED = """\
+LIMIT = 3
+_SHORT, _LONG = 0.5, 2**10
+LADDER: tuple[float, ...] = (1e-3, -2.0)
+
+
+class Box:
+    SIDES = 4
+    side: float = 2.0
+    depth: float = quantity(3.0, "m", "depth of the box")
+    parts: int = field(default=6)
+"""
+
+
+@pytest.mark.parametrize("line", [x for x in TUNED.splitlines() if "=" in x])
+def test_tuning_constants_are_left_out(one_file: Path, line: str) -> None:
+    one_file.write_text(TUNED, encoding="utf-8")
+    number = TUNED.splitlines().index(line) + 1
+    root = one_file.parents[1]
+    assert [f for f in drawing.faults_of(root, one_file) if f.line == number] == []
+    every = drawing.faults_of(root, one_file, frozenset())
+    assert any(f.line == number for f in every)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("RISE = 2 * ndtr(-2.0)", {"RISE = 2 / ndtr(-2.0)", "RISE = 3 * ndtr(-2.0)",
+                                   "RISE = 2 * ndtr(2.0)", "RISE = 2 * ndtr(-3.0)"}),
+        ("ORDER = {'tri3': 1}", {"ORDER = {'tri3': 2}"}),
+        ("EDGES = ((0, 1),)", {"EDGES = ((1, 1),)", "EDGES = ((0, 2),)"}),
+        ("WORK = SIZE + 6", {"WORK = SIZE - 6", "WORK = SIZE", "WORK = SIZE + 7"}),
+        ("limit = 3", {"limit = 4"}),
+        ("def f(LIMIT=3): pass", {"def f(LIMIT=4): pass"}),
+        ("class A:\n    exact: bool = True", {"    exact: bool = False"}),
+        ("class A:\n    least: ClassVar[float] = 0.5", {"    least: ClassVar[float] = 0.75"}),
+        ("class A:\n    side: float = part(2.0)", {"    side: float = part(3.0)"}),
+    ],
+)  # fmt: skip
+def test_formulas_tables_and_switches_are_no_tuning_constants(
+    one_file: Path, text: str, expected: set[str]
+) -> None:
+    one_file.write_text(text + "\n", encoding="utf-8")
+    found = drawing.faults_of(one_file.parents[1], one_file)
+    assert {f.after.rstrip() for f in found} == expected
+
+
 def test_draw_is_by_seed_and_still_python(one_file: Path) -> None:
     one_file.write_text("".join(f"x{i} = a{i} + {i}\n" for i in range(30)), encoding="utf-8")
     root = one_file.parents[1]
