@@ -7,7 +7,13 @@ import pytest
 from phantoms import CAPSULE, COARSE_GRID, phantom_mesh, phantom_responses
 
 from validate.arrays import Floats, rms
-from validate.compare.residual import Residual, residuals, rest_residuals, unanswered
+from validate.compare.residual import (
+    Residual,
+    residuals,
+    rest_residuals,
+    stacked,
+    unanswered,
+)
 from validate.compare.score import (
     METRICS,
     bias,
@@ -274,3 +280,27 @@ def test_cost_of_a_run(run: Run) -> None:
     assert scores["updates.max"].value == run.traces["updates"].y.max() > 0
     untimed = run_scores(replace(run, step_s=None))
     assert [s.name for s in untimed] == ["setup", "updates.max"]
+
+
+@pytest.mark.parametrize(
+    ("parts", "expected"), [((3, 4, 5), 12), ((None, None), None), ((3, None), 11), ((None, 3), 11)]
+)
+def test_degrees_of_freedom_of_repeats_are_added(
+    parts: tuple[int | None, ...], expected: int | None
+) -> None:
+    """Of 8 values each; None says that all of them are independent."""
+    each = [replace(residual(np.full((8, 1), float(i))), freedom=n) for i, n in enumerate(parts)]
+    joined = stacked(each)["contour@9mm"]
+    assert joined.freedom == expected
+    assert joined.values[:, 0].tolist() == [float(i) for i in range(len(parts)) for _ in range(8)]
+
+
+def test_repeats_keep_their_measured_values_only_where_all_have_them() -> None:
+    one = residual(np.ones((2, 1)))
+    known = replace(one, reference=np.array([[3.0], [4.0]]), simulated=1.0, measured=2.0)
+    both = stacked([known, known])[one.name]
+    assert both.reference is not None
+    assert both.reference[:, 0].tolist() == [3.0, 4.0, 3.0, 4.0]
+    assert (both.simulated, both.measured) == (None, None)
+    assert stacked([known, one])[one.name].reference is None
+    assert stacked([one, known])[one.name].reference is None

@@ -113,7 +113,7 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
         other = merged.get(residual.name)
         if other is not None:
             values = np.vstack([other.values, residual.values])
-            freedom = None if residual.freedom is None else residual.freedom + (other.freedom or 0)
+            freedom = _joined_freedom(other, residual)
             truths = [r.reference for r in (other, residual) if r.reference is not None]
             residual = replace(
                 residual, values=values, simulated=None, measured=None, freedom=freedom,
@@ -121,6 +121,13 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
             )  # fmt: skip
         merged[residual.name] = residual
     return merged
+
+
+def _joined_freedom(one: Residual, other: Residual) -> int | None:
+    """The sum of both; a residual without its own has as many as it has numbers."""
+    if one.freedom is None and other.freedom is None:
+        return None
+    return sum(r.values.size if r.freedom is None else r.freedom for r in (one, other))
 
 
 def _of(d: Deviation, selection: Selection, role: Role) -> Residual:
