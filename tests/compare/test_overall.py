@@ -90,3 +90,17 @@ def test_a_method_that_agrees_does_not_hide_one_that_differs_on_the_same_data() 
     weak = judge_all([check(2.1, name="f"), check(9.0, name="f"), check(0.1, name="g")])
     assert [c.value for c in weak.differs] == [9.0]
     assert [c.value for c in weak.alone] == [2.1]
+
+
+@pytest.mark.parametrize("weaker_first", [False, True])
+def test_repeated_names_are_corrected_by_hand(weaker_first: bool) -> None:
+    """Three checks of two comparisons: f counts once, by its smallest p, against alpha/2."""
+    third, half = (float(norm.isf(ALPHA / (2 * m))) for m in (3, 2))
+    beyond = half + 0.01
+    assert beyond < third  # three comparisons would not reject it
+    pair = [check(beyond, name="f"), check(2.1, name="f")]
+    found = judge_all([*(pair[::-1] if weaker_first else pair), check(0.1, name="g")])
+    assert [c.value for c in found.differs] == [beyond]
+    assert [c.value for c in found.alone] == [2.1]
+    last = judge_all([check(9.0, name="g"), *pair])  # g is gone: f is held against alpha
+    assert [c.value for c in last.differs] == [9.0, beyond, 2.1]

@@ -512,3 +512,24 @@ def test_the_result_is_frozen():
         found.expected_sd = 1.0
     with pytest.raises(ValueError, match="read-only"):
         found.residuals[0, 0] = 1
+
+
+@pytest.mark.parametrize(("method", "parameters"), [*zip(METHODS, (6, 7, 6, 7), strict=True)])
+def test_localisation_error_of_a_fit_counts_its_scale(method, parameters):
+    """FLE^2 = FRE^2 / (1 - p/(3 k)): six numbers are fitted, with a scale seven."""
+    y = grid(0.003)
+    found = register(measured(y, 3)[0], y, method=method)
+    share = 1 - parameters / (3 * 42)
+    assert found.fle == pytest.approx(found.fre / np.sqrt(share), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["similarity", "two_step_scaled"])
+def test_predicted_error_of_a_fit_with_a_scale_has_its_part(method):
+    """A relative scale of variance FLE^2/(3 k f^2) moves a point at a distance r by r of it."""
+    y = grid(0.003)
+    found = register(measured(y, 3)[0], y, method=method)
+    r = np.array([0.2, 0.0, 0.0])
+    rigid = target_covariance((y.mean(axis=0) + r)[None], y, found.fle)[0]
+    part = found.fle**2 / (3 * 42) * 0.2**2 / np.mean(((y - y.mean(axis=0)) ** 2).sum(axis=1))
+    expected = np.sqrt(np.trace(rigid) + part)
+    assert found.tre_at([y.mean(axis=0) + r]) == pytest.approx(expected, rel=1e-12)
