@@ -18,6 +18,7 @@ from validate.recording.alignment import (
     shift,
 )
 from validate.recording.events import event_time, offset_by_event
+from validate.recording.lag import _only_peak
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
@@ -213,3 +214,33 @@ def test_a_declared_offset_is_counted_too() -> None:
         declared_offset(recording, "/outline", 5.0, 0.001)
     with pytest.raises(RecordingError, match="no other stream"):
         declared_offset(recording, "/nothing", 0.0, 0.0)
+
+
+LAGS = np.array([-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("correlation", "expected"),
+    [
+        ([0, 0.9, 0, 0, 0, 0.78, 0], -0.2),  # 1 - 0.78^2 = 0.392 is above 2 (1 - 0.9^2) = 0.38
+        ([0, 0.9, 0, 0, 0, -0.9, 0], -0.2),  # the opposite of a motion is no rival
+        ([0, 0, 0.85, 0.9, 0.85, 0, 0], 0.0),  # one peak of three lags
+        ([0, 0.9, 0, 0, 0, 0.79, 0], "0.900 at -0.2 s and 0.790 at +0.2 s, as in periodic"),
+        ([0, 0.79, 0, 0, 0.89, 0.9, 0], "0.900 at +0.2 s and 0.790 at -0.2 s, as in periodic"),
+        ([0, 0.8, 0.85, 0, 0.9, 0, 0], "0.900 at +0.1 s and 0.850 at -0.1 s, as in periodic"),
+        ([0.79, 0, 0, 0.9, 0, 0, 0], "0.900 at +0 s goes on to the edge"),
+        ([0, 0, 0, 0.9, 0, 0, 0.79], r"\(-0.3..\+0.3 s\), as ramps do or an offset beyond 0.3 s"),
+        ([0, 0.49, 0, 0, 0, 0, 0], "correlate by 0.49 at most .at -0.2 s., at least 0.5"),
+    ],
+)
+def test_a_lag_is_ambiguous_where_another_leaves_less_than_twice_unexplained(
+    correlation: list[float], expected: float | str
+) -> None:
+    """The unexplained share of a lag is 1 - r^2; rivals lie below twice that of the best."""
+    values = np.array(correlation, dtype=float)
+    if isinstance(expected, float):
+        assert _only_peak(LAGS, values, 0.3, 0.5) == expected
+        return
+    expected = expected if expected.startswith(r"\(") else expected.replace("+", r"\+")
+    with pytest.raises(RecordingError, match=expected):
+        _only_peak(LAGS, values, 0.3, 0.5)
