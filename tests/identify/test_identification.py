@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.identify.identification import InTurn, identify
-from validate.identify.least_squares import Residual, fit
-from validate.identify.profile import RISE, side
+from validate.identify.least_squares import CalledOnce, Fit, Residual, fit
+from validate.identify.profile import RISE, Side, side
 from validate.identify.space import Range, Space
 
 TWO = Space((Range("a", -1.0, 3.0), Range("b", 0.0, 5.0)))
@@ -214,3 +214,61 @@ def test_intervals_cover_the_truth_of_two_hundred_seeded_twins() -> None:
         held += [e.low <= true <= e.high for e, true in zip(found.estimates, truth, strict=True)]
     assert (held >= 0.92 * 200).all()
     assert (held <= 0.98 * 200).all()
+
+
+class Deepening:
+    """Evaluates whose profile finds a better best by 10 each time it is walked, `times` times."""
+
+    def __init__(self, times: int) -> None:
+        self.times, self.walked = times, 0
+
+    def fits(self, starts: Floats) -> list[Fit]:
+        chi_square = 100.0 - 10.0 * self.walked
+        return [Fit(x, x, chi_square, 200, np.eye(1), 1, True) for x in starts]
+
+    def sides(self, best: Fit, wanted: object, scale: float) -> list[Side]:
+        deeper = self.walked < self.times
+        self.walked += 1
+        x = np.array([0.3 + 0.1 * self.walked]) if deeper else best.x
+        ends = np.array([0.4, 0.5]), np.array([0.0, RISE])
+        return [Side(0, s, *ends, 0.5, False, x, -10.0 if deeper else 0.0) for s in (-1, 1)]
+
+
+@pytest.mark.parametrize(("times", "walked", "chi_square"), [(0, 1, 100), (1, 2, 90), (9, 3, 70)])
+def test_a_better_best_is_profiled_again_at_most_three_times(
+    times: int, walked: int, chi_square: float
+) -> None:
+    evaluates = Deepening(times)
+    found = identify(Space((Range("a", 0.0, 1.0),)), evaluates, starts=1)
+    assert (evaluates.walked, found.best.chi_square) == (walked, chi_square)
+
+
+def test_a_simulation_that_breaks_first_later_or_compares_nothing() -> None:
+    def residual(x: Floats) -> Floats:
+        if x[0] > 0.5:
+            raise ComparisonError("cells turned\n  over")
+        return np.array([3.0, 4.0])
+
+    once = CalledOnce(residual)
+    assert once(np.array([0.1])).tolist() == [3.0, 4.0]
+    far = once(np.array([0.9]))
+    assert far.tolist() == [far[0]] * 2
+    assert far[0] > 10 * np.sqrt(12.5)
+    assert (once.failure, once.calls) == ("cells turned over", 2)
+    with pytest.raises(ComparisonError, match=r"cells turned\s+over"):
+        CalledOnce(residual)(np.array([0.9]))
+    with pytest.raises(ComparisonError, match="0 matched samples to identify from"):
+        CalledOnce(lambda x: np.zeros(0))(np.array([0.1]))
+
+
+def test_a_profile_that_never_settles_ends_after_its_points() -> None:
+    """Chi-square jumps over the wanted rise at 0.75, as where a simulation breaks."""
+
+    def residual(x: Floats) -> Floats:
+        return np.array([0.0 if x[0] < 0.75 else 10.0])
+
+    best = Fit(np.array([0.5]), np.array([0.5]), 0.0, 1, np.eye(1), 1, True)
+    found = side(residual, best, 0, 1)
+    assert len(found.at) == 15
+    assert found.end == pytest.approx(0.75, abs=1e-3)
+    assert not found.open

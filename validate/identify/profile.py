@@ -126,12 +126,15 @@ def _next(at: Floats, rise: Floats, wanted: float, reach: float, room: float) ->
 
 def _end(at: Floats, rise: Floats, wanted: float, room: float) -> tuple[float, bool]:
     """Distance to the interval's end, on the line of sqrt(rise) through the two points nearest to
-    it, and whether it is only the bound."""
+    it, and whether it is only the bound. At a jump these are the points on both sides of it."""
     z, target = np.sqrt(np.maximum(rise, 0.0)), float(np.sqrt(wanted))
     if rise.max() < (1 - _WITHIN) * wanted:
         return room, True
     b = int(np.argmin(np.abs(rise - wanted)))
     others = [k for k in range(len(at)) if z[k] != z[b]]
+    if abs(rise[b] - wanted) > _WITHIN * wanted:  # a jump, as where nothing can be simulated
+        b = min(np.flatnonzero(rise >= wanted).tolist(), key=lambda k: at[k])
+        others = [k for k in range(len(at)) if rise[k] < wanted and at[k] < at[b]]
     a = min(others, key=lambda k: abs(at[k] - at[b]))
     end = at[b] + (target - z[b]) * (at[b] - at[a]) / (z[b] - z[a])
     return float(min(end, room)), bool(end > room)
