@@ -7,7 +7,7 @@ import pytest
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
-from validate.register.observation import EVERYTHING
+from validate.register.observation import EVERYTHING, Selection
 from validate.register.stresses import StressObservation
 from validate.solve.types import Trace
 
@@ -51,3 +51,11 @@ def test_what_is_no_stress_is_not_compared() -> None:
     assert seen(y).unanswered(Ran({})) == ("nominal_stress",)
     with pytest.raises(ComparisonError, match="is in N, expected Pa"):
         seen(y).deviations(Ran({"nominal_stress": Trace(T, "N")}), EVERYTHING)
+
+
+def test_a_selection_of_rest_alone_compares_nothing() -> None:
+    y = np.array([[0.0], [100.0], [200.0]])
+    run = Ran({"nominal_stress": Trace(np.array([5.0, 110.0, 190.0]), "Pa")})
+    assert seen(y).deviations(run, Selection("rest", np.array([0.0]))) == ()
+    (two,) = seen(y).deviations(run, Selection("some", np.array([0.0, 1.0])))
+    assert two.values[:, 0] == pytest.approx([0.1])

@@ -67,10 +67,11 @@ class StressObservation:
                 f"{run.method}: '{self.traces[0]}' is in {seen[0].unit}, expected Pa"
             )
         at = selection.samples(self.t, run.t, self.quantity)
-        at = at[self.loaded[at]]
-        if len(at) == 0:
+        loaded = self.loaded[at]
+        if not loaded.any():
             return ()
-        read = [selection.read(run.t, trace.y, self.t[at]) for trace in seen]
+        read = [selection.read(run.t, trace.y, self.t[at])[loaded] for trace in seen]
+        at = at[loaded]
         off = (np.stack(read, axis=1) - self.y[at]) / self.scale[at][:, None]
         words = "simulated less measured nominal stress over the larger measured one of its row"
         return (
