@@ -85,3 +85,9 @@ def test_an_expected_value_needs_its_drift() -> None:
 def test_a_declared_number_is_finite(name: str) -> None:
     with pytest.raises(ComparisonError, match="not finite compares with nothing"):
         replace(FIGURE, **{name: float("nan")})  # type: ignore[arg-type]
+
+
+def test_a_figure_that_nothing_of_ours_can_stand_beside_has_no_value() -> None:
+    figure = Figure("mass", None, 3.0, None, "kg", "not comparable", "no mass", "Table 1")
+    found = figure.beside({"told": {"mass": 9.0}})
+    assert (found.ours, found.missing, found.verdict) == (None, "", "not comparable")

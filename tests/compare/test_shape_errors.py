@@ -5,18 +5,19 @@ import pytest
 from phantoms import grid_mesh
 
 from validate.arrays import Floats
-from validate.compare.booleans import symmetric_difference
+from validate.compare.booleans import polygon, symmetric_difference
 from validate.compare.boundary import Boundary, deformed_boundary, enclosed, outline_boundary
 from validate.compare.crossing import crossings
 from validate.compare.pair import Field, pair
 from validate.compare.shape_error import (
     Boundaries,
+    _beyond_booleans,
     boundary_scores,
     mean_absolute,
     shell_error,
     surface_error,
 )
-from validate.compare.soundness import inverted_cells
+from validate.compare.soundness import Soundness, inverted_cells, require_comparable
 from validate.compare.surface_distance import distances, hausdorff, mean_surface_distance
 from validate.compare.two_fields import compare_fields, compared
 from validate.errors import ComparisonError
@@ -242,3 +243,40 @@ def test_bodies_on_different_meshes_keep_their_own_boundary() -> None:
     between = (4 + 1) / 2 * (64 * np.sin(np.pi / 128) - 4 * np.sin(np.pi / 8))
     found = {s.name: s.value for s in compare_fields(one, other)}
     assert found["E_s"] == pytest.approx(between / area(64), rel=1e-10)
+
+
+def test_a_curve_that_crosses_itself_encloses_no_plane_body() -> None:
+    """Two lobes of 1.5 and 0.5 m2: the signed area is their difference, 1 m2."""
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 3.0]])
+    with pytest.raises(ComparisonError, match=r"5 segments encloses no plane body \(Self-inters"):
+        polygon(outline_boundary(points))
+
+
+def test_a_boundary_that_touches_itself_is_no_outline() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0]])
+    pieces = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 4], [4, 0]])
+    with pytest.raises(ComparisonError, match="touches itself in 1 nodes; it is no outline"):
+        polygon(Boundary(points, pieces))
+
+
+@pytest.mark.parametrize(
+    ("volume", "crossings", "says"),
+    [
+        (-0.5, 0, r"run is inside out \(signed volume -0.5; 2 of 9 cells are inverted\)"),
+        (0.0, 3, r"run is inside out \(signed volume 0;"),
+        (0.5, 3, r"boundary of run crosses itself in 3 places \(2 of 9 cells are inverted\)"),
+    ],
+)
+def test_a_body_without_an_interior_is_refused(volume: float, crossings: int, says: str) -> None:
+    with pytest.raises(ComparisonError, match=says):
+        require_comparable(Soundness(np.array([1, 4]), 9, volume, crossings), "run")
+
+
+@pytest.mark.parametrize("finer", [False, True])
+def test_two_equal_solids_differ_by_nothing_on_a_third_mesh(finer: bool) -> None:
+    """Carried onto another mesh than their own, they are compared by their booleans."""
+    mesh, third = box((1.0, 1.0, 1.0), (2, 2, 2)), box((1.0, 1.0, 1.0), (3, 3, 3))
+    one, other = (Field(mesh, np.zeros_like(mesh.nodes), name) for name in ("a", "b"))
+    found = pair(one, other, third if finer else mesh)
+    assert _beyond_booleans(found) != finer
+    assert surface_error(found) == pytest.approx(0.0, abs=1e-12)

@@ -302,3 +302,26 @@ def test_a_log_that_begins_in_contact_begins_on_a_parabola() -> None:
     assert modulus._parabola_start(1e-3 * x, x**3, 0.999e-3) == pytest.approx(1 / 20, rel=0.01)
     parabola = 2.0 + 3.0 * x + 4.0 * x**2
     assert modulus._parabola_start(1e-3 * x, parabola, 0.999e-3) == pytest.approx(2.0, rel=1e-9)
+
+
+def test_a_signal_of_two_columns_and_one_strain_are_refused() -> None:
+    d, force = linear()
+    two = log(d, force)
+    wide = Signal(two.signals["force"].t, np.column_stack([force, force]), "N", 0.0, "machine")
+    with pytest.raises(RecordingError, match="'force' has 2 columns, expected 1"):
+        fit_modulus(replace(two, signals={**two.signals, "force": wide}))
+    with pytest.raises(RecordingError, match=r"synthetic: 12 samples at one strain 0\.031250"):
+        modulus._fit("synthetic", np.full(12, 0.03125), np.arange(12.0), 1.0, 0.0, 0.0, (0.0, 0.1))
+
+
+def test_a_plate_that_stands_has_its_contact_where_it_stands() -> None:
+    """The force rises while the displacement stays at 1 mm: no line through the toe has a slope."""
+    approach, count = np.linspace(0.0, 1e-3, 60), 60
+    d = np.append(approach, np.full(count, 1e-3))
+    force = np.append(np.full(60, 0.25), 0.25 + np.arange(1.0, count + 1))
+    assert modulus.zero_of(d, force, 0.0, 1e-4) == pytest.approx((0.25, 1e-3), abs=1e-12)
+    first = np.full(count, 2e-3)  # in contact from the first sample on: the mean of the toe
+    assert (
+        modulus._parabola_start(first, np.arange(60.0), 1e-4)
+        == np.arange(float(modulus.PLATEAU)).mean()
+    )

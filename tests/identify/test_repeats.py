@@ -1,6 +1,7 @@
 """Several logs of one test as one: the mean, its scatter by specimens, and what that is worth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -197,3 +198,13 @@ def test_a_damaged_share_is_refused(tmp_path: Path) -> None:
     object.__setattr__(one, "metadata", {**one.metadata, REPEATS: {"share": "nan"}})
     with pytest.raises(RecordingError, match="share 'nan' is no number"):
         repeats_share(one)
+
+
+def test_what_no_machine_wrote_and_loadings_apart_are_refused(tmp_path: Path) -> None:
+    a, b = logs(tmp_path, 1.0, 1.1)
+    bare = replace(b, metadata={})
+    with pytest.raises(UsageError, match="log1 is no log of a testing machine, and only these"):
+        labels_of("one", [a, bare])
+    far = [log(tmp_path, f"far{i}", 1.0, d=np.where(D > 0, D + 5.0 * i, 0.0)) for i in range(2)]
+    with pytest.raises(RecordingError, match=r"share the displacements .* mm with \d samples"):
+        averaged(far, ("1", "2"), "mean")

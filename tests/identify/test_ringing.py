@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import ComparisonError
+from validate.identify import ringing as module
 from validate.identify.ringing import ringing, spectrum
 
 T = 0.01 * np.arange(140)
@@ -53,3 +54,13 @@ def test_the_spectrum_peaks_where_it_rings_with_its_amplitude() -> None:
     f, amplitude = spectrum(T, 2e-3 * np.cos(2 * np.pi * 8.0 * T) + 5 * T**2 - T)
     assert f[amplitude.argmax()] == pytest.approx(8.0, abs=0.1)
     assert amplitude.max() == pytest.approx(2e-3, rel=0.02)
+
+
+def test_a_frequency_that_runs_away_from_the_peak_is_no_ringing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The search may end at most a factor two from the largest peak of the spectrum."""
+    y = rung(7.7, 0.055)
+    monkeypatch.setattr(module, "_peak", lambda t, y: 3.0)
+    with pytest.raises(ComparisonError, match=r"no ringing near 3\.00 Hz was found: "):
+        ringing(T, y)

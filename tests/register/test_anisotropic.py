@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
 from validate.recording.types import Markers
+from validate.register import anisotropic
 from validate.register.anisotropic import covariance_of, fit_weighted, weighted_covariance
 from validate.register.fitting import MarkerFit
 from validate.register.markers import observe_markers
@@ -81,3 +82,19 @@ def test_markers_seen_badly_in_depth_are_compared_with_their_own_noise() -> None
     with pytest.raises(RegistrationError, match="noise by direction with method 'similarity'"):
         observe_markers(markers, layout, mesh, how=MarkerFit("similarity", tuple(DEEP)))
     assert observe_markers(markers, layout, mesh, how=MarkerFit(sd=(2e-3,))).sd == 2e-3
+
+
+def test_points_that_already_fit_are_not_turned() -> None:
+    points = np.random.default_rng(3).normal(size=(5, 3))
+    start = Similarity(np.eye(3), np.zeros(3))
+    found = fit_weighted(points, points, np.diag([1.0, 4.0, 9.0]), start)
+    assert (np.eye(3) == found.R).all()
+    assert (found.t == 0).all()
+
+
+def test_a_fit_that_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(anisotropic, "_MOST", 1)
+    points = np.random.default_rng(3).normal(size=(5, 3))
+    turn = Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix()
+    with pytest.raises(RegistrationError, match="did not settle in 1 steps: check the noise"):
+        fit_weighted(points, points @ turn.T, np.eye(3), Similarity(np.eye(3), np.zeros(3)))

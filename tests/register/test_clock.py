@@ -10,7 +10,7 @@ from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import nearest_node_rows
 from validate.recording.alignment import Offset, shift
 from validate.recording.types import Recording, Signal, Source
-from validate.register.clock import clock_sd, slopes
+from validate.register.clock import clock_sd, interpolated, slopes
 from validate.register.markers import MarkerObservation, Together
 from validate.register.observation import EVERYTHING, Selection
 from validate.register.outlines import Corner, OutlineObservation
@@ -141,3 +141,21 @@ def test_a_slope_needs_two_samples_that_were_seen() -> None:
     found = slopes(t, y, np.array([1]), 0.1)[0]
     assert found[[0, 3]] == pytest.approx([3.0, 3.0])
     assert np.isnan(found[1:3]).all()
+
+
+@pytest.mark.parametrize("said", ["soon", "", "-0.5", "inf"])
+def test_a_clock_whose_sd_is_no_time_is_refused(said: str) -> None:
+    recording = recorded()
+    spoilt = {**recording.metadata, "clock_offset/force": {"sd": said}}
+    with pytest.raises(RegistrationError, match=f"sd '{said}' is not a time >= 0 s; align anew"):
+        clock_sd(replace(recording, metadata=spoilt), "force")
+
+
+def test_two_samples_are_read_only_at_their_own_times() -> None:
+    """Two samples show no second difference, so nothing says how straight the way between is."""
+    t, z = np.array([1.0, 3.0]), np.array([[5.0, np.nan], [7.0, 8.0]])
+    shown, squared = interpolated(t, z, np.array([3.0, 2.0, 1.0, 4.0]))
+    np.testing.assert_array_equal(
+        shown, [[7.0, 8.0], [np.nan, np.nan], [5.0, np.nan], [np.nan, np.nan]]
+    )
+    assert squared.tolist() == [0.0, 0.0]

@@ -20,7 +20,7 @@ from validate.register.landmarks import Match
 from validate.register.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import EVERYTHING, Observation, Selection, field_at
 from validate.register.outline_geometry import normals, polar_angles, ray_points
-from validate.register.outlines import observe_outlines
+from validate.register.outlines import OutlineObservation, observe_outlines
 from validate.register.round_outlines import RoundOutlines
 from validate.register.signals import SignalObservation
 from validate.register.stresses import StressObservation
@@ -293,3 +293,33 @@ def test_every_observation_can_be_drawn_anew() -> None:
              and hasattr(c, "deviations") and c is not Observation]  # fmt: skip
     assert TouchedLandmarks in found
     assert [c.__name__ for c in found if not (hasattr(c, "left") and hasattr(c, "anew"))] == []
+
+
+def test_a_run_that_begins_at_rest_is_read_as_it_is_and_others_from_zero() -> None:
+    y = np.array([[2.0], [4.0]])
+    assert from_rest(np.array([0.0, 1.0]), y, np.array([0.0, 0.5]))[:, 0].tolist() == [2.0, 3.0]
+    assert from_rest(np.array([1.0, 2.0]), y, np.array([0.0, 0.5]))[:, 0].tolist() == [0.0, 1.0]
+    assert from_rest(np.array([1.0]), np.zeros((1, 0)), np.zeros(3)).shape == (3, 0)
+
+
+def test_a_late_clock_reads_only_what_was_seen() -> None:
+    t = np.array([0.0, 1.0, 2.0])
+    y = np.array([[0.0, np.nan, 1.0], [10.0, np.nan, np.nan], [20.0, np.nan, 3.0]])
+    late = shifted(t, y, 0.5)
+    np.testing.assert_array_equal(late[:, 0], [5.0, 15.0, 20.0])
+    np.testing.assert_array_equal(late[:, 1], [np.nan] * 3)
+    np.testing.assert_array_equal(late[:, 2], [1.5, np.nan, 3.0])
+    assert shifted(t, y, 0.0) is y
+
+
+def test_outlines_of_a_late_clock_move_with_their_speed() -> None:
+    """A circle that grows by 1 mm and then by 3 mm a second, read half a second late."""
+    angles = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    outlines = tuple(r * circle for r in (0.010, 0.011, 0.014))
+    seen = OutlineObservation("outline", "validates", T, outlines, np.eye(4), 0.0, None, 0.0)  # type: ignore[arg-type]
+    late = seen.anew(np.zeros(3 * 180), drawn(late=0.5))
+    for found, radius in zip(late.outlines, (0.0105, 0.012, 0.0155), strict=True):
+        np.testing.assert_allclose(found, radius * circle, rtol=1e-9, atol=1e-12)
+    one = replace(seen, t=T[:1], outlines=outlines[:1]).anew(np.zeros(180), drawn(late=0.5))
+    np.testing.assert_allclose(one.outlines[0], outlines[0], atol=1e-15)  # no speed to tell

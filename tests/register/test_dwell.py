@@ -5,7 +5,7 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError
-from validate.register.dwell import dwells, sd_of_mean, tip_path
+from validate.register.dwell import _joined, dwells, sd_of_mean, tip_path
 from validate.register.landmarks import match_landmarks
 from validate.register.transform import Similarity
 
@@ -115,3 +115,20 @@ def test_too_few_landmarks_are_refused_with_their_count() -> None:
         match_landmarks(ODD, ODD[:3], 2e-3)
     with pytest.raises(RegistrationError, match="0 of 7"):
         match_landmarks(ODD, 1e-3 * ODD, 1e-3)  # another unit
+
+
+def test_a_short_disturbance_parts_no_dwell() -> None:
+    """Two spans at one place are one again if they lie close in time; another place is another."""
+    t = np.arange(300) / 10
+    x = np.zeros((300, 3))
+    x[200:] = [0.05, 0.0, 0.0]
+    spans = [(0, 90), (92, 200), (200, 300)]
+    assert _joined(t, x, spans, 1e-3) == [(0, 200), (200, 300)]
+    late = np.where(np.arange(300) < 91, t, t + 60.0)
+    assert _joined(late, x, spans, 1e-3) == spans
+    assert _joined(t, x, [(0, 90), (90, 92), (92, 200)], 1e-3) == [(0, 200)]
+
+
+def test_more_places_than_can_be_landmarks_are_refused() -> None:
+    with pytest.raises(RegistrationError, match="61 places for 7 landmarks; at most 60"):
+        match_landmarks(ODD, np.zeros((61, 3)), 2e-3)

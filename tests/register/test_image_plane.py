@@ -257,3 +257,28 @@ def test_swapped_targets_are_doubted_and_named_twice_refused(tmp_path: Path) -> 
     code, _, err = here(*given)
     assert code == 0
     assert "most: are targets swapped" in err
+
+
+def test_one_image_that_alone_tells_a_motion_leaves_no_prediction_of_itself() -> None:
+    """Without the second image the wires are seen from one side: nothing predicts its points."""
+    rng = np.random.default_rng(4)
+    seen = landmarks(rng, 2, 3)
+    found = image_plane(seen)
+    assert np.isfinite(found.left_out).all()
+    short = seen.some(np.arange(6) < 5)  # three points and two: six numbers of eight
+    left_out = image_plane(short).left_out
+    assert np.isnan(left_out[:3]).all()
+    assert np.isfinite(left_out[3:]).all()
+
+
+def test_wires_along_one_direction_leave_a_motion_open() -> None:
+    """The probe turns by 1e-7 rad: enough for nine numbers of a linear map, not for a pose."""
+    rng = np.random.default_rng(5)
+    seen = landmarks(rng, 4, 4)
+    R = Rotation.from_rotvec(1e-7 * rng.normal(size=(4, 3))).as_matrix()[seen.image]
+    flat = np.column_stack([seen.px * SCALE, np.zeros(16)])
+    there = np.einsum("nij,nj->ni", R, TRUTH.apply(flat)) + seen.t
+    along = np.array([0.0, 0.0, 1.0])
+    wires = tuple(KnownTarget(f"w{i}", x, along) for i, x in enumerate(there))
+    with pytest.raises(RegistrationError, match="leave a motion of the image plane open: turn"):
+        image_plane(replace(seen, targets=wires, R=R))

@@ -11,7 +11,7 @@ from validate.compare.verdict import error_of
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.locate import nearest_node_rows
 from validate.recording.types import Contours, Markers
-from validate.register.markers import MarkerObservation, Together, observe_markers
+from validate.register.markers import MarkerObservation, Together, observe_markers, vector
 from validate.register.observation import (
     EVERYTHING,
     Deviation,
@@ -412,3 +412,28 @@ def test_a_force_that_falls_as_the_drive_closes_has_the_wrong_sign() -> None:
     require_rising(stage(), signal())
     with pytest.raises(RegistrationError, match="'force' falls by 4 N as 'stage' closes by 2 mm"):
         require_rising(stage(), signal(y=-signal().y))
+
+
+def test_a_signal_of_which_no_sample_is_selected_is_not_compared() -> None:
+    before = replace(HALVES, t=HALVES.t + 10.0)  # the run begins after the last sample
+    assert signal().deviations(before, EVERYTHING) == ()
+
+
+def test_markers_beside_their_layout_are_refused_and_nearest_nodes_read() -> None:
+    rest = np.array([[0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 0.0, 0.9], [0.0, 1.0, 1.0]])
+    found = Markers(np.array([0.0]), ("a", "b", "c", "d"), rest[None], 1e-5, "model")
+    layout = dict(zip(found.names, rest, strict=True))
+    near = observe_markers(found, layout, MESH, sampling="nearest_node")
+    assert near.positions.apply(MESH.nodes)[2] == pytest.approx([1.0, 0.0, 1.0])
+    del layout["b"], layout["d"]
+    with pytest.raises(
+        RegistrationError, match=r"2 of 4 markers are not in the layout: \['b', 'd'\]"
+    ):
+        observe_markers(found, layout, MESH)
+
+
+@pytest.mark.parametrize("text", ["1 2", "1 2 east", "", "1 2 nan", "1 2 3 4"])
+def test_a_record_that_is_no_vector_is_refused(text: str) -> None:
+    with pytest.raises(RegistrationError, match=f"up is '{text}': expected three numbers"):
+        vector(text, "up")
+    assert vector("1 -2e-3 0", "up").tolist() == [1.0, -0.002, 0.0]

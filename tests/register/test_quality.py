@@ -533,3 +533,18 @@ def test_predicted_error_of_a_fit_with_a_scale_has_its_part(method):
     part = found.fle**2 / (3 * 42) * 0.2**2 / np.mean(((y - y.mean(axis=0)) ** 2).sum(axis=1))
     expected = np.sqrt(np.trace(rigid) + part)
     assert found.tre_at([y.mean(axis=0) + r]) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_predicted_error_in_the_plane_by_hand(scaled):
+    """Four arms of 2 m, FLE 0.1 m: each axis has FLE^2/8, a turn r^2/4 of it across r."""
+    cross = 2.0 * np.array([[1.0, 0], [-1, 0], [0, 1], [0, -1]])
+    found = target_covariance(np.array([[3.0, 0.0]]), cross, 0.1, scaled=scaled)[0]
+    along = 1 + 9 / 4 if scaled else 1
+    np.testing.assert_allclose(found, 0.01 / 8 * np.diag([along, 1 + 9 / 4]), atol=1e-16)
+
+
+def test_swapped_names_in_the_plane_are_found():
+    x = np.array([[0.0, 0], [0.03, 0], [0.01, 0.02], [0.04, 0.035], [-0.02, 0.05]])
+    y = x[[1, 0, 2, 3, 4]]
+    assert "markers m00 and m01 look swapped" in message(x, y, expected_sd=1e-5)

@@ -1,5 +1,7 @@
 """A sensor's gain, bias and delay, and a camera's pose: what was there, from what was read."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -77,3 +79,11 @@ def test_markers_are_read_between_samples_and_never_invented() -> None:
     seen = tracked()
     late = PoseShift(delay=0.5).of(seen)
     assert late.x[0] - seen.x[0] == pytest.approx(np.tile([0, 0, 0.5e-3], (4, 1)))
+
+
+def test_markers_in_a_plane_have_no_pose() -> None:
+    seen = tracked()
+    flat = replace(seen, x=seen.x[..., :2], positions=seen.positions)
+    with pytest.raises(UsageError, match="markers in 2 dimensions: a pose has three"):
+        PoseShift(x=1e-3).of(flat)
+    assert PoseShift().of(flat) is flat

@@ -221,3 +221,30 @@ def test_a_neighbour_is_looked_for_in_three_sizes(monkeypatch: pytest.MonkeyPatc
     assert asked == [1.0, 0.7, 0.45]
     finds = 0.1
     assert sweep._beside(frames, 1, near, False) is None
+
+
+def test_a_sweep_without_an_outline_says_why_of_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    def outlined(image: int, *_: object, **__: object) -> None:
+        raise RecordingError(f"image {image} shows no wall")
+
+    monkeypatch.setattr(sweep, "extract_outline", outlined)
+    frames = SimpleNamespace(images=range(12), m_per_px=(1e-4, 1e-4))
+    with pytest.raises(RegistrationError, match="the last one: image 11 shows no wall"):
+        sweep._clearest(frames, None, None, False)
+
+
+def test_outlines_are_followed_to_both_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Images 2 to 8 of ten show the wall; one that jumps aside ends the way like one without."""
+
+    def outlined(image: int, m_per_px: object, *, centre: object, **_: object) -> SimpleNamespace:
+        if image < 2:
+            raise RecordingError("nothing")
+        aside = 3.0 if image > 8 else 0.0
+        return SimpleNamespace(centre=np.array([aside, 0.0]), radius=1.0, contrast=1.0, at=image)
+
+    monkeypatch.setattr(sweep, "extract_outline", outlined)
+    frames = SimpleNamespace(images=range(10), m_per_px=(1e-4, 1e-4))
+    found = sweep._tracked(frames, None, None, False)
+    assert {i: o.at for i, o in found.items()} == {i: i for i in range(2, 9)}
+    every = SimpleNamespace(images=range(2, 9), m_per_px=(1e-4, 1e-4))
+    assert sorted(sweep._tracked(every, None, None, False)) == list(range(7))
