@@ -11,7 +11,7 @@ import pytest
 from validate.child_process import python
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart
+from validate.recording.formats import apart, c3d
 from validate.recording.formats.c3d import _require_whole, read_c3d
 
 GRAVITY = Path("markers/silicone-beam/beam_gravity_V2_b.c3d")
@@ -302,3 +302,31 @@ def test_whole_numbers_without_a_sign_are_read_as_such(tmp_path: Path, first: in
     got = read_c3d(path, {})
     np.testing.assert_allclose(got.marker("markers").x, [[[8e-3, 12e-3, 16e-3]]] * 2, rtol=1e-6)
     assert got.signals["analog/unnamed 1"].y[:, 0].tolist() == [1.0, -2.0]
+
+
+@pytest.mark.parametrize(
+    ("rate", "says"),
+    [
+        (0.0, "0 frames a second stated; expected above 0"),
+        (float("nan"), "nan frames a second stated; expected above 0"),
+        (100.0, "neither points that were seen nor channels: {'markers': 'never seen'}"),
+    ],
+)
+def test_a_file_without_a_rate_or_streams_is_refused(
+    rate: float, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path / "x.c3d")
+    monkeypatch.setattr(c3d, "decoded", lambda *_: {"rates": np.array([rate])})
+    monkeypatch.setattr(c3d, "_streams", lambda *_: ({}, {}, {"markers": "never seen"}))
+    with pytest.raises(RecordingError, match=f"x.c3d: {says}"):
+        read_c3d(path, {})
+
+
+def test_a_decoder_that_the_machine_starts_too_late_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_bytes(b"x" * 7)
+    monkeypatch.setattr(apart, "_LOADING", 0)
+    monkeypatch.setattr(apart, "_SHARED", 0)
+    with pytest.raises(RecordingError, match="file: its reader took over 0 s for 7 bytes and was"):
+        apart.decoded("c3d_arrays", tmp_path / "file", "c3d")

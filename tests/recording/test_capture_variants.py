@@ -9,6 +9,9 @@ import pytest
 from commands import here
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.formats.optitrack import read_optitrack
+from validate.recording.formats.qualisys import read_qualisys
+from validate.recording.formats.vicon import read_vicon
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
 
@@ -261,3 +264,43 @@ def test_a_text_of_nexus_1_is_called_so(tmp_path: Path, end: str) -> None:
     path.write_bytes(f"TRAJECTORIES{end}100,Hz{end},s:A,,{end}Field #,X,Y,Z{end}".encode())
     with pytest.raises(UsageError, match=r"export of Vicon Nexus 1, .* export the trial as C3D"):
         recognised(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        (
+            "x.csv",
+            vicon(",", "zeros").replace("\n100\n", "\nfast\n"),
+            "line 2: 'fast' is no rate in Hz",
+        ),
+        (
+            "x.csv",
+            vicon(",", "zeros").replace("X,Y,Z", "X,Y,W"),
+            "without columns X, Y, Z; damaged",
+        ),
+        (
+            "y.csv",
+            "Format Version,1.23\nFrame,Time (Seconds)\n0,0\n",
+            "no lines of types and names above Frame; damaged",
+        ),
+    ],
+)
+def test_damaged_exports_name_what_is_missing(
+    name: str, text: str, says: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text, "utf-8")
+    reader = read_vicon if text.startswith("Traj") else read_optitrack
+    with pytest.raises(RecordingError, match=says):
+        reader(tmp_path / name, {})
+
+
+def test_a_body_that_was_never_seen_is_told_with_its_count(tmp_path: Path) -> None:
+    text = "NO_OF_FRAMES\t2\nNO_OF_BODIES\t1\nFREQUENCY\t100\nDATA_INCLUDED\t6D\nBODY_NAMES\tA\n"
+    text += ("\t".join(["0.000"] * 6 + ["-1.000"] + ["0.000"] * 9) + "\n") * 2
+    (tmp_path / "x.tsv").write_text(text, "utf-8")
+    with pytest.raises(RecordingError, match=r"no body was seen: {'A': '2 of 2'}"):
+        read_qualisys(tmp_path / "x.tsv", {})
+    (tmp_path / "x.tsv").write_text(text.replace("Y\t100", "Y\tfast"), "utf-8")
+    with pytest.raises(RecordingError, match="FREQUENCY 'fast' is no number of Hz above 0"):
+        read_qualisys(tmp_path / "x.tsv", {})

@@ -11,7 +11,7 @@ from children import lacking
 
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart
+from validate.recording.formats import apart, dicom, dicom_arrays, dicom_files
 from validate.recording.formats.dicom import read_dicom
 from validate.recording.readers import recognised
 
@@ -275,3 +275,68 @@ def test_more_images_than_stated_are_not_cut_off(tmp_path: Path) -> None:
     ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
     with pytest.raises(RecordingError, match="more images than the 3 that its header tells of"):
         read_dicom(tmp_path / "x.dcm", {})
+
+
+def test_a_region_that_ends_before_it_begins_is_damage() -> None:
+    assert dicom._box(Path("x.dcm"), np.array([2.0, 3.0, 5.0, 9.0]), 6, 10) == (2, 3, 6, 10)
+    with pytest.raises(RecordingError, match="a region from 5, 3 to 5, 9; damaged"):
+        dicom._box(Path("x.dcm"), np.array([5.0, 3.0, 5.0, 9.0]), 6, 10)
+    with pytest.raises(RecordingError, match="a region from -1, 3 to 5, 9; damaged"):
+        dicom._box(Path("x.dcm"), np.array([-1.0, 3.0, 5.0, 9.0]), 6, 10)
+
+
+def test_times_are_those_of_the_first_field_that_every_image_has() -> None:
+    """The first image has no time of acquisition, and that of its content is none in the second."""
+    sets = [pydicom.Dataset() for _ in range(2)]
+    assert dicom_arrays._moments(sets)[1] == "nothing"
+    for ds, text in zip(sets, ("125959.5", "130001"), strict=True):
+        ds.ContentTime = text
+    sets[1].AcquisitionTime = "130000"
+    t, field = dicom_arrays._moments(sets)
+    assert (t.tolist(), field) == ([0.0, 1.5], "ContentTime")
+
+
+@pytest.mark.parametrize(
+    ("words", "raised"),
+    [
+        ("bytes missing", RuntimeError),
+        ("unable to decode: missing dependencies", UsageError),
+    ],
+)
+def test_what_a_codec_says_is_damage_unless_it_lacks_a_library(
+    words: str, raised: type[Exception], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise RuntimeError(words)
+
+    monkeypatch.setattr(dicom_arrays, "iter_pixels", refuse)
+    ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72))
+    with pytest.raises(raised, match=r"bytes missing|in 'Explicit VR Little Endian', which no"):
+        list(dicom_arrays._frames(ds))
+
+
+def test_images_that_are_too_many_of_several_sizes_or_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72))
+    other = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72), Rows=3)
+    with pytest.raises(RecordingError, match=r"images of different sizes \[\(3, 6\), \(4, 6\)\]"):
+        dicom_arrays._images([ds, other])
+    image = np.zeros((4, 6), np.uint8)
+    monkeypatch.setattr(dicom_arrays, "_frames", lambda ds: iter([image, image]))
+    with pytest.raises(RecordingError, match="2 of 3 images can be read: cut or damaged"):
+        dicom_arrays._images([ds])
+    monkeypatch.setattr(dicom_arrays, "MAX_PIXELS", 71)
+    with pytest.raises(RecordingError, match=r"\(3, 4, 6\) pixels, the limit is 71; split"):
+        dicom_arrays._images([ds])
+
+
+def test_a_folder_of_too_many_files_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for i in range(3):
+        (tmp_path / f"{i}.dcm").write_bytes(bytes(128) + b"DICM")
+    assert len(dicom_files.files_of(tmp_path)) == 3
+    monkeypatch.setattr(dicom_files, "_MOST", 2)
+    with pytest.raises(RecordingError, match="3 files, the limit is 2; split the folder"):
+        dicom_files.files_of(tmp_path)

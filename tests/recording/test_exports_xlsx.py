@@ -18,7 +18,7 @@ from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
 from validate.recording.exports.every import every_specimen
 from validate.recording.exports.xlsx import read_sheets, read_xlsx
-from validate.recording.formats import apart, xlsx_arrays
+from validate.recording.formats import apart, sheets_arrays, xlsx_arrays
 from validate.recording.readers import recognised
 
 TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
@@ -182,3 +182,9 @@ def test_a_displacement_field_is_no_test(tmp_path: Path) -> None:
     assert read_xlsx(written(tmp_path, Data=timed), {"force": "none"}).signals.keys() == {
         "displacement"
     }
+
+
+def test_an_old_workbook_that_is_cut_within_a_sector_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "x.xls").write_bytes(bytes(1000))
+    with pytest.raises(RecordingError, match="1000 bytes, no multiple of its sectors of 512: cut"):
+        sheets_arrays.arrays(tmp_path / "x.xls")

@@ -10,6 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.formats import matlab_arrays
 from validate.recording.formats.matlab import read_matlab
 
 GEL = "field/gel-indentation/parCoordA.mat"
@@ -119,3 +120,23 @@ def test_another_version_is_told(tmp_path: Path) -> None:
     (tmp_path / "x.mat").write_bytes(b"MATLAB 7.0 MAT-file".ljust(600))
     with pytest.raises(RecordingError, match="no MATLAB 5 file"):
         read_matlab(tmp_path / "x.mat", {})
+
+
+def test_images_of_other_numbers_name_their_array(tmp_path: Path) -> None:
+    path = written(tmp_path / "x.mat", images=np.zeros((4, 5, 3)))
+    with pytest.raises(RecordingError, match=r"images: \(4, 5, 3\) float64; images are uint8"):
+        read_matlab(path, {"view": "images:px", "m_per_px": "0.1mm", "rate": "10"})
+
+
+def test_what_is_no_variable_is_told_with_its_place(tmp_path: Path) -> None:
+    path = written(tmp_path / "x.mat", P=np.ones((4, 3)))
+    path.write_bytes(path.read_bytes()[:128] + struct.pack("<II", 7, 16) + bytes(16))
+    with pytest.raises(RecordingError, match="no variable 24 bytes before byte 152; damaged"):
+        matlab_arrays.elements(path)
+
+
+def test_bytes_that_do_not_unpack_are_no_variable() -> None:
+    packed = zlib.compress(struct.pack("<II", 14, 8) + bytes(8))
+    assert matlab_arrays._unpacks(packed, "<")
+    assert not matlab_arrays._unpacks(b"no stream", "<")
+    assert not matlab_arrays._unpacks(packed + b"more", "<")

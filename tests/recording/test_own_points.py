@@ -10,6 +10,7 @@ from exports import F, T
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.point_table import read_point_table
+from validate.recording.formats.text_rows import rows_of
 from validate.recording.readers import recognised
 from validate.recording.types import Markers
 
@@ -331,3 +332,49 @@ def test_tracks_may_have_velocities_but_grid_points_have_strains(
         return
     with pytest.raises(RecordingError, match="4 rows at each 'frame' of x, y, exx: a field"):
         read(path, {"z": "0mm", "rate": "10"})
+
+
+PLAIN = "time (s),tip_x (mm),tip_y (mm),tip_z (mm)\n0,1,2,3\n0.1,1,2,3\n0.2,1,2,3\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "says"),
+    [
+        (PLAIN, {"likelihood": "0.9"}, "--map likelihood: the table has none for each point"),
+        (PLAIN, {"m_per_px": "0.1mm"}, "--map m_per_px: coordinates are in mm"),
+        (PLAIN, {"m_per_px": "0.1mm", "unit": "px"}, "--map unit and m_per_px; say one of them"),
+        (PLAIN.replace("0.1,1", ",1"), {}, "line 3: it has no time; mend it"),
+        (PLAIN.replace("0.2,1", "1e12,1"), {}, "markers: a time of 1e.12 s; damaged"),
+        (
+            "name,x (mm),y (mm),z (mm)\na,1,2,3\nb,1,,3\nc,3,2,1\n",
+            {},
+            "a landmark without coordinates; remove its line",
+        ),
+        (
+            "frame,x (mm),y (mm),z (mm)\n1,1,2,3\n3,1,2,3\n2,1,2,3\n",
+            {"rate": "10"},
+            "line 4: its 'frame' is not after the one before",
+        ),
+    ],
+)
+def test_what_a_table_cannot_mean_is_told(
+    text: str, options: dict[str, str], says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "p.csv").write_text(text)
+    with pytest.raises((RecordingError, UsageError), match=says):
+        read(tmp_path / "p.csv", options)
+
+
+def test_many_short_tracks_are_refused(tmp_path: Path) -> None:
+    """60 particles, each seen in two of 61 images: 120 rows for 3660 cells."""
+    rows = [f"{(i + k) / 10},t{i},{i},0,0" for i in range(60) for k in (0, 1)]
+    (tmp_path / "p.csv").write_text(
+        "\n".join(["time (s),marker,x (mm),y (mm),z (mm)", *rows]) + "\n"
+    )
+    with pytest.raises(RecordingError, match="60 labels at 61 instants in only 120 rows; keep"):
+        read(tmp_path / "p.csv")
+
+
+def test_a_cell_longer_than_any_table_has_is_no_table() -> None:
+    with pytest.raises(RecordingError, match=r"x.csv: no table of cells .field larger than field"):
+        rows_of("x.csv", b"time,x\n0," + b"1" * 140_000)

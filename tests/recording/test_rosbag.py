@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from test_mcap_ros2 import MADE, STORE, same
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.formats import rosbag_arrays
 from validate.recording.formats.rosbag import read_bag
 from validate.recording.mcap.read import read_all, read_recording
 from validate.recording.readers import recognised
@@ -212,3 +213,25 @@ def test_import_of_a_bag_by_the_command(tmp_path: Path) -> None:
     assert code == 0, err
     assert "read as rosbag" in said + err
     same(read_recording(tmp_path / "y.mcap"), MADE[KIND][1])
+
+
+def test_another_missing_key_is_no_missing_definition(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Reader:
+        def __init__(self, path: Path) -> None: ...
+
+        def open(self) -> None:
+            raise KeyError(self.missing)
+
+    (tmp_path / "x.db3").write_bytes(b"SQLite format 3\0")
+    monkeypatch.setattr("rosbags.rosbag2.Reader", Reader)
+    for missing, raised in (("topics", KeyError), ("unknown", RecordingError)):
+        monkeypatch.setattr(Reader, "missing", missing, raising=False)
+        folder = tmp_path / missing
+        folder.mkdir()
+        with (
+            pytest.raises(raised, match=r"topics|types without a definition"),
+            rosbag_arrays._opened(tmp_path / "x.db3", folder),
+        ):
+            pass

@@ -8,7 +8,7 @@ import pytest
 from sequences import images, tracked
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import metaimage
+from validate.recording.formats import metaimage, nrrd, nrrd_arrays
 from validate.recording.formats.metaimage import read_metaimage
 from validate.recording.formats.nrrd import read_nrrd
 
@@ -97,6 +97,7 @@ def test_a_line_may_have_any_length_and_the_header_may_not(
         ("DimSize = 5 4 3", "DimSize = 50000 40000 9", "limit"),
         ("DimSize = 5 4 3", "DimSize = 5 -4 3", "DimSize"),
         ("0.1 0.2 1", "0 0.2 1", "ElementSpacing"),
+        ("DimSize = 5 4 3", "DimSize = 5 4 3 1", r"DimSize \[5, 4, 3, 1\]: volumes 3 px deep"),
     ],
 )
 def test_damage_is_one_line(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -146,3 +147,32 @@ def test_an_nrrd_bomb_is_refused_before_it_is_unpacked(
     head = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: {sizes}\nencoding: gzip\n\n"
     with pytest.raises(RecordingError, match=rf"^x\.nrrd: {says}"):
         read_nrrd(written(tmp_path, head.encode() + packed, "x.nrrd"), {})
+
+
+def test_a_sequence_without_a_frame_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no frame, neither an image nor fields Seq_Frame0000"):
+        read_metaimage(written(tmp_path, tracked(0, pixels=False)), {})
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind"), [((5, 4, 2, 3), "uint8"), ((5, 4), "int32"), ((5, 4), "float64")]
+)
+def test_pixels_that_are_no_grey_images_are_refused(shape: tuple[int, ...], kind: str) -> None:
+    pixels = np.zeros(shape, kind)
+    with pytest.raises(RecordingError, match=rf"pixels \({shape[0]}, .* {kind}; images of 8 or 16"):
+        nrrd._images(Path("x.nrrd"), pixels)
+    image = np.arange(20, dtype=np.uint16).reshape(5, 4, 1, 1)
+    (found,) = nrrd._images(Path("x.nrrd"), image)
+    assert (found == image[:, :, 0, 0].T).all()
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "expected"),
+    [("0 0.5 2", "s", [0, 0.5, 2]), ("0 500 2000", "ms", [0, 0.5, 2]), ("a b c", "s", []),
+     ("0 2 1", "s", []), ("0 1 2", "mm", [])],
+)  # fmt: skip
+def test_a_list_of_indices_is_times_where_they_rise(
+    values: str, unit: str, expected: list[float]
+) -> None:
+    header = {"sizes": [3, 4, 4], "axis 0 index values": values, "axis 0 index unit": unit}
+    assert nrrd_arrays._times(header, ["list", "domain", "domain"]).tolist() == expected

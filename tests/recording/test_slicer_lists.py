@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from validate.errors import RecordingError
+from validate.recording.formats import slicer
 from validate.recording.formats.slicer import read_markups
 from validate.recording.readers import recognised
 
@@ -25,3 +26,26 @@ def test_a_unit_for_each_axis_of_a_list_is_one(tmp_path: Path) -> None:
     path.write_text(text % "mm" + f'"controlPoints": {points}}}]}}')
     with pytest.raises(RecordingError, match=r"\['cm', 'mm'\]; save them apart"):
         read_markups(path, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('{"markups": []}', "its 'markups' is no list of lists"),
+        ('{"markups": [3]}', "its 'markups' is no list of lists"),
+        ('{"markups": [{"controlPoints": [7]}]}', "a control point that is no object; damaged"),
+    ],
+)
+def test_damaged_markups_are_told(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "x.mrk.json").write_text(text)
+    with pytest.raises(RecordingError, match=says):
+        read_markups(tmp_path / "x.mrk.json", {})
+
+
+def test_markups_beyond_the_limit_are_not_parsed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(slicer, "_LARGEST", 10)
+    (tmp_path / "x.mrk.json").write_text('{"markups": []}')
+    with pytest.raises(RecordingError, match="15 bytes, the limit is 10"):
+        read_markups(tmp_path / "x.mrk.json", {})

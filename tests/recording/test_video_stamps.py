@@ -1,5 +1,6 @@
 """Videos that PyAV wrote: uneven stamps, pixels that are not square, names that are patterns."""
 
+import struct
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -10,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from validate.cli.main import cli
-from validate.errors import RecordingError
-from validate.recording.formats import video_arrays
+from validate.errors import RecordingError, UsageError
+from validate.recording.formats import video, video_arrays
 from validate.recording.formats.video import VIDEO, read_video
 
 UNEVEN = (0, 40, 80, 200, 230, 330, 500)  # ms
@@ -111,3 +112,33 @@ def test_a_matroska_file_that_was_cut_is_refused(tmp_path: Path) -> None:
     path.write_bytes(whole[:40])
     with pytest.raises(RecordingError, match="cut"):
         read_video(path, SCALE)
+
+
+def test_frames_that_are_declared_and_not_there_are_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = film(tmp_path / "x.mp4")
+    found = {"declared": np.array(9), "decoded": np.array(7), "images": np.zeros((7, 4, 5))}
+    monkeypatch.setattr(video, "decoded", lambda *_: found)
+    with pytest.raises(RecordingError, match="7 frames can be decoded, 9 are declared: damaged"):
+        read_video(path, SCALE)
+
+
+def test_a_box_shorter_than_its_head_is_damage(tmp_path: Path) -> None:
+    path = tmp_path / "x.mp4"
+    path.write_bytes(struct.pack(">I4s", 8, b"ftyp") + struct.pack(">I4s", 5, b"moov") + bytes(8))
+    with pytest.raises(RecordingError, match=r"x.mp4: a part of 5 bytes at 8: damaged"):
+        video._last_box(path, 24)
+    path.write_bytes(struct.pack(">I4sQ", 1, b"mdat", 40) + bytes(8))
+    assert video._last_box(path, 24) == 40
+    path.write_bytes(struct.pack(">I4s", 0, b"mdat") + bytes(16))
+    assert video._last_box(path, 24) == 24
+
+
+@pytest.mark.parametrize("rate", [0.0, -25.0, float("inf"), float("nan")])
+def test_frames_without_times_and_without_a_rate_ask_for_one(rate: float) -> None:
+    still = np.zeros(3)
+    with pytest.raises(UsageError, match=r"x.avi: 3 frames without times; say --rate HZ"):
+        video._times(Path("x.avi"), still, rate, 1, {})
+    t, words = video._times(Path("x.avi"), still, 10.0, 2, {})
+    assert (t.tolist(), words) == ([0.0, 0.2, 0.4], "10 Hz as declared; frames have no times")
