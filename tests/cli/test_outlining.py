@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import nrrd
@@ -11,6 +12,8 @@ from commands import here, refused
 from scipy.ndimage import gaussian_filter
 
 from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.images import foreign_outline
 from validate.recording.images.followed import EXPERTS
 from validate.recording.images.image import encode_png
 from validate.recording.images.outline import extract_outline
@@ -316,3 +319,46 @@ def test_images_of_several_sizes_are_streams_of_their_own(tmp_path: Path) -> Non
         "images_32x24": [0.1, 0.3],
     }
     assert "say which: --topic NAME" in refused("outline", str(out))
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda d: (d / "a.csv", "frame,x\n0,1\n"), "a.csv: columns ['frame', 'x'], expected"),
+        (lambda d: (d / "a.npy", "none"), "a.npy: no array of masks ("),
+        (lambda d: (d / "a.npz", {"a": np.zeros((2, 2)), "b": np.zeros(1)}), "arrays ['a', 'b']"),
+        (lambda d: (d / "a.npz", {"a": np.zeros(4)}), "(4,), expected masks (n, h, w) or (h, w)"),
+        (lambda d: (d / "a.nrrd", np.zeros((4, 5))), "a.nrrd: (4, 5) float64, expected masks"),
+    ],
+)
+def test_files_that_hold_no_masks_are_told(
+    make: object, says: str, moving: Path, tmp_path: Path
+) -> None:
+    file, content = make(tmp_path)  # type: ignore[operator]
+    if isinstance(content, str):
+        file.write_text(content)
+    elif isinstance(content, dict):
+        np.savez(file, **content)
+    else:
+        nrrd.write(str(file), content)
+    with pytest.raises(RecordingError, match=re.escape(says)):
+        foreign_outline._read(file, read_recording(moving).frame("images"), "")
+
+
+def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_told(
+    moving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = read_recording(moving).frame("images")
+    (tmp_path / "a.csv").write_text("frame,x,y\n")
+    with pytest.raises(UsageError, match=r"--label cyst: of masks and polygons; a.csv has none"):
+        foreign_outline._read(tmp_path / "a.csv", frames, "cyst")
+    with pytest.raises(UsageError, match=r"unit kg of a.csv: px, or a length as mm"):
+        foreign_outline._scale(tmp_path / "a.csv", frames, "kg")
+    assert foreign_outline._scale(tmp_path / "a.csv", frames, "mm").tolist() == [1e-3, 1e-3]
+    assert foreign_outline._scale(tmp_path / "a.npy", frames, "mm").tolist() == [SIDE, SIDE]
+    monkeypatch.setattr(foreign_outline, "MAX_FILE", 5)
+    with pytest.raises(RecordingError, match=r"a.csv: 10 bytes, limit 5"):
+        foreign_outline._read(tmp_path / "a.csv", frames, "")
+    shapes = {"shapes": [{"label": "a", "points": []}, {"label": "a", "points": []}]}
+    with pytest.raises(RecordingError, match=r"a.json: 2 polygons in one image, expected one"):
+        foreign_outline._shape(tmp_path / "a.json", shapes, "a")

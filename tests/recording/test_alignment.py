@@ -9,6 +9,7 @@ import pytest
 from mcap_samples import sample_recording
 
 from validate.errors import RecordingError
+from validate.recording import lag
 from validate.recording.alignment import (
     Offset,
     declared_offset,
@@ -18,7 +19,7 @@ from validate.recording.alignment import (
     shift,
 )
 from validate.recording.events import event_time, offset_by_event
-from validate.recording.lag import _only_peak
+from validate.recording.lag import _only_peak, refined_lag
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
@@ -244,3 +245,33 @@ def test_a_lag_is_ambiguous_where_another_leaves_less_than_twice_unexplained(
     expected = expected if expected.startswith(r"\(") else expected.replace("+", r"\+")
     with pytest.raises(RecordingError, match=expected):
         _only_peak(LAGS, values, 0.3, 0.5)
+
+
+def test_what_cannot_be_aligned_is_told_with_its_numbers() -> None:
+    wide = Signal(T, np.column_stack([T, T]), "N", 0.0, "machine")
+    one = signal(T, motion(T))
+    for stream in (wide, signal(T[:7], motion(T[:7]))):
+        with pytest.raises(
+            RecordingError, match=r"stream: (2 columns, exp|7 samples, at least 10)"
+        ):
+            offset_by_correlation(one, stream, 1.0)
+    with pytest.raises(RecordingError, match="an event needs 1 column, the signal has 2"):
+        event_time(wide, "onset")
+    with pytest.raises(RecordingError, match=r"between 3 and 3.02 s, "):
+        event_time(one, "onset", (3.0, 3.02))
+    with pytest.raises(RecordingError, match="samples meet the reference, 10 are needed"):
+        refined_lag(one, one, 9.95)
+
+
+def test_a_grid_of_too_many_samples_is_refused() -> None:
+    long = Signal(np.array([0.0, 1.0, 2e4]), np.zeros((3, 1)), "N", 0.0, "machine")
+    with pytest.raises(RecordingError, match=r"20000001 samples of 0.001 s, the limit is 2097152"):
+        lag._on_grid(long, 1e-3)
+
+
+def test_streams_that_do_not_follow_each_other_have_no_best_offset() -> None:
+    """The opposite of a motion: the slope of its correlation has the wrong sign."""
+    with pytest.raises(
+        RecordingError, match=r"no best offset near .0 s: the streams do not follow"
+    ):
+        refined_lag(signal(T, motion(T)), signal(T, -motion(T)), 0.0)

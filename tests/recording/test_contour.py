@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -10,6 +11,7 @@ import pytest
 import scipy.io
 
 from validate.errors import RecordingError
+from validate.recording.images import followed
 from validate.recording.images.closed_path import closed_path
 from validate.recording.images.outline import Outline, _fitted, extract_outline, outlines_of
 from validate.recording.images.polar import Grey, speckle_area
@@ -280,3 +282,44 @@ def test_real_disk_has_its_diameter(shared_data: Path) -> None:
     assert np.abs(diameters - 20.0e-3).max() < 0.6e-3
     assert np.ptp(diameters) < 0.5e-3
     assert np.ptp([o.centre for o in found], axis=0).max() < 0.4e-3
+
+
+def flat(count: int) -> Frames:
+    images = tuple(np.full((20, 30), 9, np.uint8) for _ in range(count))
+    return Frames(np.arange(float(count)), images, PX, np.eye(4), "phantom")
+
+
+def test_even_images_are_counted_and_the_first_is_named() -> None:
+    with pytest.raises(RecordingError, match=r"2 of 2 images .*, first image 0 \(t = 0.000 s\): "):
+        outlines_of(flat(2))
+    with pytest.raises(RecordingError, match=r"3 of 3 images .*, first image 0 \(t = 0.000 s\): "):
+        followed.followed(flat(3), followed.Hint(None, None), "images")
+
+
+def test_an_outline_that_jumps_or_is_doubted_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A region more than a radius from the last outline is another one."""
+    last = Outline(RING, 1e-4, np.zeros(2), 4e-3, 1.0, 1.0, 0.0, "free")
+    far = replace(last, centre=np.array([0.0, 4.1e-3]))
+
+    class At:
+        def at(self, outline: Outline) -> "At":
+            return self
+
+        def find(self, image: object, m_per_px: object) -> Outline:
+            return far
+
+    with pytest.raises(
+        RecordingError, match=r"lies 4.1 mm from the last outline, whose radius is 4"
+    ):
+        followed._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
+    monkeypatch.setattr(followed.RivalRegion, "words", "a region of 3 mm")
+    rival = followed.RivalRegion.__new__(followed.RivalRegion)
+    with pytest.raises(
+        RecordingError, match=r"confidence 0.52, 0.6 is needed .*3 mm; .*--confidence 0.51\)"
+    ):
+        followed._require_sure((rival,), 0.519, 0.6)
+    followed._require_sure((rival,), 0.6, 0.6)
+    followed._require_sure((), 0.1, 0.6)
+
+
+RING = np.array([[4e-3, 0.0], [0.0, 4e-3], [-4e-3, 0.0]])

@@ -4,6 +4,7 @@ import base64
 import json
 import struct
 import zlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,14 +15,23 @@ import pytest
 from mcap_samples import ABSENT, T0, signal_json, walk, write_foreign
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.images.image import MAX_SIDE, decode_png, encode_png, sampled
+from validate.recording.images import png_stack
+from validate.recording.images.image import (
+    MAX_SIDE,
+    decode_png,
+    demosaiced,
+    encode_png,
+    png_size,
+    sampled,
+)
+from validate.recording.images.numbered import numbered
 from validate.recording.images.png_stack import read_png_stack
 from validate.recording.images.raster import coverage
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import IMAGE, SCHEMAS
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
-from validate.recording.types import Frames, Recording
+from validate.recording.types import Contours, Frames, Markers, Recording
 
 RNG = np.random.default_rng(3)
 IMAGES = tuple(RNG.integers(0, 256, (17, 23), dtype=np.uint8) for _ in range(3))
@@ -291,3 +301,101 @@ def test_a_mirrored_outline_covers_mirrored_pixels() -> None:
     seen = coverage(np.stack([x, y], axis=1), (4, 4))
     assert coverage(np.stack([x, 3 - y], axis=1), (4, 4)) == pytest.approx(seen[::-1])
     assert seen[:, 1] == pytest.approx([0.0, 0.9, 0.9, 0.0])
+
+
+def chunk_first(kind: bytes, content: bytes) -> bytes:
+    return b"\x89PNG\r\n\x1a\n" + png(kind, content) + png(b"IEND", b"")
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (chunk_first(b"IDAT", bytes(13)), "it does not begin with a header"),
+        (chunk_first(b"IHDR", bytes(12)), "it does not begin with a header"),
+        (
+            hand_made(2, 1, b"")[:33] + png(b"IDAT", b"no stream") + png(b"IEND", b""),
+            r"its pixels cannot be unpacked \(Error -3",
+        ),
+    ],
+)
+def test_png_without_a_header_or_pixels_is_refused(data: bytes, message: str) -> None:
+    with pytest.raises(RecordingError, match=f"damaged PNG: {message}"):
+        decode_png(data)
+
+
+def test_what_opencv_cannot_encode_or_decode_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = encode_png(IMAGES[0])
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: None)
+    with pytest.raises(RecordingError, match="damaged PNG: its pixels cannot be decoded"):
+        decode_png(data)
+    monkeypatch.setattr(cv2, "imencode", lambda *_: (False, None))
+    with pytest.raises(RecordingError, match=r"image \(17, 23\) cannot be encoded as PNG"):
+        encode_png(IMAGES[0])
+
+
+@pytest.mark.parametrize(
+    "image", [np.zeros((2, 3), np.uint16), np.zeros((2, 3, 3), np.uint8), np.zeros(4, np.uint8)]
+)
+def test_only_grey_of_8_bits_is_encoded(image: np.ndarray) -> None:
+    with pytest.raises(RecordingError, match=rf"{image.dtype}: expected \(h, w\) uint8"):
+        encode_png(image)
+
+
+def test_the_size_of_what_is_no_png_is_refused() -> None:
+    assert png_size(encode_png(IMAGES[0])[:40]) == (23, 17)
+    with pytest.raises(RecordingError, match=r"no PNG .wrong first bytes.; only PNG images"):
+        png_size(b"GIF89a")
+
+
+def test_a_mosaic_narrower_than_its_filter_is_refused() -> None:
+    with pytest.raises(RecordingError, match=r"a mosaic of \(3, 8\), at least 4 px a side"):
+        demosaiced(np.zeros((3, 8), np.uint8), "RGGB")
+    assert (demosaiced(np.full((4, 8), 90, np.uint8), "RGGB") == 90).all()
+
+
+def test_files_of_a_stack_are_bounded_alone_and_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = {"m_per_px": "0.1mm", "rate": "10"}
+    for i in range(2):
+        (tmp_path / f"{i}.png").write_bytes(encode_png(IMAGES[i]))
+    size = (tmp_path / "0.png").stat().st_size
+    monkeypatch.setattr(png_stack, "MAX_FILE", size - 1)
+    with pytest.raises(RecordingError, match=f"0.png: {size} bytes, limit {size - 1}"):
+        read_png_stack(tmp_path, options)
+    monkeypatch.undo()
+    monkeypatch.setattr(png_stack, "MAX_STACK", 23 * 17)
+    with pytest.raises(RecordingError, match="more than 391 bytes; split the stack"):
+        read_png_stack(tmp_path, options)
+    monkeypatch.undo()
+    (tmp_path / "2.png").symlink_to(tmp_path / "nowhere.png")
+    with pytest.raises(RecordingError, match=r"2.png: cannot be read \(No such file"):
+        read_png_stack(tmp_path, options)
+
+
+def test_a_folder_that_cannot_be_listed_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"nowhere: cannot be read \(No such file"):
+        numbered(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Markers(T3[:0], ("a",), np.zeros((0, 1, 3)), 0, ""), "markers: no samples"),
+        (lambda: Markers(T3, ("a", "a"), np.zeros((3, 2, 3)), 0, ""), "2 names, 1 different ones"),
+        (lambda: Markers(T3, ("a",), np.zeros((3, 1, 4)), 0, ""), "4 coordinates per point, exp"),
+        (lambda: Contours(T3, (RING,), 0, np.eye(4), ""), "contours: 1 outlines, 3 times"),
+        (lambda: Contours(T3, (RING, RING[:2], RING), 0, np.eye(4), ""), "outline 1 has fewer th"),
+        (
+            lambda: Contours(T3, (RING,) * 3, 0, np.eye(4), "", each=np.full((3, 2), 1.5)),
+            "an sd below 0, or a confidence that is not within 0..1",
+        ),
+    ],
+)
+def test_impossible_streams_are_refused(make: Callable[[], object], says: str) -> None:
+    with pytest.raises(RecordingError, match=says):
+        make()
+
+
+T3 = np.array([0.0, 1.0, 2.0])
+RING = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.mcap.pictures import pictures
+from validate.recording.mcap import schemas
+from validate.recording.mcap import seen as seen_module
+from validate.recording.mcap.pictures import _TAIL, _looked, pictures
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import IMAGE, decode, image_message
 from validate.recording.mcap.seen import ChannelSeen
@@ -78,3 +80,37 @@ def test_a_run_still_finds_wrong_pixels() -> None:
     assert pictures(data) is not None
     with pytest.raises(RecordingError, match="wrong CRC of the chunk"):
         decode(IMAGE, data[5])
+
+
+def test_a_batch_whose_pictures_only_look_alike_is_none() -> None:
+    """Every picture has the same wrong header, and then the last characters are no base64."""
+    wrong = [m.replace(b"UgAAACgAAAAe", b"UgAAACkAAAAe") for m in messages()]
+    assert wrong[0] != messages()[0]
+    assert pictures(wrong) is None
+    data = messages()[0]
+    end = len(data) - len(_TAIL)
+    assert _looked(data) is not None
+    assert _looked(data[: end - 4] + b"=AAA" + data[end:]) is None
+
+
+def test_an_image_too_large_for_a_message_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(schemas, "MAX_MESSAGE", 2000)
+    with pytest.raises(
+        RecordingError, match=r"image \(30, 40\): \d+ bytes as a message, limit 2000"
+    ):
+        image_message(0, "probe", GREY[0])
+
+
+def test_outlines_of_two_points_are_told_with_their_message(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(seen_module, "pose_of", lambda *_: np.eye(4))
+    found = ChannelSeen(
+        Channel(1, 1, "/o", "json", {}), Schema(1, schemas.CONTOUR, "jsonschema", b"{}")
+    )
+    ring = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    outlines = [schemas.contour_message(i, "a", ring[:n], 0.0) for i, n in enumerate((3, 2, 1))]
+    found.take([json.dumps(one).encode() for one in outlines])
+    assert (found.error, found.count) == ("", 3)
+    with pytest.raises(RecordingError, match="'/o': contours: outline 1 has fewer than 3 points"):
+        found.stream(np.arange(3), {})

@@ -1,5 +1,6 @@
 """Videos written by FFmpeg, images by Pillow: pixels, scale and times as stated, or asked for."""
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,12 @@ from PIL import Image, TiffImagePlugin
 from validate.cli.main import cli
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.video import read_video
+from validate.recording.images import image_stack, raw, stack_arrays
+from validate.recording.images.image import MAX_SIDE
 from validate.recording.images.image_stack import read_image_stack
+from validate.recording.images.levels import shallow
+from validate.recording.images.picture import decode_picture
+from validate.recording.images.raw import RawImage
 from validate.recording.readers import recognised
 
 SAID = {"m_per_px": "0.1mm", "rate": "20"}
@@ -205,3 +211,54 @@ def test_hdf5_that_is_none_of_matlab_says_how_it_becomes_one(tmp_path: Path) -> 
     (tmp_path / "x.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
     with pytest.raises(UsageError, match=r"HDF5 file .*scipy.io.savemat\('x.mat'"):
         recognised(tmp_path / "x.h5")
+
+
+def packed(image: Image.Image, kind: str) -> bytes:
+    out = io.BytesIO()
+    image.save(out, kind)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"no picture at all", "no picture of .* in 17 bytes"),
+        (packed(Image.new("L", (MAX_SIDE + 1, 1)), "PNG"), "4097 x 1 px, allowed 1..4096 a side"),
+        (packed(Image.new("F", (2, 2)), "TIFF"), "of mode F: over 16 bits; save 16-bit grey"),
+    ],
+)
+def test_a_message_that_holds_no_picture_is_refused(data: bytes, says: str) -> None:
+    with pytest.raises(RecordingError, match=says):
+        decode_picture(data)
+
+
+def test_levels_below_zero_and_images_beyond_the_limit_are_refused() -> None:
+    with pytest.raises(RecordingError, match="levels from -2 to 7; save them from 0 on"):
+        shallow([np.array([[-2.0, 7.0]])], {})
+    with pytest.raises(RecordingError, match="4097 x 1 px, the limit is 4096 a side"):
+        shallow([np.zeros((1, MAX_SIDE + 1), np.uint8)], {})
+
+
+def test_a_file_without_images_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(image_stack, "decoded", lambda *_: {})
+    with pytest.raises(RecordingError, match=r"x.tif: no image in it"):
+        read_image_stack(tmp_path / "x.tif", {})
+
+
+def test_images_beyond_all_bytes_of_a_stack_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for i in range(3):
+        Image.fromarray(gradient(i).astype(np.uint8)).save(tmp_path / f"{i}.png")
+    size = gradient(0).size
+    assert len(stack_arrays.arrays(tmp_path)) >= 4
+    monkeypatch.setattr(stack_arrays, "MOST", 2 * size)
+    with pytest.raises(RecordingError, match=f"more than {2 * size} bytes of images; split"):
+        stack_arrays.arrays(tmp_path)
+
+
+def test_rows_of_a_raw_image_that_are_cut_are_told() -> None:
+    with pytest.raises(RecordingError, match="11 bytes for 3 x 2 px of 2; cut"):
+        raw._numbers(RawImage("yuv422", 2, 3, 6, bytes(11), False), 2, 1)
+    found = raw._numbers(RawImage("mono16", 1, 2, 6, b"\0\1\0\2\\9\\9", True), 1, 2)
+    assert found[..., 0].tolist() == [[1, 2]]

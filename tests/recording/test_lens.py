@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from validate.cli.main import cli
 from validate.errors import RecordingError, UsageError
+from validate.recording.images import lens, lens_arrays
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.images.png_stack import read_png_stack
 
@@ -126,3 +127,37 @@ def test_images_of_another_size_are_refused_and_the_lens_is_printed(
     cv2.imwrite(str(shots / "0.png"), np.zeros((100, 120), np.uint8))
     with pytest.raises(UsageError, match=r"for images of 320 x 240 px, these have 120 x 100, 320"):
         read_png_stack(shots, {**SAID, "lens": str(path)})
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("fisheye_model: 1\n", "a fisheye model; the one of OpenCV's calibrateCamera is read"),
+        ("distortion_model: equidistant\n", "distortion model 'equidistant'; read are plumb_bob"),
+        ("image_width: 320\n", "no camera_matrix in it"),
+        ("x: " + "1" * 2**21, "bytes; a calibration has at most"),
+    ],
+)
+def test_another_lens_is_called_by_its_name(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "lens.yaml").write_text(text)
+    with pytest.raises(RecordingError, match=says):
+        lens_arrays.arrays(tmp_path / "lens.yaml")
+
+
+@pytest.mark.parametrize(
+    ("matrix", "coefficients", "says"),
+    [
+        (np.diag([-260.0, 255.0, 1.0]), D, "focal lengths and distortion must be numbers, above 0"),
+        (K, np.array([np.nan, 0, 0, 0]), "focal lengths and distortion must be numbers, above 0"),
+        (K, np.zeros(3), r"3 coefficients of distortion; one of \("),
+    ],
+)
+def test_a_calibration_that_is_none_is_refused(
+    matrix: np.ndarray, coefficients: np.ndarray, says: str, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    (tmp_path / "lens.yaml").write_text("x: 1")
+    size = np.array([3.0, 2.0])
+    monkeypatch.setattr(lens, "decoded", lambda *_: {"K": matrix, "D": coefficients, "size": size})
+    with pytest.raises(RecordingError, match=says):
+        lens.straightened([np.zeros((2, 3), np.uint8)], {"lens": str(tmp_path / "lens.yaml")})

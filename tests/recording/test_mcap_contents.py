@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,12 @@ from mcap.records import Schema as TheirSchema
 from mcap.stream_reader import StreamReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from validate.errors import RecordingError
+from validate.recording.mcap import decoders, foreign, known_messages
 from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.integrity import verify
+from validate.recording.mcap.metadata import by_name
+from validate.recording.mcap.records import HEAD, Channel, Message, Metadata, Schema, records_in
 from validate.recording.mcap.verified import Verified, messages_of, opened
 
 Told = tuple[str, dict[str, Any]]
@@ -184,3 +189,109 @@ def test_one_wrong_field_is_seen(at: str, shared_data: Path) -> None:
     found, _ = ours(next((shared_data / "mcap/conformance/OneMessage").glob("*.mcap")))
     other = [(k, {**f, at: [0]} if k == "Message" else f) for k, f in found]
     assert as_text(found) != as_text(other)
+
+
+NO_SCHEMA = Schema(1, "x/msg/X", "ros2msg", b"")
+
+
+def test_encodings_that_nothing_here_decodes_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    channel = Channel(1, 1, "/x", "cdr", {})
+    assert decoder_of(None, channel) == "no decoder for '/cdr'"
+    monkeypatch.setattr(decoders, "_ros2", refusing(ImportError("no", name="mcap_ros2")))
+    assert decoder_of(NO_SCHEMA, channel) == (
+        "the library 'mcap_ros2' that reads it is not installed; "
+        "pip install 'validate-tissue[ros2]'"
+    )
+    monkeypatch.setattr(decoders, "_ros2", refusing(SyntaxError("line 3\n of it")))
+    assert decoder_of(NO_SCHEMA, channel) == "its schema cannot be parsed (line 3 of it)"
+
+
+def refusing(error: Exception) -> Any:
+    def refuse(*_: object) -> None:
+        raise error
+
+    return refuse
+
+
+def test_a_library_without_a_decoder_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = SimpleNamespace(decoder_for=lambda *_: None)
+    monkeypatch.setattr("mcap_ros2.decoder.DecoderFactory", lambda: nothing)
+    monkeypatch.setattr("mcap_protobuf.decoder.DecoderFactory", lambda: nothing)
+    with pytest.raises(RecordingError, match="no ROS 2 message definition"):
+        decoders._ros2(NO_SCHEMA)
+    with pytest.raises(RecordingError, match="no Protobuf schema"):
+        decoders._protobuf(NO_SCHEMA)
+
+
+def test_damaged_messages_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = RecordingError("a field of 3 bytes")
+    for decode, says in (
+        (refusing(known), "^a field of 3 bytes$"),
+        (refusing(IndexError("out\nof range")), r"^damaged \(out of range\)$"),
+        (lambda data: [1], "^list, expected an object with fields$"),
+    ):
+        with pytest.raises(RecordingError, match=says):
+            decoders._guarded(decode)(b"xyz")
+    monkeypatch.setattr(decoders, "MAX_MESSAGE", 2)
+    with pytest.raises(RecordingError, match="a message of 3 bytes, the limit is 2"):
+        decoders._guarded(dict)(b"xyz")
+
+
+@pytest.mark.parametrize(
+    ("value", "says"), [("A", r"no base64 \("), (3.5, r"no bytes \("), ([300], r"no bytes \(")]
+)
+def test_fields_that_are_no_bytes_are_refused(value: object, says: str) -> None:
+    assert decoders.binary("AQI=") == decoders.binary([1, 2]) == decoders.binary(b"\1\2") == b"\1\2"
+    with pytest.raises(RecordingError, match=says):
+        decoders.binary(value)
+
+
+def test_metadata_called_as_a_repeat_would_be_is_refused() -> None:
+    twice = [Metadata("a", {"k": "1"}), Metadata("a", {"k": "2"})]
+    assert by_name(twice) == {"a": {"k": "1"}, "a#2": {"k": "2"}}
+    with pytest.raises(RecordingError, match="metadata 'a#2' occurs twice; rename one"):
+        by_name([Metadata("a#2", {}), *twice])
+
+
+def test_records_longer_than_their_chunk_and_short_messages_are_refused() -> None:
+    stray = HEAD.pack(5, 0) + b"xx"
+    with pytest.raises(RecordingError, match="2 stray bytes at the end of a chunk"):
+        list(records_in(stray))
+    with pytest.raises(RecordingError, match="a record of 9 bytes where its chunk has 4"):
+        list(records_in(HEAD.pack(5, 9) + bytes(4)))
+    with pytest.raises(RecordingError, match="a message record of 21 bytes, at least 22 needed"):
+        Message.read(bytes(21), 0, 21)
+
+
+@pytest.mark.parametrize(
+    ("offsets", "stride", "says"),
+    [
+        ({"x": (0, 7), "y": (4, 7)}, 12, "a cloud without 'z' as a float"),
+        ({"x": (0, 3)}, 12, "a cloud without 'x' as a float"),
+        ({"x": (12, 7)}, 12, "a cloud without 'x' as a float"),
+        ({"x": (10, 7)}, 12, "24 bytes for 2 points of 12; cut"),
+        ({"x": (0, 7)}, 13, "24 bytes for 2 points of 13; cut"),
+    ],
+)
+def test_clouds_that_are_cut_are_refused(
+    offsets: dict[str, tuple[int, int]], stride: int, says: str
+) -> None:
+    with pytest.raises(RecordingError, match=says):
+        known_messages._packed(bytes(24), offsets, stride, "<", 2)
+    whole = np.arange(6, dtype=">f4").tobytes()
+    at = {"x": (0, 7), "y": (4, 7), "z": (8, 7)}
+    assert known_messages._packed(whole, at, 12, ">", 2).tolist() == [[0, 1, 2], [3, 4, 5]]
+
+
+def test_too_many_points_and_numbers_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(known_messages, "MAX_POINTS", 1)
+    with pytest.raises(RecordingError, match="2 points, the limit is 1"):
+        known_messages._points(0, "lab", np.zeros((2, 3)))
+    with pytest.raises(RecordingError, match="2 points, the limit is 1"):
+        known_messages._packed(bytes(24), {}, 12, "<", 2)
+    monkeypatch.setattr(foreign, "MAX_NUMBERS", 5)
+    gathered = {1: SimpleNamespace(add=lambda message: 3)}
+    messages = [Message(1, 0, 0, 0, b"")] * 2
+    foreign.fill(gathered, messages[:1])  # type: ignore[arg-type]
+    with pytest.raises(RecordingError, match="more than 5 numbers, the limit; split the file"):
+        foreign.fill(gathered, messages)  # type: ignore[arg-type]

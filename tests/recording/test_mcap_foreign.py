@@ -345,3 +345,9 @@ def test_unknown_schemas_are_listed_with_why(shared_data: Path, capfd: Any) -> N
     with pytest.raises(RecordingError, match="_service_event: its schema cannot be parsed"):
         read_all(shared_data / ROS2 / "topics_and_services.mcap", {})
     assert capfd.readouterr().out == ""  # its library prints
+
+
+def test_a_topic_that_is_not_there_is_told_with_the_others(tmp_path: Path) -> None:
+    path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}])
+    with pytest.raises(UsageError, match=r"x.mcap: no topic '/y'; topics: /x"):
+        list(messages_in(path, "/y", 1))

@@ -1,6 +1,8 @@
 """A file whose writer was ended: what is whole is said, and saved bit for bit."""
 
+import io
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from mcap.reader import NonSeekingReader
 from mcap_samples import T0, markers_json, signal_json, write_foreign
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.mcap import recover as module
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.recover import recover
 from validate.recording.preflight import inspect_recording
@@ -133,3 +136,9 @@ def test_the_command_saves_and_a_run_still_refuses(tmp_path: Path) -> None:
     assert read_recording(out).signals["/s"].y[0, 0] == 0.0
     wrong = refused("import", str(path), "--recover", "-o", str(out), "--force", "--rate", "5")
     assert "FILE and -o only" in wrong
+
+
+def test_a_file_that_shrinks_while_it_is_copied_is_told() -> None:
+    cut = SimpleNamespace(data=100, crc=0)
+    with pytest.raises(RecordingError, match="became shorter while it was read, by 60 bytes"):
+        module._copy(io.BytesIO(bytes(40)), io.BytesIO(), cut, b"")
