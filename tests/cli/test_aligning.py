@@ -1,6 +1,7 @@
 """`validate align`: two files of one test on one clock, against known offsets and drifts."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from commands import here, refused
 from scipy.ndimage import gaussian_filter1d
 
 from validate.arrays import Floats
-from validate.errors import UsageError
+from validate.cli import aligning
+from validate.errors import RecordingError, UsageError
 from validate.recording.channels import channel
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -208,3 +210,33 @@ def test_channels_are_named(tmp_path: Path) -> None:
     for wrong in ("p", "p.2", "im.colour", "q"):
         with pytest.raises(UsageError, match=rf"no channel '{wrong}'; there are p.0, p.1, im.bri"):
             channel(held, wrong)
+
+
+def test_every_further_file_has_its_channels_and_a_reason(tmp_path: Path) -> None:
+    log, seen = files(tmp_path)
+    out = tmp_path / "out.mcap"
+    line = refused("align", log, "--by", "force=force", "-o", str(out))
+    assert "align: 1 file, at least 2 are needed" in line
+    line = refused("align", log, seen, *BY, *BY, "-o", str(out))
+    assert "--by: 2 given for 1 further files; give one for each" in line
+    line = refused("align", log, seen, "--by", "force=", "-o", str(out))
+    assert "--by force=: expected CHANNEL=CHANNEL, of the first and a further file" in line
+    line = refused("align", log, seen, *BY, "--correlation", "0.9999999", "-o", str(out))
+    assert "the streams correlate by 1.00 at most" in line
+    assert not out.exists()
+
+
+def test_a_drift_that_half_a_recording_cannot_tell_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def unknown(*_: object) -> None:
+        raise RecordingError("7 samples meet the reference, 10 are needed")
+
+    monkeypatch.setattr(aligning, "drift_of", unknown)
+    pair = SimpleNamespace(reference=None, stream=None)
+    assert aligning._drift(pair, None, "b.mcap: ") is None  # type: ignore[arg-type]
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        said == "b.mcap: drift: not known, half of the recording does not tell it (7 samples "
+        "meet the reference, 10 are needed)"
+    )

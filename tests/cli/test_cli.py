@@ -1,21 +1,28 @@
 """The command line from outside: exit codes, one-line errors, light help, files that appear."""
 
+import errno
 import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from commands import here, refused
 from study_samples import experiment_file
 
-from validate.cli import checking
+from validate.cli import bodies, calibrating, checking, known_places, outlining, studying
 from validate.cli import main as cli
+from validate.cli.asking import read_answers
 from validate.compare.result import Result
-from validate.errors import ValidateError
+from validate.errors import RecordingError, SceneError, UsageError, ValidateError
+from validate.scene.box import box
+from validate.scene.foreign_mesh import ForeignBody
 
 COARSE = [
     "--set", "mesh.nodes_x=7", "--set", "mesh.nodes_y=8", "--set", "mesh.nodes_z=11",
@@ -271,3 +278,107 @@ def test_check_fails_by_name_for_a_printed_figure_that_nothing_computes(
     (found,) = json.loads(out)[0]["published"]
     assert (done, found["name"], found["fault"]) == (code, "the printed error", fault)
     assert "the printed error" in here("check", str(file))[1]
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (BrokenPipeError(), 130, ""),
+        (MemoryError(), 2, "out of memory: take a coarser mesh or fewer steps"),
+        (MemoryError("3 GB"), 2, "out of memory (3 GB): take a coarser mesh or fewer steps"),
+        (OSError(errno.ENOSPC, "No space left"), 2, "the output cannot be written: No space left"),
+        (OSError(errno.EROFS, "Read-only", "/x/out"), 2, "/x/out: "),
+        (OSError(errno.EBADF, "Bad file"), 70, "Traceback"),
+    ],
+)
+def test_exit_codes_of_what_the_machine_refuses(
+    error: Exception, code: int, says: str, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    def broken(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(cli.cli, "main", broken)
+    assert cli.run(["list"]) == code
+    said = capsys.readouterr().err
+    assert said.removeprefix("validate: ").startswith(says)
+    assert ("\n" in said.rstrip("\n")) == (code == 70)
+
+
+def test_answers_of_a_file_too_large_are_not_read(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("#" * 100_001)
+    with pytest.raises(UsageError, match=r"a.toml: 100001 bytes; answers take 100000"):
+        read_answers(tmp_path / "a.toml")
+
+
+def test_places_that_cannot_be_known_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "wires.csv"
+    file.write_text("target,x,y,z,x2,y2,z2\nw,1,2,3,1,2,3\n")
+    row = known_places.rows_of(file, ("target", "x"))[0]
+    with pytest.raises(RecordingError, match=r"wires.csv: wire w has one place twice"):
+        known_places._along(file, row, 1e-3, np.array([1e-3, 2e-3, 3e-3]))
+    assert known_places._along(file, {**row, "x2": " "}, 1.0, np.zeros(3)) is None
+    along = known_places._along(file, row, 1e-3, np.array([1e-3, 2e-3, 0.0]))
+    assert along is not None
+    assert along.tolist() == [0.0, 0.0, 1.0]
+    with pytest.raises(RecordingError, match=r"none.csv: cannot be read \(No such file"):
+        known_places.rows_of(tmp_path / "none.csv", ("target",))
+    monkeypatch.setattr(known_places, "_MAX_TABLE", 20)
+    with pytest.raises(RecordingError, match=r"wires.csv: 36 bytes, limit 20"):
+        known_places.rows_of(file, ("target",))
+    monkeypatch.setattr(known_places, "read_device_set", lambda _: SimpleNamespace(landmarks={}))
+    with pytest.raises(UsageError, match=r"d.xml: no landmarks in its PhantomDefinition"):
+        known_places._declared(tmp_path / "d.xml")
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: known_places._table(Path("w.csv"), "kg"), "--unit kg: expected a length, as mm"),
+        (lambda: bodies._metres("2"), "--edge 2: expected a length with its unit, as 2mm"),
+        (lambda: bodies._metres("-2mm"), "--edge -2mm: expected a length with its unit, as 2mm"),
+        (lambda: outlining._place("3px", None), "--centre 3px: expected X,Y as 120px,80px or"),
+        (
+            lambda: outlining._drawn(Path("a"), None, "", {"centre": "1px,1px", "radius": 0,
+                                                           "bright": False}),
+            "--centre is for outlines that are searched: not with --from",
+        ),
+        (
+            lambda: calibrating._seen(None, None, "probe", {}, Path(os.devnull)),
+            "null: no points are marked",
+        ),
+    ],
+)  # fmt: skip
+def test_options_that_do_not_fit_are_told(
+    call: Callable[[], object], says: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(calibrating, "rows_of", lambda *_: [])
+    with pytest.raises(UsageError, match=re.escape(says)):
+        call()
+
+
+def test_a_part_of_a_body_that_is_none_names_the_file() -> None:
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    with pytest.raises(SceneError, match=r"body.msh: "):
+        bodies._part(Path("body.msh"), ForeignBody(mesh, {}), "nowhere")
+    whole = ForeignBody(mesh, {})
+    assert bodies._part(Path("body.msh"), whole, None) is whole
+
+
+def test_a_study_that_is_interrupted_says_how_many_cells_are_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    experiment = SimpleNamespace(name="x", path=tmp_path / "x.py")
+    common = SimpleNamespace(out=tmp_path)
+    cells = studying.study_folder(experiment, "tradeoff", tmp_path) / studying.CELLS
+    cells.mkdir(parents=True)
+    for i in range(3):
+        (cells / f"{i}.json").write_text("{}")
+    with (
+        pytest.raises(KeyboardInterrupt),
+        studying.running(experiment, "choose", "choose", common),  # type: ignore[arg-type]
+    ):
+        raise KeyboardInterrupt
+    assert "3 finished cells are kept; the same command goes on" in capsys.readouterr().err

@@ -17,7 +17,7 @@ from odf.text import P
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
 from validate.recording.exports.every import every_specimen
-from validate.recording.exports.xlsx import read_sheets, read_xlsx
+from validate.recording.exports.xlsx import _Sheet, _tests, read_sheets, read_xlsx
 from validate.recording.formats import apart, sheets_arrays, xlsx_arrays
 from validate.recording.readers import recognised
 
@@ -188,3 +188,17 @@ def test_an_old_workbook_that_is_cut_within_a_sector_is_refused(tmp_path: Path) 
     (tmp_path / "x.xls").write_bytes(bytes(1000))
     with pytest.raises(RecordingError, match="1000 bytes, no multiple of its sectors of 512: cut"):
         sheets_arrays.arrays(tmp_path / "x.xls")
+
+
+def test_a_sheet_that_is_named_and_holds_no_table_says_why() -> None:
+    sheets = [_Sheet("notes", {}, "no line of names"), _Sheet("test", {})]
+    with pytest.raises(RecordingError, match="sheet 'notes': no line of names"):
+        _tests(sheets, "notes")
+    with pytest.raises(UsageError, match="sheet=log: no such sheet; the workbook has 'notes', 'te"):
+        _tests(sheets, "log")
+    with pytest.raises(
+        RecordingError, match="in the sheets 'notes', 'test' of this workbook: no l"
+    ):
+        _tests(sheets, None)
+    with pytest.raises(RecordingError, match="in the sheets  of this workbook: no sheet"):
+        _tests([], None)

@@ -64,3 +64,9 @@ def test_compression_is_negative(tmp_path: Path) -> None:
     text = "stretch,stress_[kPa]\n1,0\n.9,-2\n.8,-3\n.7,-4\n"
     stress = read_stretch_stress(written(tmp_path, text)).signal("stress", "Pa").y[:, 0]
     assert np.array_equal(stress, [0, -2e3, -3e3, -4e3])
+
+
+def test_two_curves_in_one_file_are_refused(tmp_path: Path) -> None:
+    table = f"stretch,stress_[kPa]\n{ROWS}"
+    with pytest.raises(RecordingError, match=r"rubber_uniaxial.csv: 2 tables; one curve a file"):
+        read_stretch_stress(written(tmp_path, f"{table}\nstretch,stress_[MPa]\n{ROWS}"))

@@ -1,8 +1,13 @@
 """Which rows of an export hold units, and which numbers."""
 
+import re
+
 import pytest
 
+from validate.errors import RecordingError, UsageError
+from validate.recording.exports import cells, geometry, stepped
 from validate.recording.exports.cells import is_data, is_row, is_unit_row
+from validate.recording.exports.columns import Said
 
 
 @pytest.mark.parametrize(
@@ -38,3 +43,37 @@ def test_a_row_of_units(cells: tuple[str, ...], units: bool) -> None:
 )
 def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None:
     assert (is_row(cells), is_data(cells)) == (row, data)
+
+
+def test_a_line_that_is_no_csv_is_told_with_its_length() -> None:
+    with pytest.raises(RecordingError, match="no CSV text: a line of 140001 characters: field l"):
+        cells._cells("1" * 140_000 + ",", ",")
+
+
+@pytest.mark.parametrize(
+    ("text", "decimal", "expected"),
+    [("20", ".", 20), ("20,5", ".", 20.5), ("20.5", ",", 20.5), ("1,250", ".", None),
+     ("1.250", ",", None), ("about 20", ".", None)],
+)  # fmt: skip
+def test_a_number_of_a_header_has_either_sign_but_where_it_may_group(
+    text: str, decimal: str, expected: float | None
+) -> None:
+    if expected is None:
+        says = f"header: 'width' is '{re.escape(text)}', no plain number; write it without"
+        with pytest.raises(RecordingError, match=says):
+            geometry._number("width", text, decimal)
+    else:
+        assert geometry._number("width", text, decimal) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("0.1s", (0.1, "s")), ("5 ms", (5.0, "ms")), ("s", None), ("1.2.3s", None), ("-1s", None),
+     ("0.1", None)],
+)  # fmt: skip
+def test_a_step_of_time_has_its_unit(text: str, expected: tuple[float, str] | None) -> None:
+    if expected is None:
+        with pytest.raises(UsageError, match=f"--map time=every:{re.escape(text)}: expected a st"):
+            stepped._step(Said("every", text, None))
+    else:
+        assert stepped._step(Said("every", text, None)) == expected

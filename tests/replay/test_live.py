@@ -16,9 +16,10 @@ from click.testing import CliRunner
 
 from validate.arrays import Floats
 from validate.cli.main import cli
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.types import Recording, Signal, Source
 from validate.replay import load as experiment_named
 from validate.replay.live import (
     Listener,
@@ -42,6 +43,7 @@ from validate.replay.live.packets import (
     position_bytes,
     position_of,
 )
+from validate.replay.live.tip import recorded_tip
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.solve.needle import NeedleStepper
@@ -416,3 +418,62 @@ def test_real_time_is_asked_for_and_given_back(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(os, "sched_setscheduler", refused)
     with pytest.raises(UsageError, match="--realtime: not permitted"), realtime(wanted=True):
         pass
+
+
+class Refusing:
+    """A socket whose other end has gone: it reports so once, and takes nothing more."""
+
+    def __init__(self, packet: bytes) -> None:
+        self.answers: list[object] = [ConnectionResetError("gone"), packet]
+
+    def recvfrom(self, size: int) -> tuple[bytes, tuple[str, int]]:
+        if not self.answers:
+            raise BlockingIOError
+        answer = self.answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer, ("127.0.0.1", 9)  # type: ignore[return-value]
+
+    def sendto(self, data: bytes, peer: tuple[str, int]) -> None:
+        raise ConnectionRefusedError("gone")
+
+
+def test_a_device_that_has_gone_is_counted_and_ends_nothing() -> None:
+    listener = Listener(*made().reach, 512.0)
+    own, listener._socket = listener._socket, Refusing(at(1, -0.001))  # type: ignore[assignment]
+    try:
+        place = listener.place(0, 0.0)
+        listener.give(np.zeros(2), 0)
+    finally:
+        listener._socket = own
+        listener.close()
+    assert place is not None
+    assert place.tolist() == [REST[0], -0.001]
+    counts = {name: n for name, n in listener.findings.items() if n}
+    assert counts == {"unreachable": 1, "taken": 1, "unsent": 1}
+
+
+def test_an_interruption_ends_the_loop_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("validate.replay.live.clock._run", interrupted)
+    done = run(made().path, Turned())
+    assert done.findings["interrupted"] == 1
+    assert len(done.t) == 0
+
+
+def test_a_tip_recorded_at_different_times_is_refused() -> None:
+    def signal(t: Floats) -> Signal:
+        return Signal(t, np.zeros((len(t), 1)), "m", 0.0, "lab")
+
+    t = np.arange(3.0)
+    recording = Recording(
+        "r", Source("r", "", 0, ""), 0, signals={"tip.x": signal(t), "tip.y": signal(t + 1)}
+    )
+    with pytest.raises(
+        RecordingError, match=r"r: tip.x .. tip.y have \[3, 3\] samples at different times"
+    ):
+        recorded_tip(recording, 2)
+    with pytest.raises(RecordingError, match=r"no signals tip.x, tip.y and no markers 'tip'"):
+        recorded_tip(replace(recording, signals={"a": signal(t)}), 2)
