@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from cubes import case
 
 from validate.errors import ComparisonError
 from validate.estimate import filterpy_oracle
-from validate.estimate.filterpy_guest import GUESTS, FilterpyGuest, ensemble, kalman
+from validate.estimate.filterpy_guest import GUESTS, FilterpyGuest, ensemble, kalman, require_shapes
 from validate.estimate.filterpy_names import drawing
 from validate.estimate.filterpy_oracle import OracleRow, oracle_table
 from validate.estimate.kalman import Gaussian
@@ -135,3 +136,13 @@ def test_an_ensemble_of_three_by_hand() -> None:
     assert pytest.approx(np.array([[7.0]])) == ensemble_gaussian(members).P
     moved = enkf_update(members, seen, lambda x: x, np.array([[7.0]]), np.array([[0], [2], [-2]]))
     assert moved.ravel() == pytest.approx([2.5, 4.0, 4.0])
+
+
+@pytest.mark.parametrize("name", ["predict", "update"])
+def test_a_guest_without_a_method_of_a_filter_is_refused(name: str) -> None:
+    one = np.eye(1)
+    model = SimpleNamespace(size=1, H=one)
+    methods = {m: (lambda *_: None) for m in ("predict", "update") if m != name}
+    guest = SimpleNamespace(x=np.zeros(1), P=one, Q=one, R=one, F=one, H=one, **methods)
+    with pytest.raises(ComparisonError, match=f"guest SimpleNamespace has no `{name}`: not a fil"):
+        require_shapes(guest, model)  # type: ignore[arg-type]

@@ -8,10 +8,13 @@ import pytest
 from cubes import DT, PAPER, case, cube
 from scipy import sparse
 
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, SceneError
+from validate.estimate.displacement_filter import load_shapes
 from validate.estimate.kalman import best_gain, innovation
+from validate.estimate.load_scale import LoadScale
 from validate.estimate.measurements import Measurements, measurements, on_steps, timetable
 from validate.fem.locate import barycentric_rows
+from validate.fem.system import build
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
@@ -154,3 +157,35 @@ def test_an_innovation_by_hand() -> None:
     assert found.nis == pytest.approx(14 / 3)
     assert found.dof == 2
     assert found.sd == pytest.approx([np.sqrt(2), 0, np.sqrt(2)])
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda m: replace(m, t=m.t[:0], z=m.z[:0]), "0 times of 3 components: nothing measured"),
+        (lambda m: replace(m, names=m.names[:2]), "2 names for 3 measured components"),
+        (lambda m: replace(m, t=m.t[::-1].copy()), "measurement times must rise; sort the rec"),
+        (lambda m: replace(m, sd=0 * m.sd), "measurement sd 0 m: it must be positive"),
+        (lambda m: m.of("top", "knee"), "marker 'knee' was not measured; there are top"),
+        (lambda m: m.moving(np.zeros(0, int)), "every measured component is held or driven: noth"),
+    ],
+)
+def test_measurements_that_teach_a_filter_nothing_are_refused(call: Any, says: str) -> None:
+    with pytest.raises(ComparisonError, match=says):
+        call(case().measured(1, every=5))
+
+
+def test_a_shape_of_a_load_that_moves_nothing_measured_cannot_be_estimated() -> None:
+    system = cube()
+    H = np.zeros((1, len(system.free)))
+    with pytest.raises(SceneError, match="a load moves no measured component: its shape cannot"):
+        load_shapes(system, H)
+    H[0, -1] = 2.0
+    assert (H @ load_shapes(system, H)).tolist() == [[pytest.approx(1.0)]]
+
+
+def test_one_shape_is_for_one_load() -> None:
+    scene = cube().scene
+    two = build(replace(scene, loads=(*scene.loads, replace(scene.loads[0], name="side"))))
+    with pytest.raises(SceneError, match="2 loads: one shape is for one load"):
+        LoadScale().prepare(two, case().measured(1, every=5))

@@ -15,6 +15,7 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import UsageError
+from validate.estimate import members
 from validate.estimate.consistency import nis_consistency
 from validate.estimate.doubtful import doubts, parts
 from validate.estimate.ensemble_kf import EnsembleKf, reached
@@ -480,3 +481,41 @@ def test_a_modulus_is_found_at_large_strain_and_members_are_the_explicit_run() -
         off = np.abs(found.u[-1].ravel() - true[-1]).max()
         assert off < 0.02 * np.abs(stiff[-1] - true[-1]).max()
         assert last(found, "estimate.stiffness") == pytest.approx(24e3, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: EnsembleKf(dt=DT, runs=2), "2 members, walks .* at least 3, 0, 0"),
+        (lambda: EnsembleKf(dt=DT, walk=-0.1), "walks -0.1 and .* at least 3, 0, 0"),
+        (lambda: EnsembleKf(dt=DT, inflation=0.9), "inflation 0.9: 1 or more"),
+        (lambda: EnsembleKf(dt=DT, R=0.0), "R = 0 m2: a variance above 0"),
+        (lambda: EnsembleKf(dt=0.0), "dt 0 s in .* parameters: all must be above 0"),
+    ],
+)
+def test_members_that_cannot_be_are_refused(make: Any, says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        make()
+
+
+def test_fewer_members_than_parameters_are_refused() -> None:
+    small, seen = case().system, case().measured(1, every=5)
+    filters = EnsembleKf(dt=DT, runs=3, parameters=("load.pull", "stiffness"))
+    with pytest.raises(UsageError, match="3 members for 2 parameters: at least 4"):
+        filters.prepare(small, seen)
+
+
+def test_a_correction_that_is_singular_is_a_diverged_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError("S_yy (3, 3) is not positive definite")
+
+    stepper = EnsembleKf(dt=DT, runs=4).prepare(case().system, case().measured(1))
+    monkeypatch.setattr(MemberStepper, "_corrected", singular)
+    after = stepper.step(stepper.rest(), np.zeros(1))
+    why = "step 1: S_yy (3, 3) is not positive definite"
+    assert after.failure == ("diverged", why)
+
+
+def test_no_shapes_make_no_basis() -> None:
+    with pytest.raises(UsageError, match="0 shapes: at least 1"):
+        members._basis(case().system, (), (), None, 0)  # type: ignore[arg-type]

@@ -20,7 +20,14 @@ from skfem import (
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.errors import SceneError
-from validate.fem.assemble import divergence, library_mesh, shape_gradients, stiffness
+from validate.fem.assemble import (
+    _renumbered,
+    _require_node_major,
+    divergence,
+    library_mesh,
+    shape_gradients,
+    stiffness,
+)
 from validate.scene.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
@@ -205,3 +212,15 @@ def test_what_cannot_be_assembled_is_refused() -> None:
     inverted = Mesh(grid_mesh((3, 3, 3)).nodes, cells, "tet4")
     with pytest.raises(SceneError, match="1 of 48 elements inverted or flat, worst element 5 "):
         stiffness(Scene(inverted, Material(1.0, 0.3)))
+
+
+def test_a_library_that_numbers_otherwise_is_an_error_of_ours() -> None:
+    """What it assembles would be permuted: places are compared, node by node."""
+    nodes = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]])
+    places = np.repeat(nodes, 2, axis=0).T
+    _require_node_major(places, nodes, 2)
+    with pytest.raises(AssertionError, match="numbers its unknowns differently from the mesh"):
+        _require_node_major(places[:, ::-1], nodes, 2)
+    assert _renumbered(nodes[[2, 0, 1]], nodes).tolist() == [1, 2, 0]
+    with pytest.raises(AssertionError, match="has its unknowns elsewhere than the mesh its nodes"):
+        _renumbered(nodes + 1e-6, nodes)

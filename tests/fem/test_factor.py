@@ -169,3 +169,16 @@ def test_nested_dissection_saves_fill_on_a_grid() -> None:
     ours = factorise(A, np.arange(len(places)), places)
     assert isinstance(ours, Factor)
     assert ours.lu.L.nnz < 0.5 * natural
+
+
+@pytest.mark.parametrize("factorised", [factor.factorise_indefinite, factor.factorise_general])
+def test_a_vanishing_pivot_is_refused_whatever_the_signs(factorised: object) -> None:
+    order = np.arange(3)
+    signs = sparse.csr_array(np.diag([2.0, -1.0, 4.0]))
+    solved = factorised(signs, order).solve(np.ones(3))  # type: ignore[operator]
+    assert solved.tolist() == [0.5, -1.0, 0.25]
+    tiny = sparse.csr_array(np.diag([2.0, -1.0, 1e-15]))
+    with pytest.raises(SceneError, match="positive definite"):
+        factorised(tiny, order)  # type: ignore[operator]
+    with pytest.raises(SceneError, match="positive definite"):
+        factorised(sparse.csr_array(np.zeros((3, 3)) + np.diag([1.0, 0, 1])), order)  # type: ignore[operator]

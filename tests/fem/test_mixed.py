@@ -1,11 +1,13 @@
 """Taylor-Hood statics: exact fields, agreement where nothing locks, and what locking costs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from validate.errors import SceneError
+from validate.fem import mixed
 from validate.fem.locking import locking_warning
 from validate.fem.mixed import mixed_static
 from validate.fem.system import build
@@ -14,7 +16,7 @@ from validate.papers.accuracy.rod import GRAVITY, bending_rod
 from validate.scene.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Load, Pin, Scene, Support
+from validate.scene.scene import Load, Mass, Membrane, Pin, Scene, Support
 
 
 def compliance(scene: Scene) -> float:
@@ -118,3 +120,20 @@ def test_what_it_cannot_do_is_refused() -> None:
         mixed_static(replace(scene, loads=()))
     with pytest.raises(SceneError, match=r"got \['push'\]"):
         mixed_static(replace(scene, loads=(replace(scene.loads[0], spread="nodal"),)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"masses": (Mass("m", "x1", 1.0),)}, "know faces alone, no edges, points, mas"),
+        (
+            {"membranes": (Membrane("x1", 1e-3, Material(1.0, 0.3)),)},
+            "know supports, pins, drives and loads",
+        ),
+        ({"loads": ()}, "mixed elements need consistent loads or weights, got none"),
+    ],
+)
+def test_what_mixed_elements_do_not_know_is_refused(changed: dict[str, object], says: str) -> None:
+    scene = SimpleNamespace(**{**vars(pushed(6, 0.3)), **changed})
+    with pytest.raises(SceneError, match=says):
+        mixed._require_plain(scene)  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ from validate.scene.box import box
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
-from validate.scene.scene import Cavity, Dilatation, Drive, Pin, Scene, Support
+from validate.scene.scene import Cavity, Dilatation, Drive, Load, Pin, Scene, Support
 
 SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)), Support("lower_plate", (2,)))
 BONDED = (Support("lower_plate", (0, 1)), Support("upper_plate", (0, 1)))
@@ -234,3 +234,15 @@ def test_a_body_whose_nodes_are_all_held_is_refused_with_the_elements_it_takes()
     pressed = Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), held, drives=(stage,))
     with pytest.raises(SceneError, match=r"all 24 unknowns of 8 nodes are held .*at least 2 elem"):
         build(pressed)
+
+
+def test_columns_know_no_loads_and_no_large_strain() -> None:
+    scene = Scene(
+        box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1.0, 0.3), (Support("z0", (0, 1, 2)),),
+        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+    )  # fmt: skip
+    with pytest.raises(SceneError, match="response columns know drives and cavities; give loads"):
+        responses(build(scene))
+    large = replace(scene, material=Material(1.0, 0.3, "svk"))
+    with pytest.raises(SceneError, match="a linear scheme cannot solve the law 'svk'; use Static"):
+        responses(build(large))

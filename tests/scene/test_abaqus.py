@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
+from validate.scene import abaqus_arrays, abaqus_lines
+from validate.scene.abaqus_nodes import placed
+from validate.scene.abaqus_text import KeywordBlock
 from validate.scene.box import grid
 from validate.scene.foreign_mesh import read_foreign
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
@@ -353,3 +356,41 @@ def test_sets_by_range_by_other_sets_and_by_elements(tmp_path: Path) -> None:
     one = whole.nodes[whole.cells[0]]
     there = got.nodes[got.facet_nodes("ofone")]
     assert {tuple(x) for x in there} <= {tuple(x) for x in one}
+
+
+def block(*rows: str) -> KeywordBlock:
+    return KeywordBlock("*INSTANCE", {}, rows, "line 7")
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: placed(np.zeros((1, 3)), block("1, 2")), "a shift x, y, z, and a turn about two"),
+        (
+            lambda: placed(np.zeros((1, 3)), block("0, 0, 0", "1, 0, 0, 1, 0, 0, 90")),
+            "turned about two points that are one",
+        ),
+        (lambda: abaqus_arrays._range(block(), "1, 2.5"), "'1, 2.5' is no first, last and step"),
+        (lambda: abaqus_arrays._range(block(), "4"), "'4' is no first, last and step"),
+    ],
+)
+def test_rows_of_a_deck_that_are_none_name_their_line(
+    call: Callable[[], object], says: str
+) -> None:
+    with pytest.raises(SceneError, match=f"line 7.*{says}"):
+        call()
+
+
+def test_an_instance_is_shifted_then_turned_and_ranges_hold_their_ends() -> None:
+    quarter = block("1, 0, 0", "0, 0, 0, 0, 0, 1, 90")
+    assert placed(np.array([[1.0, 0.0, 5.0]]), quarter) == pytest.approx(np.array([[0, 2, 5]]))
+    assert list(abaqus_arrays._range(block(), "2, 8, 3")) == [2, 5, 8]
+
+
+def test_a_deck_that_grows_beyond_its_limit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.inp").write_text("*NODE\n1, 0, 0, 0\n")
+    monkeypatch.setattr(abaqus_lines, "_MOST", 10)
+    with pytest.raises(SceneError, match="more than 10 bytes with what it includes"):
+        list(abaqus_lines.Deck(tmp_path / "a.inp").lines())

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from validate.cli.main import cli
 from validate.errors import SceneError, UsageError
 from validate.scene.body_facts import facts, odd_size, quality
+from validate.scene import foreign_mesh, vtu_series
 from validate.scene.box import grid
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import read_foreign
@@ -312,3 +313,46 @@ def test_a_surface_of_vtk_is_told_how_to_come_in(tmp_path: Path) -> None:
         whole.save(tmp_path / name)
         refused = run.invoke(cli, ["body", str(tmp_path / name), "--unit", "mm"])
         assert re.search(rf"{name}: a surface of VTK .* mesh.save", str(refused.exception))
+
+
+@pytest.mark.parametrize("cells", [[[0, 1, 2, 4]], [[-1, 1, 2, 3]]])
+def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]) -> None:
+    found = {"points": np.zeros((4, 3)), "cells.tetra": np.array(cells)}
+    low, high = np.min(cells), np.max(cells)
+    with pytest.raises(SceneError, match=f"x.vtu: its elements name nodes {low} to {high} of 4; d"):
+        foreign_mesh._body("x.vtu", found, 1.0, None, turn=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<VTKFile>", r"no list of files \("),
+        ("<VTKFile><DataSet file='a.vtu'/></VTKFile>", r"no list of files \('timestep'\)"),
+        ("<VTKFile><DataSet timestep='x' file='a'/></VTKFile>", r"no list of files \(could not"),
+        ("<VTKFile></VTKFile>", "lists no file"),
+        ("<VTKFile><DataSet timestep='0' file='../a.vtu'/></VTKFile>", "names '../a.vtu': files"),
+        ("<!DOCTYPE x><VTKFile></VTKFile>", "declares entities: no list of files needs that"),
+    ],
+)
+def test_a_series_that_is_none_is_told(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "a.pvd").write_text(text)
+    with pytest.raises(SceneError, match=says):
+        vtu_series.arrays(tmp_path / "a.pvd")
+
+
+def test_a_series_of_two_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = "".join(f"<DataSet timestep='{t}' file='{t}.vtu'/>" for t in (1, 0))
+    (tmp_path / "a.pvd").write_text(f"<VTKFile>{listed}</VTKFile>")
+    sizes = {"0.vtu": 4, "1.vtu": 4}
+
+    def fields(path: Path) -> dict[str, np.ndarray]:
+        points = np.zeros((sizes[path.name], 3))
+        return {"points": points, "u": points + int(path.stem)}
+
+    monkeypatch.setattr(vtu_series, "_fields", fields)
+    found = vtu_series.arrays(tmp_path / "a.pvd")
+    assert found["t"].tolist() == [0.0, 1.0]
+    assert found["u"][:, 0, 0].tolist() == [0.0, 1.0]
+    sizes["1.vtu"] = 5
+    with pytest.raises(SceneError, match="files of different numbers of points"):
+        vtu_series.arrays(tmp_path / "a.pvd")

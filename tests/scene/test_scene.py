@@ -7,9 +7,13 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
+from validate.scene.box import box
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Cavity, Drive, Scene, Support
+from validate.scene.scene import Cavity, Drive, Foundation, Scene, Support
+from validate.scene.select import Chosen, Nearest
+from validate.scene.tool import Needle, require_usable
+from validate.solve.entry import Surface
 
 
 @pytest.mark.parametrize("E", [0.0, -1.0, math.nan, math.inf])
@@ -55,3 +59,31 @@ def test_a_regions_cells_are_those_of_the_mesh(cell: int) -> None:
     stiff = Region("stiff", np.array([0, cell]), Material(1e4, 0.3))
     with pytest.raises(SceneError, match=f"region 'stiff' has cell {cell}, the mesh "):
         Scene(phantom_mesh(COARSE_GRID), Material(1.0, 0.3), regions=(stiff,))
+
+
+def test_what_a_plane_mesh_cannot_have_is_refused() -> None:
+    plane = box((1.0, 1.0), (1, 1))
+    for parts in ({"dilatation": "nodal_mean"}, {"foundations": (Foundation("x0", (0,), 1.0),)}):
+        with pytest.raises(SceneError, match="mean dilatation, foundations and membranes are for"):
+            Scene(plane, Material(1.0, 0.3), **parts)  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="0 copies of the mesh: at least 1"):
+        Scene(plane, Material(1.0, 0.3), copies=0)
+    with pytest.raises(SceneError, match="nodal mean dilatation is for one material; drop the reg"):
+        Scene(
+            box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1.0, 0.3), dilatation="nodal_mean",
+            regions=(Region("stiff", np.array([0]), Material(2.0, 0.3)),),
+        )  # fmt: skip
+
+
+def test_a_needle_touches_faces_of_simplices() -> None:
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    needle = Needle(
+        "needle", Chosen(Nearest((1.0, 1.0, 1.0)), "points"), (0.5, 0.5, 2.0), (0.0, 0.0, -1.0)
+    )
+    with pytest.raises(SceneError, match=r"needle 'needle' touches .*: choose faces"):
+        require_usable((needle,), mesh)
+    with pytest.raises(SceneError, match="2 needles: one at a time"):
+        require_usable((needle, needle), mesh)
+    with pytest.raises(SceneError, match="facets of 4 nodes in 3-D: a needle touches simplices"):
+        Surface(np.zeros((1, 4), int), 3)
+    assert Surface(np.zeros((1, 6), int), 3).facets.shape == (1, 6)

@@ -1,5 +1,6 @@
 """Closed surfaces of others: what is inside does not depend on how a program writes triangles."""
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import vtk
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.scene import filled as filled_module
+from validate.scene import surface_arrays
 from validate.scene.body_facts import quality
 from validate.scene.box import grid
 from validate.scene.filled import filled
@@ -142,3 +145,42 @@ def test_vtk_packed_as_it_offers(kind: str, mode: str, tmp_path: Path) -> None:
         return
     found = read_foreign(tmp_path / "x.vtu", "mm").mesh
     assert cell_volumes(found).sum() == pytest.approx(6e-6, rel=1e-6)
+
+
+def test_an_edge_below_zero_and_a_body_that_is_none_name_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "body.stl"
+    path.write_bytes(b"solid")
+    for edge in (-1e-3, np.inf):
+        with pytest.raises(SceneError, match=f"body.stl: edges of {edge:g} m; 0 or above"):
+            filled(path, "mm", edge)
+    flat = {"points": np.zeros((4, 3)), "cells.tetra": np.array([[0, 1, 2, 3]])}
+    monkeypatch.setattr(filled_module, "decoded", lambda *_: flat)
+    with pytest.raises(SceneError, match=r"^body\.stl: "):
+        filled(path, "mm")
+
+
+def test_files_without_triangles_or_numbers_are_no_surface(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    with pytest.raises(SceneError, match="no triangles in it: no surface"):
+        _surface(path)
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n")
+    with pytest.raises(SceneError, match="1 coordinates are no numbers; damaged"):
+        _surface(path)
+    monkeypatch.setattr(surface_arrays, "_MOST", 0)
+    with pytest.raises(SceneError, match="1 triangles, the limit is 0; simplify it"):
+        _surface(path)
+
+
+def test_a_reader_that_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    caught: list[object] = []
+    monkeypatch.setattr(signal, "signal", lambda number, handler: caught.append(handler))
+    with (
+        pytest.raises(SceneError, match="its reader took over 7 s: cut or damaged"),
+        surface_arrays._within(7),
+    ):
+        caught[0](0, None)  # type: ignore[operator]

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -276,3 +277,13 @@ def test_what_rests_damped_under_its_load_has_balanced_energies(damping: Damping
         left.append(n["energy.external"] - stored - n["energy.damped"])
     assert abs(left[-1]) < 0.01 * state.numbers["energy.external"]
     assert left[-1] == pytest.approx(left[450], abs=1e-4 * state.numbers["energy.external"])
+
+
+def test_lagged_damping_is_for_one_stiffness_damping() -> None:
+    scheme = CentralDifference(1e-3, damping="lagged")
+    for betas, expected in (([0.1, 0.1], 0.1), ([0.0, 0.0], 0.0)):
+        scene = SimpleNamespace(per_cell=lambda of, betas=betas: np.array(betas))
+        assert scheme._beta(scene) == expected  # type: ignore[arg-type]
+    scene = SimpleNamespace(per_cell=lambda of: np.array([0.2, 0.1]))
+    with pytest.raises(SceneError, match=r"for one stiffness damping, got \[.*0\.1.*0\.2.*\] s"):
+        scheme._beta(scene)  # type: ignore[arg-type]

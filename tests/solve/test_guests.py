@@ -20,6 +20,7 @@ from validate.scene.box import grid
 from validate.scene.material import Material, Region
 from validate.scene.scene import Drive, Load, Pin, Probe, Scene, Support, Weight
 from validate.scene.vtu import write_vtu
+from validate.solve.guests import job, limits, ran
 from validate.solve.guests.answer import echoed
 from validate.solve.guests.guest import Guest, run_of
 from validate.solve.guests.job import write_job
@@ -360,3 +361,43 @@ def test_the_mesh_is_read_by_another_library(tmp_path: Path, kind: str) -> None:
 def test_it_stands_in_an_experiment_and_is_set_as_others_are() -> None:
     method = with_values(Method("a guest", Guest()), {"command": "python g.py", "seconds": "3"})
     assert (method.settings.command, method.settings.seconds) == ("python g.py", 3.0)
+
+
+def test_a_guest_that_weighs_the_body_needs_a_density() -> None:
+    assert job._density(Material(1.0, 0.3, rho=1000.0)) == 1000.0
+    with pytest.raises(SceneError, match=r"needs a density; give material.rho"):
+        job._density(Material(1.0, 0.3))
+
+
+def test_files_that_go_while_they_are_counted_are_not_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, size in (("kept", 5), ("gone", 7)):
+        (tmp_path / name).write_bytes(bytes(size))
+    lstat = os.lstat
+
+    def missing(path: Path) -> os.stat_result:
+        if Path(path).name == "gone":
+            raise FileNotFoundError(path)
+        return lstat(path)
+
+    assert ran.size_of(tmp_path) == 12
+    monkeypatch.setattr(ran.os, "lstat", missing)
+    assert ran.size_of(tmp_path) == 5
+
+
+def test_a_program_that_cannot_be_started_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def forbidden(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    def ended(code: int) -> None:
+        raise SystemExit(code)
+
+    monkeypatch.setattr(limits.resource, "setrlimit", lambda *_: None)
+    monkeypatch.setattr(limits.os, "execvp", forbidden)
+    monkeypatch.setattr(limits.os, "_exit", ended)
+    with pytest.raises(SystemExit, match="127"):
+        limits.become(["solver", "job"], 2**30, 2**20)
+    assert capsys.readouterr().out == "solver: Permission denied\n"

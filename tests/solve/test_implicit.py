@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from explicit_scenes import pulled, ran, rise
 
+from validate.errors import SceneError
 from validate.solve.implicit import NewtonDynamics, RateRule
 
 
@@ -43,3 +44,13 @@ def test_a_step_that_finds_no_end_says_what_to_do() -> None:
         assert run.outcome.step == 1
         assert run.outcome.why.startswith("step 2: ")
         assert run.outcome.why.endswith("; take a smaller dt")
+
+
+def test_a_tangent_that_vanishes_ends_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    def vanished(*_: object) -> None:
+        raise SceneError("a pivot of 0")
+
+    stepper = NewtonDynamics(0.001).prepare(pulled())
+    monkeypatch.setattr(type(stepper), "_correction", vanished)
+    after = stepper.step(stepper.rest(), np.array([5.0]))
+    assert after.failure == ("not_converged", "step 1: a pivot of 0; take a smaller dt")

@@ -1,6 +1,7 @@
 """Static Newton: uniaxial truths, energy, locking, the linear limit, contracts of a stepper."""
 
 from dataclasses import FrozenInstanceError, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from validate.fem.system import build
 from validate.scene.material import Material
 from validate.scene.rubber import mooney_rivlin
 from validate.scene.scene import Dilatation
+from validate.solve import newton
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.march import march
 from validate.solve.newton import NewtonStepper, StaticNewton
@@ -305,3 +307,27 @@ def test_phantom_scene_of_both_laws_prepares() -> None:
     for law in ("svk", "neo_hooke"):
         stepper = prepared(phantom(law, 1, "pointwise"))  # type: ignore[arg-type]
         assert pressed(stepper, 0.002).failure is None
+
+
+def test_a_stiffness_that_is_not_positive_at_rest_is_refused() -> None:
+    found = SimpleNamespace(factor=SimpleNamespace(negative_pivots=3))
+    problem = SimpleNamespace(
+        rest_volumes=(), system=SimpleNamespace(scene=SimpleNamespace(inputs=()), moves=()),
+        balance=lambda *_: None, tangent=lambda _: found,
+    )  # fmt: skip
+    with pytest.raises(SceneError, match="stiffness at rest has 3 negative pivots: an element is"):
+        newton._rest(problem)  # type: ignore[arg-type]
+
+
+def test_a_tangent_that_vanishes_ends_a_step_by_its_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def vanished(*_: object) -> None:
+        raise SceneError("a pivot of 0")
+
+    stepper = prepared(cube("svk", n=2))
+    monkeypatch.setattr(NewtonStepper, "_corrected", vanished)
+    after = stepper.step(stepper.rest(), np.array([0.01 * SIDE]))
+    assert after.failure is not None
+    assert after.failure[0] == "not_converged"
+    assert "a pivot of 0" in after.failure[1]

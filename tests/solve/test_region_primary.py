@@ -1,10 +1,12 @@
 """A primary region of its own law: the linear run, the law's own statics, one Prony branch."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import SceneError
@@ -14,6 +16,8 @@ from validate.papers.async_regions.bodies import AREA, LENGTH, bar, block, pad_o
 from validate.papers.async_regions.runs import growth, pushed
 from validate.scene.prony import Prony
 from validate.scene.scene import Scene
+from validate.solve.region_primary import PrimarySolver, UnsettledError
+from validate.solve.region_size import PrimarySize
 from validate.solve.regions import AsyncRegions
 from validate.solve.types import State
 
@@ -234,3 +238,31 @@ def test_a_region_without_a_whole_cell_stays_linear_and_says_so() -> None:
 def test_a_law_of_its_own_has_no_spectral_radius() -> None:
     with pytest.raises(SceneError, match="has no spectral radius"):
         growth(block(E, 2, 2), replace(NEAR, law="neo_hooke"))
+
+
+@pytest.mark.parametrize(("slope", "moved"), [(0.0, 1e-3), (1.0, 0.0), (-1.0, 1e-3)])
+def test_a_region_that_never_grows_is_refused(slope: float, moved: float) -> None:
+    with pytest.raises(SceneError, match=f"slope {slope:g} and threshold {moved:g} m of the prim"):
+        PrimarySize("linear", 1, 3, slope, moved, 1e-3)
+
+
+def test_a_region_without_balance_or_upright_cells_is_unsettled() -> None:
+    """A law whose force jumps with its sign has no balance; one that is inverted has no step."""
+    one = sparse.csr_array(np.eye(1))
+    jump = SimpleNamespace(
+        force=lambda u: np.where(u > 0.3, 9.0, -9.0), tangent=lambda u: 0 * one,
+        inverted=lambda u: False,
+    )  # fmt: skip
+    law = SimpleNamespace(rounding=0.0, after=lambda *_: jump)
+    base = SimpleNamespace(inertia=np.ones(1), damping=np.zeros(1), next=lambda u, b, f: u)
+    solver = PrimarySolver(base, law, 1e-3, one, np.zeros(1, int), np.zeros((1, 3)))
+    with pytest.raises(UnsettledError, match=r"no balance of the primary region after \d+ iterat"):
+        solver._settled(base, np.zeros(1), np.zeros(1), np.zeros(1), jump)
+    over = SimpleNamespace(force=lambda u: 0 * u, inverted=lambda u: True)
+    turned = replace(solver, law=SimpleNamespace(after=lambda *_: over))
+    with pytest.raises(UnsettledError, match="the primary region has inverted cells; take a small"):
+        turned.walk(np.zeros(1), np.zeros(1), np.zeros(1), None)
+    with pytest.raises(
+        UnsettledError, match=r"a correction inverts cells even at 1/\d+ of its siz"
+    ):
+        solver._corrected(np.zeros(1), np.ones(1), over)
