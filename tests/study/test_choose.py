@@ -9,6 +9,7 @@ from validate.errors import RecordingError, UsageError
 from validate.replay.ladder import Rival
 from validate.solve.newmark import Newmark
 from validate.solve.types import StepTimes
+from validate.study import choose
 from validate.study.choose import Wanted, left_out, meeting, misses, nearest, wanted
 from validate.study.trade import TradeRow
 
@@ -91,3 +92,10 @@ def test_a_unit_of_something_else_is_refused() -> None:
 def test_large_strain_is_left_out_for_the_reason_that_holds() -> None:
     assert left_out(False, "quad4") == "left out: large strain was not solved (quad4)"
     assert "--declared-law" in left_out(True, "quad4")
+
+
+@pytest.mark.parametrize("text", ["1.2.3mm", "mm", "5", "5 ", "", "infHz", "-Hz"])
+def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
+    assert choose._split("2.5 mm", "--error", "1mm") == (2.5, "mm")
+    with pytest.raises(UsageError, match=f"--error {text}: a number with its unit, as in 1mm"):
+        choose._split(text, "--error", "1mm")

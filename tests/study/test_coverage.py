@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
+from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
@@ -16,7 +17,8 @@ from validate.errors import ComparisonError, UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.report.store import schema
-from validate.study import coverage_worlds
+from validate.study import coverage as coverage_module
+from validate.study import coverage_bench, coverage_worlds
 from validate.study.coverage import Coverage, coverage
 from validate.study.coverage_bench import ExactReading, opened_here
 from validate.study.coverage_found import Quantity
@@ -326,3 +328,35 @@ def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Pa
     (note,) = found.notes
     assert "drawn truths have no solution" in note
     assert len(found.quantities[0].judged.verdicts) == 20
+
+
+def test_what_has_no_coverage_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(
+        ComparisonError, match="cell: SimpleNamespace cannot be drawn anew; give it"
+    ):
+        coverage_bench.drawable(SimpleNamespace(name="cell"))  # type: ignore[arg-type]
+    end = SimpleNamespace(state="diverged", why="not finite")
+    ended = SimpleNamespace(registered=[None], runs=[SimpleNamespace(outcome=end)])
+    monkeypatch.setattr(coverage_bench, "in_world", lambda *_: None)
+    monkeypatch.setattr(coverage_bench, "solve", lambda *_: ended)
+    monkeypatch.setattr(coverage_bench, "reached_end", lambda *_: False)
+    road = SimpleNamespace(experiment=None, parameters=None, recordings=(), settings={"m": None})
+    cell = SimpleNamespace(world=None, method="m", label="world 3")
+    with pytest.raises(ComparisonError, match="world 3: diverged, not finite"):
+        coverage_bench.run_reading(SimpleNamespace(road=road), cell)  # type: ignore[arg-type]
+    monkeypatch.setattr(coverage_bench, "terms_of", lambda *_: ())
+    bench = SimpleNamespace(road=road, followed=lambda method: ended)
+    with pytest.raises(
+        ComparisonError, match=r"m: nothing that is accepted was compared .diverged"
+    ):
+        coverage_bench.run_terms(bench, cell)  # type: ignore[arg-type]
+
+
+def test_terms_that_failed_are_raised_by_their_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = SimpleNamespace(job=SimpleNamespace(), opening=None)
+    monkeypatch.setattr(coverage_module, "key_of", lambda *_: "k")
+    monkeypatch.setattr(coverage_module, "Plan", lambda *_: None)
+    failed = SimpleNamespace(records={"k": Record("k", failed="no force")})
+    monkeypatch.setattr(coverage_module, "finished", lambda *_: failed)
+    with pytest.raises(ComparisonError, match="no force"):
+        coverage_module._terms(study, "linear")  # type: ignore[arg-type]

@@ -297,3 +297,9 @@ def test_a_file_that_the_experiment_names_is_part_of_it_and_no_other(tmp_path: P
     assert file_sha256(files["mine"]) == first
     files["helper"].write_text("x = 1", encoding="utf-8")
     assert file_sha256(files["mine"]) != first
+
+
+def test_fewer_workers_than_none_are_refused(tmp_path: Path) -> None:
+    plan = waiting(tmp_path, (Waiting("a"),))
+    with pytest.raises(UsageError, match=r"--workers -1: 0 \(in this process\) or more"):
+        finish(plan, tmp_path / "cells", Where(workers=-1))

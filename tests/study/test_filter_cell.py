@@ -2,17 +2,19 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from study_samples import experiment_file
 
 from validate.compare.track import rmse, track_error
-from validate.errors import UsageError
+from validate.errors import ComparisonError, UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.study import filter_cell
 from validate.study.engine import finish
 from validate.study.filter_cell import Bench, open_bench, run_cell
 from validate.study.filter_plan import FilterPlan, plan
@@ -137,3 +139,26 @@ def test_a_worker_keeps_few_systems_and_many_recordings(pulled: Experiment) -> N
     bench = Bench(pulled, planned(pulled).job)
     kept = (bench._systems, bench._truths, bench._seen, bench._recordings)
     assert [k._most for k in kept] == [4, 4, 40, 40]
+
+
+def shared_run(monkeypatch: pytest.MonkeyPatch, **found: object) -> None:
+    """Filters of all seeds at once, of which only the result is looked at."""
+    probes = SimpleNamespace(weights=SimpleNamespace(toarray=lambda: np.ones((1, 1))))
+    monkeypatch.setattr(filter_cell, "probe_rows", lambda *_: probes)
+    monkeypatch.setattr(filter_cell, "sharing", lambda stepper: stepper, raising=False)
+    monkeypatch.setattr(filter_cell, "shared_gain_run", lambda *_: SimpleNamespace(**found))
+
+
+def test_a_march_that_ends_early_names_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    end = SimpleNamespace(state="diverged", step=7, why="not finite")
+    run = SimpleNamespace(finished=False, outcome=end)
+    monkeypatch.setattr(filter_cell, "_march", lambda *_: run)
+    cell = SimpleNamespace(seeds=(11, 12))
+    with pytest.raises(ComparisonError, match="seed 11: diverged at step 7: not finite"):
+        filter_cell._one_by_one(None, cell, None, None, 0.0)  # type: ignore[arg-type]
+
+
+def test_a_twin_that_tells_no_truth_is_no_benchmark() -> None:
+    bench = SimpleNamespace(truth=lambda first: {})
+    with pytest.raises(ComparisonError, match="the twin tells no probe's truth: 0 compared"):
+        filter_cell._scores(bench, None, {}, 1.0, 1)  # type: ignore[arg-type]

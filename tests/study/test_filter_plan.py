@@ -1,6 +1,7 @@
 """What a study will run: checked before anything runs, keyed by all that makes a cell."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from study_samples import experiment_file
@@ -9,6 +10,7 @@ from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
+from validate.study import filter_plan
 from validate.study.filter_plan import FilterPlan, plan
 from validate.study.filters import run_line
 from validate.study.sweep import axes
@@ -91,3 +93,29 @@ def test_what_cannot_run_is_refused_at_once(
 def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
     with pytest.raises(UsageError, match="no twin whose truth is known"):
         plan(phantom, Options({}), (), 2)
+
+
+def test_seeds_need_a_parameter_and_stand_once() -> None:
+    assert filter_plan._seeds(1, None, "") == (0,)
+    with pytest.raises(UsageError, match=r"2 seeds, but the experiment has no parameter twin.seed"):
+        filter_plan._seeds(2, None, "")
+    with pytest.raises(UsageError, match="--seeds 0: at least 1"):
+        filter_plan._seeds(0, None, "twin.seed")
+    with pytest.raises(UsageError, match="a seed stands twice: that is no second sample"):
+        filter_plan._seeds((3, 3), None, "twin.seed")
+
+
+def test_a_combination_that_settings_refuse_has_a_key_of_its_refusal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    keyed: list[object] = []
+
+    def refuse(*_: object) -> None:
+        raise UsageError("dt = 0: above 0")
+
+    monkeypatch.setattr(filter_plan, "set_up", refuse)
+    monkeypatch.setattr(filter_plan, "key_of", lambda job, bare, made: keyed.append(made) or "k")
+    monkeypatch.setattr(filter_plan, "replace", lambda bare, key: key)
+    bare = SimpleNamespace(seeds=(1,))
+    assert filter_plan._keyed(None, None, bare) == "k"  # type: ignore[arg-type]
+    assert keyed == ["dt = 0: above 0"]

@@ -6,13 +6,17 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from commands import here, refused
 
+from validate.errors import ComparisonError
 from validate.replay.find import load_file
+from validate.study import identify as identify_module
 from validate.study.identify import IdentifyStudy, identification
 from validate.study.job import Where
+from validate.study.store import Record
 
 ALONE = ("--workers", "0")
 
@@ -155,3 +159,10 @@ def test_what_is_stopped_goes_on_where_it_was(
     found = identification(load_file(block), out=tmp_path, where=Where(0))
     assert 2 <= found.done.reused < len(found.done.records) == 12
     assert {f: f.stat().st_mtime_ns for f in kept} == written
+
+
+def test_a_cell_that_failed_is_raised_by_its_label() -> None:
+    found = SimpleNamespace(records={"k": Record("k", failed="out of memory"), "g": Record("g", 3)})
+    assert identify_module._value(found, SimpleNamespace(key="g")) == 3  # type: ignore[arg-type]
+    with pytest.raises(ComparisonError, match="start 4: out of memory"):
+        identify_module._value(found, SimpleNamespace(key="k", label="start 4"))  # type: ignore[arg-type]

@@ -1,7 +1,12 @@
 """Places, ties, dominance and failures on results made by hand."""
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 
+import pytest
+
+from validate.errors import ComparisonError, UsageError
+from validate.study import filters
 from validate.study.filter_plan import FilterCell
 from validate.study.ranking import Ranking, dominator, rankings
 from validate.study.score import FilterScores
@@ -79,3 +84,13 @@ def test_errors_that_differ_by_rounding_are_one_error() -> None:
     """Two solvers of one system: the slower one is no point of the front."""
     assert dominator(0, [1.0 - 1e-12, 1.0], [168.0, 118.0]) == 1
     assert dominator(1, [1.0 - 1e-12, 1.0], [168.0, 118.0]) is None
+
+
+def test_nothing_is_ranked_by_a_score_that_is_not_there_or_of_cells_that_failed() -> None:
+    failed = {str(i): Record(str(i), failed=f"trap {i}") for i in range(3)}
+    with pytest.raises(ComparisonError, match="all 3 cells failed, 0 compared; the first: trap 0"):
+        filters._require_score(SimpleNamespace(records=failed), "rmse")  # type: ignore[arg-type]
+    good = {"a": Record("a", SimpleNamespace(scores={"top.rmse": 1.0}))}
+    filters._require_score(SimpleNamespace(records=good), "top.rmse")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"no score 'top.rms' to rank by; .*top.rmse"):
+        filters._require_score(SimpleNamespace(records=good), "top.rms")  # type: ignore[arg-type]

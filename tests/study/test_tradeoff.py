@@ -4,14 +4,16 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from validate.cli import studying
 from validate.cli.main import run
-from validate.errors import SceneError
+from validate.errors import ComparisonError, SceneError
 from validate.fem.factor import factorise
 from validate.fem.system import build
 from validate.replay.experiment import Experiment
@@ -26,13 +28,14 @@ from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
-from validate.study import climb
+from validate.study import climb, precision, stability_cell, trade, trade_cell
 from validate.study.choose import Wanted, choose, wanted
 from validate.study.choose_exhibits import choose_exhibits
 from validate.study.choose_facts import principal_strains
 from validate.study.engine import finish
 from validate.study.held import held_bytes
 from validate.study.job import Job, Plan, Where
+from validate.study.store import Record
 from validate.study.trade import Trade, TradeRow, front, trade_cells, traded
 from validate.study.trade_cell import Measured, TradeCell, run_cell
 from validate.study.trade_exhibits import trade_exhibits
@@ -346,3 +349,41 @@ def test_elements_that_lock_are_named(measured: Trade) -> None:
     assert warning.startswith("nu = 0.499: linear tetrahedra lock")
     assert warning.endswith("(P1)")
     assert warning in trade_exhibits(found)[0].words
+
+
+def test_a_trade_without_its_reference_compares_nothing() -> None:
+    trial = SimpleNamespace(reference=("tet4", 9))
+    cell = SimpleNamespace(part="best", element="tet4", level=9, key="k")
+    done = SimpleNamespace(records={"k": Record("k", failed="out of memory")})
+    with pytest.raises(ComparisonError, match="no reference, 0 compared: out of memory"):
+        trade.traded(None, trial, (cell,), done, True)  # type: ignore[arg-type]
+
+
+def test_a_reference_that_ends_early_names_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    end = SimpleNamespace(state="diverged", step=3, why="not finite")
+    scheme = SimpleNamespace(prepare=lambda system: None)
+    monkeypatch.setattr(trade_cell, "_scheme", lambda *_: (scheme, None))
+    monkeypatch.setattr(trade_cell, "build", lambda scene: None)
+    run = SimpleNamespace(finished=False, outcome=end)
+    monkeypatch.setattr(trade_cell, "_march", lambda *_: run)
+    trial = SimpleNamespace(build=lambda *_: None)
+    cell = SimpleNamespace(part="best", element="tet4", level=9, steps=(0.1,))
+    with pytest.raises(ComparisonError, match="run on tet4 mesh 9 ended at step 3: not finite"):
+        trade_cell.run_cell(trial, cell)  # type: ignore[arg-type]
+
+
+def test_a_system_that_is_singular_in_a_precision_has_no_answer() -> None:
+    one = sparse.csr_array(np.diag([1.0, 0.0]))
+    assert np.isnan(precision._solved(one, np.ones(2))).all()
+    whole = sparse.csr_array(np.diag([1.0, 2.0]))
+    assert precision._solved(whole, np.ones(2)).tolist() == [1.0, 0.5]
+
+
+def test_cells_that_mixed_elements_do_not_know_have_no_locking(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def unknown(scene: object) -> None:
+        raise SceneError("mixed elements are for linear meshes")
+
+    monkeypatch.setattr(stability_cell, "mixed_static", unknown)
+    assert stability_cell._locking(None) is None  # type: ignore[arg-type]
