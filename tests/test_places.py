@@ -162,3 +162,8 @@ def test_the_reason_is_that_of_the_system(tmp_path: Path) -> None:
     assert full.startswith("No space left on device: more than 7 bytes are needed, ")
     assert not of_the_place(FileNotFoundError(errno.ENOENT, "No such file"))
     assert free_bytes(tmp_path / "not" / "there") > 0
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=f"{tmp_path} is a folder; name a file"):
+        try_file(tmp_path)

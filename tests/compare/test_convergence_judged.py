@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats, rms
-from validate.compare.convergence import GridConvergence, Numerical, convergence
+from validate.compare.convergence import GridConvergence, Numerical, convergence, observed_order
 from validate.errors import ComparisonError
 
 H = (2.0, 1.5, 1.0, 0.7)
@@ -152,3 +152,9 @@ def test_answers_that_differ_by_rounding_need_no_factor() -> None:
     assert found.deciding(1e-3) == 1.0
     above = convergence((2.0, 1.0, 0.5), answers, 1, 2.0, rounding=2.9e-9)
     assert above.conduct != "at rounding"
+
+
+@pytest.mark.parametrize(("e21", "e32"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0), (1.0, 0.5)])
+def test_differences_that_vanish_or_grow_have_no_order(e21: float, e32: float) -> None:
+    assert observed_order(2.0, 2.0, e21, e32) is None
+    assert observed_order(2.0, 2.0, 1.0, 4.0) == pytest.approx(2.0, abs=1e-9)

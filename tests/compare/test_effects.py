@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from validate.compare.effects import TELLS_APART, Sensor, effect
+from validate.compare.exhibit import NumberTable, TableCell
 from validate.compare.residual import Residual
+from validate.errors import ComparisonError
 
 
 def residual(
@@ -78,3 +80,13 @@ def test_the_same_model_twice_has_no_effect() -> None:
     found = effect("none", "", one, other, {}, (Sensor("s", "contour", 1e-9),))
     assert found.changes[0].separation == 0.0
     assert found.seen_by == found.would_see == ()
+
+
+def test_a_number_that_is_not_finite_is_no_entry() -> None:
+    assert [TableCell(v).value for v in (float("nan"), float("inf"), 2.0)] == [None, None, 2.0]
+    with pytest.raises(ComparisonError, match="table 't': no heading 'why' to stand below"):
+        NumberTable("t", "a title", ("E", "u"), ((1.0, 2.0),), below="why")
+    with pytest.raises(ComparisonError, match="table 't': a row of 1 under 2 headings"):
+        NumberTable("t", "a title", ("E", "u"), ((1.0,),))
+    with pytest.raises(ComparisonError, match="table 'a title': a number is not finite in a"):
+        NumberTable("", "a title", ("E", "u"), (("a", float("nan")),))

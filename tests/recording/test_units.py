@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from validate import units
 from validate.errors import RecordingError
 from validate.units import in_si, is_unit, si_factor, split
 
@@ -117,3 +118,8 @@ def test_a_unit_that_nobody_stated_is_itself_alone() -> None:
     assert split("26 force unit/m") == (26.0, "force unit/m")
     with pytest.raises(RecordingError, match="nobody stated"):
         si_factor("force unit", "force")
+
+
+def test_a_quantity_that_is_none_is_an_error_of_ours() -> None:
+    with pytest.raises(ValueError, match=r"quantity 'taste' is none of \['area', "):
+        units._factor("mm", "taste")

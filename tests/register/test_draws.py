@@ -3,6 +3,7 @@
 import importlib
 import pkgutil
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 
 from validate import register
 from validate.arrays import Floats, Ints, rms
+from validate.errors import RegistrationError
 from validate.fem.locate import barycentric_rows
 from validate.recording.types import Contours, Markers
+from validate.register import from_rest as from_rest_module
 from validate.register.digitised import Digitised, TouchedLandmarks
 from validate.register.displacements import DisplacementObservation
 from validate.register.draws import Draw, Exact, from_rest, shifted
@@ -323,3 +326,28 @@ def test_outlines_of_a_late_clock_move_with_their_speed() -> None:
         np.testing.assert_allclose(found, radius * circle, rtol=1e-9, atol=1e-12)
     one = replace(seen, t=T[:1], outlines=outlines[:1]).anew(np.zeros(180), drawn(late=0.5))
     np.testing.assert_allclose(one.outlines[0], outlines[0], atol=1e-15)  # no speed to tell
+
+
+def test_markers_that_are_not_seen_at_rest_are_named() -> None:
+    x = np.zeros((3, 2, 3))
+    x[:2, 1] = np.nan
+    seen = Markers(np.array([0.0, 0.1, 1.0]), ("a", "b"), x + [[[1.0, 0, 0]]], 1e-4, "lab")
+    rested, unseen, fewest = from_rest_module.rested(seen, 0.5)
+    assert (rested.names, unseen, fewest) == (("a",), ("b",), 2)
+    late, unseen, fewest = from_rest_module.rested(seen, 2.0)
+    assert (late.names, unseen, fewest) == (("a", "b"), (), 1)
+    only = replace(seen, names=("b",), x=seen.x[:, 1:])
+    with pytest.raises(
+        RegistrationError, match=r"none of 1 markers is seen in the first 0.5 s, at"
+    ):
+        from_rest_module.rested(only, 0.5)
+
+
+def test_markers_off_the_body_ask_how_far_they_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+    rest = np.array([[0.5e-2, 0.5e-2, 3e-2]])
+    whole = SimpleNamespace(x=rest[None], names=("stalk",))
+    with pytest.raises(
+        RegistrationError,
+        match=r"stalk.*; of markers on stalks say how far: --set seen.stands=15mm",
+    ):
+        from_rest_module.since_rest(whole, MESH, 1e-4, 1, 1e-3)  # type: ignore[arg-type]

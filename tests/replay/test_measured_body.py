@@ -4,6 +4,7 @@ outlines of a section; and what is refused."""
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,19 @@ import pytest
 
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
-from validate.errors import ComparisonError, RegistrationError, SceneError, UsageError
+from validate.errors import (
+    ComparisonError,
+    RecordingError,
+    RegistrationError,
+    SceneError,
+    UsageError,
+)
+from validate.parameters import with_values
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
 from validate.register.fitting import MarkerFit
-from validate.replay import compare
+from validate.replay import compare, ladder_default, measured_markers, measured_seen
+from validate.replay import measured_body as measured_body_module
 from validate.replay.experiment import Experiment
 from validate.replay.measured_body import body_of, measured_body, solid
 from validate.replay.measured_cards import (
@@ -377,3 +386,107 @@ def test_force_and_motion_of_different_signs_are_refused(tmp_path: Path) -> None
     turned["force"] = replace(turned["force"], y=-turned["force"].y)
     with pytest.raises(RegistrationError, match="must have one sign"):
         compare(experiment(tmp_path, BASE, recording(signals=turned), "force"))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"body.file": "a.vtu", "body.block": "1mm,1mm,1mm"}, "2 are given, block"),
+        ({"body.block": "1mm,1mm"}, r"block \(0.001, 0.001\)"),
+        ({"seen.states": "1"}, r"seen: 1 states \(2 to 500\)"),
+        ({"seen.fit_to": "1"}, r"fit_to 1 \(between 0 and 1\)"),
+        ({"seen.still": "-1s"}, r"still -1 s \(0 or above\)"),
+    ],
+)
+def test_settings_of_a_body_that_cannot_be(change: dict[str, str], says: str) -> None:
+    with pytest.raises(UsageError, match=says):
+        with_values(MeasuredBody(), change)
+
+
+def test_a_plane_mesh_is_no_body(monkeypatch: pytest.MonkeyPatch) -> None:
+    flat = SimpleNamespace(dimension=2, kind="tri3")
+    monkeypatch.setattr(measured_body_module, "_meshed", lambda *_: flat)
+    card = SimpleNamespace(file="sheet.msh")
+    with pytest.raises(
+        SceneError, match=r"sheet.msh: cells of tri3; a body of 3-D cells is needed"
+    ):
+        measured_body_module.body_of(card, folder=Path())  # type: ignore[arg-type]
+
+
+def test_layouts_and_markers_that_are_not_said_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measured_markers, "_points_in", lambda path: {})
+    with pytest.raises(RecordingError, match=r"a.fcsv: no points; a layout is a file of landmarks"):
+        measured_markers.layout_of(None, "a.fcsv", tmp_path)  # type: ignore[arg-type]
+    monkeypatch.undo()
+    (tmp_path / "a.csv").write_text("name,x,y,z\na,1,2,3\nb,4,5,6\n")
+    with pytest.raises(
+        UsageError, match=r"seen.layout: .*; a layout says all itself: as a table its columns are"
+    ):
+        measured_markers._points_in(tmp_path / "a.csv")
+    none = SimpleNamespace(seen=SimpleNamespace(markers=""))
+    for names in ((), ("left", "right")):
+        recording = SimpleNamespace(markers=dict.fromkeys(names))
+        with pytest.raises(UsageError, match=r"seen.markers is not set; one of "):
+            measured_markers.markers_topic(recording, none)  # type: ignore[arg-type]
+    one = SimpleNamespace(markers={"left": None})
+    assert measured_markers.markers_topic(one, none) == "left"  # type: ignore[arg-type]
+
+
+def use(**seen: object) -> SimpleNamespace:
+    plain = {"force": None, "markers": None, "outline": None, "states": 4}
+    return SimpleNamespace(
+        seen=SimpleNamespace(**{**plain, **seen}), moved=SimpleNamespace(by=None)
+    )
+
+
+def test_streams_that_are_not_there_or_share_no_time_are_told() -> None:
+    def stream(*t: float) -> SimpleNamespace:
+        return SimpleNamespace(t=np.array(t))
+
+    recording = SimpleNamespace(name="r", streams={"cell": stream(0, 1), "tip": stream(2, 3)})
+    for seen, error, says in (
+        ({"force": "load"}, UsageError, r"no stream \['load'\] in r; it has \['cell', 'tip'\]"),
+        ({}, ComparisonError, "nothing of the recording is used: set seen.* or moved.by"),
+        (
+            {"force": "cell", "markers": "tip"}, ComparisonError,
+            r"share no time \(latest start 2.000 s, earliest end 1.000 s\)",
+        ),
+    ):  # fmt: skip
+        with pytest.raises(error, match=says):
+            measured_seen._instants(recording, use(**seen))  # type: ignore[arg-type]
+    t, start = measured_seen._instants(recording, use(force="cell"))  # type: ignore[arg-type]
+    assert (t.tolist(), start) == ([0, 0.25, 0.5, 0.75, 1], 0.0)
+
+
+def test_a_window_of_too_few_samples_is_refused() -> None:
+    few = np.arange(float(measured_seen._FEWEST - 1))
+    with pytest.raises(ComparisonError, match=f"window 'low': {len(few)} samples, "):
+        measured_seen._window("low", few, "samples")
+    assert measured_seen._window("low", np.append(few, 9.0), "samples").label == "low"
+
+
+def test_a_body_that_is_not_driven_or_cannot_be_squeezed_has_no_ladder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = SimpleNamespace(t=np.array([0.0, 1.0]), inputs=np.zeros((2, 1)))
+    own = SimpleNamespace(
+        seen=seen, experiment=SimpleNamespace(name="x"),
+        scene=SimpleNamespace(material=SimpleNamespace(rho=None), mesh=None),
+    )  # fmt: skip
+    with pytest.raises(UsageError, match="'x' drives nothing: all its inputs are zero"):
+        ladder_default._loading(own)  # type: ignore[arg-type]
+    monkeypatch.setattr(ladder_default, "touched_ladder", lambda *_: None)
+    monkeypatch.setattr(ladder_default, "_untaken", lambda own: UsageError("no probe"))
+    with pytest.raises(UsageError, match="no probe"):
+        ladder_default._touched(own, quick=True)  # type: ignore[arg-type]
+
+    def turned_over(mesh: object) -> None:
+        raise SceneError("3 cells are turned over")
+
+    monkeypatch.setattr(ladder_default, "squeezed", lambda *_: None)
+    monkeypatch.setattr(ladder_default, "require_positive_cells", turned_over)
+    assert not ladder_default._squeezable(own.scene)
+    monkeypatch.setattr(ladder_default, "require_positive_cells", lambda mesh: None)
+    assert ladder_default._squeezable(own.scene)

@@ -1,15 +1,26 @@
 """What an experiment gives its methods, and what a wider specimen means."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import pytest
 
 from validate.compare.verdict import Accept
-from validate.errors import UsageError
+from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording, Source
+from validate.replay import asked, calibrated, inclusion, refined
 from validate.replay.compression import compression, pressed
 from validate.replay.compression_cards import Compression, CompressionRanges, Gel, Specimen
+from validate.replay.experiment import Variant
+from validate.replay.find import _executed
+from validate.replay.followed import Followed
+from validate.replay.ladder import turned
 from validate.replay.method import Method
+from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
+from validate.scene.material import Material
+from validate.scene.material_point import Meshless
 from validate.solve.newmark import Newmark
 
 
@@ -41,3 +52,88 @@ def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
     assert made.identify((), card, methods).parameters == card
     with pytest.raises(UsageError, match=r"material.C01 = 500.0: no method .* only linear; set"):
         made.identify((), card, {"slip": methods["slip"]})
+
+
+def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> None:
+    """A time step that is neither the default nor the experiment's own."""
+    plain = Method("m", Newmark())
+    with pytest.raises(
+        UsageError, match=r"dt = 0.5 of 'm': the experiment sets 0.01; change its own parameter"
+    ):
+        Method("m", Newmark(dt=0.5)).given({"dt": 0.01})
+    assert plain.given({"dt": 0.01, "colour": 3}).dt == 0.01
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "says"),
+    [
+        (
+            lambda: asked.asked(bare(), Newmark()),
+            UsageError,
+            "x declares no calibration; name parameters with their bounds: --parameters PATH=LOW:",
+        ),
+        (
+            lambda: asked._on_all(bare(accept=(), accepted=(), methods={"m": None}), ()),
+            UsageError,
+            "x accepts nothing: declare a calibration in its file",
+        ),
+        (
+            lambda: calibrated.problem_of(
+                bare(calibrations=(SimpleNamespace(method="fine"),)), 0, (), None, {"m": None}, ()
+            ),
+            UsageError,
+            "calibration by 'fine': no such method; m",
+        ),
+        (
+            lambda: _executed(Path("x.unknown")),
+            UsageError,
+            "x.unknown cannot be loaded as Python",
+        ),
+        (
+            lambda: turned(Material(1.0, 0.3), 4),
+            SceneError,
+            "nothing moves without a density; give the material rho kg/m3",
+        ),
+        (
+            lambda: PressedOutline(holds=0),
+            UsageError,
+            r"outline: holds 0 \(1 to 50\), sd .* \(0 or above\)",
+        ),
+        (
+            lambda: PressedOutline(holds=3, sd=-1e-3),
+            UsageError,
+            r"outline: holds 3 \(1 to 50\), sd -0.001 \(0 or above\)",
+        ),
+    ],
+)
+def test_what_an_experiment_lacks_is_told(call: object, error: type, says: str) -> None:
+    with pytest.raises(error, match=says):
+        call()  # type: ignore[operator]
+
+
+def bare(**parts: object) -> SimpleNamespace:
+    return SimpleNamespace(**{"name": "x", "calibrations": (), "methods": {}, **parts})
+
+
+def test_a_run_without_a_mesh_has_no_body() -> None:
+    meshless = Meshless.__new__(Meshless)
+    with pytest.raises(SceneError, match="'law' was run on a scene without a mesh"):
+        Followed.body.__get__(SimpleNamespace(scene=meshless, label="law"))
+
+
+def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
+    def refuse(variant: object) -> None:
+        raise SceneError("a hole without a node")
+
+    road = SimpleNamespace(main=refuse)
+    own, other = Variant("m"), Variant("m", split=2)
+    assert refined._solved(road, other) is None  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="a hole without a node"):
+        refined._solved(road, own)  # type: ignore[arg-type]
+
+
+def test_an_inclusion_without_loads_compares_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inclusion, "driving", lambda *_: None)
+    streams = SimpleNamespace(stage="stage")
+    with pytest.raises(ComparisonError, match="no loads: nothing would be compared; set stage po"):
+        inclusion.placed(None, None, None, None, streams, {}, (), ())  # type: ignore[arg-type]

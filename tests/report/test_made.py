@@ -10,6 +10,7 @@ import pytest
 from report_samples import small_result
 
 from validate.parameters import Changed
+from validate.report import environment as module
 from validate.report.environment import environment
 from validate.report.exhibits import draw_all
 from validate.report.html import page
@@ -140,3 +141,18 @@ def test_the_machine_is_described() -> None:
     found = environment()
     assert {"cpu", "cpu_count", "memory", "os", "python", "numpy", "scipy", "numba"} <= set(found)
     assert all(found.values())
+
+
+@pytest.mark.parametrize("error", [AttributeError, ValueError, OSError])
+def test_a_machine_that_does_not_say_its_memory(
+    error: type[Exception], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown(name: str) -> int:
+        raise error(name)
+
+    monkeypatch.setattr(module.os, "sysconf", unknown)
+    assert module._memory() == "unknown"
+    sizes = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**20}
+    monkeypatch.setattr(module.os, "sysconf", sizes.__getitem__)
+    assert module._memory() == "4.0 GiB"
+    assert module._version("no-such-distribution") == "not installed"

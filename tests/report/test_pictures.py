@@ -1,6 +1,7 @@
 """Pictures that are no charts: registration, errors over noise, images with what was found."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from report_samples import small_result
 from validate.recording.images.outline import outlines_of
 from validate.recording.types import Contours, Frames, Recording, Source
 from validate.register.quality import Registration, register_points
+from validate.report import outline_images as module
 from validate.report.observed import Held
 from validate.report.outline_images import outline_images
 from validate.report.over_noise import noise_rows, over_noise
@@ -152,3 +154,14 @@ def test_outlines_recorded_as_such_show_no_images(recording: Recording) -> None:
     bare = replace(recording, contours={"outline": made})
     assert outline_images(bare, "outline", HOLDS, SECTIONS[:2], "a model") == ()
     assert outline_images(recording, "another", HOLDS, SECTIONS[:2], "a model") == ()
+
+
+def test_an_outline_that_was_pressed_flat_has_no_circle(monkeypatch: pytest.MonkeyPatch) -> None:
+    angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    ring = 5e-3 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    monkeypatch.setattr(module, "_outline", lambda *_: ring * [1.0, 0.2])
+    assert module._circle(SimpleNamespace(sd=0.0), None) is None  # type: ignore[arg-type]
+    monkeypatch.setattr(module, "_outline", lambda *_: ring)
+    found = module._circle(SimpleNamespace(sd=1e-5), None)  # type: ignore[arg-type]
+    assert found is not None
+    assert found.radius == pytest.approx(5e-3)
