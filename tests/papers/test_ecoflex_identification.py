@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
 
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
+from validate.papers.ecoflex import cylinder as cylinder_module
 from validate.papers.ecoflex.cylinder import (
     CylinderModel,
     LoggedCylinder,
@@ -136,3 +137,10 @@ def test_what_logs_say_differently_is_asked_for(project_root: Path) -> None:
     with pytest.raises(UsageError, match=r"specimen.height \(m\) is not set\. The rec") as refused:
         opened(mixed, mixed.parameters)
     assert "specimen.diameter" not in str(refused.value)
+
+
+def test_a_cylinder_without_a_modulus_has_no_scene() -> None:
+    p = SimpleNamespace(material=SimpleNamespace(E_slip=None))
+    model = SimpleNamespace(modulus="slip")
+    with pytest.raises(RecordingError, match=r"no modulus identified; set material.E_slip"):
+        cylinder_module.build(None, p, model)  # type: ignore[arg-type]

@@ -1,12 +1,15 @@
 """The planar block of paper 000, section 3.3: numbers computed apart, every set-up, refusals."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from validate.errors import SceneError, UsageError
+from validate.papers.fluid_block import block as block_module
+from validate.papers.fluid_block import curves, updates
 from validate.papers.fluid_block.block import (
     Cavities,
     FluidBlock,
@@ -210,3 +213,44 @@ def test_the_recording_is_seeded() -> None:
     other = record(replace(p, twin=replace(p.twin, seed=4)), silent)
     assert not np.array_equal(one.signals["force"].y, other.signals["force"].y)
     assert one.metadata["provenance"]["plane"] == "strain"
+
+
+def ended(*_: object) -> SimpleNamespace:
+    """A run that did not reach its end."""
+    return SimpleNamespace(finished=False, outcome=SimpleNamespace(why="diverged at step 3"))
+
+
+def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(block_module, "march", ended)
+    with pytest.raises(SceneError, match="the twin: diverged at step 3"):
+        block_module.record(FluidBlock(), lambda what: None)
+
+
+def test_a_volume_that_no_pressure_gives_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wall that does not move keeps its volume at any pressure: 1 of the wanted 3."""
+    monkeypatch.setattr(curves, "_wall", lambda surface, x, A, u, P: u)
+    monkeypatch.setattr(curves, "volume_of", lambda surface, x: 1.0)
+    still = np.zeros((2, 2))
+    with pytest.raises(
+        SceneError, match="no pressure with following normals gives the volume 3: o"
+    ):
+        curves._follower(None, still, None, still, 3.0, 0.0)
+
+
+def test_septa_that_cannot_be_meshed_are_rows_with_their_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = updates.pressed
+
+    def thick_only(p: Any, *rest: Any, count: int, **more: Any) -> Any:
+        if count > 1:
+            raise SceneError("cavities touch")
+        return made(p, *rest, count=count, **more)
+
+    monkeypatch.setattr(updates, "pressed", thick_only)
+    monkeypatch.setattr(updates, "_MOST", 3)
+    exhibit, _ = several_exhibit(FluidBlock(), lambda what: None)
+    table = next(t for t in exhibit.tables if any("cavities touch" in row for row in t.rows))
+    refused = [row for row in table.rows if row[-1] == "cavities touch"]
+    assert len(refused) == 2 * len(updates._SEPTA)
+    assert {row[0] for row in refused} == {2, 3}

@@ -4,12 +4,14 @@ import os
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, SceneError
+from validate.papers.ekf_nfem import haptic as haptic_module
 from validate.papers.ekf_nfem import haptic_exhibits
 from validate.papers.ekf_nfem.haptic import (
     STOPS,
@@ -213,3 +215,23 @@ def test_a_loop_that_is_first_takes_its_simulation_along(monkeypatch: pytest.Mon
     assert asked == []
     _first_too((7,))
     assert asked == [(7, os.SCHED_FIFO, os.sched_get_priority_min(os.SCHED_FIFO))]
+
+
+def ended(*_: object) -> SimpleNamespace:
+    """A run that did not reach its end."""
+    return SimpleNamespace(finished=False, outcome=SimpleNamespace(why="diverged at step 3"))
+
+
+def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    t, x = np.arange(3.0), np.zeros((3, 3))
+    loop = SimpleNamespace(prepare=lambda system: None)
+    for name, found in (
+        ("way", lambda *_: (t, x)), ("touched_place", lambda *_: None), ("march", ended),
+        ("touchable_liver", lambda p: None), ("liver_under", lambda *_: None),
+        ("replace", lambda *_, **__: loop), ("build_system", lambda scene: None),
+    ):  # fmt: skip
+        monkeypatch.setattr(haptic_module, name, found)
+    hand = SimpleNamespace(spring=1, reach=1, pad=1, grip=1, limit=1)
+    p = SimpleNamespace(path=SimpleNamespace(rate=500.0), hand=hand)
+    with pytest.raises(SceneError, match="the twin: diverged at step 3"):
+        haptic_module.record(p, lambda what: None)

@@ -3,12 +3,14 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.errors import RecordingError, SceneError
+from validate.errors import RecordingError, SceneError, UsageError
+from validate.papers.needle_pocket import twin as twin_module
 from validate.papers.needle_pocket.hand import STOPS, Hand, closed, moved
 from validate.papers.needle_pocket.judged import follows
 from validate.papers.needle_pocket.loops import LAWS, around, turn_energy
@@ -228,3 +230,23 @@ def test_the_cube_is_drawn_cut_at_the_needle_and_turned_up() -> None:
     same, v = half(block(), np.zeros_like(block().nodes), 0.0)
     assert same is block()
     assert v.shape == block().nodes.shape
+
+
+def ended(*_: object) -> SimpleNamespace:
+    """A run that did not reach its end."""
+    return SimpleNamespace(finished=False, outcome=SimpleNamespace(why="diverged at step 3"))
+
+
+def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(twin_module, "march", ended)
+    loop = SimpleNamespace(prepare=lambda system: None)
+    monkeypatch.setattr(twin_module, "NeedleLoop", lambda **_: loop)
+    monkeypatch.setattr(twin_module, "build_system", lambda scene: None)
+    with pytest.raises(SceneError, match="the twin: diverged at step 3"):
+        record(NeedlePocket(), lambda what: None)
+
+
+@pytest.mark.parametrize("bad", [{"depth": 0.0}, {"rate": 0.0}, {"tremor": -1e-3}])
+def test_a_hand_that_does_not_move_is_refused(bad: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match=r"deep at .* Hz with a tremor of .* must be above 0"):
+        replace(Hand(1e-3, 1e-3, 500.0, 0.0, 1), **bad)  # type: ignore[arg-type]

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
+from validate.papers.skin_pads import files as files_module
 from validate.papers.skin_pads.files import FORCE, paired, read_folder
 from validate.papers.skin_pads.placed import Images, binned, place, spurious
 from validate.papers.skin_pads.sheet import (
@@ -240,3 +242,33 @@ def test_a_linear_law_fitted_to_4_mm_differs_at_8_mm(project_root: Path, shared_
     assert linear.scene.force_unit == FORCE
     found = {s.name: s.value for s in result.identified}
     assert found["material.E_linear"] == pytest.approx(28.1, rel=0.03)
+
+
+def test_files_of_a_test_that_do_not_belong_together_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.dat").write_text("1 2\n3 4\n")
+    assert files_module.numbers(tmp_path / "a.dat").tolist() == [[1, 2], [3, 4]]
+    monkeypatch.setattr(files_module, "_LARGEST", 7)
+    with pytest.raises(RecordingError, match=r"a.dat: 8 bytes of numbers, at most 64 MB"):
+        files_module.numbers(tmp_path / "a.dat")
+    sizes = iter((5, 4, 5))
+    monkeypatch.setattr(files_module, "numbers", lambda path: None)
+    monkeypatch.setattr(files_module, "_states", lambda *_: np.zeros((next(sizes), 3, 2)))
+    with pytest.raises(RecordingError, match=r"5 states of the points, \[4, 5\] of the marks"):
+        files_module._tracked(tmp_path)
+
+
+def test_a_log_without_samples_at_its_zero_needs_a_larger_bin() -> None:
+    t = np.arange(50.0)
+    d = np.append(np.zeros(2), np.linspace(5e-3, 9e-3, 48))
+    signals = {"displacement": d, "force": 1e3 * d}
+    recording = SimpleNamespace(
+        name="r", record=lambda name: {"displacement_m": "0"},
+        signal=lambda name, unit: SimpleNamespace(t=t, y=signals[name][:, None]),
+    )  # fmt: skip
+    p = SimpleNamespace(bin=1e-3, predict_to=9e-3)
+    with pytest.raises(
+        RecordingError, match="r: 2 samples within 1 mm of the zero of displacement,"
+    ):
+        binned(recording, p)  # type: ignore[arg-type]

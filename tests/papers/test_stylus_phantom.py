@@ -1,6 +1,7 @@
 """A stylus on landmarks: the pose is fitted, each landmark is predicted from the others."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from sequences import sequence
 
 from validate.arrays import Floats, rms
 from validate.errors import RecordingError, RegistrationError, UsageError, ValidateError
+from validate.papers.stylus import phantom as phantom_module
+from validate.papers.stylus import plus, shown
 from validate.papers.stylus.phantom import StylusPhantom, digitised, load, stated
 from validate.papers.stylus.shown import apart, mean_error
 from validate.parameters import with_values
@@ -140,3 +143,23 @@ def test_bad_input_is_one_line(shared_data: Path, values: dict[str, str], said: 
         compare(experiment("stylus_phantom"), values)
     assert isinstance(raised.value, ValidateError)
     assert "\n" not in str(raised.value)
+
+
+def test_landmarks_that_are_not_declared_or_not_found_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    devices = SimpleNamespace(name="d.xml", landmarks={})
+    with pytest.raises(RecordingError, match=r"d.xml: no landmarks in its PhantomDefinition"):
+        phantom_module._landmarks(devices)  # type: ignore[arg-type]
+    t = np.arange(100) / 20
+    moving = np.linspace([0.0, 0, 0], [1.0, 0, 0], 100)
+    known = np.eye(3)
+    with pytest.raises(RegistrationError, match="0 of 3 landmarks by the detection of PLUS"):
+        plus.by_plus(t, moving, moving, known)
+    monkeypatch.setattr(shown, "shaft_of", lambda *_: moving)
+    mine = SimpleNamespace(t=t, x=moving, known=known)
+    said = shown._by_plus(None, None, mine)  # type: ignore[arg-type]
+    assert said == (
+        "The detection of PLUS itself is not held beside ours: 0 of 3 landmarks by the detection "
+        "of PLUS."
+    )

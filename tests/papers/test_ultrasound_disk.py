@@ -1,6 +1,7 @@
 """A disk in B-mode images: found in each, its diameter predicted by the nominal one."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from sequences import tracked
 
 from validate.compare.result import Result
 from validate.errors import RecordingError, UsageError
+from validate.papers.disk import disk as disk_module
 from validate.replay import compare, load
 
 DISK = "ultrasound/disk/bmode_PWI_disk.mat"
@@ -90,3 +92,47 @@ def test_the_disk_of_two_centimetres(shared_data: Path) -> None:
     assert values["diameter.sd"] == pytest.approx(0.095e-3, abs=0.02e-3)
     assert values["scale.factor"] == pytest.approx(1.005, abs=0.002)
     assert values["scale.confidence"] == pytest.approx(0.028, abs=0.003)
+
+
+def test_images_in_which_few_disks_are_found_say_what_was_looked_for(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    calls = iter(range(9))
+
+    def one_of_five(*_: object, **__: object) -> object:
+        i = next(calls)
+        if i != 2:
+            raise RecordingError(f"no wall in call {i}")
+        return SimpleNamespace()
+
+    frames = SimpleNamespace(images=[None] * 5, m_per_px=(1e-4, 1e-4))
+    recording = SimpleNamespace(name="r", frame=lambda topic: frames)
+    for name, found in (
+        ("found", lambda *_: tmp_path), ("_read", lambda *_: recording),
+        ("_topic", lambda *_: "images"), ("extract_outline", one_of_five),
+    ):  # fmt: skip
+        monkeypatch.setattr(disk_module, name, found)
+    with pytest.raises(
+        RecordingError,
+        match=r"found in 1 of 5 images; first refusal: no wall in call 0; it was taken to be "
+        "bright: --set image.bright=False",
+    ):
+        disk_module.load(disk_module.ImagedDisk(), tmp_path)
+
+
+def test_images_without_a_scale_name_the_setting_of_a_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def asks(*_: object) -> None:
+        raise UsageError("x.mat states no unit of length")
+
+    monkeypatch.setattr(disk_module, "recognised", lambda path: SimpleNamespace(read=asks))
+    monkeypatch.setattr(disk_module, "_options", lambda *_: {})
+    with pytest.raises(UsageError, match=r"no unit of length; in a run --set image.m_per_px=0.1mm"):
+        disk_module._read(tmp_path, None)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("diameter", [0.0, -1.0, 1.0, float("nan")])
+def test_a_disk_has_a_diameter_of_a_disk(diameter: float) -> None:
+    with pytest.raises(UsageError, match=f"disk.diameter = {diameter:g} m: above 0, below 1 m"):
+        disk_module.Disk(diameter)

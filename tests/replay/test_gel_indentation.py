@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 
-from validate.errors import RecordingError, UsageError
+from validate.errors import RecordingError, RegistrationError, UsageError
+from validate.papers.gel import between as between_module
+from validate.papers.gel import box as box_module
+from validate.papers.gel import pair as pair_module
 from validate.papers.gel.between import RATIOS, best_ratio, solved
 from validate.papers.gel.box import FACES, GelIndentation, _axis, load, stated
 from validate.papers.gel.pair import motion, side_of
@@ -119,3 +123,51 @@ def test_the_upper_box_is_predicted_by_the_lower_one(
     (upper,) = (t for e in result.exhibits for t in e.tables if t.name == "errors_over_strain")
     row = dict(zip(upper.headings, upper.rows[-1], strict=True))
     assert row["linear / floor (1)"] < 2.0 < 2.4 < row["laplace / floor (1)"]  # type: ignore[operator]
+
+
+def test_boxes_with_too_few_particles_are_refused_or_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    boxes = SimpleNamespace(which="lower")
+    fewest = box_module._FEWEST
+    box_module._require(fewest, boxes, 2e-6)  # type: ignore[arg-type]
+    with pytest.raises(
+        RegistrationError, match=f"{fewest - 1} linked particles in the lower box more than 2.0 um"
+    ):
+        box_module._require(fewest - 1, boxes, 2e-6)  # type: ignore[arg-type]
+
+    def few(whose: object, name: str, other: object) -> list[str]:
+        if name == "empty":
+            raise RegistrationError("3 linked particles")
+        return [name]
+
+    inside = SimpleNamespace(ends=lambda: (np.full(3, 0.4), np.full(3, 0.6)))
+    beyond = SimpleNamespace(ends=lambda: (np.full(3, 0.4), np.full(3, 1.6)))
+    around = [("own", inside), ("empty", inside), ("beyond", beyond), ("other", inside)]
+    for name, found in (
+        ("motion", lambda recording: (np.array([np.zeros(3), np.ones(3)]), None)),
+        ("replace", lambda box, which: box), ("_around", lambda box: around), ("_fitted", few),
+    ):  # fmt: skip
+        monkeypatch.setattr(between_module, name, found)
+    whose = SimpleNamespace(recording=None)
+    assert between_module.between.__wrapped__(whose, None) == ("own", "other")  # type: ignore[arg-type]
+
+
+def test_a_ratio_that_is_open_and_clouds_that_are_none_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    p = SimpleNamespace(material=SimpleNamespace(nu=None))
+    with pytest.raises(
+        UsageError, match=r"material.nu is open: identify it, or --set material.nu="
+    ):
+        box_module.build(None, p, None)  # type: ignore[arg-type]
+    points = SimpleNamespace(x=np.zeros((1, 4, 2)))
+    for markers, says in (
+        ({}, "a.mat: 0 clouds of points, one needed"),
+        ({"P": points}, "a.mat: points in 2 dimensions, 3 needed"),
+    ):
+        recording = SimpleNamespace(markers=markers, source=None)
+        reader = SimpleNamespace(read=lambda *_, recording=recording: recording)
+        monkeypatch.setattr(pair_module, "recognised", lambda path, reader=reader: reader)
+        with pytest.raises(RecordingError, match=says):
+            pair_module.cloud(Path("a.mat"), 1e-6)
