@@ -14,7 +14,7 @@ from validate.estimate.consistency import nees, nees_consistency, nis_consistenc
 from validate.estimate.covariance import Decoupled
 from validate.estimate.displacement_filter import DisplacementStepper, Estimate, Structure
 from validate.estimate.gains import Claims, gain_sequence, schedule
-from validate.estimate.kalman import Gaussian, kf_predict, kf_update
+from validate.estimate.kalman import Gaussian, best_gain, kf_predict, kf_update
 from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
 from validate.estimate.load_scale import LoadScale, ScaleCore
 from validate.estimate.measurements import Measurements, timetable
@@ -528,3 +528,18 @@ def test_riccati_by_doubling_is_that_by_schurs_form() -> None:
     assert np.abs(X - solve_discrete_are(A, B, Q, np.eye(2))).max() < 1e-9 * np.abs(X).max()
     with pytest.raises(ValueError, match="does not settle"):
         _doubled(1.5 * np.eye(2), np.zeros((2, 2)), np.eye(2))
+
+
+@pytest.mark.parametrize("name", ["start", "walk", "jitter"])
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+def test_the_doubt_of_a_load_is_a_number_of_at_least_zero(name: str, value: float) -> None:
+    with pytest.raises(SceneError, match=rf"doubt of the load, {name} = {value:g}: a number >= 0"):
+        LoadDoubt(**{"start": 0.0, "walk": 0.0, name: value})
+
+
+def test_a_covariance_of_innovations_that_is_not_positive_names_its_pivot() -> None:
+    wrong = np.diag([1.0, -2.0])
+    with pytest.raises(np.linalg.LinAlgError, match=r"S_yy \(2, 2\) is .* definite \(pivot 2\)"):
+        best_gain(np.eye(2), wrong)
+    seen = best_gain(np.eye(2), np.diag([4.0, -2.0]), (True, False))
+    assert seen.G.tolist() == [[0.25], [0.0]]

@@ -1,6 +1,7 @@
 """The reduced filter: exact on its own linear model, and what it gains where the model is wrong."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.stats import chi2
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
+from validate.estimate import reduced_ekf
 from validate.estimate.explicit_step import explicit_step
 from validate.estimate.measurements import Measurements
 from validate.estimate.reduced_basis import modes, pod
@@ -311,3 +313,18 @@ def test_the_table_of_the_science_note_at_3840_tetrahedra() -> None:
     for form, limit in (("pod", 0.06), ("pod steady", 0.06), ("modes", 0.15)):
         seen = run(FORMS[form].prepare(stiff, measured), H, inputs, 25)
         assert error(seen.u, truth) < limit
+
+
+def test_noise_of_loads_that_move_no_shape_and_steps_that_are_none() -> None:
+    still = SimpleNamespace(
+        masses=np.ones(6), loads=np.zeros((6, 1)),
+        scene=SimpleNamespace(mesh=SimpleNamespace(dimension=3)),
+    )  # fmt: skip
+    basis = SimpleNamespace(Phi=np.eye(6)[:, :2], squares=np.ones(2))
+    white = reduced_ekf._directions(ReducedEKF(dt=1e-3), still, basis)  # type: ignore[arg-type]
+    assert white.tolist() == [[2.0, 0.0], [0.0, 2.0]]
+    with pytest.raises(UsageError, match="noise='load' needs a load that moves the shapes; take n"):
+        reduced_ekf._directions(ReducedEKF(dt=1e-3, noise="load"), still, basis)  # type: ignore[arg-type]
+    for wrong in ({"dt": 0.0}, {"dt": 1e-3, "substeps": 0}):
+        with pytest.raises(UsageError, match=r"dt .* s in . substeps: both must be positive"):
+            ReducedEKF(**wrong)  # type: ignore[arg-type]

@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 from phantoms import CAPSULE, COARSE_GRID, PAPER_GRID, grid_mesh, phantom_mesh
 
 from validate.errors import SceneError
+from validate.fem import cavity as module
 from validate.fem.cavity import (
     CavitySurface,
     cavity_surface,
@@ -162,3 +163,13 @@ def test_one_facet_flipped_is_refused() -> None:
     flipped = Mesh(mesh.nodes, mesh.cells, "tet4", {"hole0": facets})
     with pytest.raises(SceneError, match="cavity 'box': at 3 edges two facets face opposite ways"):
         cavity_surface(flipped, "box", "hole0")
+
+
+@pytest.mark.parametrize("facets", [[[0, 1], [1, 2]], [[0, 1], [2, 1], [2, 0]]])
+def test_a_line_that_is_open_or_turns_back_bounds_no_cavity(facets: list[list[int]]) -> None:
+    def surface(rows: list[list[int]]) -> module.CavitySurface:
+        return module.CavitySurface("cyst", np.array(rows), np.arange(3))
+
+    module._require_closed_line(surface([[0, 1], [1, 2], [2, 0]]))
+    with pytest.raises(SceneError, match="cavity 'cyst' is open or its facets face opposite ways"):
+        module._require_closed_line(surface(facets))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from field_oracles import frequency_range
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem import critical as module
+from validate.fem import explicit
 from validate.fem.critical import (
     critical_step,
     element_frequencies,
@@ -182,3 +185,17 @@ def test_the_limit_of_a_stretched_body_is_lower() -> None:
 def test_a_missing_density_is_named() -> None:
     with pytest.raises(SceneError, match="set rho kg/m3"):
         critical_step(build(Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), HELD)))
+
+
+def test_what_has_no_critical_step_says_why() -> None:
+    assert module._density(Material(1.0, 0.3, rho=5.0)) == 5.0
+    with pytest.raises(SceneError, match="a critical step needs the density; set rho kg/m3 of eve"):
+        module._density(Material(1.0, 0.3))
+    scene = SimpleNamespace(
+        mesh=SimpleNamespace(kind="tet4"), material=Material(1.0, 0.3, "svk"), regions=(),
+        membranes=(None,), dilatation="pointwise",
+    )  # fmt: skip
+    with pytest.raises(
+        SceneError, match="membranes are linear only: drop them, or take the linear"
+    ):
+        explicit._require(scene)  # type: ignore[arg-type]

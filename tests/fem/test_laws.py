@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from law_samples import NAMES, sample
 
 from validate.arrays import Floats
+from validate.errors import SceneError
 from validate.fem.laws import law_of
 from validate.fem.stretch_response import response
 from validate.scene.laws import LAWS, Coefficients, VolumetricName, ogden_terms
@@ -179,3 +180,13 @@ def test_volume_work_of_both_forms() -> None:
     assert split.stress(H) == pytest.approx(split.kappa / 2 * (l**6 - 1) / l * EYE, rel=1e-13)
     exact = split.mu * (l - 1 / l) + 3 * lam * np.log(l) / l
     assert coupled.stress(H) == pytest.approx(exact * EYE, rel=1e-13)
+
+
+def test_what_has_no_form_at_large_strain_or_no_isochoric_part_is_refused() -> None:
+    with pytest.raises(
+        SceneError, match=r"law 'linear' has no form at large strain; choose one of"
+    ):
+        law_of(Material(1.0, 0.3))
+    coupled = Material(1.0, 0.3, "neo_hooke", coefficients=Coefficients(volumetric="coupled"))
+    with pytest.raises(SceneError, match="law 'neo_hooke' in its coupled form has no isochoric pa"):
+        law_of(coupled, isochoric=True)

@@ -17,7 +17,7 @@ from validate.recording.exports.instron import read_instron
 from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.scatter import REPEATS, repeats_share
+from validate.recording.scatter import REPEATS, SHARE, repeats_share
 from validate.recording.types import Recording
 from validate.register.signals import validating
 from validate.replay.compression import compression, pressed
@@ -208,3 +208,14 @@ def test_what_no_machine_wrote_and_loadings_apart_are_refused(tmp_path: Path) ->
     far = [log(tmp_path, f"far{i}", 1.0, d=np.where(D > 0, D + 5.0 * i, 0.0)) for i in range(2)]
     with pytest.raises(RecordingError, match=r"share the displacements .* mm with \d samples"):
         averaged(far, ("1", "2"), "mean")
+
+
+@pytest.mark.parametrize("share", ["a tenth", "-0.1", "nan", "inf"])
+def test_a_share_that_is_no_number_names_its_record(share: str, tmp_path: Path) -> None:
+    (one,) = logs(tmp_path, 1.0)
+    assert repeats_share(one) == 0.0
+    damaged = replace(one, metadata={REPEATS: {SHARE: share}})
+    with pytest.raises(
+        RecordingError, match=f"log0: record '{REPEATS}': {SHARE} '{share}' is no n"
+    ):
+        repeats_share(damaged)

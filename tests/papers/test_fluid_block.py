@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from validate.errors import SceneError, UsageError
+from validate.errors import ComparisonError, SceneError, UsageError
 from validate.papers.fluid_block import block as block_module
 from validate.papers.fluid_block import curves, updates
 from validate.papers.fluid_block.block import (
@@ -22,6 +22,7 @@ from validate.papers.fluid_block.block import (
 from validate.papers.fluid_block.curves import condensed_block, curve_exhibit, curve_of
 from validate.papers.fluid_block.other_laws import laws_exhibit
 from validate.papers.fluid_block.updates import several_exhibit, updates_exhibit
+from validate.recording.types import Recording, Source
 from validate.replay import load as experiment_named
 from validate.replay.options import Options
 from validate.replay.road import compare
@@ -254,3 +255,24 @@ def test_septa_that_cannot_be_meshed_are_rows_with_their_reason(
     refused = [row for row in table.rows if row[-1] == "cavities touch"]
     assert len(refused) == 2 * len(updates._SEPTA)
     assert {row[0] for row in refused} == {2, 3}
+
+
+def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(curves, "pressure_load", lambda surface, x: x)
+    x = np.array([[1.0], [2.0]])
+    with pytest.raises(
+        SceneError, match=r"the wall does not settle at 1 Pa: it still moves by .* m"
+    ):
+        curves._wall(None, x, 2.0 * np.eye(2), np.zeros_like(x), 1.0)
+    settled = curves._wall(None, x, 0.5 * np.eye(2), np.zeros_like(x), 1.0)
+    assert settled == pytest.approx(x, rel=1e-9)  # u = (x + u)/2
+    recording = Recording("r", Source("r", "", 0, ""), 0)
+    for name in ("driving", "validating"):
+        monkeypatch.setattr(block_module, name, lambda *_, **__: None)
+    scene = SimpleNamespace(cavities=(SimpleNamespace(name="cavity0"),))
+    with pytest.raises(
+        ComparisonError, match=r"r: no signal 'pressure0' for cavity 0 of 1; it has"
+    ):
+        block_module.place(recording, FluidBlock(), scene)  # type: ignore[arg-type]

@@ -329,3 +329,8 @@ def test_the_loaded_swing_is_predicted_from_the_one_under_gravity(
     assert abs(checks["tip.vertical.rms@settled"].value) < 1e-3
     assert not {c.verdict for c in checks.values()} & {"fitted", "differs"}
     assert {p.verdict for p in result.published} == {"reproduced"}
+
+
+def test_a_recording_without_markers_is_no_beam() -> None:
+    with pytest.raises(RecordingError, match="r: no markers; record those of a motion capture"):
+        named(Recording("r", Source("r", "", 0, ""), 0))

@@ -150,3 +150,9 @@ def test_the_strip_of_others(shared_data: Path) -> None:
     assert [row[1] for row in tracker.rows] == [3476, 3475]
     assert all(row[4] == pytest.approx(1.5, abs=0.2) for row in tracker.rows)  # um, along
     assert all(row[7] == pytest.approx(0.255, abs=0.01) for row in tracker.rows)  # um, one point
+
+
+@pytest.mark.parametrize(("states", "patches"), [(1, 4), (5, 1)])
+def test_a_ratio_needs_two_states_and_two_patches(states: int, patches: int) -> None:
+    with pytest.raises(RecordingError, match=f"{states} states in {patches} patches: at least two"):
+        stretches(np.zeros((states, 40, 3)), patches)

@@ -340,3 +340,45 @@ def test_a_folder_of_too_many_files_is_refused(
     monkeypatch.setattr(dicom_files, "_MOST", 2)
     with pytest.raises(RecordingError, match="3 files, the limit is 2; split the folder"):
         dicom_files.files_of(tmp_path)
+
+
+def test_a_region_that_reaches_beyond_its_image_was_resized() -> None:
+    with pytest.raises(
+        UsageError, match="region ends at pixel 9, 5 of an image of 8 x 6: it was r"
+    ):
+        dicom._box(Path("x.dcm"), np.array([0.0, 0.0, 9.0, 5.0]), 8, 6)
+
+
+def test_files_of_a_folder_that_are_no_one_loop_say_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def sets(*numbers: int | None, many: int = 1) -> list[pydicom.Dataset]:
+        made = []
+        for number in numbers:
+            ds = pydicom.Dataset()
+            ds.NumberOfFrames = many
+            if number is not None:
+                ds.InstanceNumber = number
+            made.append(ds)
+        return made
+
+    monkeypatch.setattr(dicom_arrays, "_read", lambda ds: ds)
+    monkeypatch.setattr(dicom_arrays, "files_of", lambda found: found)
+    assert [ds.InstanceNumber for ds in dicom_arrays._series(sets(2, 1))] == [1, 2]
+    for found, says in (
+        (sets(1, 2, many=3), "2 files of several images each; import them one by one"),
+        (sets(1, 1, 2), "2 instance numbers of 3 files"),
+        (sets(1, None), "2 instance numbers of 2 files"),
+    ):
+        with pytest.raises(RecordingError, match=says):
+            dicom_arrays._series(found)  # type: ignore[arg-type]
+
+
+def test_what_unpacks_to_too_much_is_refused_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = deflated(tmp_path / "x.dcm", None)
+    dicom_arrays._require_few_bytes(path)
+    monkeypatch.setattr(dicom_arrays, "_PACKED", 1000)
+    with pytest.raises(
+        RecordingError, match="it unpacks to over 1000 bytes; save it without deflat"
+    ):
+        dicom_arrays._require_few_bytes(path)

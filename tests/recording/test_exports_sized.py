@@ -1,13 +1,17 @@
 """Tables of stress, strain and stretch: force and displacement by sizes that are said."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError, ValidateError
+from validate.recording.exports import encoding, every, repeats, sized
+from validate.recording.exports.columns import Pick, Said
 from validate.recording.exports.instron import read_instron
 from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.readers import READERS
 from validate.recording.types import Recording
 
 E = np.linspace(0.0, 0.4, 41)  # engineering strain of the path
@@ -209,3 +213,41 @@ def test_real_stretches_and_stresses(shared_data: Path) -> None:
 def test_two_directions_are_asked_about(shared_data: Path) -> None:
     with pytest.raises(RecordingError, match=r"2 columns may be stress: .*--map area=314mm2"):
         read_instron(shared_data / "force/multimode/kawabata1981_biaxial.csv")
+
+
+def picked(role: str, *values: float) -> Pick:
+    return Pick(role, SimpleNamespace(label=role), "1", 1.0, np.array(values), None)  # type: ignore[arg-type]
+
+
+def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
+    assert sized._relative(picked("stretch", 1.0, 1.5), "", None).tolist() == [0.0, 0.5]
+    for values in ((1.0, 0.0), (1.0, sized._LONGEST + 1)):
+        with pytest.raises(
+            RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest and a"
+        ):
+            sized._relative(picked("stretch", *values), "", None)
+    with pytest.raises(
+        ValidateError, match="'strain' does not say whether the specimen is pressed"
+    ):
+        sized._signed(np.array([0.0, 0.1]), None, picked("strain"))
+
+
+def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = {"strain": Said("e", "%", -1.0)}
+    with pytest.raises(UsageError, match="--map strain: no sign; say --map test=compression or"):
+        sized._source("strain", None, said)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="--map repeated=both: expected first or last"):
+        repeats.without_repeats(None, Said("every", "1s", None), "both")  # type: ignore[arg-type]
+    mcap = next(reader for reader in READERS if reader.name == "mcap")
+    with pytest.raises(
+        UsageError, match=r"--map specimen=.*: x.mcap is .*, which has no specimens"
+    ):
+        every.every_specimen(mcap, tmp_path / "x.mcap", {})
+    (tmp_path / "a.csv").write_bytes(b"12345")
+    monkeypatch.setattr(encoding, "MAX_BYTES", 4)
+    with pytest.raises(RecordingError, match=r"a.csv: 5 bytes, the limit is 4"):
+        encoding.whole_file(tmp_path / "a.csv")
+    with pytest.raises(RecordingError, match="5 bytes, the limit for text tables is 4"):
+        encoding.decode(b"12345")

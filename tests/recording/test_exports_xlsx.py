@@ -17,7 +17,7 @@ from odf.text import P
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
 from validate.recording.exports.every import every_specimen
-from validate.recording.exports.xlsx import _Sheet, _tests, read_sheets, read_xlsx
+from validate.recording.exports.xlsx import _chosen, _Sheet, _tests, read_sheets, read_xlsx
 from validate.recording.formats import apart, sheets_arrays, xlsx_arrays
 from validate.recording.readers import recognised
 
@@ -202,3 +202,13 @@ def test_a_sheet_that_is_named_and_holds_no_table_says_why() -> None:
         _tests(sheets, None)
     with pytest.raises(RecordingError, match="in the sheets  of this workbook: no sheet"):
         _tests([], None)
+
+
+def test_two_sheets_that_may_hold_the_test_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    sheets = [_Sheet("first", {"": None}), _Sheet("second", {"": None})]  # type: ignore[dict-item]
+    monkeypatch.setattr(_Sheet, "is_test", property(lambda self: True))
+    with pytest.raises(
+        RecordingError, match="2 sheets may hold the test: 'first', 'second'; choose"
+    ):
+        _chosen(sheets, None)
+    assert _chosen(sheets, "second").name == "second"

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from validate.cli.main import main
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import matlab, matlab73_arrays, matlab_arrays
+from validate.recording.formats import matlab, matlab73_arrays, matlab_arrays, matlab_named
 from validate.recording.formats.matlab import read_matlab
 from validate.recording.formats.matlab_named import listing
 from validate.recording.mcap.read import read_recording
@@ -362,3 +362,32 @@ def test_displacements_of_one_point_have_times(tmp_path: Path) -> None:
     assert read_matlab(path, {"u": "u:mm", "rate": "10"}).signal("u", "m").t[1] == 0.1
     path = file_of(tmp_path, s=np.arange(4.0), **{name: np.arange(4.0) for name in names[1:]})
     assert read_matlab(path, {"u": "u:mm", "time": "s:s"}).signal("u", "m").t[1] == 1
+
+
+def test_times_have_no_sign_and_as_many_samples_as_what_they_tell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    t = np.arange(4.0)
+    with pytest.raises(UsageError, match="--map time=t:s:-: time has no sign to set"):
+        matlab_named.named_array("time", "t:s:-", {"t": t})
+    with pytest.raises(UsageError, match="force: 3 samples, the time of --map time= has 4"):
+        matlab_named._times("force", 3, t, {})
+    assert matlab_named._times("force", 4, t, {}) is t
+    with h5py.File(tmp_path / "x.mat", "w") as out:
+        out["P"] = np.zeros((4, 5))
+    monkeypatch.setattr(matlab73_arrays, "MOST", 19)
+    with pytest.raises(RecordingError, match="20 numbers, the limit is 19; split it"):
+        matlab73_arrays.arrays(tmp_path / "x.mat")
+
+
+def test_a_file_of_words_alone_and_one_of_curves_say_what_they_hold() -> None:
+    word = {"note": np.array("text")}
+    with pytest.raises(
+        RecordingError, match=r"neither points \(n, 2 or 3\) nor uint8 images .*; it"
+    ):
+        matlab._unnamed(Path("x.mat"), word, {})
+    curve = {"F": np.zeros(50), "d": np.zeros(9)}
+    with pytest.raises(
+        UsageError, match=r"no array shows what it is; .* as --map force=F:N --map ra"
+    ):
+        matlab._unnamed(Path("x.mat"), curve, {})

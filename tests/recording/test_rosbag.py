@@ -235,3 +235,8 @@ def test_another_missing_key_is_no_missing_definition(
             rosbag_arrays._opened(tmp_path / "x.db3", folder),
         ):
             pass
+
+
+def test_a_bag_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="nowhere: no such file or folder"):
+        read_bag(tmp_path / "nowhere", {})

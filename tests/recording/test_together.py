@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from validate.errors import RecordingError
+from validate.recording import together as module
 from validate.recording.alignment import Offset
 from validate.recording.together import (
     ClockDrift,
@@ -59,3 +61,20 @@ def test_a_drift_that_stays_adds_a_ramp_of_its_height(
     drift = ClockDrift(rate, sd, 5.0, 10.0 * np.sqrt(12))
     assert with_drift(offset, drift).sd == pytest.approx(expected, rel=1e-12)
     assert with_drift(offset, None) == offset
+
+
+def test_a_drift_that_does_not_settle_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_left", lambda *_: (1.0, 1.0))
+    with pytest.raises(
+        RecordingError, match=f"the drift does not settle within {module._TURNS} tu"
+    ):
+        drift_of(signal(T, motion(T)), signal(T, motion(T)), NO_OFFSET)
+
+
+def test_a_topic_of_two_files_is_told() -> None:
+    one = Recording("r", "measured", 0, signals={"f": signal(T, T)})  # type: ignore[arg-type]
+    module.require_other_topics([one])
+    with pytest.raises(
+        RecordingError, match=r"more than one file has \['f'\]: import one of them a"
+    ):
+        module.require_other_topics([one, one])

@@ -9,6 +9,7 @@ import pytest
 from validate.errors import RecordingError, UsageError
 from validate.recording.exports.instron import read_instron
 from validate.recording.formats.ndi import read_ndi
+from validate.recording.formats.options import length
 from validate.recording.formats.point_table import read_point_table
 from validate.recording.readers import recognised
 
@@ -224,3 +225,18 @@ def test_velocities_and_quaternions_beside_a_point_are_none(tmp_path: Path) -> N
     assert markers.names == ("p_R",)
     assert markers.x[:, 0, 0].tolist() == [0, 1, 2]
     assert np.allclose(markers.t, [0, 0.005, 0.01], rtol=0, atol=5e-7)  # ns since 1970 as float
+
+
+def test_rows_without_a_time_are_damage(tmp_path: Path) -> None:
+    head = "time,q0,qx,qy,qz,tx,ty,tz,error"
+    path = log(tmp_path / "x.csv", head, *(f"{t},{POSE.format(0)},0.1" for t in ("0", "", "0.2")))
+    with pytest.raises(RecordingError, match=r"x.csv: 1 rows without a time; damaged"):
+        read_ndi(path, {})
+
+
+@pytest.mark.parametrize("text", ["0", "-1mm", "5kg", "wide", "nan", "inf"])
+def test_a_length_is_above_zero_and_has_a_unit_of_length(text: str) -> None:
+    with pytest.raises(UsageError, match=f"--map side={text}: expected a length, as 0.1mm"):
+        length({"side": text}, "side", "0.1mm")
+    assert length({"side": "0"}, "side", "0.1mm", zero=True) == 0.0
+    assert length({"side": "mm"}, "side", "0.1mm") == 1e-3

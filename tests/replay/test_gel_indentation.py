@@ -171,3 +171,22 @@ def test_a_ratio_that_is_open_and_clouds_that_are_none_are_told(
         monkeypatch.setattr(pair_module, "recognised", lambda path, reader=reader: reader)
         with pytest.raises(RecordingError, match=says):
             pair_module.cloud(Path("a.mat"), 1e-6)
+
+
+def test_a_folder_of_one_file_and_pixels_of_no_size_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pair_module, "found", lambda *_: tmp_path)
+    (tmp_path / "a.mat").write_bytes(b"1")
+    with pytest.raises(
+        RecordingError, match="1 MATLAB files, a pair is needed: say which, --set be"
+    ):
+        pair_module.files(None, (None, None), tmp_path)
+    (tmp_path / "b.mat").write_bytes(b"2")
+    both = (tmp_path / "a.mat", tmp_path / "b.mat")
+    assert pair_module.files(None, (None, None), tmp_path) == both
+    assert pair_module.side_of(4e-7, both[0]) == 4e-7
+    with pytest.raises(
+        UsageError, match=r"a.mat is in pixels and nobody says their size; measure it"
+    ):
+        pair_module.side_of(None, both[0])

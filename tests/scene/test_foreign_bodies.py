@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from validate.cli.main import cli
 from validate.errors import SceneError, UsageError
 from validate.scene.body_facts import facts, odd_size, quality
-from validate.scene import foreign_mesh, vtu_series
+from validate.scene import foreign_mesh, meshio_arrays, vtu_series
 from validate.scene.box import grid
 from validate.scene.filled import filled
 from validate.scene.foreign_mesh import read_foreign
@@ -356,3 +356,18 @@ def test_a_series_of_two_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.M
     sizes["1.vtu"] = 5
     with pytest.raises(SceneError, match="files of different numbers of points"):
         vtu_series.arrays(tmp_path / "a.pvd")
+
+
+@pytest.mark.parametrize(
+    ("head", "says"),
+    [
+        (b"<VTKFile compressor='vtkLZ4DataCompressor'>", "packed by LZ4, which is not unpacked; "),
+        (b"# vtk DataFile\nDATASET POLYDATA", "surface"),
+    ],
+)
+def test_files_that_would_end_the_library_are_refused_first(
+    head: bytes, says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.vtu").write_bytes(head)
+    with pytest.raises(SceneError, match=says):
+        meshio_arrays.read_quietly(tmp_path / "a.vtu", "a.vtu")

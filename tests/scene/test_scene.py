@@ -87,3 +87,10 @@ def test_a_needle_touches_faces_of_simplices() -> None:
     with pytest.raises(SceneError, match="facets of 4 nodes in 3-D: a needle touches simplices"):
         Surface(np.zeros((1, 4), int), 3)
     assert Surface(np.zeros((1, 6), int), 3).facets.shape == (1, 6)
+
+
+@pytest.mark.parametrize("name", ["mass", "stiffness"])
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
+def test_damping_is_a_number_of_at_least_zero(name: str, value: float) -> None:
+    with pytest.raises(SceneError, match=f"{name} damping {value:g}: a number >= 0"):
+        Material(1.0, 0.3, **{f"{name}_damping": value})  # type: ignore[arg-type]

@@ -184,3 +184,19 @@ def test_a_reader_that_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) 
         surface_arrays._within(7),
     ):
         caught[0](0, None)  # type: ignore[operator]
+
+
+def test_a_filling_of_another_volume_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tetrahedron of 1/6 cm3 in a surface around 1 cm3, of which a hundredth may differ."""
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    found = {"points": corners, "cells.tetra": np.array([[0, 1, 2, 3]]), "enclosed": 1.0,
+             "may_differ": 0.01, "triangles": 12, "turned": 0}  # fmt: skip
+    monkeypatch.setattr(filled_module, "decoded", lambda *_: found)
+    (tmp_path / "a.stl").write_bytes(b"solid")
+    with pytest.raises(
+        SceneError,
+        match=r"a.stl: 12 triangles around 1 cm3, filled are 0.1667 cm3 \(-83.33 %\), where 1 %",
+    ):
+        filled(tmp_path / "a.stl", "cm")

@@ -1,6 +1,7 @@
 """Contact in statics: plates, Hertz, a punch, friction on a slope, and what is refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from contact_scenes import (
     traced,
     walked,
 )
+from scipy import sparse
 
 from validate.errors import SceneError
 from validate.fem.system import build
@@ -33,7 +35,9 @@ from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Drive, Load, Pin, Scene, Support
 from validate.scene.select import OnPlane
+from validate.solve.central import CentralDifference
 from validate.solve.contact import ContactNewton, ContactStepper
+from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
@@ -326,3 +330,31 @@ def test_schemes_without_contact_refuse_it() -> None:
 def test_graded_lines_reach_as_far() -> None:
     line = graded(0.1, 3, 2.0, 2.0)
     assert line == pytest.approx([0, 0.1, 0.2, 0.3, 0.5, 0.9, 1.7, 3.3])
+
+
+@pytest.mark.parametrize("wrong", [{"dt": 0.0}, {"tolerance": 0.0}, {"max_iterations": 0}])
+def test_settings_of_a_scheme_are_positive(wrong: dict[str, float]) -> None:
+    for scheme in (ContactNewton, NewtonDynamics):
+        with pytest.raises(
+            SceneError, match=r"dt .* s, tolerance .*, .* iterations: all must be p"
+        ):
+            scheme(**wrong)  # type: ignore[arg-type]
+    for margin in (-0.1, 1.0):
+        with pytest.raises(SceneError, match=f"margin {margin:g}: a share of the critical step, 0"):
+            CentralDifference(margin=margin)
+
+
+def test_a_tangent_of_touching_bodies_that_is_indefinite_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One unknown of stiffness -1 N/m: no correction of Newton leads to balance."""
+    one = sparse.csr_array(-np.eye(1))
+    stepper = SimpleNamespace(
+        body=SimpleNamespace(tangent=lambda u, pressures: one), C=0 * one, masses=np.zeros(1),
+        rank=np.zeros(1, int),
+    )  # fmt: skip
+    held = SimpleNamespace(L=sparse.csr_array(np.eye(1)), T=sparse.csr_array(np.eye(1)), S=None,
+                           kept=np.zeros(1, int), off=np.zeros(1), du=np.zeros(1))  # fmt: skip
+    rates = SimpleNamespace(p=0.0, q=0.0)
+    with pytest.raises(SceneError, match=r"tangent not positive definite \(1 negative pivots\)"):
+        ContactStepper._correction(stepper, np.zeros(1), None, rates, held)  # type: ignore[arg-type]

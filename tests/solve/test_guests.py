@@ -7,6 +7,7 @@ import shlex
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,8 +21,10 @@ from validate.scene.box import grid
 from validate.scene.material import Material, Region
 from validate.scene.scene import Drive, Load, Pin, Probe, Scene, Support, Weight
 from validate.scene.vtu import write_vtu
+from validate.solve.guests import fields as fields_module
 from validate.solve.guests import job, limits, ran
 from validate.solve.guests.answer import echoed
+from validate.solve.guests.fields import NoAnswerError
 from validate.solve.guests.guest import Guest, run_of
 from validate.solve.guests.job import write_job
 from validate.solve.guests.ran import Ended
@@ -401,3 +404,11 @@ def test_a_program_that_cannot_be_started_is_one_line(
     with pytest.raises(SystemExit, match="127"):
         limits.become(["solver", "job"], 2**30, 2**20)
     assert capsys.readouterr().out == "solver: Permission denied\n"
+
+
+def test_an_answer_that_unpacks_to_more_than_the_job_has_is_not_unpacked(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "fields.npz", u=np.zeros(10**6))
+    mesh = SimpleNamespace(nodes=np.zeros((4, 3)))
+    asked = SimpleNamespace(scene=SimpleNamespace(mesh=mesh), times=np.zeros(2))
+    with pytest.raises(NoAnswerError, match=r"fields.npz: 8000\d\d\d bytes unpacked, the job has"):
+        fields_module._arrays(tmp_path / "fields.npz", asked)  # type: ignore[arg-type]

@@ -1,6 +1,7 @@
 """Asynchronous regions: exact truths first, then orders of error, stability and refusals."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from validate.papers.async_regions.bodies import (
 )
 from validate.scene.scene import Scene
 from validate.solve.march import run_scheme
+from validate.solve.region_body import RegionBody
 from validate.solve.region_map import layers_from, ratios, split
 from validate.solve.region_march import carried, spectral_radius
 from validate.solve.region_size import PrimarySize
@@ -381,3 +383,18 @@ def test_regions_of_a_block_settle_where_the_whole_body_does(dimension: int) -> 
     near = force(AsyncRegions(H, (2, 1), (500.0, 250.0), overlap=1), ramp, scene)[-1]
     assert near == pytest.approx(whole, rel=1e-3)
     assert whole > 0
+
+
+@pytest.mark.parametrize(("least", "most"), [(0, 3), (4, 3), (-1, -1)])
+def test_layers_of_a_region_rise_from_one(least: int, most: int) -> None:
+    with pytest.raises(SceneError, match=f"primary region of {least} to {most} layers: at least 1"):
+        PrimarySize("linear", least, most, 1.0, 1e-3, 1e-3)
+
+
+def test_touched_bodies_have_the_damping_of_their_nodes_only() -> None:
+    material = SimpleNamespace(stiffness_damping=0.1)
+    system = SimpleNamespace(scene=SimpleNamespace(materials=(material,)), free=np.arange(3))
+    with pytest.raises(
+        SceneError, match=r"each node's own damping, C = alpha M .*; drop stiffness"
+    ):
+        RegionBody.of(system)  # type: ignore[arg-type]

@@ -99,3 +99,10 @@ def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
     assert choose._split("2.5 mm", "--error", "1mm") == (2.5, "mm")
     with pytest.raises(UsageError, match=f"--error {text}: a number with its unit, as in 1mm"):
         choose._split(text, "--error", "1mm")
+
+
+def test_a_ladder_without_a_rung_is_told() -> None:
+    with pytest.raises(
+        UsageError, match="no rung of the ladder has a cell for this scene; see 'st"
+    ):
+        choose.choose((), None, True, None)  # type: ignore[arg-type]

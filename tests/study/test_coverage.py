@@ -360,3 +360,21 @@ def test_terms_that_failed_are_raised_by_their_words(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(coverage_module, "finished", lambda *_: failed)
     with pytest.raises(ComparisonError, match="no force"):
         coverage_module._terms(study, "linear")  # type: ignore[arg-type]
+
+
+def test_blocks_of_draws_that_fail_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    records = {"a": Record("a", 1), "b": Record("b", failed="out of memory")}
+    worlds = SimpleNamespace(whole=True, moved={}, base=None, sides={}, drawn={})
+    for name, found in (
+        ("_terms", ()), ("draws_of", None), ("read_worlds", worlds), ("key_of", ""),
+        ("Given", None), ("_draws", SimpleNamespace(records=records)),
+    ):  # fmt: skip
+        monkeypatch.setattr(coverage_module, name, lambda *_, found=found: found)
+    road = SimpleNamespace(experiment=None)
+    study = SimpleNamespace(
+        bench=SimpleNamespace(road=road), draws=9, seed=1, job=None, noise=None, opening=None
+    )
+    with pytest.raises(
+        ComparisonError, match=r"kf: 1 of 2 blocks of \d+ draws could not be judged: o"
+    ):
+        coverage_module._of_method(study, "kf")  # type: ignore[arg-type]

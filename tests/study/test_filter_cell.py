@@ -162,3 +162,23 @@ def test_a_twin_that_tells_no_truth_is_no_benchmark() -> None:
     bench = SimpleNamespace(truth=lambda first: {})
     with pytest.raises(ComparisonError, match="the twin tells no probe's truth: 0 compared"):
         filter_cell._scores(bench, None, {}, 1.0, 1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("value", "dof", "says"),
+    [(np.nan, 3, "diverged: the estimate is not finite"), (1.0, 0, "invalid: no sample heard")],
+)
+def test_seeds_at_once_that_diverge_or_hear_nothing_are_refused(
+    value: float, dof: int, says: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shared_run(monkeypatch, values=np.full((1, 2), value), nis=np.ones(1), dof=np.array([dof]))
+    table = SimpleNamespace(unheard=lambda count, names: "no sample heard")
+    stepper = SimpleNamespace(gains=True, sensor=SimpleNamespace(table=table))
+    monkeypatch.setattr(filter_cell, "_measured", lambda *_: np.zeros(1))
+    scene = SimpleNamespace(mesh=SimpleNamespace(dimension=3), probes=(SimpleNamespace(name="a"),))
+    first = SimpleNamespace(
+        system=SimpleNamespace(scene=scene), seen=SimpleNamespace(inputs=np.zeros((2, 1)))
+    )
+    bench = SimpleNamespace(experiment=SimpleNamespace(axis="z"))
+    with pytest.raises(ComparisonError, match=says):
+        filter_cell._all_seeds(bench, None, stepper, first)  # type: ignore[arg-type]

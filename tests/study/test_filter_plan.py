@@ -119,3 +119,14 @@ def test_a_combination_that_settings_refuse_has_a_key_of_its_refusal(
     bare = SimpleNamespace(seeds=(1,))
     assert filter_plan._keyed(None, None, bare) == "k"  # type: ignore[arg-type]
     assert keyed == ["dt = 0: above 0"]
+
+
+def test_a_method_that_is_only_timed_has_no_error() -> None:
+    methods = {"whole": SimpleNamespace(steps=None), "timed": SimpleNamespace(steps=20)}
+    experiment = SimpleNamespace(methods=methods)
+    with pytest.raises(
+        UsageError, match="method 'timed' runs 20 steps only, to be timed: it has no"
+    ):
+        filter_plan._methods(experiment, ("timed",), ())  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"unknown method 'hole'; .*whole"):
+        filter_plan._methods(experiment, ("hole",), ())  # type: ignore[arg-type]

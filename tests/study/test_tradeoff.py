@@ -28,7 +28,16 @@ from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
-from validate.study import climb, precision, stability_cell, trade, trade_cell
+from validate.study import (
+    climb,
+    coverage_plan,
+    gain,
+    precision,
+    shared,
+    stability_cell,
+    trade,
+    trade_cell,
+)
 from validate.study.choose import Wanted, choose, wanted
 from validate.study.choose_exhibits import choose_exhibits
 from validate.study.choose_facts import principal_strains
@@ -387,3 +396,50 @@ def test_cells_that_mixed_elements_do_not_know_have_no_locking(
 
     monkeypatch.setattr(stability_cell, "mixed_static", unknown)
     assert stability_cell._locking(None) is None  # type: ignore[arg-type]
+
+
+def test_a_solver_that_is_refused_has_a_stride_of_its_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> None:
+        raise SceneError("no density")
+
+    cell = SimpleNamespace(element="P1", level=2, steps=(0.1, 0.2), budget=1.0)
+    trial = SimpleNamespace(build=lambda *_: None)
+    monkeypatch.setattr(trade_cell, "build", refuse)
+    found = trade_cell._measured(trial, cell, SimpleNamespace(law="svk"))  # type: ignore[arg-type]
+    assert [s.failed for s in found.strides] == ["refused: no density"] * 2
+    monkeypatch.setattr(trade_cell, "build", lambda scene: None)
+    solver = SimpleNamespace(law="svk", make=refuse)
+    found = trade_cell._measured(trial, cell, solver)  # type: ignore[arg-type]
+    assert [(s.dt, s.failed) for s in found.strides] == [
+        (0.1, "refused: no density"),
+        (0.2, "refused: no density"),
+    ]
+
+
+def test_studies_of_what_cannot_be_say_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stability_cell, "body_of", lambda experiment: None)
+    job = SimpleNamespace(experiment=lambda: None)
+    with pytest.raises(ComparisonError, match="the experiment declares no density: nothing steps"):
+        stability_cell.open_bench(job)  # type: ignore[arg-type]
+    marked = SimpleNamespace(markers=("tip",), steps=None)
+    experiment = SimpleNamespace(name="x", methods={"kf": marked}, reference="", accepted=("kf",))
+    with pytest.raises(ComparisonError, match="x: no method without markers could be the truth"):
+        coverage_plan.true_method(experiment, "kf")  # type: ignore[arg-type]
+    failed = SimpleNamespace(failure=("not_converged", "no root"))
+    stepper = SimpleNamespace(rest=lambda: None, step=lambda *_: failed)
+    exact = SimpleNamespace(on=lambda columns: stepper)
+    monkeypatch.setattr(gain, "ExactPressure", lambda: exact)
+    with pytest.raises(ComparisonError, match="no pressure keeps the volume: no root"):
+        gain._predicted(None, None)  # type: ignore[arg-type]
+
+    def coupled(*_: object) -> None:
+        raise SceneError("damping couples the modes")
+
+    monkeypatch.setattr(shared, "in_modes", coupled)
+    filters = SimpleNamespace(
+        care=None, smooth=False, claimed=None, covariance=None, system=None,
+        excitation=SimpleNamespace(rule=None),
+    )  # fmt: skip
+    assert shared.sharing(filters) is None  # type: ignore[arg-type]

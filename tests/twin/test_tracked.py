@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.errors import RecordingError, RegistrationError
+from validate.errors import RecordingError, RegistrationError, UsageError
 from validate.fem.system import build
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -19,7 +19,15 @@ from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
 from validate.solve.march import march
 from validate.solve.types import Outcome
-from validate.twin.tracked import Camera, Origin, Points, Reading, points_of, record_tracked
+from validate.twin.tracked import (
+    Camera,
+    Origin,
+    Points,
+    Reading,
+    points_of,
+    record_tracked,
+    require_noise,
+)
 
 MESH = box((0.1, 0.1, 0.1), (3, 3, 3))
 SIDE = 0.1
@@ -221,3 +229,11 @@ def test_a_late_look_sees_the_motion_of_its_own_time_and_says_how_sure_it_is() -
 def test_a_careless_camera_has_its_limits(wrong: dict[str, float]) -> None:
     with pytest.raises(RecordingError, match="0 <= outliers < 1, astray > 0, late >= 0"):
         Camera(1e-5, **wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("variance", [0.0, -1e-9, float("nan")])
+def test_a_tracker_without_noise_is_refused(variance: float) -> None:
+    with pytest.raises(
+        UsageError, match=f"twin.noise = {variance:g} m2: a variance above 0; 1e-16"
+    ):
+        require_noise(variance)
