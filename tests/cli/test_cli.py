@@ -16,7 +16,20 @@ import pytest
 from commands import here, refused
 from study_samples import experiment_file
 
-from validate.cli import bodies, calibrating, checking, known_places, outlining, studying
+from validate.cli import (
+    bodies,
+    calibrating,
+    checking,
+    guesting,
+    known_places,
+    making,
+    new_body,
+    new_body_questions,
+    new_outline,
+    outlining,
+    studying,
+    tool_poses,
+)
 from validate.cli import main as cli
 from validate.cli.asking import read_answers
 from validate.compare.result import Result
@@ -382,3 +395,72 @@ def test_a_study_that_is_interrupted_says_how_many_cells_are_kept(
     ):
         raise KeyboardInterrupt
     assert "3 finished cells are kept; the same command goes on" in capsys.readouterr().err
+
+
+def test_commands_without_what_they_need_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "kept").write_text("x")
+    with pytest.raises(UsageError, match="is not empty; a job takes a folder of its own"):
+        guesting.job("x", tmp_path, None, 2, (), inertia=False)
+    experiment = SimpleNamespace(methods={"linear": None}, accepted=("linear",), twin=None)
+    for module in (guesting, making):
+        monkeypatch.setattr(module, "find", lambda *_: experiment)
+    monkeypatch.setattr(guesting, "own_body", lambda found: SimpleNamespace(experiment=found))
+    with pytest.raises(UsageError, match=r"no method 'lin'; .*linear"):
+        guesting.job("x", tmp_path / "new", "lin", 2, (), inertia=False)
+    with pytest.raises(UsageError, match="experiment 'x' has no synthetic recording; its data are"):
+        making.record("x", tmp_path / "x.mcap", ())
+    for check in (new_body_questions.there, new_outline._there):
+        with pytest.raises(UsageError, match="no such file here"):
+            check(str(tmp_path / "nowhere"))
+        check(str(tmp_path / "kept"))
+
+
+def test_a_body_that_is_not_held_or_not_judged_is_no_experiment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(new_body, "_mesh_of", lambda found: None)
+    monkeypatch.setattr(new_body, "_judged", lambda found: ())
+    with pytest.raises(
+        UsageError, match=r"held.all, .x, .y, .z and .slides are all empty: the body"
+    ):
+        new_body._fields(None, "", Path(), {})  # type: ignore[arg-type]
+    with pytest.raises(
+        UsageError, match=r"nothing is judged: seen.force, seen.markers and seen.outl"
+    ):
+        new_body._fields(None, "", Path(), {"held.all": "x0"})  # type: ignore[arg-type]
+
+
+def test_tools_that_are_never_seen_together_and_files_that_would_lose_topics(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    poses = {"a": np.arange(3.0), "b": np.arange(3.0) + 0.5}
+
+    def seen(recording: object, tool: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return poses[tool], np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3))
+
+    monkeypatch.setattr(tool_poses, "tool_poses", seen)
+    with pytest.raises(UsageError, match="'a' and 'b' are never seen at one time"):
+        tool_poses.in_reference(None, "a", "b")  # type: ignore[arg-type]
+    partly = SimpleNamespace(unread={"/x": "", "/y": ""})
+    with pytest.raises(
+        UsageError, match=r"a.mcap holds 2 topics that are not read here and would be"
+    ):
+        outlining._same(Path("a.mcap"), partly)  # type: ignore[arg-type]
+    whole = SimpleNamespace(unread={})
+    assert outlining._same(Path("a.mcap"), whole) == Path("a.mcap")  # type: ignore[arg-type]
+    frames = SimpleNamespace()
+    monkeypatch.setattr(outlining, "outlines_over", lambda *_, **__: None)
+    monkeypatch.setattr(outlining, "png", lambda picture: b"")
+    contours = SimpleNamespace(t=np.zeros(1))
+    with pytest.raises(
+        RecordingError, match=r"a.png: cannot be written \(No such file or directory"
+    ):
+        outlining._pictured(frames, contours, tmp_path / "no" / "a.png", ())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "inf", "nan"])
+def test_a_loop_takes_seconds_above_zero(seconds: str) -> None:
+    line = refused("live", "needle_block", "--seconds", seconds)
+    assert f"--seconds {float(seconds):g}: a number above 0" in line

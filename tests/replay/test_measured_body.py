@@ -23,7 +23,14 @@ from validate.parameters import with_values
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
 from validate.register.fitting import MarkerFit
-from validate.replay import compare, ladder_default, measured_markers, measured_seen
+from validate.replay import (
+    compare,
+    ladder_default,
+    measured_drive,
+    measured_markers,
+    measured_outline,
+    measured_seen,
+)
 from validate.replay import measured_body as measured_body_module
 from validate.replay.experiment import Experiment
 from validate.replay.measured_body import body_of, measured_body, solid
@@ -490,3 +497,80 @@ def test_a_body_that_is_not_driven_or_cannot_be_squeezed_has_no_ladder(
     assert not ladder_default._squeezable(own.scene)
     monkeypatch.setattr(ladder_default, "require_positive_cells", lambda mesh: None)
     assert ladder_default._squeezable(own.scene)
+
+
+def moved_by(*names: str, noted: tuple[float, ...] = ()) -> SimpleNamespace:
+    seen = SimpleNamespace(markers="m", still=0.5, layout="a.fcsv", outline="o")
+    moved = SimpleNamespace(markers=names, noted=noted, scale=1.0)
+    return SimpleNamespace(seen=seen, moved=moved)
+
+
+def test_a_place_that_markers_move_needs_three_that_are_seen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording = SimpleNamespace(marker=lambda topic: SimpleNamespace(names=("a", "b", "c", "d")))
+    for names, says in (
+        ((), "moved.markers = none: three or more are needed; the recording has a, b, c, d"),
+        (("a", "b"), "moved.markers = a,b: three or more are needed"),
+        (("a", "b", "knee"), r"moved.markers = a,b,knee: \['knee'\] are not recorded"),
+    ):
+        with pytest.raises(UsageError, match=says):
+            measured_drive.prescribed(recording, moved_by(*names), "x0", None)  # type: ignore[arg-type]
+    at_rest = SimpleNamespace(names=("a", "b"), x=np.zeros((1, 2, 3)))
+    monkeypatch.setattr(measured_drive, "registered", lambda *_: at_rest)
+    with pytest.raises(
+        RegistrationError, match=r"markers \['c'\] on the moved place are not seen at"
+    ):
+        measured_drive.prescribed(recording, moved_by("a", "b", "c"), "x0", None)  # type: ignore[arg-type]
+
+
+def test_amounts_that_were_noted_differ_and_markers_that_drive_have_no_gaps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    t = np.array([0.0, 1.0, 2.0])
+    for noted in ((), (1e-3,), (1e-3, 1e-3)):
+        with pytest.raises(
+            UsageError, match=r"moved.noted = .*: two amounts or more that differ, fr"
+        ):
+            measured_drive._noted(moved_by(noted=noted), t)  # type: ignore[arg-type]
+    found = measured_drive._noted(moved_by(noted=(1e-3, 3e-3)), t)  # type: ignore[arg-type]
+    assert found.y[:, 0] == pytest.approx([0.0, 1e-3, 2e-3])
+    x = np.zeros((3, 1, 3))
+    x[1] = np.nan
+    seen = SimpleNamespace(t=t, names=("a",), x=x)
+    monkeypatch.setattr(measured_drive, "registered", lambda *_: seen)
+    with pytest.raises(
+        RegistrationError, match=r"not all seen at t = 1.000 s: fill the gap, or leave"
+    ):
+        measured_drive._followed(None, moved_by("a"), t, None)  # type: ignore[arg-type]
+
+
+def test_a_layout_without_the_recorded_names_and_markers_that_all_drive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording = SimpleNamespace(marker=lambda topic: None)
+    names = ("left", "right")
+    rest = SimpleNamespace(names=names)
+    monkeypatch.setattr(measured_markers, "rested", lambda *_: (rest, (), 3))
+    monkeypatch.setattr(measured_markers, "layout_of", lambda *_: {"Left": None})
+    with pytest.raises(
+        RegistrationError, match=r"a.fcsv has 'Left'; the recording has 'left', 'right'"
+    ):
+        measured_markers.registered(recording, moved_by(), (None, Path()))  # type: ignore[arg-type]
+    monkeypatch.setattr(measured_seen, "registered", lambda *_: rest)
+    monkeypatch.setattr(measured_seen, "rested", lambda *_: (rest, (), 3))
+    with pytest.raises(
+        ComparisonError, match="every marker moves the body: none is left to be comp"
+    ):
+        measured_seen._markers(recording, moved_by(*names), "follows", None)  # type: ignore[arg-type]
+
+
+def test_outlines_need_triangles_and_an_open_modulus_a_force(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording = SimpleNamespace(contour=lambda topic: None)
+    bricks = SimpleNamespace(bricks=True, kind="hex8")
+    with pytest.raises(
+        RegistrationError, match="outlines need triangular facets, the body has hex8"
+    ):
+        measured_outline.observed_outline(recording, moved_by(), bricks, 0.0)  # type: ignore[arg-type]

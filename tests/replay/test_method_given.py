@@ -3,20 +3,24 @@
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording, Source
-from validate.replay import asked, calibrated, inclusion, refined
+from validate.replay import asked, calibrated, inclusion, ladder_default, refined, remade
 from validate.replay.compression import compression, pressed
 from validate.replay.compression_cards import Compression, CompressionRanges, Gel, Specimen
 from validate.replay.experiment import Variant
 from validate.replay.find import _executed
 from validate.replay.followed import Followed
 from validate.replay.ladder import turned
+from validate.replay.live import prepared as prepared_live
+from validate.replay.live.replayed import as_given
 from validate.replay.method import Method
+from validate.replay.options import folder_of
 from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
@@ -137,3 +141,55 @@ def test_an_inclusion_without_loads_compares_nothing(monkeypatch: pytest.MonkeyP
     streams = SimpleNamespace(stage="stage")
     with pytest.raises(ComparisonError, match="no loads: nothing would be compared; set stage po"):
         inclusion.placed(None, None, None, None, streams, {}, (), ())  # type: ignore[arg-type]
+
+
+def test_what_was_not_loaded_or_recorded_by_a_twin_is_told() -> None:
+    with pytest.raises(ComparisonError, match="experiment 'x' was not loaded from a file"):
+        folder_of(bare(path=None))  # type: ignore[arg-type]
+    with pytest.raises(ComparisonError, match="experiment 'x' has no twin to replay a loop with"):
+        as_given(bare(twin=None), None)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"unknown method 'hold'; .*held"):
+        prepared_live(bare(methods={"held": None}, accepted=("held",)), None, "hold")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="--parameters mass: not a number that can be varied"):
+        asked._number(Newmark(), "mass", "lumped")
+
+
+def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> None:
+    recording = Recording("r", Source("r", "", 0, ""), 0)
+    remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",), ("dt",))
+    with pytest.raises(
+        UsageError, match=r"r: --set dt=.* would be ignored: the recording does not"
+    ):
+        remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
+
+
+def test_a_ladder_that_cannot_be_refined_is_told() -> None:
+    mesh = SimpleNamespace(nodes=np.zeros((4, 3)))
+    own = SimpleNamespace(
+        experiment=bare(), scene=SimpleNamespace(mesh=mesh), levels=lambda wanted: (1,)
+    )
+    with pytest.raises(
+        UsageError, match="'x' has 12 unknowns and cannot be meshed twice with at mos"
+    ):
+        ladder_default._touched_levels(own, 100)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("sizes", "refused"), [((1.0, 2.0, 2.0), True), ((1.0, 2.0, 4.0), False)])
+def test_three_meshes_have_three_sizes(sizes: tuple[float, ...], refused: bool) -> None:
+    def change(size: float) -> SimpleNamespace:
+        return SimpleNamespace(change=lambda parameters: size)
+
+    mesh = SimpleNamespace(size=lambda size: size)
+    own = SimpleNamespace(_uncertainty=SimpleNamespace(mesh=mesh))
+    road = SimpleNamespace(parameters=None)
+    found = {"mesh": [change(size) for size in sizes]}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(refined, "variants", lambda *_: found)
+        if refused:
+            with pytest.raises(
+                ComparisonError, match="fine, mesh: sizes 1, 2, 2; u_num needs three"
+            ):
+                refined.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
+        else:
+            sizes_found = refined.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
+            assert sizes_found == [1.0, 2.0, 4.0]
