@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -44,6 +45,7 @@ from validate.replay.live.packets import (
     position_of,
 )
 from validate.replay.live.tip import recorded_tip
+from validate.replay.live.written import _from_rest
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.solve.needle import NeedleStepper
@@ -477,3 +479,14 @@ def test_a_tip_recorded_at_different_times_is_refused() -> None:
         recorded_tip(recording, 2)
     with pytest.raises(RecordingError, match=r"no signals tip.x, tip.y and no markers 'tip'"):
         recorded_tip(replace(recording, signals={"a": signal(t)}), 2)
+
+
+def test_a_path_that_does_not_begin_at_rest_has_rest_a_tick_before() -> None:
+    rest, x, F = np.zeros(2), np.array([[1.0, 0.0], [2.0, 0.0]]), np.ones((2, 2))
+    done = SimpleNamespace(x=x, t=np.array([0.5, 0.6]), F=F, rate=10.0)
+    t, places, forces = _from_rest(done, rest)  # type: ignore[arg-type]
+    assert t.tolist() == [0.4, 0.5, 0.6]
+    assert places.tolist() == [[0, 0], [1, 0], [2, 0]]
+    assert forces.tolist() == [[0, 0], [1, 1], [1, 1]]
+    done.x = x - x[0]
+    assert _from_rest(done, rest)[0].tolist() == [0.5, 0.6]  # type: ignore[arg-type]

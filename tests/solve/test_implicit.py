@@ -1,11 +1,13 @@
 """Newton dynamics and statics under loads at large strain."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from explicit_scenes import pulled, ran, rise
 
 from validate.errors import SceneError
-from validate.solve.implicit import NewtonDynamics, RateRule
+from validate.solve.implicit import ImplicitStepper, NewtonDynamics, RateRule
 
 
 @pytest.mark.slow
@@ -54,3 +56,23 @@ def test_a_tangent_that_vanishes_ends_a_step(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(type(stepper), "_correction", vanished)
     after = stepper.step(stepper.rest(), np.array([5.0]))
     assert after.failure == ("not_converged", "step 1: a pivot of 0; take a smaller dt")
+
+
+@pytest.mark.parametrize(
+    ("rule", "speed", "acceleration"),
+    [
+        ("backward_euler", 4.0, 2.0),  # v' = d/dt, a' = (v' - v)/dt
+        ("average", 5.0, 7.0),  # v' = 2 d/dt - v, a' = 4 d/dt^2 - 4 v/dt - a
+    ],
+)
+def test_rates_at_the_end_of_a_step_by_hand(
+    rule: RateRule, speed: float, acceleration: float
+) -> None:
+    """A node of speed 3 m/s and acceleration 1 m/s2 goes 2 m in half a second."""
+    stepper = SimpleNamespace(
+        settings=NewtonDynamics(0.5, rule), system=SimpleNamespace(moves=np.zeros((1, 0)))
+    )
+    last = SimpleNamespace(v=np.array([3.0]), a=np.array([1.0]))
+    rates = ImplicitStepper._rates(stepper, last)  # type: ignore[arg-type]
+    assert rates.p * 2.0 + rates.v == pytest.approx([speed], rel=1e-14)
+    assert rates.q * 2.0 + rates.a == pytest.approx([acceleration], rel=1e-14)

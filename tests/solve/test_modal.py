@@ -1,6 +1,7 @@
 """Modal superposition: equal to Newmark, exact in time, exact in statics, whole clusters."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -18,6 +19,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene, Support
 from validate.solve.march import march
 from validate.solve.modal import Modal
+from validate.solve.modal_walk import exact_walk
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import RuleName
 from validate.solve.quasi_static import QuasiStatic
@@ -175,3 +177,21 @@ def test_damping_that_couples_modes_is_refused() -> None:
 def test_a_count_of_modes_that_is_none_is_refused(count: int, words: str) -> None:
     with pytest.raises(SceneError, match=words):
         Modal(modes=count).prepare(small())
+
+
+@pytest.mark.parametrize("force", ["constant", "linear"])
+def test_an_exact_step_ends_with_the_rates_of_the_damped_motion(force: str) -> None:
+    """q'' + 0.6 q' + 4.09 q = 2 swings at 2 rad/s: q = q_s + Re(C e^(s t)), s = -0.3 + 2i."""
+    c, w2, f, q0, v0, h = 0.6, 4.09, 2.0, 1.0, 0.5, 0.7
+    s, still = -0.3 + 2j, f / w2
+    C = (q0 - still) - 1j * (v0 + 0.3 * (q0 - still)) / 2
+    walk = exact_walk(
+        SimpleNamespace(damping=np.array([c]), omega=np.sqrt([w2])),
+        h,
+        force,  # type: ignore[arg-type]
+    )
+    one = np.ones(1)
+    q, v, a = walk.step(q0 * one, v0 * one, 0 * one, f * one, f * one)
+    expected = [(C * s**n * np.exp(s * h)).real for n in range(3)]
+    found = [q[0] - still, v[0], a[0]]
+    assert found == pytest.approx(expected, rel=1e-12)

@@ -24,7 +24,7 @@ from validate.scene.scene import Scene
 from validate.solve.march import run_scheme
 from validate.solve.region_body import RegionBody
 from validate.solve.region_map import layers_from, ratios, split
-from validate.solve.region_march import carried, spectral_radius
+from validate.solve.region_march import Motion, Piece, Zone, carried, spectral_radius
 from validate.solve.region_size import PrimarySize
 from validate.solve.regions import AsyncRegions, RegionStepper
 from validate.solve.types import State
@@ -398,3 +398,36 @@ def test_touched_bodies_have_the_damping_of_their_nodes_only() -> None:
         SceneError, match=r"each node's own damping, C = alpha M .*; drop stiffness"
     ):
         RegionBody.of(system)  # type: ignore[arg-type]
+
+
+def zone(wide: list[int], own: list[int], ratio: int) -> Zone:
+    places = np.searchsorted(wide, own)
+    return Zone(np.array(wide), np.array(own), places, ratio, "newmark", None, None)  # type: ignore[arg-type]
+
+
+def test_a_node_that_changes_regions_keeps_its_place_and_velocity_by_hand() -> None:
+    """Node 2 goes 8 mm in a period of four ticks: 2 mm a tick in the region of every tick."""
+    old = SimpleNamespace(zones=(zone([0, 1, 2], [0, 1], 1), zone([1, 2, 3], [2, 3], 4)))
+    new = SimpleNamespace(zones=(zone([0, 1, 2], [0, 1, 2], 1), zone([2, 3], [3], 4)))
+    visible = np.array([1.0, 2.0, 30.0, 40.0])
+    pieces = (
+        Piece(np.array([1.0, 2.0, 7.0]), np.array([0.5, 1.0, 6.0]), visible[:2], visible),
+        Piece(np.array([9.0, 28.0, 38.0]), np.array([8.0, 20.0, 46.0]), visible[2:], visible),
+    )
+    found = carried(old, Motion(5, pieces, visible), new)  # type: ignore[arg-type]
+    first, second = found.pieces
+    assert first.u.tolist() == [1.0, 2.0, 7.0]  # histories that the region had
+    assert first.before.tolist() == [0.5, 1.0, 6.0]
+    assert first.start.tolist() == [1.0, 2.0, 30.0]  # what it takes over stands where it is shown
+    assert second.u.tolist() == [28.0, 38.0]
+    narrow = SimpleNamespace(zones=(zone([0, 1], [0, 1], 1), zone([1, 2, 3], [2, 3], 4)))
+    taken = carried(narrow, Motion(5, (_first_two(pieces[0]), pieces[1]), visible), new)  # type: ignore[arg-type]
+    assert taken.pieces[0].u.tolist() == [1.0, 2.0, 30.0]
+    assert taken.pieces[0].before.tolist() == [0.5, 1.0, 30.0 - 2.0]
+    slower = SimpleNamespace(zones=(zone([0, 1, 2], [0, 1, 2], 2), zone([2, 3], [3], 4)))
+    other = carried(narrow, Motion(5, (_first_two(pieces[0]), pieces[1]), visible), slower)  # type: ignore[arg-type]
+    assert other.pieces[0].before.tolist() == [1.0 - 2 * 0.5, 2.0 - 2 * 1.0, 30.0 - 2 * 2.0]
+
+
+def _first_two(piece: Piece) -> Piece:
+    return replace(piece, u=piece.u[:2], before=piece.before[:2])
