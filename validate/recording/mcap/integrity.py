@@ -309,8 +309,7 @@ class _Walk:
             self._misindexed = len(set(self._indexed_places) ^ self._chunk_places)
 
     def found(self, path: Path) -> Verified:
-        if self._header is None:
-            raise RecordingError("no header record")
+        assert self._header is not None  # any other first record was refused
         integrity = "verified" if self._data_crc else NOT_PROVABLE
         if self._cut is not None:
             integrity = f"whole up to byte {self._cut.at} of {self.size}"
