@@ -25,6 +25,7 @@ from mcap_ros2.writer import Writer as RosWriter
 from PIL import Image
 
 from validate.errors import RecordingError, UsageError
+from validate.recording.mcap import foreign
 from validate.recording.mcap.peek import messages_in
 from validate.recording.mcap.read import read_all
 from validate.recording.preflight import inspect_recording
@@ -351,3 +352,12 @@ def test_a_topic_that_is_not_there_is_told_with_the_others(tmp_path: Path) -> No
     path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}])
     with pytest.raises(UsageError, match=r"x.mcap: no topic '/y'; topics: /x"):
         list(messages_in(path, "/y", 1))
+
+
+def test_errors_of_a_whole_file_name_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}, {"a": 2.0}])
+    monkeypatch.setattr(foreign, "MAX_NUMBERS", 1)
+    with pytest.raises(
+        RecordingError, match=r"x.mcap: more than 1 numbers, the limit; split the fi"
+    ):
+        read_all(path, {"/x.a": "N"})

@@ -176,3 +176,16 @@ def test_a_list_of_indices_is_times_where_they_rise(
 ) -> None:
     header = {"sizes": [3, 4, 4], "axis 0 index values": values, "axis 0 index unit": unit}
     assert nrrd_arrays._times(header, ["list", "domain", "domain"]).tolist() == expected
+
+
+def test_an_nrrd_that_is_cut_in_its_packed_pixels_is_refused(tmp_path: Path) -> None:
+    packer = zlib.compressobj(wbits=31)
+    packed = packer.compress(bytes(1000)) + packer.flush()
+    path = tmp_path / "x.nrrd"
+    path.write_bytes(b"NRRD0004\nencoding: gzip\n\n" + packed)
+    nrrd_arrays._require_end(path, 1000)
+    with pytest.raises(RecordingError, match="over 999 bytes unpacked, more than its sizes hold"):
+        nrrd_arrays._require_end(path, 999)
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(RecordingError, match="cut: its pixels do not end with their checksum"):
+        nrrd_arrays._require_end(path, 1000)

@@ -142,3 +142,16 @@ def test_frames_without_times_and_without_a_rate_ask_for_one(rate: float) -> Non
         video._times(Path("x.avi"), still, rate, 1, {})
     t, words = video._times(Path("x.avi"), still, 10.0, 2, {})
     assert (t.tolist(), words) == ([0.0, 0.2, 0.4], "10 Hz as declared; frames have no times")
+
+
+def test_frames_beyond_all_bytes_of_a_film_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = film(tmp_path / "x.mp4")
+    monkeypatch.setattr(video_arrays, "_require_few", lambda *_: None)
+    monkeypatch.setattr(video_arrays, "MOST", 3 * 48 * 64)
+    assert len(video_arrays.arrays(path, every=3)["images"]) == 3
+    with pytest.raises(
+        RecordingError, match="frames of 64 x 48 beyond 9216 bytes after 4; take few"
+    ):
+        video_arrays.arrays(path)

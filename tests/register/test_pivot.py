@@ -1,5 +1,6 @@
 """The tip of a tracked tool against one that is known, and against a published one."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -153,3 +154,13 @@ def test_a_stylus_on_eight_landmarks_against_its_published_tip(
     assert 2 * ERROR < np.linalg.norm(tip - PUBLISHED) < 4 * ERROR
     whole = refused("calibrate", str(x), *given)
     assert "does not stand on a point" in whole
+
+
+def test_a_tip_that_stands_in_few_poses_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    R, T, point = turned(np.random.default_rng(0), WIDE)
+    module = sys.modules[pivot.__module__]  # its package exports the function by the same name
+    monkeypatch.setattr(module, "_standing", lambda *_: np.arange(149))
+    with pytest.raises(RegistrationError, match="in 149 of 300 poses, fewer than half: cut"):
+        pivot(R, T, point)
+    monkeypatch.setattr(module, "_standing", lambda *_: np.arange(150))
+    assert len(pivot(R, T, point).used) == 150

@@ -10,11 +10,19 @@ from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording, Source
-from validate.replay import asked, calibrated, inclusion, ladder_default, refined, remade
+from validate.replay import (
+    asked,
+    calibrated,
+    inclusion,
+    ladder_default,
+    pressed_outline,
+    refined,
+    remade,
+)
 from validate.replay.compression import compression, pressed
 from validate.replay.compression_cards import Compression, CompressionRanges, Gel, Specimen
 from validate.replay.experiment import Variant
-from validate.replay.find import _executed
+from validate.replay.find import _executed, load_file
 from validate.replay.followed import Followed
 from validate.replay.ladder import turned
 from validate.replay.live import prepared as prepared_live
@@ -193,3 +201,22 @@ def test_three_meshes_have_three_sizes(sizes: tuple[float, ...], refused: bool) 
         else:
             sizes_found = refined.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
             assert sizes_found == [1.0, 2.0, 4.0]
+
+
+def test_a_body_that_does_not_move_between_its_outlines_is_refused() -> None:
+    t = np.arange(5.0)
+    contours = SimpleNamespace(t=t)
+    stage = SimpleNamespace(t=t, y=np.zeros((5, 1)), name="stage")
+    card = PressedOutline(holds=2)
+    with pytest.raises(ComparisonError, match="the body does not move between its outlines"):
+        pressed_outline._instants(contours, stage, card)  # type: ignore[arg-type]
+    rising = SimpleNamespace(t=t, y=t[:, None], name="stage")
+    times, moved = pressed_outline._instants(contours, rising, card)  # type: ignore[arg-type]
+    assert (times.tolist(), moved.tolist()) == ([0.0, 2.0, 4.0], [0.0, 2.0, 4.0])
+
+
+def test_an_experiment_is_named_as_its_file(tmp_path: Path, project_root: Path) -> None:
+    text = (project_root / "experiments" / "kf_cube.py").read_text("utf-8")
+    (tmp_path / "other.py").write_text(text)
+    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'kf_cube', not the file's name"):
+        load_file(tmp_path / "other.py")
