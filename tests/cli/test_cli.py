@@ -320,7 +320,7 @@ def test_exit_codes_of_what_the_machine_refuses(
 
 def test_answers_of_a_file_too_large_are_not_read(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("#" * 100_001)
-    with pytest.raises(UsageError, match=r"a.toml: 100001 bytes; answers take 100000"):
+    with pytest.raises(UsageError, match=r"a.toml: 100001 bytes, the limit is 100000"):
         read_answers(tmp_path / "a.toml")
 
 
@@ -339,7 +339,7 @@ def test_places_that_cannot_be_known_are_told(
     with pytest.raises(RecordingError, match=r"none.csv: cannot be read \(No such file"):
         known_places.rows_of(tmp_path / "none.csv", ("target",))
     monkeypatch.setattr(known_places, "_MAX_TABLE", 20)
-    with pytest.raises(RecordingError, match=r"wires.csv: 36 bytes, limit 20"):
+    with pytest.raises(RecordingError, match=r"wires.csv: 36 bytes, the limit is 20"):
         known_places.rows_of(file, ("target",))
     monkeypatch.setattr(known_places, "read_device_set", lambda _: SimpleNamespace(landmarks={}))
     with pytest.raises(UsageError, match=r"d.xml: no landmarks in its PhantomDefinition"):
@@ -350,8 +350,8 @@ def test_places_that_cannot_be_known_are_told(
     ("call", "says"),
     [
         (lambda: known_places._table(Path("w.csv"), "kg"), "--unit kg: expected a length, as mm"),
-        (lambda: bodies._metres("2"), "--edge 2: expected a length with its unit, as 2mm"),
-        (lambda: bodies._metres("-2mm"), "--edge -2mm: expected a length with its unit, as 2mm"),
+        (lambda: bodies._metres("edge", "2"), "--edge 2: expected a length with its unit, as 2mm"),
+        (lambda: bodies._metres("edge", "-2mm"), "--edge -2mm: expected a length with its unit"),
         (lambda: outlining._place("3px", None), "--centre 3px: expected X,Y as 120px,80px or"),
         (
             lambda: outlining._drawn(Path("a"), None, "", {"centre": "1px,1px", "radius": 0,
@@ -401,14 +401,14 @@ def test_commands_without_what_they_need_say_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "kept").write_text("x")
-    with pytest.raises(UsageError, match="is not empty; a job takes a folder of its own"):
-        guesting.job("x", tmp_path, None, 2, (), inertia=False)
+    with pytest.raises(UsageError, match="it is not empty; name another folder"):
+        guesting.job("x", tmp_path, None, 2, (), inertia=False, force=False)
     experiment = SimpleNamespace(methods={"linear": None}, accepted=("linear",), twin=None)
     for module in (guesting, making):
         monkeypatch.setattr(module, "find", lambda *_: experiment)
     monkeypatch.setattr(guesting, "own_body", lambda found: SimpleNamespace(experiment=found))
     with pytest.raises(UsageError, match=r"no method 'lin'; .*linear"):
-        guesting.job("x", tmp_path / "new", "lin", 2, (), inertia=False)
+        guesting.job("x", tmp_path / "new", "lin", 2, (), inertia=False, force=False)
     with pytest.raises(UsageError, match="experiment 'x' has no synthetic recording; its data are"):
         making.record("x", tmp_path / "x.mcap", ())
     for check in (new_body_questions.there, new_outline._there):

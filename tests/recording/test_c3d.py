@@ -329,4 +329,4 @@ def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     monkeypatch.setattr(apart, "_LOADING", 0)
     monkeypatch.setattr(apart, "_SHARED", 0)
     with pytest.raises(RecordingError, match="file: its reader took over 0 s for 7 bytes and was"):
-        apart.decoded("c3d_arrays", tmp_path / "file", "c3d")
+        apart.decoded("c3d_arrays", tmp_path / "file")

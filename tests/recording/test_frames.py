@@ -361,7 +361,7 @@ def test_files_of_a_stack_are_bounded_alone_and_together(
         (tmp_path / f"{i}.png").write_bytes(encode_png(IMAGES[i]))
     size = (tmp_path / "0.png").stat().st_size
     monkeypatch.setattr(png_stack, "MAX_FILE", size - 1)
-    with pytest.raises(RecordingError, match=f"0.png: {size} bytes, limit {size - 1}"):
+    with pytest.raises(RecordingError, match=f"0.png: {size} bytes, the limit is {size - 1}"):
         read_png_stack(tmp_path, options)
     monkeypatch.undo()
     monkeypatch.setattr(png_stack, "MAX_STACK", 23 * 17)

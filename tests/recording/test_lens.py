@@ -135,8 +135,9 @@ def test_images_of_another_size_are_refused_and_the_lens_is_printed(
         ("fisheye_model: 1\n", "a fisheye model; the one of OpenCV's calibrateCamera is read"),
         ("distortion_model: equidistant\n", "distortion model 'equidistant'; read are plumb_bob"),
         ("image_width: 320\n", "no camera_matrix in it"),
-        ("x: " + "1" * 2**21, "bytes; a calibration has at most"),
+        ("x: " + "1" * 2**21, "bytes, the limit is 1000000"),
     ],
+    ids=["fisheye", "model", "matrix", "size"],
 )
 def test_another_lens_is_called_by_its_name(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "lens.yaml").write_text(text)

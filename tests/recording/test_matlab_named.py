@@ -388,6 +388,6 @@ def test_a_file_of_words_alone_and_one_of_curves_say_what_they_hold() -> None:
         matlab._unnamed(Path("x.mat"), word, {})
     curve = {"F": np.zeros(50), "d": np.zeros(9)}
     with pytest.raises(
-        UsageError, match=r"no array shows what it is; .* as --map force=F:N --map ra"
+        UsageError, match=r"no array shows what it is; .* as --map force=PATH:N --map ra"
     ):
         matlab._unnamed(Path("x.mat"), curve, {})

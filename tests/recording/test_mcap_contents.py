@@ -20,6 +20,7 @@ from mcap.stream_reader import StreamReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from validate.errors import RecordingError
+from validate.installation import install_command
 from validate.recording.mcap import decoders, foreign, known_messages
 from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.integrity import verify
@@ -199,8 +200,7 @@ def test_encodings_that_nothing_here_decodes_say_so(monkeypatch: pytest.MonkeyPa
     assert decoder_of(None, channel) == "no decoder for '/cdr'"
     monkeypatch.setattr(decoders, "_ros2", refusing(ImportError("no", name="mcap_ros2")))
     assert decoder_of(NO_SCHEMA, channel) == (
-        "the library 'mcap_ros2' that reads it is not installed; "
-        "pip install 'validate-tissue[ros2]'"
+        f"the library 'mcap_ros2' that reads it is not installed; {install_command()}"
     )
     monkeypatch.setattr(decoders, "_ros2", refusing(SyntaxError("line 3\n of it")))
     assert decoder_of(NO_SCHEMA, channel) == "its schema cannot be parsed (line 3 of it)"

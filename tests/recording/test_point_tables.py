@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import npz_points
 from validate.recording.formats.c3d import read_c3d
 from validate.recording.formats.ndi import read_ndi
 from validate.recording.formats.optitrack import read_optitrack
@@ -320,18 +319,6 @@ def test_qualisys_bodies_are_read_by_their_matrix_column_by_column(tmp_path: Pat
     path.write_text(text.replace("-1\t0\t0\t0\t0\t1\n", "-1\t0\t0\t0\t0\t2\n"))
     with pytest.raises(RecordingError, match="Tool: sample 1 is no rotation"):
         read_qualisys(path, {})
-
-
-def test_archives_that_are_not_there_or_too_large_are_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(UsageError, match=r"cannot read .*none.npz: no such file"):
-        npz_points._archive(tmp_path / "none.npz")
-    np.savez(tmp_path / "a.npz", x=np.zeros(100))
-    assert npz_points._archive(tmp_path / "a.npz")[1]["x"].shape == (100,)
-    monkeypatch.setattr(npz_points, "_MOST", 100)
-    with pytest.raises(RecordingError, match=r"a.npz: \d+ bytes unpacked, the limit is 100"):
-        npz_points._archive(tmp_path / "a.npz")
 
 
 def test_a_trc_file_without_a_name_is_none(tmp_path: Path) -> None:

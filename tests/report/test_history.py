@@ -103,7 +103,7 @@ def test_an_edited_result_is_told_and_no_run(
 ) -> None:
     folder = wrote(tmp_path / "cube", 0, made("a"))
     text = (folder / MARK).read_text("utf-8")
-    (folder / MARK).write_text(text.replace('"kind": "twin"', '"kind": "measured"'), "utf-8")
+    (folder / MARK).write_text(text.replace('"quick": false', '"quick": true'), "utf-8")
     assert (folder / MARK).read_text("utf-8") != text
     assert history(tmp_path, "cube") == ()
     assert "cube/results.json: not believed (its content does not fit its checksum" in caplog.text

@@ -133,7 +133,7 @@ def test_the_command_leaves_nothing_of_a_body_that_cannot_be_read(
     path = tmp_path / f"Gewebe é{suffix}"
     path.write_bytes(b"\x89MCAP0\r\n" * 40)
     (tmp_path / "b.npz").write_bytes(b"old")
-    assert run(["body", str(path), "--unit", "mm", "-o", str(tmp_path / "b.npz")]) == 2
+    assert run(["body", str(path), "--unit", "mm", "-o", str(tmp_path / "b.npz"), "--force"]) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"validate: Gewebe é{suffix}: ")
     assert said.count("\n") == 1

@@ -1,37 +1,105 @@
-"""Batches of cells on Dask: what a dead worker and a broken plan make of them."""
+"""Batches of cells on Dask: what a dead worker, other code and a broken plan make of them."""
 
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from distributed.scheduler import KilledWorker
-from engine_samples import Waited, Waiting
+from engine_samples import Waited, Waiting, waiting
 
 from validate.errors import UsageError
-from validate.study.cluster import _records
+from validate.study import cluster
+from validate.study.cluster import _Drain
+from validate.study.code_identity import digest
 from validate.study.store import Record
 
+HERE = {"validate": "a" * 64}
 CELLS = (Waiting("a"), Waiting("b"))
 
 
-def future(error: Exception | None = None, result: object = None) -> SimpleNamespace:
-    return SimpleNamespace(
-        status="error" if error else "finished", exception=lambda: error, result=lambda: result
+def given(cell: Waiting, code: str = digest(HERE)) -> Record[Waited]:
+    return Record(cell.key, Waited(1, 0.0), seconds=0.0, code=code)
+
+
+class Scheduler:
+    """A scheduler whose workers answer at once, by `answer` of the cells of a task."""
+
+    def __init__(self, answer: Callable[[Sequence[Waiting]], Any], *workers: str) -> None:
+        self.answer, self.workers = answer, list(workers or ("w1", "w2"))
+        self.sent: list[tuple[str, ...]] = []
+
+    def scheduler_info(self, n_workers: int) -> dict[str, Any]:
+        return {"workers": dict.fromkeys(self.workers)}
+
+    def submit(self, function: Any, *given: Any, workers: list[str], **_: Any) -> Any:
+        if function is cluster.prove:
+            return SimpleNamespace(status="finished", result=lambda: HERE)
+        cells = given[3]
+        self.sent.append(tuple(cell.key for cell in cells))
+        found = self.answer(cells)
+        error = found if isinstance(found, Exception) else None
+        return SimpleNamespace(
+            status="error" if error else "finished", exception=lambda: error,
+            result=lambda: found, cancel=lambda: None,
+        )  # fmt: skip
+
+
+def drained(scheduler: Scheduler, monkeypatch: pytest.MonkeyPatch, size: int = 1) -> Counter[str]:
+    """What was finished, and how often; `size` cells go in a task at first."""
+    done: list[Record[Waited]] = []
+    monkeypatch.setattr(cluster, "_dask", SimpleNamespace(wait=lambda *_, **__: None))
+    plan = waiting(Path(), CELLS)
+    drain = _Drain(plan, scheduler, CELLS, lambda _, r: done.append(r), HERE, ahead=2)
+    monkeypatch.setattr(drain, "_size", lambda most: size)
+    drain.run()
+    return Counter(f"{r.key} {r.why}".strip() for r in done)
+
+
+def test_cells_of_a_batch_whose_worker_died_are_sent_again_each_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Which of the two killed it is not known: neither is lost, neither is done twice."""
+    dead = KilledWorker("task", None, 2)
+    scheduler = Scheduler(lambda cells: dead if len(cells) == 2 else [given(c) for c in cells])
+    assert drained(scheduler, monkeypatch, size=2) == {"a": 1, "b": 1}
+    assert scheduler.sent[0] == ("a", "b")
+    assert sorted(scheduler.sent[1:]) == [("a",), ("b",)]
+
+
+def test_a_cell_that_kills_every_worker_is_a_failure_and_the_other_is_done(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def answer(cells: Sequence[Waiting]) -> Any:
+        keys = [c.key for c in cells]
+        return KilledWorker("task", None, 2) if "b" in keys else [given(c) for c in cells]
+
+    scheduler = Scheduler(answer)
+    why = "its worker died 4 times: out of memory?"
+    assert drained(scheduler, monkeypatch, size=2) == {"a": 1, f"b {why}": 1}
+    assert scheduler.sent.count(("b",)) == 4
+
+
+def test_records_of_other_code_are_thrown_away_and_asked_for_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers = iter(["other", digest(HERE), digest(HERE)])
+    scheduler = Scheduler(lambda cells: [given(c, next(answers)) for c in cells])
+    assert drained(scheduler, monkeypatch) == {"a": 1, "b": 1}
+    assert len(scheduler.sent) == 3
+
+
+def test_a_refusal_counts_as_an_answer_of_proven_code_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["other", digest(HERE), digest(HERE)])
+    scheduler = Scheduler(
+        lambda cells: [replace(given(c, next(answers)), value=None, refused="no") for c in cells]
     )
+    assert drained(scheduler, monkeypatch) == {"a no": 1, "b no": 1}
 
 
-def test_a_finished_batch_is_its_records() -> None:
-    records = [Record("a", Waited(1, 0.5)), Record("b", refused="this cannot be")]
-    assert _records(future(result=records), CELLS) == records
-
-
-@pytest.mark.parametrize("count", [2, 1])
-def test_a_dead_worker_fails_only_a_cell_that_was_alone(count: int) -> None:
-    """Which of two cells killed it is not known: both are sent again, each alone."""
-    dead = future(KilledWorker("task", None, 2))
-    alone = [Record("a", failed="its worker died 3 times: out of memory?", lasting=False)]
-    assert _records(dead, CELLS[:count]) == ([None, None] if count == 2 else alone)
-
-
-def test_what_opening_the_experiment_raises_is_raised() -> None:
+def test_what_opening_the_experiment_raises_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UsageError, match="no experiment 'x'"):
-        _records(future(UsageError("no experiment 'x'")), CELLS)
+        drained(Scheduler(lambda _: UsageError("no experiment 'x'")), monkeypatch)

@@ -11,7 +11,6 @@ from validate.cli.arguments import BAD_INPUT
 from validate.cli.main import run
 from validate.errors import ComparisonError, UsageError
 from validate.seals import sealed
-from validate.study import stored as stored_module
 from validate.study.stored import pairs, read_run, side_by_side
 
 
@@ -186,13 +185,3 @@ def test_scores_that_the_first_run_lacks_are_counted(tmp_path: Path) -> None:
         ("a", "b", [(2e-3, 3e-3)]), ("a", "c", [(2e-3, 3e-3)]),
     ]  # fmt: skip
     assert (more, unseen) == (0, 1)
-
-
-def test_a_stored_run_beyond_the_limit_is_not_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "results.json").write_text('{"a": 1}')
-    assert stored_module.read_as(tmp_path, lambda found: found["a"]) == 1
-    monkeypatch.setattr(stored_module, "_LARGEST", 7)
-    with pytest.raises(UsageError, match=r"results.json: 8 bytes, at most 7"):
-        stored_module.read_as(tmp_path, dict)

@@ -133,8 +133,9 @@ def _images(folder: Path) -> tuple[Pixels, ...]:
 
 
 def _read(file: Path) -> Pixels:
+    data = read_bytes(file, MAX_FILE)
     try:
-        return decode_png(read_bytes(file, MAX_FILE))
+        return decode_png(data)
     except RecordingError as error:
         raise RecordingError(f"{file.name}: {error}; --as image-stack reads others") from None
 
