@@ -25,7 +25,6 @@ from validate.cli import (
     making,
     new_body,
     new_body_questions,
-    new_outline,
     outlining,
     studying,
     tool_poses,
@@ -411,10 +410,9 @@ def test_commands_without_what_they_need_say_so(
         guesting.job("x", tmp_path / "new", "lin", 2, (), inertia=False, force=False)
     with pytest.raises(UsageError, match="experiment 'x' has no synthetic recording; its data are"):
         making.record("x", tmp_path / "x.mcap", ())
-    for check in (new_body_questions.there, new_outline._there):
-        with pytest.raises(UsageError, match="no such file here"):
-            check(str(tmp_path / "nowhere"))
-        check(str(tmp_path / "kept"))
+    with pytest.raises(UsageError, match="no such file here"):
+        new_body_questions.there(str(tmp_path / "nowhere"))
+    new_body_questions.there(str(tmp_path / "kept"))
 
 
 def test_a_body_that_is_not_held_or_not_judged_is_no_experiment(
