@@ -70,8 +70,8 @@ def _sizes(tree: ast.Module) -> set[int]:
 
 
 def _tuning(tree: ast.Module) -> Iterator[ast.expr]:
-    """Values of tuning constants: numbers that a module or a class names in capital letters, and
-    numbers that are defaults of fields. Formulas, tables and named objects are none."""
+    """Yield the values of tuning constants: numbers that a module or a class names in capital
+    letters, and numbers that are defaults of fields. Formulas, tables and objects are excluded."""
     classes = [n for n in ast.walk(tree) if isinstance(n, ast.ClassDef)]
     for body in (tree.body, *(kind.body for kind in classes)):
         for statement in body:
@@ -94,7 +94,7 @@ def _constants(target: ast.expr) -> bool:
 
 
 def _default(value: ast.expr) -> ast.expr:
-    """The default in the declaration of a field."""
+    """Return the default in the declaration of a field."""
     match value:
         case ast.Call(func=ast.Name(id=name), args=[default, *_]) if name in _DECLARED:
             return default
@@ -104,7 +104,7 @@ def _default(value: ast.expr) -> ast.expr:
 
 
 def _numbers(value: ast.expr) -> bool:
-    """A number, arithmetic of numbers, or a tuple of them."""
+    """Return whether a value is a number, arithmetic of numbers, or a tuple of them."""
     match value:
         case ast.Constant(value=number):
             return type(number) in (int, float)

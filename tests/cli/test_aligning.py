@@ -226,7 +226,7 @@ def test_every_further_file_has_its_channels_and_a_reason(tmp_path: Path) -> Non
     assert not out.exists()
 
 
-def test_a_drift_that_half_a_recording_cannot_tell_is_said(
+def test_a_drift_that_half_a_recording_cannot_determine_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def unknown(*_: object) -> None:

@@ -323,7 +323,7 @@ def test_answers_of_a_file_too_large_are_not_read(tmp_path: Path) -> None:
         read_answers(tmp_path / "a.toml")
 
 
-def test_places_that_cannot_be_known_are_told(
+def test_places_that_cannot_be_known_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "wires.csv"
@@ -363,7 +363,7 @@ def test_places_that_cannot_be_known_are_told(
         ),
     ],
 )  # fmt: skip
-def test_options_that_do_not_fit_are_told(
+def test_options_that_do_not_fit_are_refused(
     call: Callable[[], object], says: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(calibrating, "rows_of", lambda *_: [])
@@ -396,7 +396,7 @@ def test_a_study_that_is_interrupted_says_how_many_cells_are_kept(
     assert "3 finished cells are kept; the same command goes on" in capsys.readouterr().err
 
 
-def test_commands_without_what_they_need_say_so(
+def test_commands_without_what_they_need_report_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "kept").write_text("x")
@@ -415,7 +415,7 @@ def test_commands_without_what_they_need_say_so(
     new_body_questions.there(str(tmp_path / "kept"))
 
 
-def test_a_body_that_is_not_held_or_not_judged_is_no_experiment(
+def test_a_body_that_is_not_held_or_not_compared_is_no_experiment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(new_body, "_mesh_of", lambda found: None)
@@ -430,7 +430,7 @@ def test_a_body_that_is_not_held_or_not_judged_is_no_experiment(
         new_body._fields(None, "", Path(), {"held.all": "x0"})  # type: ignore[arg-type]
 
 
-def test_tools_that_are_never_seen_together_and_files_that_would_lose_topics(
+def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     poses = {"a": np.arange(3.0), "b": np.arange(3.0) + 0.5}

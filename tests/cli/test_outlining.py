@@ -331,7 +331,7 @@ def test_images_of_several_sizes_are_streams_of_their_own(tmp_path: Path) -> Non
         (lambda d: (d / "a.nrrd", np.zeros((4, 5))), "a.nrrd: (4, 5) float64, expected masks"),
     ],
 )
-def test_files_that_hold_no_masks_are_told(
+def test_files_without_masks_are_refused(
     make: object, says: str, moving: Path, tmp_path: Path
 ) -> None:
     file, content = make(tmp_path)  # type: ignore[operator]
@@ -345,7 +345,7 @@ def test_files_that_hold_no_masks_are_told(
         foreign_outline._read(file, read_recording(moving).frame("images"), "")
 
 
-def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_told(
+def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_refused(
     moving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     frames = read_recording(moving).frame("images")

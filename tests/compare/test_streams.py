@@ -119,7 +119,7 @@ def test_where_outlines_come_from_is_kept_in_a_file(tmp_path: Path) -> None:
     assert found.unread == {}
 
 
-def test_topics_that_are_not_read_say_why() -> None:
+def test_topics_that_are_not_read_are_reported() -> None:
     recording = replace(both(""), unread={"/camera": "a message type that is not known"})
     found = stream_uses([recording], [])[-1]
     assert (found.topic, found.kind, found.used) == ("/camera", "not read", False)

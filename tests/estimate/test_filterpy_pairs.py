@@ -139,7 +139,7 @@ def test_an_ensemble_of_three_by_hand() -> None:
 
 
 @pytest.mark.parametrize("name", ["predict", "update"])
-def test_a_guest_without_a_method_of_a_filter_is_refused(name: str) -> None:
+def test_a_simulator_filter_without_a_method_of_a_filter_is_refused(name: str) -> None:
     one = np.eye(1)
     model = SimpleNamespace(size=1, H=one)
     methods = {m: (lambda *_: None) for m in ("predict", "update") if m != name}

@@ -532,7 +532,7 @@ def test_riccati_by_doubling_is_that_by_schurs_form() -> None:
 
 @pytest.mark.parametrize("name", ["start", "walk", "jitter"])
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
-def test_the_doubt_of_a_load_is_a_number_of_at_least_zero(name: str, value: float) -> None:
+def test_the_uncertainty_of_a_load_is_a_number_of_at_least_zero(name: str, value: float) -> None:
     with pytest.raises(SceneError, match=rf"doubt of the load, {name} = {value:g}: a number >= 0"):
         LoadDoubt(**{"start": 0.0, "walk": 0.0, name: value})
 

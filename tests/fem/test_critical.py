@@ -187,7 +187,7 @@ def test_a_missing_density_is_named() -> None:
         critical_step(build(Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), HELD)))
 
 
-def test_what_has_no_critical_step_says_why() -> None:
+def test_what_has_no_critical_step_is_reported() -> None:
     assert module._density(Material(1.0, 0.3, rho=5.0)) == 5.0
     with pytest.raises(SceneError, match="a critical step needs the density; set rho kg/m3 of eve"):
         module._density(Material(1.0, 0.3))

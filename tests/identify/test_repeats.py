@@ -200,7 +200,7 @@ def test_a_damaged_share_is_refused(tmp_path: Path) -> None:
         repeats_share(one)
 
 
-def test_what_no_machine_wrote_and_loadings_apart_are_refused(tmp_path: Path) -> None:
+def test_what_no_machine_wrote_and_loadings_without_overlap_are_refused(tmp_path: Path) -> None:
     a, b = logs(tmp_path, 1.0, 1.1)
     bare = replace(b, metadata={})
     with pytest.raises(UsageError, match="log1 is no log of a testing machine, and only these"):

@@ -227,7 +227,7 @@ def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch)
         block_module.record(FluidBlock(), lambda what: None)
 
 
-def test_a_volume_that_no_pressure_gives_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_volume_that_no_pressure_gives_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wall that does not move keeps its volume at any pressure: 1 of the wanted 3."""
     monkeypatch.setattr(curves, "_wall", lambda surface, x, A, u, P: u)
     monkeypatch.setattr(curves, "volume_of", lambda surface, x: 1.0)
@@ -257,7 +257,7 @@ def test_septa_that_cannot_be_meshed_are_rows_with_their_reason(
     assert {row[0] for row in refused} == {2, 3}
 
 
-def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_told(
+def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(curves, "pressure_load", lambda surface, x: x)

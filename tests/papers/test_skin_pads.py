@@ -244,7 +244,7 @@ def test_a_linear_law_fitted_to_4_mm_differs_at_8_mm(project_root: Path, shared_
     assert found["material.E_linear"] == pytest.approx(28.1, rel=0.03)
 
 
-def test_files_of_a_test_that_do_not_belong_together_are_told(
+def test_files_of_a_test_that_do_not_belong_together_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "a.dat").write_text("1 2\n3 4\n")

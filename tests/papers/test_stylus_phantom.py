@@ -145,7 +145,7 @@ def test_bad_input_is_one_line(shared_data: Path, values: dict[str, str], said: 
     assert "\n" not in str(raised.value)
 
 
-def test_landmarks_that_are_not_declared_or_not_found_are_told(
+def test_landmarks_that_are_not_declared_or_not_found_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     devices = SimpleNamespace(name="d.xml", landmarks={})

@@ -94,7 +94,7 @@ def test_the_disk_of_two_centimetres(shared_data: Path) -> None:
     assert values["scale.confidence"] == pytest.approx(0.028, abs=0.003)
 
 
-def test_images_in_which_few_disks_are_found_say_what_was_looked_for(
+def test_images_in_which_few_disks_are_found_report_what_was_searched(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     calls = iter(range(9))

@@ -247,7 +247,7 @@ def test_a_lag_is_ambiguous_where_another_leaves_less_than_twice_unexplained(
         _only_peak(LAGS, values, 0.3, 0.5)
 
 
-def test_what_cannot_be_aligned_is_told_with_its_numbers() -> None:
+def test_what_cannot_be_aligned_is_reported_with_its_numbers() -> None:
     wide = Signal(T, np.column_stack([T, T]), "N", 0.0, "machine")
     one = signal(T, motion(T))
     for stream in (wide, signal(T[:7], motion(T[:7]))):

@@ -295,7 +295,7 @@ def test_damaged_exports_name_what_is_missing(
         reader(tmp_path / name, {})
 
 
-def test_a_body_that_was_never_seen_is_told_with_its_count(tmp_path: Path) -> None:
+def test_a_body_that_was_never_tracked_is_reported_with_its_count(tmp_path: Path) -> None:
     text = "NO_OF_FRAMES\t2\nNO_OF_BODIES\t1\nFREQUENCY\t100\nDATA_INCLUDED\t6D\nBODY_NAMES\tA\n"
     text += ("\t".join(["0.000"] * 6 + ["-1.000"] + ["0.000"] * 9) + "\n") * 2
     (tmp_path / "x.tsv").write_text(text, "utf-8")

@@ -296,7 +296,7 @@ def test_even_images_are_counted_and_the_first_is_named() -> None:
         followed.followed(flat(3), followed.Hint(None, None), "images")
 
 
-def test_an_outline_that_jumps_or_is_doubted_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A region more than a radius from the last outline is another one."""
     last = Outline(RING, 1e-4, np.zeros(2), 4e-3, 1.0, 1.0, 0.0, "free")
     far = replace(last, centre=np.array([0.0, 4.1e-3]))

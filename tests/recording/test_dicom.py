@@ -349,7 +349,9 @@ def test_a_region_that_reaches_beyond_its_image_was_resized() -> None:
         dicom._box(Path("x.dcm"), np.array([0.0, 0.0, 9.0, 5.0]), 8, 6)
 
 
-def test_files_of_a_folder_that_are_no_one_loop_say_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_of_a_folder_that_are_no_one_loop_are_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def sets(*numbers: int | None, many: int = 1) -> list[pydicom.Dataset]:
         made = []
         for number in numbers:

@@ -232,7 +232,7 @@ def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
         sized._signed(np.array([0.0, 0.1]), None, picked("strain"))
 
 
-def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_told(
+def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = {"strain": Said("e", "%", -1.0)}

@@ -190,7 +190,7 @@ def test_an_old_workbook_that_is_cut_within_a_sector_is_refused(tmp_path: Path) 
         sheets_arrays.arrays(tmp_path / "x.xls")
 
 
-def test_a_sheet_that_is_named_and_holds_no_table_says_why() -> None:
+def test_a_sheet_that_is_named_and_has_no_table_is_reported() -> None:
     sheets = [_Sheet("notes", {}, "no line of names"), _Sheet("test", {})]
     with pytest.raises(RecordingError, match="sheet 'notes': no line of names"):
         _tests(sheets, "notes")
@@ -204,7 +204,7 @@ def test_a_sheet_that_is_named_and_holds_no_table_says_why() -> None:
         _tests([], None)
 
 
-def test_two_sheets_that_may_hold_the_test_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_sheets_that_may_contain_the_test_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     sheets = [_Sheet("first", {"": None}), _Sheet("second", {"": None})]  # type: ignore[dict-item]
     monkeypatch.setattr(_Sheet, "is_test", property(lambda self: True))
     with pytest.raises(

@@ -82,7 +82,7 @@ def test_a_run_still_finds_wrong_pixels() -> None:
         decode(IMAGE, data[5])
 
 
-def test_a_batch_whose_pictures_only_look_alike_is_none() -> None:
+def test_a_batch_whose_pictures_only_begin_alike_is_none() -> None:
     """Every picture has the same wrong header, and then the last characters are no base64."""
     wrong = [m.replace(b"UgAAACgAAAAe", b"UgAAACkAAAAe") for m in messages()]
     assert wrong[0] != messages()[0]
@@ -101,7 +101,7 @@ def test_an_image_too_large_for_a_message_is_refused(monkeypatch: pytest.MonkeyP
         image_message(0, "probe", GREY[0])
 
 
-def test_outlines_of_two_points_are_told_with_their_message(
+def test_outlines_of_two_points_are_reported_with_their_message(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(seen_module, "pose_of", lambda *_: np.eye(4))

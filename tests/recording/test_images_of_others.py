@@ -227,7 +227,7 @@ def packed(image: Image.Image, kind: str) -> bytes:
         (packed(Image.new("F", (2, 2)), "TIFF"), "of mode F: over 16 bits; save 16-bit grey"),
     ],
 )
-def test_a_message_that_holds_no_picture_is_refused(data: bytes, says: str) -> None:
+def test_a_message_without_picture_is_refused(data: bytes, says: str) -> None:
     with pytest.raises(RecordingError, match=says):
         decode_picture(data)
 
@@ -257,7 +257,7 @@ def test_images_beyond_all_bytes_of_a_stack_are_refused(
         stack_arrays.arrays(tmp_path)
 
 
-def test_rows_of_a_raw_image_that_are_cut_are_told() -> None:
+def test_rows_of_a_raw_image_that_are_cut_are_refused() -> None:
     with pytest.raises(RecordingError, match="11 bytes for 3 x 2 px of 2; cut"):
         raw._numbers(RawImage("yuv422", 2, 3, 6, bytes(11), False), 2, 1)
     found = raw._numbers(RawImage("mono16", 1, 2, 6, b"\0\1\0\2\\9\\9", True), 1, 2)

@@ -380,7 +380,7 @@ def test_times_have_no_sign_and_as_many_samples_as_what_they_tell(
         matlab73_arrays.arrays(tmp_path / "x.mat")
 
 
-def test_a_file_of_words_alone_and_one_of_curves_say_what_they_hold() -> None:
+def test_a_file_of_words_alone_and_one_of_curves_list_what_they_contain() -> None:
     word = {"note": np.array("text")}
     with pytest.raises(
         RecordingError, match=r"neither points \(n, 2 or 3\) nor uint8 images .*; it"

@@ -195,7 +195,7 @@ def test_one_wrong_field_is_seen(at: str, shared_data: Path) -> None:
 NO_SCHEMA = Schema(1, "x/msg/X", "ros2msg", b"")
 
 
-def test_encodings_that_nothing_here_decodes_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_encodings_that_nothing_here_decodes_report_it(monkeypatch: pytest.MonkeyPatch) -> None:
     channel = Channel(1, 1, "/x", "cdr", {})
     assert decoder_of(None, channel) == "no decoder for '/cdr'"
     monkeypatch.setattr(decoders, "_ros2", refusing(ImportError("no", name="mcap_ros2")))

@@ -348,13 +348,13 @@ def test_unknown_schemas_are_listed_with_why(shared_data: Path, capfd: Any) -> N
     assert capfd.readouterr().out == ""  # its library prints
 
 
-def test_a_topic_that_is_not_there_is_told_with_the_others(tmp_path: Path) -> None:
+def test_a_topic_that_is_not_there_is_reported_with_the_others(tmp_path: Path) -> None:
     path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}])
     with pytest.raises(UsageError, match=r"x.mcap: no topic '/y'; topics: /x"):
         list(messages_in(path, "/y", 1))
 
 
-def test_errors_of_a_whole_file_name_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_errors_of_a_file_name_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}, {"a": 2.0}])
     monkeypatch.setattr(foreign, "MAX_NUMBERS", 1)
     with pytest.raises(

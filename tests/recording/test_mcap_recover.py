@@ -138,7 +138,7 @@ def test_the_command_saves_and_a_run_still_refuses(tmp_path: Path) -> None:
     assert "FILE and -o only" in wrong
 
 
-def test_a_file_that_shrinks_while_it_is_copied_is_told() -> None:
+def test_a_file_that_shrinks_while_it_is_copied_is_refused() -> None:
     cut = SimpleNamespace(data=100, crc=0)
     with pytest.raises(RecordingError, match="became shorter while it was read, by 60 bytes"):
         module._copy(io.BytesIO(bytes(40)), io.BytesIO(), cut, b"")

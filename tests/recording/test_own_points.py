@@ -357,7 +357,7 @@ PLAIN = "time (s),tip_x (mm),tip_y (mm),tip_z (mm)\n0,1,2,3\n0.1,1,2,3\n0.2,1,2,
         ),
     ],
 )
-def test_what_a_table_cannot_mean_is_told(
+def test_what_a_table_cannot_mean_is_refused(
     text: str, options: dict[str, str], says: str, tmp_path: Path
 ) -> None:
     (tmp_path / "p.csv").write_text(text)
@@ -366,7 +366,7 @@ def test_what_a_table_cannot_mean_is_told(
 
 
 def test_many_short_tracks_are_refused(tmp_path: Path) -> None:
-    """60 particles, each seen in two of 61 images: 120 rows for 3660 cells."""
+    """60 particles, each tracked in two of 61 images: 120 rows for 3660 cells."""
     rows = [f"{(i + k) / 10},t{i},{i},0,0" for i in range(60) for k in (0, 1)]
     (tmp_path / "p.csv").write_text(
         "\n".join(["time (s),marker,x (mm),y (mm),z (mm)", *rows]) + "\n"

@@ -237,6 +237,6 @@ def test_another_missing_key_is_no_missing_definition(
             pass
 
 
-def test_a_bag_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_bag_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="nowhere: no such file or folder"):
         read_bag(tmp_path / "nowhere", {})

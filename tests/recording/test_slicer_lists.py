@@ -36,7 +36,7 @@ def test_a_unit_for_each_axis_of_a_list_is_one(tmp_path: Path) -> None:
         ('{"markups": [{"controlPoints": [7]}]}', "a control point that is no object; damaged"),
     ],
 )
-def test_damaged_markups_are_told(text: str, says: str, tmp_path: Path) -> None:
+def test_damaged_markups_are_refused(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "x.mrk.json").write_text(text)
     with pytest.raises(RecordingError, match=says):
         read_markups(tmp_path / "x.mrk.json", {})

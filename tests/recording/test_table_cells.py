@@ -45,7 +45,7 @@ def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None
     assert (is_row(cells), is_data(cells)) == (row, data)
 
 
-def test_a_line_that_is_no_csv_is_told_with_its_length() -> None:
+def test_a_line_that_is_no_csv_is_reported_with_its_length() -> None:
     with pytest.raises(RecordingError, match="no CSV text: a line of 140001 characters: field l"):
         cells._cells("1" * 140_000 + ",", ",")
 

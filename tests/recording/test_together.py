@@ -63,7 +63,7 @@ def test_a_drift_that_stays_adds_a_ramp_of_its_height(
     assert with_drift(offset, None) == offset
 
 
-def test_a_drift_that_does_not_settle_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drift_that_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_left", lambda *_: (1.0, 1.0))
     with pytest.raises(
         RecordingError, match=f"the drift does not settle within {module._TURNS} tu"
@@ -71,7 +71,7 @@ def test_a_drift_that_does_not_settle_is_told(monkeypatch: pytest.MonkeyPatch) -
         drift_of(signal(T, motion(T)), signal(T, motion(T)), NO_OFFSET)
 
 
-def test_a_topic_of_two_files_is_told() -> None:
+def test_a_topic_of_two_files_is_refused() -> None:
     one = Recording("r", "measured", 0, signals={"f": signal(T, T)})  # type: ignore[arg-type]
     module.require_other_topics([one])
     with pytest.raises(

@@ -305,7 +305,7 @@ def test_a_run_that_begins_at_rest_is_read_as_it_is_and_others_from_zero() -> No
     assert from_rest(np.array([1.0]), np.zeros((1, 0)), np.zeros(3)).shape == (3, 0)
 
 
-def test_a_late_clock_reads_only_what_was_seen() -> None:
+def test_a_late_clock_reads_only_tracked_samples() -> None:
     t = np.array([0.0, 1.0, 2.0])
     y = np.array([[0.0, np.nan, 1.0], [10.0, np.nan, np.nan], [20.0, np.nan, 3.0]])
     late = shifted(t, y, 0.5)
@@ -328,7 +328,7 @@ def test_outlines_of_a_late_clock_move_with_their_speed() -> None:
     np.testing.assert_allclose(one.outlines[0], outlines[0], atol=1e-15)  # no speed to tell
 
 
-def test_markers_that_are_not_seen_at_rest_are_named() -> None:
+def test_markers_that_are_missing_at_rest_are_named() -> None:
     x = np.zeros((3, 2, 3))
     x[:2, 1] = np.nan
     seen = Markers(np.array([0.0, 0.1, 1.0]), ("a", "b"), x + [[[1.0, 0, 0]]], 1e-4, "lab")

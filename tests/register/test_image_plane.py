@@ -260,7 +260,7 @@ def test_swapped_targets_are_doubted_and_named_twice_refused(tmp_path: Path) -> 
 
 
 def test_one_image_that_alone_tells_a_motion_leaves_no_prediction_of_itself() -> None:
-    """Without the second image the wires are seen from one side: nothing predicts its points."""
+    """Without the second image its points have no prediction."""
     rng = np.random.default_rng(4)
     seen = landmarks(rng, 2, 3)
     found = image_plane(seen)

@@ -153,7 +153,7 @@ def test_boxes_with_too_few_particles_are_refused_or_left_out(
     assert between_module.between.__wrapped__(whose, None) == ("own", "other")  # type: ignore[arg-type]
 
 
-def test_a_ratio_that_is_open_and_clouds_that_are_none_are_told(
+def test_a_ratio_that_is_open_and_clouds_that_are_none_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     p = SimpleNamespace(material=SimpleNamespace(nu=None))
@@ -173,7 +173,7 @@ def test_a_ratio_that_is_open_and_clouds_that_are_none_are_told(
             pair_module.cloud(Path("a.mat"), 1e-6)
 
 
-def test_a_folder_of_one_file_and_pixels_of_no_size_are_told(
+def test_a_folder_of_one_file_and_pixels_of_no_size_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pair_module, "found", lambda *_: tmp_path)

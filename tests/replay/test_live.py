@@ -455,7 +455,7 @@ def test_a_device_that_has_gone_is_counted_and_ends_nothing() -> None:
     assert counts == {"unreachable": 1, "taken": 1, "unsent": 1}
 
 
-def test_an_interruption_ends_the_loop_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interruption_ends_the_loop_and_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object) -> int:
         raise KeyboardInterrupt
 

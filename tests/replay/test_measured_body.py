@@ -420,7 +420,7 @@ def test_a_plane_mesh_is_no_body(monkeypatch: pytest.MonkeyPatch) -> None:
         measured_body_module.body_of(card, folder=Path())  # type: ignore[arg-type]
 
 
-def test_layouts_and_markers_that_are_not_said_are_asked_for(
+def test_layouts_and_markers_that_are_not_given_are_requested(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(measured_markers, "_points_in", lambda path: {})
@@ -448,7 +448,7 @@ def use(**seen: object) -> SimpleNamespace:
     )
 
 
-def test_streams_that_are_not_there_or_share_no_time_are_told() -> None:
+def test_streams_that_are_not_there_or_share_no_time_are_refused() -> None:
     def stream(*t: float) -> SimpleNamespace:
         return SimpleNamespace(t=np.array(t))
 
@@ -505,7 +505,7 @@ def moved_by(*names: str, noted: tuple[float, ...] = ()) -> SimpleNamespace:
     return SimpleNamespace(seen=seen, moved=moved)
 
 
-def test_a_place_that_markers_move_needs_three_that_are_seen(
+def test_a_place_that_markers_move_needs_three_that_are_tracked(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     recording = SimpleNamespace(marker=lambda topic: SimpleNamespace(names=("a", "b", "c", "d")))

@@ -67,7 +67,7 @@ def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
 
 
 def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> None:
-    """A time step that is neither the default nor the experiment's own."""
+    """The time step is neither the default nor the one that the experiment gives."""
     plain = Method("m", Newmark())
     with pytest.raises(
         UsageError, match=r"dt = 0.5 of 'm': the experiment sets 0.01; change its own parameter"
@@ -118,7 +118,7 @@ def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> N
         ),
     ],
 )
-def test_what_an_experiment_lacks_is_told(call: object, error: type, says: str) -> None:
+def test_what_an_experiment_lacks_is_refused(call: object, error: type, says: str) -> None:
     with pytest.raises(error, match=says):
         call()  # type: ignore[operator]
 
@@ -151,7 +151,7 @@ def test_an_inclusion_without_loads_compares_nothing(monkeypatch: pytest.MonkeyP
         inclusion.placed(None, None, None, None, streams, {}, (), ())  # type: ignore[arg-type]
 
 
-def test_what_was_not_loaded_or_recorded_by_a_twin_is_told() -> None:
+def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
     with pytest.raises(ComparisonError, match="experiment 'x' was not loaded from a file"):
         folder_of(bare(path=None))  # type: ignore[arg-type]
     with pytest.raises(ComparisonError, match="experiment 'x' has no twin to replay a loop with"):
@@ -171,7 +171,7 @@ def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> 
         remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
 
 
-def test_a_ladder_that_cannot_be_refined_is_told() -> None:
+def test_a_ladder_that_cannot_be_refined_is_refused() -> None:
     mesh = SimpleNamespace(nodes=np.zeros((4, 3)))
     own = SimpleNamespace(
         experiment=bare(), scene=SimpleNamespace(mesh=mesh), levels=lambda wanted: (1,)

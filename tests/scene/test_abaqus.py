@@ -381,7 +381,7 @@ def test_rows_of_a_deck_that_are_none_name_their_line(
         call()
 
 
-def test_an_instance_is_shifted_then_turned_and_ranges_hold_their_ends() -> None:
+def test_an_instance_is_shifted_then_turned_and_ranges_contain_their_ends() -> None:
     quarter = block("1, 0, 0", "0, 0, 0, 0, 0, 1, 90")
     assert placed(np.array([[1.0, 0.0, 5.0]]), quarter) == pytest.approx(np.array([[0, 2, 5]]))
     assert list(abaqus_arrays._range(block(), "2, 8, 3")) == [2, 5, 8]

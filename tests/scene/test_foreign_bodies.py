@@ -334,7 +334,7 @@ def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]
         ("<!DOCTYPE x><VTKFile></VTKFile>", "declares entities: no list of files needs that"),
     ],
 )
-def test_a_series_that_is_none_is_told(text: str, says: str, tmp_path: Path) -> None:
+def test_a_series_that_is_none_is_refused(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "a.pvd").write_text(text)
     with pytest.raises(ValidateError, match=says):
         vtu_series.arrays(tmp_path / "a.pvd")

@@ -344,7 +344,7 @@ def test_settings_of_a_scheme_are_positive(wrong: dict[str, float]) -> None:
             CentralDifference(margin=margin)
 
 
-def test_a_tangent_of_touching_bodies_that_is_indefinite_is_told(
+def test_a_tangent_of_touching_bodies_that_is_indefinite_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One unknown of stiffness -1 N/m: no correction of Newton leads to balance."""

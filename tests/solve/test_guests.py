@@ -366,7 +366,7 @@ def test_it_stands_in_an_experiment_and_is_set_as_others_are() -> None:
     assert (method.settings.command, method.settings.seconds) == ("python g.py", 3.0)
 
 
-def test_a_guest_that_weighs_the_body_needs_a_density() -> None:
+def test_a_simulator_that_weighs_the_body_needs_a_density() -> None:
     assert job._density(Material(1.0, 0.3, rho=1000.0)) == 1000.0
     with pytest.raises(SceneError, match=r"needs a density; give material.rho"):
         job._density(Material(1.0, 0.3))

@@ -101,7 +101,7 @@ def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
         choose._split(text, "--error", "1mm")
 
 
-def test_a_ladder_without_a_rung_is_told() -> None:
+def test_a_ladder_without_a_rung_is_refused() -> None:
     with pytest.raises(
         UsageError, match="no rung of the ladder has a cell for this scene; see 'st"
     ):

@@ -330,7 +330,7 @@ def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Pa
     assert len(found.quantities[0].judged.verdicts) == 20
 
 
-def test_what_has_no_coverage_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_has_no_coverage_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(
         ComparisonError, match="cell: SimpleNamespace cannot be drawn anew; give it"
     ):

@@ -142,7 +142,7 @@ def test_a_worker_keeps_few_systems_and_many_recordings(pulled: Experiment) -> N
 
 
 def shared_run(monkeypatch: pytest.MonkeyPatch, **found: object) -> None:
-    """Filters of all seeds at once, of which only the result is looked at."""
+    """Replace the filter of all seeds by its result `found`."""
     probes = SimpleNamespace(weights=SimpleNamespace(toarray=lambda: np.ones((1, 1))))
     monkeypatch.setattr(filter_cell, "probe_rows", lambda *_: probes)
     monkeypatch.setattr(filter_cell, "sharing", lambda stepper: stepper, raising=False)

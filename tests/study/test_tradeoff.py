@@ -418,7 +418,7 @@ def test_a_solver_that_is_refused_has_a_stride_of_its_words(
     ]
 
 
-def test_studies_of_what_cannot_be_say_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_studies_of_what_cannot_be_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stability_cell, "body_of", lambda experiment: None)
     job = SimpleNamespace(experiment=lambda: None)
     with pytest.raises(ComparisonError, match="the experiment declares no density: nothing steps"):

@@ -124,7 +124,7 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
 
 
 def _joined_freedom(one: Residual, other: Residual) -> int | None:
-    """The sum of both; a residual without its own has as many as it has numbers."""
+    """Return the sum of both; a residual that declares none has as many as it has numbers."""
     if one.freedom is None and other.freedom is None:
         return None
     return sum(r.values.size if r.freedom is None else r.freedom for r in (one, other))

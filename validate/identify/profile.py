@@ -126,7 +126,7 @@ def _next(at: Floats, rise: Floats, wanted: float, reach: float, room: float) ->
 
 def _end(at: Floats, rise: Floats, wanted: float, room: float) -> tuple[float, bool]:
     """Distance to the interval's end, on the line of sqrt(rise) through the two points nearest to
-    it, and whether it is only the bound. At a jump these are the points on both sides of it."""
+    it, and whether it is only the bound. At a jump, the points on both sides."""
     z, target = np.sqrt(np.maximum(rise, 0.0)), float(np.sqrt(wanted))
     if rise.max() < (1 - _WITHIN) * wanted:
         return room, True
