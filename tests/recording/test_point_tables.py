@@ -321,21 +321,6 @@ def test_qualisys_bodies_are_read_by_their_matrix_column_by_column(tmp_path: Pat
         read_qualisys(path, {})
 
 
-
-
-
-def test_archives_that_are_not_there_or_too_large_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(UsageError, match=r"cannot read .*none.npz: no such file"):
-        npz_points._archive(tmp_path / "none.npz")
-    np.savez(tmp_path / "a.npz", x=np.zeros(100))
-    assert npz_points._archive(tmp_path / "a.npz")[1]["x"].shape == (100,)
-    monkeypatch.setattr(npz_points, "_MOST", 100)
-    with pytest.raises(RecordingError, match=r"a.npz: \d+ bytes unpacked, the limit is 100"):
-        npz_points._archive(tmp_path / "a.npz")
-
-
 def test_a_trc_file_without_a_name_is_none(tmp_path: Path) -> None:
     text = (
         "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumFrames\n100\t1\nFrame#\tTime\n\tX1\n1\t0\n"

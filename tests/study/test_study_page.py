@@ -28,18 +28,3 @@ def test_the_kind_is_the_declared_one(
     )
     page = write_study(experiment, told, tmp_path / "study")
     assert json.loads((page.parent / "results.json").read_text("utf-8"))["kind"] == KINDS[name]
-
-
-
-def test_recordings_that_are_not_available_count_as_measured(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def absent(*_: object) -> None:
-        raise RecordingError("no such folder")
-
-    monkeypatch.setattr(study_page, "folder_of", lambda experiment: None)
-    one = SimpleNamespace(same_model=False, load=absent, parameters=None)
-    assert study_page._kind(one, twin=False) == "measured"  # type: ignore[arg-type]
-    assert study_page._kind(one, twin=True) == "twin"  # type: ignore[arg-type]
-    same = SimpleNamespace(same_model=True)
-    assert study_page._kind(same, twin=True) == "same model"  # type: ignore[arg-type]
