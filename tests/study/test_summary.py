@@ -83,7 +83,7 @@ def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None
         "same": "recording and model are the same model",
         "forced": "predicted with parameters that are not identifiable (--anyway)",
         "old": "stored before sizes were; run it again",
-        "broken": "broken/results.json: not believed",
+        "broken": "broken/results.json",
     }  # fmt: skip
     assert only(summary(tmp_path)).stated.bias.value == pytest.approx(1.1, rel=0.001)
 
