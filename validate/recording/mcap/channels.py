@@ -5,6 +5,7 @@ replay. `enable_data_crcs` is off by default in the `mcap` package. Equal channe
 metadata give equal bytes.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -75,11 +76,15 @@ def write_channels(
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """As `places.replacing`; raises `RecordingError` for a path that cannot be written, or text
     that is no UTF-8."""
+    written = 0
     try:
         with places.replacing(path) as stream:
-            yield stream
+            try:
+                yield stream
+            finally:
+                written = os.fstat(stream.fileno()).st_size
     except OSError as error:
-        why = why_not(error, path)
+        why = why_not(error, path, written)
         raise RecordingError(f"{path.name}: cannot be written ({why})") from error
     except UnicodeEncodeError as error:
         raise RecordingError(f"{path.name}: text that is no UTF-8 ({error.reason})") from error
