@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from graphlib import TopologicalSorter
@@ -138,3 +139,16 @@ def test_what_a_module_prepares_is_prepared_by_one_worker(request: pytest.Fixtur
     """pytest 9.2 with pytest-xdist 3.8 drops the groups without a word (xdist issue 1386)."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         assert request.node.nodeid.endswith("@tree")
+
+
+def test_files_of_others_are_opened_in_one_guarded_way(project_root: Path) -> None:
+    """`validate.files` alone reads: what a process of its own hands back is ours."""
+    reads = re.compile(r"\.(read_bytes|read_text)\(|\bpath\.open\(|\bfile\.open\(|\bopen\(path")
+    found = [
+        f"{path.name}: {line.strip()}"
+        for folder in ("recording", "scene", "papers", "register")
+        for path in sorted((project_root / "validate" / folder).rglob("*.py"))
+        for line in path.read_text("utf-8").splitlines()
+        if reads.search(line) and path.name != "apart.py"
+    ]
+    assert found == []

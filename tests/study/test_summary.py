@@ -74,6 +74,9 @@ def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None
     content = json.loads(path.read_text())
     del content["domain"]
     path.write_text(json.dumps(sealed(content)))
+    stored(tmp_path, "turned", check(30.0), kind="twin")
+    path = tmp_path / "turned" / "results.json"
+    path.write_text(path.read_text().replace('"kind": "twin"', '"kind": "measured"'))
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "results.json").write_text('{"kind": "meas')
     found = whys(tmp_path)
@@ -83,6 +86,7 @@ def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None
         "same": "recording and model are the same model",
         "forced": "predicted with parameters that are not identifiable (--anyway)",
         "old": "stored before sizes were; run it again",
+        "turned": "turned/results.json",
         "broken": "broken/results.json",
     }  # fmt: skip
     assert only(summary(tmp_path)).stated.bias.value == pytest.approx(1.1, rel=0.001)
