@@ -77,7 +77,7 @@ def test_a_drift_is_said_enters_the_sd_and_is_taken_out_on_demand(tmp_path: Path
     blunt = float(read_recording(out).record("clock_offset/markers")["sd"])
     assert blunt > drift * 55 / np.sqrt(12) * 0.9
     assert f"sd {blunt:.2g} s" in " ".join(said.split())
-    code, said, err = here("align", *given, *BY, "--drift", "-o", str(out))
+    code, said, err = here("align", *given, *BY, "--drift", "-o", str(out), "--force")
     assert (code, err) == (0, "")
     found = read_recording(out)
     record = found.record("clock_offset/markers")

@@ -144,7 +144,8 @@ def test_a_stylus_on_eight_landmarks_against_its_published_tip(
     path = shared_data / SEQUENCE
     x, out = tmp_path / "x.mcap", tmp_path / "y.mcap"
     write_recording(recognised(path).read(path, {"images": "no"}), x)
-    given = ["--pivot", "StylusToTracker", "--reference", "ReferenceToTracker", "-o", str(out)]
+    given = ["--pivot", "StylusToTracker", "--reference", "ReferenceToTracker", "-o", str(out),
+             "--force"]  # fmt: skip
     code, said, _ = here("calibrate", str(x), *given, "--tip", "110mm,5mm,0mm")
     assert code == 0
     assert "poses about 10 points" in said

@@ -37,14 +37,14 @@ class Scheduler:
 
     def submit(self, function: Any, *given: Any, workers: list[str], **_: Any) -> Any:
         if function is cluster.prove:
-            return SimpleNamespace(status="finished", result=lambda: HERE)
+            return SimpleNamespace(status="finished", result=lambda **_: HERE)
         cells = given[3]
         self.sent.append(tuple(cell.key for cell in cells))
         found = self.answer(cells)
         error = found if isinstance(found, Exception) else None
         return SimpleNamespace(
             status="error" if error else "finished", exception=lambda: error,
-            result=lambda: found, cancel=lambda: None,
+            result=lambda **_: found, cancel=lambda: None,
         )  # fmt: skip
 
 
@@ -103,3 +103,25 @@ def test_a_refusal_counts_as_an_answer_of_proven_code_only(monkeypatch: pytest.M
 def test_what_opening_the_experiment_raises_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UsageError, match="no experiment 'x'"):
         drained(Scheduler(lambda _: UsageError("no experiment 'x'")), monkeypatch)
+
+
+def test_a_result_that_is_gone_with_its_worker_is_computed_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The task is finished, and the worker that holds what it gave dies before it is fetched."""
+    scheduler = Scheduler(lambda cells: [given(c) for c in cells], "w1")
+    submit = scheduler.submit
+
+    def lost(**_: object) -> None:
+        scheduler.workers = ["w2"]
+        raise TimeoutError
+
+    def first_is_lost(function: Any, *given: Any, **more: Any) -> Any:
+        future = submit(function, *given, **more)
+        if function is not cluster.prove and len(scheduler.sent) == 1:
+            future.result = lost
+        return future
+
+    monkeypatch.setattr(scheduler, "submit", first_is_lost)
+    assert drained(scheduler, monkeypatch) == {"a": 1, "b": 1}
+    assert scheduler.sent.count(("a",)) == 2

@@ -9,7 +9,7 @@ import pytest
 from commands import here, refused
 
 from validate.errors import UsageError
-from validate.seals import sealed
+from validate.seals import sealed, unsealed
 from validate.study.predictions import predictions, stored_runs
 from validate.study.summary import Summary, summary
 from validate.study.summary_page import document
@@ -204,5 +204,5 @@ def test_the_command_prints_and_draws_all_of_it(tmp_path: Path) -> None:
     assert "Predicted against measured size" in (folder / "report.html").read_text("utf-8")
     assert {p.name for p in (folder / "figures").iterdir()} == {"against.png"}
     again = json.loads(here("summary", "--out", str(tmp_path), "--json")[1])
-    assert again == json.loads((folder / "results.json").read_text("utf-8"))
+    assert again == unsealed(json.loads((folder / "results.json").read_text("utf-8")))
     assert [run["folder"] for run in again["runs"]] == ["a", "b", "c", "q"]

@@ -174,10 +174,10 @@ class _Drain:
             self._wait([one.future for one in self._sent])
             there = frozenset(self._there())
             for one in tuple(self._sent):
-                if one.future.status in ("finished", "error"):
-                    self._sent.remove(one)
-                    self._collect(one)
-                elif not one.workers & there:
+                if one.future.status == "error" or one.workers & there:
+                    if one.future.status in ("finished", "error") and self._collect(one):
+                        self._sent.remove(one)
+                else:  # also where it was finished: its result is gone with its workers
                     self._sent.remove(one)
                     one.future.cancel()
                     self._bury(one.batch)
@@ -233,11 +233,13 @@ class _Drain:
         if asked.status == "cancelled":
             return
         try:
-            there = asked.result() if error is None else {}
+            there = asked.result(timeout=_MOMENT) if error is None else {}
             require_same(self._here, there, f"worker {worker}")
         except OtherCodeError as other:
             self._refused.add(worker)
             LOG.warning(str(other))
+            return
+        except TimeoutError:  # gone since: asked again where it comes back
             return
         self._proven.add(worker)
 
@@ -256,21 +258,27 @@ class _Drain:
         )  # fmt: skip
         self._sent.append(_Sent(future, batch, frozenset(on)))
 
-    def _collect(self, one: _Sent) -> None:
-        """Takes the records that proven code made; others are asked for again, of all workers."""
+    def _collect(self, one: _Sent) -> bool:
+        """Takes the records that proven code made; others are asked for again, of all workers.
+        False where they do not come: their worker may be gone."""
         error = one.future.exception() if one.future.status == "error" else None
         if isinstance(error, KilledWorker):
             self._bury(one.batch)
-            return
+            return True
         if error is not None:
             raise error
-        for cell, record in zip(one.batch, one.future.result(), strict=True):
+        try:
+            records = one.future.result(timeout=_MOMENT)
+        except TimeoutError:
+            return False
+        for cell, record in zip(one.batch, records, strict=True):
             if record.code != self._code:
                 self._proven.clear()
                 self._waiting.append((cell,))
                 continue
             self._spent, self._finished = self._spent + record.seconds, self._finished + 1
             self._done(cell, record)
+        return True
 
     def _bury(self, batch: tuple[Any, ...]) -> None:
         """The workers of a batch died: its cells are sent again one by one, and one that dies
