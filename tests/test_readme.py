@@ -86,3 +86,11 @@ def test_its_pictures_are_there_and_small(readme: str, project_root: Path) -> No
     pictures = re.findall(r"!\[.+?\]\((.+?)\)", readme)
     assert len(pictures) == 1
     assert 0 < (project_root / pictures[0]).stat().st_size < 500_000
+
+
+def test_every_shipped_experiment_has_a_row_with_its_exit_code(project_root: Path) -> None:
+    """`benchmarks/exit_codes.py` runs them and holds each to its row."""
+    table = (project_root / "README.md").read_text("utf-8").partition("\n## Experiments\n")[2]
+    rows = re.findall(r"^\| `(\w+)` \|.*\| ([01]) \|$", table.partition("\n## ")[0], re.M)
+    names = {path.stem for path in (project_root / "experiments").glob("*.py")}
+    assert sorted(name for name, _ in rows) == sorted(names)
