@@ -107,5 +107,5 @@ EXPERIMENT = Experiment(
             (Calibrates(("force", "right")),),
         ),
     ),
-    twin=Twin(record, remake=(), same_model=True),
+    twin=Twin(record, remake=(), kind="same model"),
 )

@@ -31,7 +31,7 @@ EXPERIMENT = Experiment(
     parameters=PARAMETERS,
     methods=BLOCK,
     accepted=("whole",),
-    accept=(Accept("force", 0.05, "a twentieth of the largest force (ours)"),),
+    accept=(Accept("force", 0.05, "a twentieth of the largest force"),),
     load=shipped,
     build=build,
     place=place,
@@ -45,7 +45,7 @@ EXPERIMENT = Experiment(
     twin=Twin(
         record,
         remake=("twin.", "probe.", "body.", "dt"),
-        same_model=True,
+        kind="same model",
         seed=PARAMETERS.twin.seed,
         notice="The recording is a twin: the whole solve on the models' own mesh, plus noise.",
     ),

@@ -52,7 +52,7 @@ EXPERIMENT = replace(
     accepted=("p2_neo_hooke",),
     accept=(
         *LINEAR.accept,
-        Accept("force.plate", 0.8, "a tenth of the largest plate force (ours)"),
+        Accept("force.plate", 0.8, "a tenth of the largest plate force"),
     ),
     uncertainty=replace(LINEAR.uncertainty, stand_in={"p2_neo_hooke": "p2_fluid"}),
     effects=(

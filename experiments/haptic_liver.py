@@ -47,7 +47,7 @@ EXPERIMENT = Experiment(
     parameters=PARAMETERS,
     methods=METHODS,
     accepted=("every_tick",),
-    accept=(Accept("force.z", 0.15, "a twentieth of the largest force (ours)"),),
+    accept=(Accept("force.z", 0.15, "a twentieth of the largest force"),),
     load=load,
     build=build,
     place=place,
@@ -62,7 +62,7 @@ EXPERIMENT = Experiment(
     twin=Twin(
         record,
         remake=("twin.", "path.", "body.", "material.", "hand."),
-        same_model=True,
+        kind="same model",
         seed=PARAMETERS.twin.seed,
         notice="The recording is a twin: the same body simulated at every tick, plus noise.",
     ),

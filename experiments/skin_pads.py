@@ -69,9 +69,9 @@ EXPERIMENT = Experiment(
     methods=METHODS,
     accepted=("neo_hooke", "linear"),
     accept=(
-        Accept("force", 0.03, "a tenth of the largest force (ours)", ("predicted", "end")),
-        Accept("field.axial", 0.2e-3, "a twentieth of what the pads move (ours)"),
-        Accept("field.lateral", 0.1e-3, "half of that (ours)"),
+        Accept("force", 0.03, "a tenth of the largest force", ("predicted", "end")),
+        Accept("field.axial", 0.2e-3, "a twentieth of what the pads move"),
+        Accept("field.lateral", 0.1e-3, "half of that"),
     ),
     load=load,
     build=build,

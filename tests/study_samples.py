@@ -104,7 +104,7 @@ EXPERIMENT = Experiment(
     build=lambda recording, p, model: scene(1e4),
     place=lambda recording, p, made: follow_signal(recording, made.mesh, "pull", "N"),
     sets=lambda p, seen: {"dt": DT}, axis="z", reference="plain",
-    twin=Twin(record, truth, same_model=True, seed=5),
+    twin=Twin(record, truth, kind="same model", seed=5),
 )
 '''
 

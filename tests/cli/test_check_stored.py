@@ -79,7 +79,7 @@ def test_a_run_is_stored_with_what_it_rests_on(stored: Path) -> None:
 def test_it_prints_what_a_new_one_prints(stored: Path) -> None:
     old, new = here("check", "pulled", cwd=stored), here("check", "pulled", "--fresh", cwd=stored)
     assert old[:2] == new[:2]
-    assert "top.rms@all" in old[1]
+    assert "top.max@all" in old[1]
 
 
 @pytest.mark.parametrize(

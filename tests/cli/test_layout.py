@@ -105,5 +105,6 @@ def test_a_complaint_is_one_line_in_a_pipe_and_breaks_between_words_on_a_termina
 
 def test_a_check_that_nothing_bounds_is_a_row_all_the_same() -> None:
     """Meshes that say nothing of convergence leave u_num, and with it u_val, infinite."""
-    check = Check("force", 1.0, 2.0, math.inf, 0.1, math.inf, 0.1, "N", 3, "cannot decide", "why")
-    assert running._row(check, "why")[:4] == ["force", "1.000 N", "no bound", "2.000 N"]
+    check = Check("force", 1.0, 2.0, math.inf, 0.1, math.inf, 0.1, "N", 3, "no answer",
+                  "undecided", "why")  # fmt: skip
+    assert running._row(check, "why")[:5] == ["force", "1.000 N", "no bound", "2.000 N", "-"]

@@ -94,7 +94,7 @@ def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root
     (method,) = [m for m in told(report)["methods"] if m["name"] == "slip"]
     judged = [c for c in method["checks"] if c["name"].startswith("contour.rms@")]
     assert [c["count"] for c in judged] == [120] * 4
-    assert all(0 < c["u_val"] < 0.2e-3 and c["verdict"] != "cannot decide" for c in judged)
+    assert all(0 < c["u_val"] < 0.2e-3 and c["verdict"] != "undecided" for c in judged)
     code, out, _ = called(["run", "my_gel", "--set", "outline.origin=-17mm,0mm,34mm"])  # 1 mm off
     assert (code, out.count("mm  120  differs")) == (1, 4)
     bonded = next(m for m in told(report)["methods"] if m["name"] == "bonded")

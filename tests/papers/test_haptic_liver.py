@@ -152,7 +152,7 @@ def test_what_is_told_of_a_coarse_liver(
     monkeypatch.setattr(haptic_exhibits, "_LIVE_SECONDS", 0.01)
     result = compare(experiment(), Options(small))
     (check,) = result.checks
-    assert check.verdict == "repeats itself"
+    assert check.verdict == "same model"
     found = {e.anchor: e for e in result.exhibits}
     forces = {row[0]: row for row in found["forces"].tables[0].rows}
     held, line, curve = (forces[f"100 Hz, {n}"] for n in ("held", "linear", "second order"))

@@ -21,7 +21,7 @@ def quick(experiment: Experiment) -> Result:
 
 def test_the_explicit_run_agrees_with_markers_of_the_implicit_one(quick: Result) -> None:
     assert quick.passed
-    assert [(c.name, c.count) for c in quick.checks] == [("tip.rms@all", 300)]
+    assert [(c.name, c.count) for c in quick.checks] == [("tip.max@all", 300)]
 
 
 def test_quasi_statics_is_off_by_the_whole_way_at_first(quick: Result) -> None:
@@ -35,7 +35,7 @@ def test_quasi_statics_is_off_by_the_whole_way_at_first(quick: Result) -> None:
 def test_dropped_damping_is_seen(experiment: Experiment) -> None:
     values = {"methods.explicit.settings.damping_terms": "mass"}
     result = compare(experiment, values, ("explicit",), quick=True)
-    assert {c.verdict for c in result.checks} == {"differs"}
+    assert {c.verdict for c in result.checks} == {"not good enough"}
 
 
 def test_beam_theory() -> None:

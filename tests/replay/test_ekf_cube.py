@@ -140,7 +140,7 @@ def test_only_a_reduced_filter_corrects_a_node_that_nobody_measures(stiff: Resul
 def test_the_accepted_filter_decides_and_does_not_claim_too_much(stiff: Result) -> None:
     """Its claim at B, part of u_val, is below the limit and above its error (NEES below 1)."""
     (check,) = of(stiff, "reduced_modes").checks
-    assert check.verdict == "repeats itself"
+    assert check.verdict == "same model"
     assert 0.5e-5 < check.u_input < 1.5e-5  # ours: .012 mm of the limit's .03
     found = scores(stiff, "reduced_modes")
     assert 0.05 < found["node_B.nees.per_dof"] < 1

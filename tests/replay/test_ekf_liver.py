@@ -157,7 +157,7 @@ def test_the_whole_experiment_stands(
     found = scores(result, "reduced_modes")
     assert found["node_A.rmse"] < 0.2 * NOISE  # what the printed filter leaves where it is
     (check,) = of(result, "reduced_modes").checks
-    assert check.verdict == "repeats itself"
+    assert check.verdict == "same model"
     assert 0.5 < found["node_B.nees.per_dof@finer"] < 2
     sets = next(e for e in result.exhibits if e.anchor == "sets")
     assert sets.pictures

@@ -28,7 +28,7 @@ FEM = {"fem": TINY.methods["fem"]}
 
 def other_model(**more: Any) -> Experiment:
     """The block and its twin, declared as made by another model; the twin is a file."""
-    twin = replace(TINY.twin or Twin(record), same_model=False, remake=("twin.", "sd"))
+    twin = replace(TINY.twin or Twin(record), kind="twin", remake=("twin.", "sd"))
     levels = tuple(changed(cells=n) for n in (6, 9))
     uncertainty = Uncertainty(MeshLadder(levels, lambda card: 0.01 / card.cells))
     own = replace(TINY, twin=twin, uncertainty=uncertainty, methods=FEM, cases=(), load=shipped)
@@ -50,28 +50,28 @@ def test_a_mesh_that_no_level_changes_shows_no_convergence() -> None:
         return scene(card.E, 3)
 
     (check,) = judged(other_model(build=build)).checks
-    assert (check.verdict, check.u_num) == ("cannot decide", float("inf"))
+    assert (check.verdict, check.u_num) == ("undecided", float("inf"))
     assert "fewer than three different sizes" in check.why
 
 
 def test_the_same_model_repeats_itself_and_predicts_nothing() -> None:
     result = judged(replace(TINY, cases=()))
-    assert [c.verdict for c in result.checks] == ["repeats itself"]
+    assert [c.verdict for c in result.checks] == ["same model"]
     assert (result.kind, result.overall.word, result.passed) == ("same model", "no evidence", True)
     assert result.overall.counted == "evidence: 0 of 1 checks"
     assert "predicts" not in result.sentence
-    assert "repeat the model itself, no evidence" in result.sentence
+    assert "of the same model, no evidence" in result.sentence
 
 
 def test_a_same_model_that_differs_has_failed() -> None:
     result = judged(replace(TINY, cases=(), load=shipped), E="9e4")
-    assert [c.verdict for c in result.checks] == ["differs"]
+    assert [(c.validation, c.verdict) for c in result.checks] == [("differs", "not good enough")]
     assert not result.passed
 
 
 def test_another_models_twin_is_evidence_but_no_measurement() -> None:
     result = judged(other_model())
-    assert [c.verdict for c in result.checks] == ["agrees"]
+    assert [c.verdict for c in result.checks] == ["good enough"]
     assert result.kind == "twin"
     assert "predicts what was measured" not in result.sentence
     assert {s.against for s in result.methods[0].scores} >= {"recording of a twin"}
@@ -81,7 +81,7 @@ def test_another_models_twin_is_evidence_but_no_measurement() -> None:
 def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
     result = judged(other_model(), sd="1e-4")
     assert result.notes[0].startswith("The twin was recorded anew")
-    assert [c.verdict for c in result.checks] == ["repeats itself"]
+    assert [c.verdict for c in result.checks] == ["same model"]
     assert "made again from this run's own parameters" in result.checks[0].why
 
 
@@ -94,7 +94,7 @@ def unsaid(card: Card, folder: Path) -> tuple[Recording, ...]:
 @pytest.mark.parametrize("files", [1, 2])
 def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(files: int) -> None:
     silent = other_model(load=lambda card, folder: files * unsaid(card, folder))
-    assert [c.verdict for c in judged(silent).checks] == ["agrees"]
+    assert [c.verdict for c in judged(silent).checks] == ["good enough"]
     with pytest.raises(UsageError, match=r"--set sd=0\.0001 would be ignored: .*validate record"):
         judged(silent, sd="1e-4")
 
@@ -106,7 +106,7 @@ def test_a_setting_that_the_record_does_not_know_is_refused() -> None:
         known = {k: v for k, v in made.record("made_with").items() if k != "twin.stiffness"}
         return (replace(made, metadata={**made.metadata, "made_with": known}),)
 
-    assert [c.verdict for c in judged(other_model(load=older)).checks] == ["agrees"]
+    assert [c.verdict for c in judged(other_model(load=older)).checks] == ["good enough"]
     with pytest.raises(UsageError, match=r"--set twin\.stiffness=1\.5 would be ignored"):
         judged(other_model(load=older), **{"twin.stiffness": "1.5"})
 
@@ -159,7 +159,7 @@ def test_a_marker_given_to_a_filter_is_fitted() -> None:
     experiment = replace(TINY, methods=methods, accepted=("kf",), accept=accept, cases=())
     found = {c.name: c.verdict for c in compare(experiment, Options({})).checks}
     assert methods["kf"].markers == ("node_A",)
-    assert found == {"node_A.rms@all": "fitted", "node_B.rms@all": "repeats itself"}
+    assert found == {"node_A.max@all": "fitted", "node_B.max@all": "same model"}
 
 
 def test_the_terminals_first_line_says_what_was_judged(
@@ -181,7 +181,9 @@ def test_the_terminals_first_line_says_what_was_judged(
     )
 
 
-@pytest.mark.parametrize(("doubts", "word"), [((), "agrees;"), (("50 m?",), "agrees, in doubt;")])
+@pytest.mark.parametrize(
+    ("doubts", "word"), [((), "good enough;"), (("50 m?",), "good enough, in doubt;")]
+)
 def test_the_first_line_doubts_what_the_warnings_doubt(
     doubts: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -80,7 +80,7 @@ def test_another_material_has_its_own_title_and_limit_and_no_printed_figure(logs
     assert figures[0].why == "printed for EF30_0T; not compared with this data (EF50_0T)"
     (accept,) = found.accept
     assert accept.limit == pytest.approx(3.40, abs=0.01)  # 34 N at 10 % strain in the log itself
-    assert "these logs" in accept.source
+    assert "these logs" in accept.reason
     assert found.uncertainty is not None
     assert all(i.source.startswith("assumed, as for EF30_0T") for i in found.uncertainty.inputs)
 

@@ -96,7 +96,7 @@ def experiment(
     folder: Path, parameters: MeasuredBody, seen: Recording, *names: str, order: int = 1
 ) -> Experiment:
     write_recording(seen, folder / "body.mcap")
-    limits = {"force": 0.05, "marker": 5e-5, "contour": 2e-4}
+    limits = {"force": 0.1, "marker": 1e-4, "contour": 4e-4}
     made = measured_body(
         "body", "body", "x", parameters, {"linear": solid("linear", "linear", order)}, ("linear",),
         tuple(Accept(n, limits[n], "of a test") for n in names), folder,
@@ -110,7 +110,7 @@ def verdicts(result: Result) -> dict[str, str]:
 
 def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
     result = compare(experiment(tmp_path, BASE, recording(signals=log()), "force"))
-    assert verdicts(result) == {"force.rms@low": "agrees", "force.rms@high": "agrees"}
+    assert verdicts(result) == {"force.max@low": "good enough", "force.max@high": "good enough"}
     rms = {s.name: s.value for s in result.methods[0].scores}
     assert rms["force.rms@high"] < 4e-3  # noise alone
 
@@ -120,7 +120,7 @@ def test_a_test_may_be_longer_than_its_states_are_seconds(tmp_path: Path) -> Non
     slow = {n: replace(s, t=20 * s.t) for n, s in log().items()}
     p = replace(BASE, seen=replace(BASE.seen, still=8.0))
     result = compare(experiment(tmp_path, p, recording(signals=slow), "force"))
-    assert set(verdicts(result).values()) == {"agrees"}
+    assert set(verdicts(result).values()) == {"good enough"}
 
 
 def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> N
     result = compare(experiment(tmp_path, open_, recording(signals=log()), "force"))
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.01)
-    assert verdicts(result) == {"force.rms@low": "fitted", "force.rms@high": "agrees"}
+    assert verdicts(result) == {"force.max@low": "fitted", "force.max@high": "good enough"}
     assert found["ranges.E"] < 0.01  # of the fit, in place of the assumed one
     assert any("identified" in note for note in result.notes)
 
@@ -145,7 +145,7 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
     )  # fmt: skip
     p = replace(BASE, seen=replace(BASE.seen, markers="markers", layout="recorded"))
     result = compare(experiment(tmp_path, p, both, "force", "marker"))
-    assert set(verdicts(result).values()) == {"agrees"}
+    assert set(verdicts(result).values()) == {"good enough"}
     rms = {s.name: s.value for s in result.methods[0].scores}
     assert rms["marker.rms@high"] < 1.5 * np.sqrt(3) * SD  # of a length
     shown, run = result.methods[0], result.methods[0].run
@@ -171,7 +171,7 @@ def test_markers_as_seen_may_stand_anywhere(
     p = replace(BASE, seen=replace(BASE.seen, markers="markers"))
     found = recording(signals=log(), markers={"markers": tracked(stretched)})
     result = compare(experiment(tmp_path, p, found, "marker"))
-    assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"agrees"}
+    assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"good enough"}
 
 
 @pytest.mark.parametrize("some", [("A",), ("A", "D")], ids=["one", "two"])
@@ -186,7 +186,7 @@ def test_a_single_marker_is_enough_in_the_body_s_own_frame(
         signals=log(), markers={"markers": tracked(stretched)}, metadata={"marker_layout": layout}
     )
     result = compare(experiment(tmp_path, p, found, "marker"))
-    assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"agrees"}
+    assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"good enough"}
     shown = registration(result)
     assert shown.words == (
         "Nothing was fitted: the markers were recorded in the body's frame, as declared.",
@@ -212,7 +212,7 @@ def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
                 material=replace(BASE.material, nu=0.0), ranges=BodyRanges(E=0.02))  # fmt: skip
     seen = recording(markers={"m": tracked(sunk)})
     result = compare(experiment(tmp_path, p, seen, "marker", order=2))
-    assert verdicts(result) == {"marker.rms@loaded": "agrees"}
+    assert verdicts(result) == {"marker.max@loaded": "good enough"}
     assert {s.name: s.value for s in result.methods[0].scores}["marker.rms@loaded"] < 2e-5
 
 
@@ -231,7 +231,7 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
         seen=SeenOf(markers="m", states=8, still=0.4),
     )  # fmt: skip
     result = compare(experiment(tmp_path, p, seen, "marker"))
-    assert verdicts(result) == {"marker.rms@low": "agrees", "marker.rms@high": "agrees"}
+    assert verdicts(result) == {"marker.max@low": "good enough", "marker.max@high": "good enough"}
     short = replace(p, moved=MovedBy("markers", "zmax", markers=names[:2]))
     with pytest.raises(UsageError, match="three or more are needed"):
         compare(experiment(tmp_path, short, seen, "marker"))
@@ -257,11 +257,11 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
     p = replace(BASE, seen=known)
     seen = recording(signals=log(), contours={"o": contours})
     result = compare(experiment(tmp_path, p, seen, "contour"))
-    assert verdicts(result) == {"contour.rms@low": "agrees", "contour.rms@high": "agrees"}
+    assert verdicts(result) == {"contour.max@low": "good enough", "contour.max@high": "good enough"}
     aside = recording(signals=log(), contours={"o": replace(contours, outlines=tuple(
         s + np.array([0.3, -0.2]) for s in shapes))})  # fmt: skip
     fitted = compare(experiment(tmp_path, replace(p, seen=looks), aside, "contour"))
-    assert set(verdicts(fitted).values()) == {"agrees"}
+    assert set(verdicts(fitted).values()) == {"good enough"}
     assert any("was fitted" in note for note in fitted.notes)
     with pytest.raises(UsageError, match="two directions at right angles"):
         compare(experiment(tmp_path, replace(p, seen=replace(p.seen, image_y="+x")), seen))
@@ -276,11 +276,11 @@ def test_a_motion_that_was_only_noted_is_judged_by_outlines(tmp_path: Path) -> N
     by = MovedBy("noted", "zmax", "-z", sideways=False, noted=(0.0, 0.4e-3, 1e-3))
     p = replace(BASE, moved=by, seen=looks)
     seen = recording(contours={"o": Contours(t, shapes, 2e-5, np.eye(4), "image")})
-    names = {"contour.rms@low": "agrees", "contour.rms@high": "agrees"}
+    names = {"contour.max@low": "good enough", "contour.max@high": "good enough"}
     assert verdicts(compare(experiment(tmp_path, p, seen, "contour"))) == names
     twice = replace(p, moved=replace(by, noted=(0.0, 2e-3)))
     found = verdicts(compare(experiment(tmp_path, twice, seen, "contour")))
-    assert found["contour.rms@high"] == "differs"
+    assert found["contour.max@high"] == "differs"
     for noted in ((), (1e-3,), (1e-3, 1e-3)):
         with pytest.raises(UsageError, match="two amounts or more that differ"):
             compare(experiment(tmp_path, replace(p, moved=replace(by, noted=noted)), seen))
@@ -290,7 +290,7 @@ def test_a_mesh_file_is_found_beside_the_experiment(tmp_path: Path) -> None:
     write_mesh(box(SIZE, (2, 2, 2)), tmp_path / "body.npz")
     p = replace(BASE, body=Solid("body.npz"))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
-    assert set(verdicts(result).values()) == {"agrees"}
+    assert set(verdicts(result).values()) == {"good enough"}
 
 
 @cache
@@ -333,7 +333,7 @@ def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path)
         compare(experiment(tmp_path, p, recording(signals=log()), "force"))
     p = replace(p, body=Solid("b.npz", halvings=1))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
-    assert set(verdicts(result).values()) == {"agrees"}
+    assert set(verdicts(result).values()) == {"good enough"}
 
 
 @pytest.mark.parametrize("words", ["near 20mm,15mm,50mm", "box 5mm,5mm,49mm to 36mm,26mm,51mm"])
@@ -378,7 +378,7 @@ def test_markers_that_rise_against_gravity_are_refused(tmp_path: Path) -> None:
 def test_a_body_that_slides_on_its_plate_neither_drifts_nor_turns(tmp_path: Path) -> None:
     p = replace(BASE, held=HeldAt(slides="zmin"))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
-    assert set(verdicts(result).values()) == {"agrees"}
+    assert set(verdicts(result).values()) == {"good enough"}
     method = result.methods[0]
     x, u = method.scene.mesh.nodes, method.run.u[-1]
     widened = 0.3 * 0.02 * (x[:, :2] - (0.02, 0.015))  # nu, strain, from the middle

@@ -166,7 +166,7 @@ TINY = Experiment(
         Case("stiff", "25 % stiffer", stiffer),
         Case("missing", "looks are missing", missed, methods=("kf", "diverged")),
     ),
-    twin=Twin(record, truth, same_model=True),
+    twin=Twin(record, truth, kind="same model"),
     path=Path(__file__),
 )
 
@@ -227,5 +227,5 @@ AT_HOLDS = replace(
     place=place_moved,
     sets=lambda card, seen: {},
     cases=(Case("stiff", "25 % stiffer", stiffer),),
-    twin=Twin(record_moved, moved_truth, same_model=True),
+    twin=Twin(record_moved, moved_truth, kind="same model"),
 )

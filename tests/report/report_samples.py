@@ -33,8 +33,11 @@ CHECK = Check(
     0.005,
     "N",
     1,
-    "agrees",
+    "not distinguishable",
+    "good enough",
     "|E| is 0.5 u_val",
+    0.25,
+    "ours: a half",
     0.012,
     0.008,
 )

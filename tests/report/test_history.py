@@ -177,4 +177,4 @@ def test_parameters_methods_and_verdict_that_changed(tmp_path: Path) -> None:
     found = since(second, third)
     assert (found.parameters, found.added, found.left_out) == ({}, (), ("stiff",))
     assert found.verdict is not None
-    assert found.verdict[0].startswith("agrees; evidence: 1 of 1")
+    assert found.verdict[0].startswith("good enough; evidence: 1 of 1")

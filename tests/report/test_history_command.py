@@ -40,7 +40,7 @@ def test_runs_and_what_changed_at_80_columns(reports: Path, tmp_path: Path) -> N
     lines = out.splitlines()
     assert max(map(len, lines[1:])) <= 80
     text = " ".join(out.split())
-    assert "1. 2026-11-20 04:00 UTC, cube: agrees; evidence: 1 of 1 checks" in text
+    assert "1. 2026-11-20 04:00 UTC, cube: good enough; evidence: 1 of 1 checks" in text
     assert "differs: nothing; commit abcdef0123 figures:" in text
     assert "soft: force.plate@2mm 0.01000 N (2 u_val 0.04000 N)" in text
     assert "differs: material.E 10000 -> 14000 Pa; commit abcdef0123, with changes" in text

@@ -20,20 +20,25 @@ from validate.seals import sealed
 
 
 def check(name: str, verdict: str, value: float | None = 1.5e-5) -> dict[str, Any]:
+    """A check with this answer to what decides; without a requirement where that is validation."""
+    free = verdict in ("differs", "not distinguishable")
     return {
         "name": name, "verdict": verdict, "value": value, "u_val": 2.0, "unit": "m", "count": 7,
+        "validation": verdict if free else "differs",
+        "acceptance": "no requirement" if free else verdict, "limit": None if free else 9.0,
+        "margin": None if free else 5.0, "requirement": "ours: a tenth",
         "why": "|E| < 2 u_val & more",
     }  # fmt: skip
 
 
 def content(*checks: dict[str, Any], published: tuple[Any, ...] = ()) -> dict[str, Any]:
     differs = [c["name"] for c in checks if c["verdict"] == "differs" and c["name"] != "alone"]
-    undecided = [c["name"] for c in checks if c["verdict"] == "cannot decide"]
+    undecided = [c["name"] for c in checks if c["verdict"] in ("undecided", "not good enough")]
     ended = {"state": "finished", "step": 9, "why": ""}
     return {
-        "experiment": "kf_cube", "created": "2026-01-01T00:00:00Z", "sentence": "it\nagrees",
+        "experiment": "kf_cube", "created": "2026-01-01T00:00:00Z", "sentence": "it\nholds",
         "passed": bool(checks) and not differs and not undecided,
-        "overall": {"verdict": "differs" if differs else "agrees", "evidence": 1,
+        "overall": {"verdict": "differs" if differs else "good enough", "evidence": 1,
                     "checks": len(checks), "differs": differs, "undecided": undecided},
         "methods": [
             {"name": "fem", "label": "FEM_1 & 50 %", "accepted": True, "checks": list(checks),
@@ -66,14 +71,18 @@ def results(suite: Any) -> dict[str, Any]:
 
 
 def test_a_check_that_fails_is_a_failure_and_no_evidence_is_skipped(tmp_path: Path) -> None:
-    given = content(check("a@1", "agrees"), check("b@1", "differs"), check("c@1", "cannot decide"),
-                    check("d@1", "fitted"), check("e@1", "repeats itself", None))  # fmt: skip
+    given = content(check("a@1", "good enough"), check("b@1", "not good enough"),
+                    check("c@1", "undecided"), check("d@1", "fitted"),
+                    check("e@1", "same model", None))  # fmt: skip
     found = suites(given, tmp_path)
     fem = results(found["fem"])
     assert {name: [kind for kind, _ in said] for name, said in fem.items()} == {
         "a@1": [], "b@1": [Failure], "c@1": [Failure], "d@1": [Skipped], "e@1": [Skipped]
     }  # fmt: skip
-    said = "differs: E 1.5e−5 m, u_val 2.00 m, 7 values; |E| < 2 u_val & more"
+    said = (
+        "not good enough (differs): E 1.5e−5 m, u_val 2.00 m, limit 9.00 m, margin 5.00 m, 7 "
+        "values; |E| < 2 u_val & more; limit: ours: a tenth"
+    )
     assert fem["b@1"][0][1] == said
     assert "E none" in fem["e@1"][0][1]
     assert found["rival"].failures == 0  # rivals never decide
@@ -82,14 +91,14 @@ def test_a_check_that_fails_is_a_failure_and_no_evidence_is_skipped(tmp_path: Pa
 
 def test_it_fails_where_the_run_fails(tmp_path: Path) -> None:
     """A check that differs by itself, but not after the correction, does not fail alone."""
-    found = suites(content(check("alone", "differs"), check("b", "agrees")), tmp_path)
+    found = suites(content(check("alone", "differs"), check("b", "not distinguishable")), tmp_path)
     assert [s.failures + s.errors for s in found.values()] == [0, 0, 0]
     (case, _) = found["fem"]
     assert "not after Holm's correction" in case.system_out
 
 
 def test_an_accepted_method_that_ended_early_is_an_error(tmp_path: Path) -> None:
-    given = content(check("a", "agrees"))
+    given = content(check("a", "good enough"))
     for method in given["methods"]:
         method |= {"checks": [], "outcome": {"state": "diverged", "step": 12, "why": "u > 1e3 m"}}
     found = suites(given, tmp_path)
@@ -106,14 +115,17 @@ def test_an_experiment_that_compared_nothing_fails(tmp_path: Path) -> None:
 def test_a_printed_figure_that_fell_is_a_failure(tmp_path: Path) -> None:
     figure = {"name": "peak \x07", "verdict": "reproduced", "ours": 1.0, "theirs": 2.0,
               "reason": "", "source": "Table 1", "fault": "ours moved to 1.0"}  # fmt: skip
-    found = suites(content(check("a", "agrees"), published=(figure,)), tmp_path)
+    found = suites(content(check("a", "good enough"), published=(figure,)), tmp_path)
     assert results(found["published"]) == {"peak ?": [(Failure, "ours moved to 1.0")]}
     assert [s.failures for s in found.values()] == [0, 0, 0, 1]
 
 
 def test_latex_escapes_and_is_a_whole_table() -> None:
-    table = latex(content(check("a_b@1", "agrees"), check("c", "fitted", None)))
-    assert r"FEM\_1 \& 50 \% & a\_b@1 & $1.5\times10^{-5}$ & $2$ & m & 7 & agrees \\" in table
+    table = latex(content(check("a_b@1", "good enough"), check("c", "fitted", None)))
+    assert (
+        r"FEM\_1 \& 50 \% & a\_b@1 & $1.5\times10^{-5}$ & $2$ & $9$ & $5$ & m & 7 & good enough & "
+        in table
+    )
     assert " -- & $2$" in table
     assert table.isascii()
     known = get_default_latex_context_db()
@@ -122,14 +134,14 @@ def test_latex_escapes_and_is_a_whole_table() -> None:
     (tabular,) = (n for n in nodes if isinstance(n, LatexEnvironmentNode))
     assert tabular.environmentname == "tabular"
     inside = tabular.latex_verbatim().splitlines()
-    assert {line.replace(r"\&", "").count("&") for line in inside if "&" in line} == {6}
+    assert {line.replace(r"\&", "").count("&") for line in inside if "&" in line} == {9}
 
 
 def test_latex_typesets_it(tmp_path: Path) -> None:
     if shutil.which("pdflatex") is None:
         assert os.environ.get("VALIDATE_REQUIRE_LATEX") != "1", "no pdflatex"
         pytest.skip("no pdflatex (VALIDATE_REQUIRE_LATEX=1 makes this a failure)")
-    rows = (check("a_b@1 {x}~^", "agrees"), check("50 % \\ # $", "fitted", None))
+    rows = (check("a_b@1 {x}~^", "good enough"), check("50 % \\ # $", "fitted", None))
     document = (
         r"\documentclass{article}\begin{document}" + latex(content(*rows)) + r"\end{document}"
     )
@@ -142,7 +154,7 @@ def test_latex_typesets_it(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_what_is_asked_for(tmp_path: Path) -> None:
-    (tmp_path / "results.json").write_text(json.dumps(sealed(content(check("a", "agrees")))))
+    (tmp_path / "results.json").write_text(json.dumps(sealed(content(check("a", "good enough")))))
     run = CliRunner()
     nothing = run.invoke(cli, ["export", str(tmp_path)])
     assert "say what: --junit" in str(nothing.exception)

@@ -10,7 +10,7 @@ from report_samples import BLIND, CHECK, bare_result, small_result
 
 from validate.compare.effects import Change
 from validate.compare.result import Result
-from validate.compare.verdict import Verdict
+from validate.compare.verdict import Acceptance, Validation
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.html import page
 from validate.report.sections import exhibits
@@ -94,23 +94,28 @@ def test_all_recordings_are_drawn() -> None:
 
 
 @pytest.mark.parametrize(
-    ("verdict", "size", "word", "colour"),
-    [("agrees", 0.01, "Agrees", "good"), ("differs", 0.1, "Differs", "bad"),
-     ("cannot decide", 0.01, "Undecided", "open"), ("fitted", 0.1, "No evidence", "open"),
-     ("repeats itself", 0.01, "No evidence", "open")],
+    ("validation", "acceptance", "word", "colour"),
+    [("differs", "good enough", "Good enough", "good"),
+     ("differs", "not good enough", "Not good enough", "bad"),
+     ("not distinguishable", "undecided", "Undecided", "open"),
+     ("not distinguishable", "no requirement", "Not distinguishable", "good"),
+     ("differs", "no requirement", "Differs", "bad"),
+     ("fitted", "fitted", "No evidence", "open"),
+     ("same model", "same model", "No evidence", "open")],
 )  # fmt: skip
 def test_band_says_the_verdict_in_words_and_colour(
-    verdict: Verdict, size: float, word: str, colour: str
+    validation: Validation, acceptance: Acceptance, word: str, colour: str
 ) -> None:
     result = small_result()
-    method = replace(result.methods[0], checks=(replace(CHECK, value=size, verdict=verdict),))
+    one = replace(CHECK, validation=validation, acceptance=acceptance, ratio=2.0)
+    method = replace(result.methods[0], checks=(one,))
     text = empty(replace(result, methods=(method,)))
     assert f'class="band {colour}" id="verdict"><b>{word}:' in text
     assert unescape(text).count(result.sentence) == 1
 
 
-def test_nothing_checked_is_undecided() -> None:
-    assert "<b>Undecided:" in empty(bare_result())
+def test_nothing_checked_says_so() -> None:
+    assert "<b>Nothing compared:" in empty(bare_result())
 
 
 @pytest.mark.parametrize("anchor", ["quick", "twin", "same-model"])
@@ -143,8 +148,9 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
         "force@3mm", "N", "0.0200", "0.0300", "? 50.0", "12",
     ]  # fmt: skip
     assert [shown(c) for c in table.rows[0]] == [
-        "soft", "force.plate@2mm", "✓ agrees", "N", "0.0100", "0.0400", "0.500",
-        "0.0120", "0.00800", "0.0150", "0.0100", "0.00500", "1", "|E| is 0.5 u_val",
+        "soft", "force.plate@2mm", "✓ good enough", "not distinguishable", "N", "0.0100", "0.0400",
+        "0.500", "0.450", "0.0120", "0.00800", "0.0150", "0.0100", "0.00500", "1",
+        "|E| is 0.5 u_val. Limit: ours: a half.",
     ]  # fmt: skip
 
 

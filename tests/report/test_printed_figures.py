@@ -79,11 +79,13 @@ def test_terminals_of_run_and_check_show_the_verdict_of_today(
     [("reproduced", True), ("moved", False), ("not reproduced", False), ("not computed", False),
      ("other data", True)],
 )  # fmt: skip
-def test_a_run_fails_where_a_figure_does_not_stand(line: str, *, stands: bool) -> None:
+def test_a_figure_that_does_not_stand_fails_the_check_and_not_the_run(
+    line: str, *, stands: bool
+) -> None:
     result = showing(STATES[line])
-    assert small_result().passed
-    assert result.passed is stands
-    assert document(result, CREATED)["passed"] is stands
+    assert result.passed
+    assert document(result, CREATED)["passed"]
+    assert checking._holds(checking._content(result), declared=False) is stands
 
 
 def test_figures_of_other_data_alone_hold_nothing() -> None:
@@ -114,7 +116,7 @@ def test_what_was_chosen_on_the_judging_twin_stands_beside_the_verdict(
     soft, stiff = small_result().methods
     result = replace(small_result(), methods=(replace(soft, chosen=chosen), stiff))
     (row,), checked = written(result, checks, tmp_path)
-    assert row["why"] == f"|E| is 0.5 u_val; {chosen}"
+    assert row["why"] == f"|E| is 0.5 u_val; {chosen}. Limit: ours: a half."
     assert checked.count(chosen) == 2  # the sentence above and the row
     assert chosen in written(result, methods, tmp_path)[1]
     assert [m["chosen"] for m in document(result, CREATED)["methods"]] == [chosen, ""]

@@ -8,7 +8,11 @@ import pytest
 from validate.replay.find import load_file
 from validate.study.study_page import Findings, write_study
 
-KINDS = {"hanging_bar": "reference", "fluid_phantom": "twin", "ecoflex_cylinder": "measured"}
+KINDS = {
+    "hanging_bar": "reference",
+    "fluid_phantom": "same law, finer mesh",
+    "ecoflex_cylinder": "measured",
+}
 
 
 @pytest.mark.parametrize("present", [True, False])

@@ -18,7 +18,8 @@ from validate.study.summary_page import document
 def check(simulated: float, measured: float = 10.0, **more: Any) -> dict[str, Any]:
     found = {
         "name": "force@3mm", "value": simulated - measured, "u_val": 0.5, "u_D": 0.3,
-        "u_num": 0.0, "u_input": 0.4, "unit": "N", "count": 1, "verdict": "agrees",
+        "u_num": 0.0, "u_input": 0.4, "unit": "N", "count": 1, "verdict": "good enough",
+        "validation": "not distinguishable",
         "kind": "force", "size": {"measured": measured, "simulated": simulated, "u": 0.3},
     }  # fmt: skip
     return {**found, **more}
@@ -95,11 +96,11 @@ def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None
 def test_fitted_checks_never_enter(tmp_path: Path) -> None:
     stored(
         tmp_path, "a", check(11.0), check(10.0, verdict="fitted"),
-        check(10.0, verdict="repeats itself"), check(10.0, count=0), check(10.0, u_num=None),
+        check(10.0, verdict="same model"), check(10.0, count=0), check(10.0, u_num=None),
         check(10.0, size=None), check(10.0, kind=""),
         check(0.9, 1.0, size={"measured": 1.0, "simulated": 0.9, "u": 0.3}),
-        check(12.0, name="force@6mm", verdict="differs"),
-        check(13.0, name="force@9mm", verdict="cannot decide"),
+        check(12.0, name="force@6mm", verdict="differs", validation="differs"),
+        check(13.0, name="force@9mm", verdict="undecided"),
     )  # fmt: skip
     found, left = predictions(stored_runs(tmp_path))
     assert [p.check for p in found] == ["force@3mm", "force@6mm", "force@9mm"]

@@ -1,4 +1,4 @@
-"""`validate check`: published figures and accepted limits, today."""
+"""`validate check`: published figures and declared verdicts, today."""
 
 import json
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.chosen import each
-from validate.cli.display import error_shown, figures_table, relative, say, shown, table
+from validate.cli.display import error_shown, figures_table, relative, say, shown, table, warn
 from validate.cli.progress import progress
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
@@ -14,6 +14,7 @@ from validate.replay.named_run import run_folder
 from validate.replay.options import Options
 from validate.replay.reused import stored_run
 from validate.replay.road import compare
+from validate.report.plain import members
 from validate.report.store import check_members, figure_members, overall_members
 
 Json = dict[str, Any]
@@ -22,8 +23,8 @@ Json = dict[str, Any]
 def check(
     names: tuple[str, ...], *, named: tuple[Path, ...], out: Path | None, fresh: bool, as_json: bool
 ) -> int:
-    """Holds every figure of stored runs that match, else of new ones, which are not stored; 0 when
-    none failed and one was compared."""
+    """Holds every figure and verdict of stored runs that match, else of new ones, which are not
+    stored; 0 when no figure moved and every verdict is the declared one."""
     found: list[Json] = []
 
     def one(experiment: Experiment) -> bool:
@@ -65,6 +66,8 @@ def _content(result: Result) -> Json:
         "kind": result.kind,
         "source": result.source,
         "passed": result.passed,
+        "expected": [members(e) for e in result.expected],
+        "moved": [members(m) for m in result.moved] if result.expected else [],
         "overall": overall_members(result.overall),
         "published": [figure_members(p) for p in result.published],
         "methods": [
@@ -77,6 +80,8 @@ def _document(content: Json, *, declared: bool) -> Json:
     return {
         "experiment": content["experiment"],
         "holds": _holds(content, declared=declared),
+        "expected": content["expected"],
+        "moved": content["moved"],
         "stored": content["created"],
         "published": content["published"],
         "checks": [{"method": m["name"], **c} for m in content["methods"] for c in m["checks"]],
@@ -84,9 +89,13 @@ def _document(content: Json, *, declared: bool) -> Json:
 
 
 def _holds(content: Json, *, declared: bool) -> bool:
-    """Checks agree and figures stand; an experiment that declares figures must have held some."""
+    """Verdicts are the declared ones (none declared: the run passed) and figures stand; an
+    experiment that declares figures must have held some."""
     held_some = any(not p["other"] for p in content["published"]) or not declared
-    return bool(content["passed"]) and held_some
+    checked = any(m["checks"] for m in content["methods"])
+    as_declared = not content["moved"] if content["expected"] else bool(content["passed"])
+    fallen = any(p["fault"] for p in content["published"])
+    return checked and as_declared and held_some and not fallen
 
 
 def _print(content: Json) -> None:
@@ -96,8 +105,13 @@ def _print(content: Json) -> None:
     figures_table(figures)
     for method in content["methods"]:
         if method["checks"]:
-            head = ["check", "error", "limit", "n", "verdict"]
-            table(f"Accepted limits, {method['name']}", head, [_row(c) for c in method["checks"]])
+            head = ["check", "error", "2 u_val", "limit", "margin", "n", "acceptance", "validation"]
+            table(f"Requirements, {method['name']}", head, [_row(c) for c in method["checks"]])
+    for e in content["expected"]:
+        say(f"expected: {e['check']} of {e['method']} is {e['verdict']}, for {e['why']}")
+    for m in content["moved"]:
+        told = m["expected"] or "not declared"
+        warn(f"moved: {m['method']}: {m['check']} is {m['found']}; expected: {told}")
     overall, fallen = content["overall"], sum(bool(p["fault"]) for p in figures)
     say(
         f"\n{len(figures)} published figures, {fallen} no longer stand; checks: "
@@ -106,5 +120,9 @@ def _print(content: Json) -> None:
 
 
 def _row(check: Mapping[str, Any]) -> list[str]:
-    limit = shown(check["limit"], check["unit"])
-    return [check["name"], error_shown(check), limit, str(check["count"]), check["verdict"]]
+    u_val, unit = check["u_val"], check["unit"]
+    numbers = (None if u_val is None else 2 * u_val, check["limit"], check["margin"])
+    return [
+        check["name"], error_shown(check), *(shown(n, unit) for n in numbers),
+        str(check["count"]), check["acceptance"], check["validation"],
+    ]  # fmt: skip

@@ -41,7 +41,7 @@ def _show(found: Coverage) -> None:
     rows = [list(share_row(q)) for q in found.quantities]
     rows += [
         [t.method, f"all {t.checks} (Holm)", percent(t.share), interval(t.share),
-         percent(t.undecided), "holds" if t.holds else "too narrow"]
+         "-", "-", "-", "-", "holds" if t.holds else "too narrow"]
         for t in found.together
     ]  # fmt: skip
     table("A perfect model under our own verdicts", HEAD, rows)

@@ -8,6 +8,7 @@ from validate.cli.display import say, table
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
+from validate.report.plain import members
 
 
 def show(name: str, named: tuple[Path, ...], as_json: bool) -> None:
@@ -38,11 +39,18 @@ def _details(experiment: Experiment) -> dict[str, Any]:
         "methods": [{"name": k, "label": m.label} for k, m in experiment.methods.items()],
         "accepted": list(experiment.accepted),
         "accept": [
-            {"quantity": a.quantity, "limit": a.limit, "source": a.source}
+            {
+                "quantity": a.quantity,
+                "limit": a.required,
+                "statistic": a.statistic,
+                "loads": list(a.loads),
+                "why": a.why,
+            }
             for a in experiment.accept
         ],
+        "expected": [members(e) for e in experiment.expected],
         "seed": experiment.seed,
-        "same_model": experiment.same_model,
+        "kind": experiment.declared_kind,
     }
 
 
@@ -56,8 +64,14 @@ def _print(experiment: Experiment) -> None:
         for k, m in experiment.methods.items()
     ]
     table("Methods", ["name", "what", ""], methods)
-    accepted = [[a.quantity, f"{a.limit:g}", a.source] for a in experiment.accept]
-    table("Accepted when", ["quantity", "limit (SI)", "source"], accepted)
+    required = [
+        [a.quantity, ", ".join(a.loads) or "all", a.statistic,
+         "none" if a.required is None else f"{a.required:g}", a.why]
+        for a in experiment.accept
+    ]  # fmt: skip
+    table("Requirements", ["quantity", "at", "of many", "limit (SI)", "why"], required)
+    known = [[e.method, e.check, e.verdict, e.why] for e in experiment.expected]
+    table("Expected verdicts", ["method", "check", "verdict", "why"], known)
 
 
 def _default(parameter: Parameter) -> str:

@@ -139,7 +139,7 @@ def written(
         title_text=repr(title),
         source=plain(Path(source).name).replace("\\", "/").replace('"', "'"),
         source_text=repr(plain(Path(source).name)),
-        kind=_declared(kind_of_recordings((recording,), same_model=False)),
+        kind=_declared(kind_of_recordings((recording,))),
         recording=repr(source),
         channels="\n".join(f"#   {line}".rstrip() for line in channels(recording)),
     )

@@ -26,7 +26,13 @@ from validate.cli.new_body_questions import (
     three_of,
     unit_of,
 )
-from validate.cli.new_kind import FEW_CELLS, NewKind, quantity_in
+from validate.cli.new_kind import (
+    FEW_CELLS,
+    NewKind,
+    accept_line,
+    limit_question,
+    reason_question,
+)
 from validate.cli.rendered import rendered
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
@@ -200,9 +206,9 @@ def _of_the_outlines(
 
 def _of_the_limits(found: Answers) -> list[Question]:
     return [
-        Question(f"accept.{name}", f"largest error that is accepted, {unit}: {what}", open=True,
-                 check=quantity_in(unit))
+        question
         for name, (unit, what) in _ACCEPTED.items() if name in _judged(found)
+        for question in (limit_question(name, what, unit), reason_question(name))
     ]  # fmt: skip
 
 
@@ -257,8 +263,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         "methods": "\n        ".join(_methods(found["law"], mesh, order)),
         "accepted": "solid" if found["law"] != "linear" else "linear",
         "accept": "\n        ".join(
-            f'Accept("{name}", {quantity_in(_ACCEPTED[name][0])(found[f"accept.{name}"]):.6g}, '
-            f'"answered"),  # {_ACCEPTED[name][0]}'
+            accept_line(name, _ACCEPTED[name][0], found)
             for name in _ACCEPTED if name in _judged(found)
         ),
     }  # fmt: skip

@@ -31,6 +31,37 @@ class NewKind:
     assumed: Callable[[Recording, Answers], Sequence[str]]
 
 
+NOTHING = "none"  # the answer of a user who requires nothing
+
+
+def limit_question(name: str, what: str, unit: str) -> Question:
+    """Which error is good enough, or that none is required."""
+    given = quantity_in(unit)
+    return Question(
+        f"accept.{name}", f"largest error that is good enough, {unit}: {what}; {NOTHING}: only the "
+        "difference from zero is tested", open=True,
+        check=lambda text: None if text == NOTHING else given(text),
+    )  # fmt: skip
+
+
+def reason_question(name: str, default: str = "") -> Question:
+    """Why the limit is what it is: without a reason it is no requirement."""
+    return Question(
+        f"why.{name}", "why such an error is good enough for your purpose, a source or your own "
+        "choice; empty: it is no requirement", default,
+    )  # fmt: skip
+
+
+def accept_line(name: str, unit: str, found: Answers) -> str:
+    """The requirement as an experiment's file declares it."""
+    answer = found[f"accept.{name}"]
+    if answer == NOTHING:
+        return f'Accept("{name}"),  # nothing is required'
+    reason = found.get(f"why.{name}", "")
+    told = "" if reason else "; write why, or it is no requirement"
+    return f'Accept("{name}", {quantity_in(unit)(answer):.6g}, {reason!r}),  # {unit}{told}'
+
+
 def quantity_in(unit: str) -> Callable[[str], float]:
     """A check: a positive number in `unit`, or with its own."""
 

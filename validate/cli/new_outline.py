@@ -9,7 +9,13 @@ import numpy as np
 
 from validate.cli.asking import Answers, Question
 from validate.cli.new_body_questions import known_size, there
-from validate.cli.new_kind import FEW_CELLS, quantity_in
+from validate.cli.new_kind import (
+    FEW_CELLS,
+    accept_line,
+    limit_question,
+    quantity_in,
+    reason_question,
+)
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression
@@ -79,8 +85,8 @@ def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
         *asked,
         Question("outline.sd", "how well that place is known along x and y of the images, one "
                  "standard uncertainty, as 0.3mm", open=True, check=quantity_in("m")),
-        Question("accept.contour", "largest distance of the outlines that is accepted, as 0.5mm",
-                 open=True, check=quantity_in("m")),
+        limit_question("contour", "distance of the outlines", "m"),
+        reason_question("contour"),
     ]  # fmt: skip
 
 
@@ -111,11 +117,10 @@ def fields(found: Answers) -> dict[str, str]:
     if found.get("outline.shows", _OTHER) == _OTHER:
         return {"outline": "", "accept_outline": "", "body": "", "fluid": "",
                 "E": "None"}  # fmt: skip
-    limit = quantity_in("m")(found["accept.contour"])
     inside = found["outline.shows"] == _WALL
     return {
         "outline": f"    # The images, and where they lie, m.\n    outline={_card(found)},\n",
-        "accept_outline": f'\n        Accept("contour", {limit:.6g}, "answered, m"),',
+        "accept_outline": f"\n        {accept_line('contour', 'm', found)}",
         "body": _mesh(found) if inside else "",
         "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside else "None",
         "fluid": _of_the_model(found) if inside else "",

@@ -7,7 +7,7 @@ import numpy as np
 
 from validate.cli import new_outline
 from validate.cli.asking import Answers, Question
-from validate.cli.new_kind import NewKind, quantity_in
+from validate.cli.new_kind import NewKind, quantity_in, reason_question
 from validate.identify.modulus import stated_test
 from validate.recording.types import Recording
 from validate.replay.compression_cards import stated_sizes
@@ -36,19 +36,24 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
                  check=length)
         for name in _SIZES if f"specimen.{name}" not in stated
     ]  # fmt: skip
-    return [*asked, _accepts(recording, found), *new_outline.asks(recording, found)]
+    return [*asked, *_accepts(recording, found), *new_outline.asks(recording, found)]
 
 
-def _accepts(recording: Recording, found: Answers) -> Question:
+def _accepts(recording: Recording, found: Answers) -> tuple[Question, Question]:
     """Without a height the force at the strain limit is not known yet, so that no number is shown
     that would stay when the height is answered."""
-    what, check = "largest error of the force that is accepted, N", quantity_in("N")
+    what, check = "largest error of the force that is good enough, N", quantity_in("N")
     height, limit, judged = _judged(recording, found)[1:]
     if height is None:
         what += "; empty: a tenth of the force at the strain limit"
-        return Question("accept.force", what, check=check)
-    return Question("accept.force", what, f"{limit:.3g}", f"a tenth of {judged}, assumed",
-                    check=check)  # fmt: skip
+        return Question("accept.force", what, check=check), reason_question("force")
+    own = found.get("accept.force", f"{limit:.3g}") != f"{limit:.3g}"
+    return (
+        Question(
+            "accept.force", what, f"{limit:.3g}", f"a tenth of {judged}, assumed", check=check
+        ),
+        reason_question("force", "" if own else f"a tenth of {judged}"),
+    )  # fmt: skip
 
 
 def _what(name: str, recording: Recording) -> str:
@@ -91,7 +96,8 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     free, fixed, ends = _WORDS[test]
     own = found.get("accept.force", "")
     said = quantity_in("N")(own) if own else accepted
-    reason = f"a tenth of {judged}" if f"{said:.3g}" == f"{accepted:.3g}" else "answered"
+    default = "" if own and f"{said:.3g}" != f"{accepted:.3g}" else f"a tenth of {judged}"
+    reason = found.get("why.force") or default
     return {
         "test": f'"{test}",  # {"recorded" if stated_test(recording) else "answered"}',
         "diameter": _size("diameter", stated, found, by_area=by_area),
@@ -100,7 +106,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         "fit_to": f"{0.5 * limit:.3g}",
         "limit": f"{limit:.3g}",
         "accept": f"{said:.3g}",
-        "judged": reason,
+        "reason": repr(reason),
         "free": free,
         "fixed": fixed,
         "ends": ends,

@@ -1,6 +1,7 @@
 """`validate history`: the runs of an experiment and what changed from one to the next."""
 
 import json
+import math
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -70,7 +71,7 @@ def _figures(run: PastRun) -> str:
         if s["value"] is not None
     ]
     judged = [c for c in run.checks if c.value is not None]
-    judged.sort(key=lambda c: -abs(c.value or 0) / (c.limit or 1))
+    judged.sort(key=lambda c: -abs(c.value or 0) / (c.limit or math.inf))
     return "; ".join([*found, *map(_figure, judged[:_FIGURES])]) or "no check has a number"
 
 

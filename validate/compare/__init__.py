@@ -16,6 +16,7 @@ _HOMES = {
     "boundary": ("outline_boundary",),
     "shape_error": ("Boundaries", "boundary_scores"),
     "overall": ("Overall", "judge_all"),
+    "expected": ("Expected",),
     "result": ("MethodResult", "Result"),
     "exhibit": ("Animation", "Chart", "Exhibit", "NodeMap", "NumberTable", "Picture", "Series"),
 }

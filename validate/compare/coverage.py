@@ -15,15 +15,16 @@ import numpy as np
 from scipy.special import betaincinv
 
 from validate.arrays import Floats, rms
-from validate.compare.overall import ALPHA
+from validate.compare.verdict import ALPHA
 
 LEAST, MOST = 0.02, 0.07
+FALSE_ACCEPTANCE = 0.05  # of models whose error is the limit, and of perfect ones
 U_NUM = "u_num"
 MEASUREMENT = "measurement"
 _ALIKE = 0.1  # relative: how far a shown term may lie off its part before it is another one
 _MUCH = 0.2  # of u_val squared: what a term claims beyond what it shows, 200 draws make it 0.14
 
-Word = Literal["holds", "too narrow", "too wide", "blunt", "cannot decide", "no evidence"]
+Word = Literal["holds", "too narrow", "too wide", "blunt", "no answer", "no evidence"]
 
 
 @dataclass(frozen=True)

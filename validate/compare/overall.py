@@ -1,10 +1,14 @@
-"""The experiment's verdict over all its checks, corrected for how many there are.
+"""The experiment's two answers over all its checks.
 
-Each check alone is wrong for a perfect model in 4.6 % of cases (|E| > 2 u_val of a normal error),
-so twenty of them show a difference more often than not. Holm (1979), "A simple sequentially
-rejective multiple test procedure", Scand. J. Stat. 6, 65-70: the i-th smallest of m p-values must
-stay below alpha/(m - i + 1); whatever the checks have in common, a perfect model is then called
-different in at most alpha of all experiments.
+*Good enough*: every requirement is met. Each check is a test of its own and all must pass, so that
+their number needs no correction: an intersection-union test, Berger (1982), "Multiparameter
+hypothesis testing and acceptance sampling", Technometrics 24, 295-300.
+
+*Differs*: one check of a perfect model is beyond 2 u_val in 4.6 % of cases, so twenty of them show
+a difference more often than not. Holm (1979), "A simple sequentially rejective multiple test
+procedure", Scand. J. Stat. 6, 65-70: the i-th smallest of m p-values must stay below
+alpha/(m - i + 1); whatever the checks have in common, a perfect model is then called different in
+at most alpha of all experiments.
 
 Checks of one name are one comparison: several accepted methods on the same data. It is one piece of
 evidence, however many methods show it, and one of the m: its p-value is the smallest of theirs.
@@ -12,62 +16,94 @@ evidence, however many methods show it, and one of the m: its p-value is the sma
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from scipy.special import ndtr
+from validate.compare.verdict import ALPHA, Check
 
-from validate.compare.verdict import Check
-
-ALPHA = 2 * float(ndtr(-2.0))  # one check alone: |E| > 2 u_val
+Word = Literal[
+    "good enough", "not good enough", "undecided", "not distinguishable", "differs", "no evidence",
+    "nothing compared",
+]  # fmt: skip
+PASSES: tuple[Word, ...] = ("good enough", "not distinguishable", "no evidence")
 
 
 @dataclass(frozen=True)
 class Overall:
     """What all checks say together.
 
-    `differs` after Holm's correction; `alone` differ by themselves only; `undecided` cannot be
-    decided; `evidence` agree or differ; the rest of `total` is fitted or repeats itself. `evidence`
-    and `total` count comparisons; `again` are checks of further methods on the same ones.
+    Of the requirements: checks that are `failed` (not good enough), `undecided`, and `met`. Of the
+    differences: `differs` after Holm's correction, and `alone` by themselves only. `absent`
+    compared nothing, and `unanswered` have no bound of u_val and no requirement. `evidence` and
+    `total` count comparisons; `again` are checks of further methods on the same ones.
     """
 
+    failed: tuple[Check, ...]
+    undecided: tuple[Check, ...]
+    met: tuple[Check, ...]
     differs: tuple[Check, ...]
     alone: tuple[Check, ...]
-    undecided: tuple[Check, ...]
+    absent: tuple[Check, ...]
+    unanswered: tuple[Check, ...]
     evidence: int
     total: int
     again: int
 
     @property
-    def passed(self) -> bool:
-        """Nothing differs, nothing is undecided, and something was checked."""
-        return self.total > 0 and not self.differs and not self.undecided
-
-    @property
-    def word(self) -> str:
-        """The verdict in a word or two."""
+    def word(self) -> Word:
+        """The verdict: acceptance where something is required and answered, else validation."""
+        if not self.total or self.absent:
+            return "not good enough" if self.failed else "nothing compared"
+        if self.failed:
+            return "not good enough"
+        if self.undecided:
+            return "undecided"
+        if self.met:
+            return "good enough"
         if self.differs:
             return "differs"
-        if self.undecided or not self.total:
+        if self.unanswered:
             return "undecided"
-        return "agrees" if self.evidence else "no evidence"
+        return "not distinguishable" if self.evidence else "no evidence"
+
+    @property
+    def passed(self) -> bool:
+        """Whether the exit code is 0."""
+        return self.word in PASSES
 
     @property
     def counted(self) -> str:
         more = f" ({self.again} more on the same data)" if self.again else ""
         return f"evidence: {self.evidence} of {self.total} checks{more}"
 
+    @property
+    def corrections(self) -> str:
+        """How many checks are taken into account, in a sentence."""
+        return (
+            "All requirements must be met, each alone: no correction (intersection-union test, "
+            f"Berger 1982). Corrected for {self.total} checks (Holm 1979), {len(self.differs)} "
+            f"differ from zero, and {len(self.alone)} by themselves only."
+        )
+
 
 def judge_all(checks: Sequence[Check]) -> Overall:
     """The verdict over all checks, in their order."""
-    undecided = tuple(c for c in checks if c.verdict == "cannot decide")
-    differing = [c for c in checks if c.verdict == "differs"]
-    tested = [c for c in checks if c.evidence] + [c for c in undecided if c.count]
+    undecided = [c for c in checks if c.acceptance == "undecided"]
+    tested = [
+        c for c in [*(c for c in checks if c.evidence), *undecided]
+        if c.validation in ("differs", "not distinguishable")
+    ]  # fmt: skip
+    differing = [c for c in tested if c.validation == "differs"]
     levels = _holm(tested)
     rejected = [c.p_value < levels.get(c.name, 0.0) for c in differing]
     total = len({c.name for c in checks})
     return Overall(
+        failed=tuple(c for c in checks if c.acceptance == "not good enough"),
+        undecided=tuple(undecided),
+        met=tuple(c for c in checks if c.acceptance == "good enough"),
         differs=tuple(c for c, gone in zip(differing, rejected, strict=True) if gone),
         alone=tuple(c for c, gone in zip(differing, rejected, strict=True) if not gone),
-        undecided=undecided,
+        absent=tuple(c for c in checks if not c.count),
+        unanswered=tuple(c for c in checks if c.verdict == "no answer"),
         evidence=len({c.name for c in checks if c.evidence}),
         total=total,
         again=len(checks) - total,

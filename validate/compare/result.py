@@ -7,6 +7,7 @@ from typing import Literal
 
 from validate.compare.effects import Effect
 from validate.compare.exhibit import Exhibit
+from validate.compare.expected import Expected, MovedVerdict, moved
 from validate.compare.inputs import Declared, Joint
 from validate.compare.overall import Overall, judge_all
 from validate.compare.published import Published
@@ -20,13 +21,16 @@ from validate.register.registered import Registered
 from validate.scene.meshless import AnyScene
 from validate.solve.types import Run
 
-Kind = Literal["measured", "twin", "same model", "reference"]
+Kind = Literal["measured", "twin", "same law, finer mesh", "same model", "reference"]
 KINDS: Mapping[Kind, str] = MappingProxyType(
     {
         "measured": "measured",
         "twin": "twin, made by another model than the one judged",
-        "same model": "same model, the recording and the judged model are one",
-        "reference": "reference, computed by a code of others",
+        "same law, finer mesh": (
+            "same law, finer mesh: evidence of code and registration, not of physics"
+        ),
+        "same model": "same model, the recording and the judged model are one: no evidence",
+        "reference": "reference, computed by third-party code",
     }
 )
 
@@ -75,7 +79,8 @@ class Result:
 
     `kind` is what the recording is: measured, a twin, the judged model's own, or computed.
     `warnings` doubt what was given. `changed` parameters are not as the experiment declares them.
-    `specimens` are those of the recordings, one name each.
+    `specimens` are those of the recordings, one name each. `expected` are the verdicts that the
+    experiment is known to have.
     """
 
     name: str
@@ -100,6 +105,7 @@ class Result:
     exhibits: tuple[Exhibit, ...] = ()
     changed: tuple[Changed, ...] = ()
     specimens: tuple[str, ...] = ()
+    expected: tuple[Expected, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:
@@ -117,7 +123,7 @@ class Result:
 
     @property
     def overall(self) -> Overall:
-        """The experiment's verdict, corrected for the number of its checks."""
+        """The experiment's verdict over all its checks."""
         return judge_all(self.checks)
 
     @property
@@ -127,6 +133,15 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """What the exit code follows: a run that compares nothing has failed, and one where a
-        printed figure does not stand."""
-        return self.overall.passed and not self.fallen
+        """What the exit code follows: a run that compares nothing has failed."""
+        return self.overall.passed
+
+    @property
+    def moved(self) -> tuple[MovedVerdict, ...]:
+        """The checks whose verdict is not the one that the experiment declares."""
+        return moved(((m.name, c) for m in self.methods for c in m.checks), self.expected)
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether every verdict is the declared one; without declarations, whether it passed."""
+        return bool(self.checks) and not self.moved if self.expected else self.passed

@@ -1,84 +1,134 @@
-"""Verdicts after ASME V&V 20: is the error within the uncertainty of the comparison?
+"""Two answers per check: does the model differ from what was measured, and is it good enough?
 
 E = simulation - measurement, u_val^2 = u_D^2 + u_num^2 + u_input^2 (standard uncertainties).
-|E| > 2 u_val: differs; else 2 u_val above the accepted limit: cannot decide; else agrees. A limit
-as wide as all that was measured decides nothing either.
 
-An rms over many noisy points is not zero for a perfect model. E is then the part that noise does
-not explain, sqrt(rms^2 - noise^2), and u_D half of the smallest such part that noise alone reaches
-in 5 % of repetitions (chi-square with a degree of freedom per independent number). It has the sign
-of the mean where points have one component, and none where they have more.
+*Validation* (ASME V&V 20-2009): the model error lies in E +- 2 u_val. It **differs** from zero, or
+it is **not distinguishable** from zero.
 
-Only what validates is evidence: data that calibrated the model are "fitted" and a model judged by
-its own recording "repeats itself"; neither agrees, whatever its error.
+*Acceptance* (ASME V&V 10-2019, V&V 40-2018): the interval against a requirement, [-limit, limit]:
+**good enough** (wholly inside), **not good enough** (wholly outside), **undecided** (it straddles a
+limit). A limit without a written reason is no requirement; then only validation is answered.
+
+One number is signed. Of many points or times every one is held against the limit, and the worst
+decides: the E and u_val shown are those of the point where |E| + 2 u_val is largest. All points are
+good enough where each one is (an intersection-union test needs no correction, Berger 1982).
+"Differs" and "not good enough" hold where one point alone is beyond what noise shows somewhere
+among that many: the noise's quantile is Bonferroni's, for the number of independent points.
+
+Where the requirement is an rms, E = sqrt(rms^2 - noise^2) estimates the rms of the model error
+itself, and u_D is half of the wider side of its 95 % interval, from the noncentral chi-square
+distribution of the squared rms: noise is counted once.
+
+Data that calibrated the model are *fitted*, and a recording of the judged model itself is the *same
+model*: neither is evidence.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import chdtri, chndtrinc, ndtr
 
-from validate.arrays import rms
+from validate.arrays import Floats, rms
 from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual
 from validate.compare.sizes import Size, kind_of, size_of
 from validate.errors import ComparisonError
-from validate.estimate.consistency import chi_square_quantile
 
-Verdict = Literal["agrees", "differs", "cannot decide", "fitted", "repeats itself"]
+NO_EVIDENCE = ("fitted", "same model")
+Validation = Literal[
+    "differs", "not distinguishable", "no answer", "nothing compared", "fitted", "same model"
+]
+Acceptance = Literal[
+    "good enough", "not good enough", "undecided", "no requirement", "nothing compared", "fitted",
+    "same model",
+]  # fmt: skip
+Statistic = Literal["every", "rms", "mean"]
+Origin = Literal["ours", "source"]
 
+ALPHA = 2 * float(ndtr(-2.0))  # 4.6 %: two standard uncertainties of a normal law to both sides
 # The name of the part of u_val that a filter itself claims.
 OWN_COVARIANCE = "the filter's own covariance"
-_OTHERWISE = {
+_SMALLER = {
     OWN_COVARIANCE: "a filter that is surer of its estimate",
     "mesh": "a finer mesh",
     "time step": "a shorter time step",
 }
+_STATISTICS: Mapping[Statistic, str] = {"every": "max", "rms": "rms", "mean": "mean"}
 
 
 @dataclass(frozen=True)
 class Accept:
-    """A quantity the accepted methods must predict to `limit` (SI), at `loads` (none: all).
+    """A quantity that the accepted methods must predict to `limit` (SI), at `loads` (none: all).
 
-    Raises `ComparisonError` for a limit that is not a positive number.
+    `reason` says why this limit: without one, or without a limit, nothing is required and only
+    validation is answered. `origin` tells a cited reason from our own choice. `statistic` says what
+    is judged of many points or times: every one, their rms, or their mean.
+
+    Raises `ComparisonError` for a limit that is not a positive number, and for a requirement
+    without a quantity.
     """
 
     quantity: str
-    limit: float
-    source: str
+    limit: float | None = None
+    reason: str = ""
     loads: tuple[str, ...] = ()
+    statistic: Statistic = "every"
+    origin: Origin = "ours"
 
     def __post_init__(self) -> None:
-        if not 0 < self.limit < math.inf:
+        if self.limit is not None and not 0 < self.limit < math.inf:
             raise ComparisonError(
                 f"accept '{self.quantity}': limit {self.limit:g} is not a positive number"
             )
+        if self.statistic not in _STATISTICS:
+            raise ComparisonError(
+                f"accept '{self.quantity}': statistic '{self.statistic}'; it is one of "
+                f"{', '.join(_STATISTICS)}"
+            )
+
+    @property
+    def required(self) -> float | None:
+        """The limit, where a reason is written for it."""
+        return self.limit if self.reason.strip() else None
+
+    @property
+    def why(self) -> str:
+        """The reason with its origin; what is missing where there is none."""
+        if self.required is not None:
+            return f"{self.origin}: {self.reason}"
+        return "no reason is written: no requirement" if self.limit else "no requirement"
 
 
 @dataclass(frozen=True)
 class Check:
-    """A verdict: error `value`, `limit`, `u_val` and its parts, in `unit`; points compared.
+    """Both answers about one quantity: E is `value`, with `u_val` and its parts, in `unit`.
 
-    u_num and u_val are infinite where nothing bounds them; `numerical` says how u_num was found.
-    `raw` is the rms as it is, `noise` what the measurement's noise alone explains of it. `kind` is
-    what was measured, and `size` how large it was, measured and simulated; None: of nothing that
-    has a zero.
+    `limit` is None without a requirement; `requirement` says why this limit. `margin` is what is
+    left of the limit beyond |E| + 2 u_val. `ratio` is the largest |E| over what noise and
+    uncertainties reach by chance in 4.6 % of repetitions, of all points that were compared; of one
+    number it is |E| / (2 u_val). u_num and u_val are infinite where nothing bounds them.
+    `raw` is the rms as it is, `noise` what the measurement's noise alone explains of it;
+    `numerical` says how u_num was found. `kind` is what was measured, and `size` how large it was,
+    measured and simulated; None: of nothing that has a zero.
     """
 
     name: str
     value: float
-    limit: float
+    limit: float | None
     u_val: float
     u_D: float
     u_num: float
     u_input: float
     unit: str
     count: int
-    verdict: Verdict
+    validation: Validation
+    acceptance: Acceptance
     why: str
+    ratio: float = 0.0
+    requirement: str = ""
     raw: float = 0.0
     noise: float = 0.0
     numerical: str = ""
@@ -86,30 +136,56 @@ class Check:
     size: Size | None = None
 
     @property
+    def verdict(self) -> Validation | Acceptance:
+        """The answer that decides: acceptance where something is required, else validation."""
+        return self.validation if self.acceptance == "no requirement" else self.acceptance
+
+    @property
     def evidence(self) -> bool:
         """Whether it decides anything about the model."""
-        return self.verdict in ("agrees", "differs")
+        return self.verdict in ("good enough", "not good enough", "differs", "not distinguishable")
+
+    @property
+    def margin(self) -> float | None:
+        """The limit less |E| + 2 u_val, in `unit`; positive where good enough."""
+        if self.limit is None or not self.count or not math.isfinite(self.u_val):
+            return None
+        return self.limit - abs(self.value) - 2 * self.u_val
 
     @property
     def p_value(self) -> float:
         """How often a perfect model would show an error as large, by a normal law of u_val."""
-        if self.u_val == 0:
-            return 1.0 if self.value == 0 else 0.0
-        return 2 * float(ndtr(-abs(self.value) / self.u_val))
+        return 2 * float(ndtr(-2 * self.ratio))
+
+
+def nothing_compared(accept: Accept, name: str, unit: str, why: str) -> Check:
+    """The check of a quantity that was compared with nothing: it has failed."""
+    none: Acceptance = "no requirement" if accept.required is None else "nothing compared"
+    return Check(
+        name, 0.0, accept.required, 0.0, 0.0, 0.0, 0.0, unit, 0, "nothing compared", none,
+        f"compared nothing: {why}", requirement=accept.why,
+    )  # fmt: skip
 
 
 def as_fitted(check: Check, by: str) -> Check:
     """A check on data that calibrated the model counts for nothing, whatever its error."""
     if not check.count:
         return check
-    return replace(check, verdict="fitted", why=f"{by}: no evidence; {check.why}")
+    acceptance = check.acceptance if check.limit is None else "fitted"
+    why = f"{by}: no evidence; {check.why}"
+    return replace(check, validation="fitted", acceptance=acceptance, why=why)
 
 
-def as_repeated(check: Check, why: str) -> Check:
-    """A model judged by its own recording cannot agree; an error or a doubt of it stays."""
-    if check.verdict != "agrees":
+def as_same_model(check: Check, why: str) -> Check:
+    """A model judged by its own recording cannot be confirmed; an error that it shows stays."""
+    known = check.verdict in ("good enough", "not distinguishable")
+    if not known:
         return check
-    return replace(check, verdict="repeats itself", why=f"{why}: no evidence; {check.why}")
+    acceptance = check.acceptance if check.limit is None else "same model"
+    validation: Validation = "differs" if check.validation == "differs" else "same model"
+    return replace(
+        check, validation=validation, acceptance=acceptance, why=f"{why}: no evidence; {check.why}"
+    )
 
 
 @dataclass(frozen=True)
@@ -120,89 +196,198 @@ class Sensitivity:
     change: Residual
 
 
-def judge(
-    residual: Residual,
-    limit: float,
-    numerical: Numerical,
-    inputs: Sequence[Sensitivity],
-) -> Check:
-    """The verdict on one residual; where nothing bounds u_num it cannot be decided."""
-    seen = error_of(residual)
-    E, u_D = seen.E, seen.u_D
-    u_num = numerical.u
-    parts = {s.name: rms(s.change.values) for s in inputs}
-    u_input = float(np.sqrt(sum(p**2 for p in parts.values())))
-    u_val = float(np.sqrt(u_D**2 + u_num**2 + u_input**2))
-    named = {"measurement": u_D} | dict(numerical.parts) | parts
-    verdict, why = _verdict(E, u_val, limit, named, numerical)
-    if verdict == "agrees" and residual.scale is not None and limit >= residual.scale:
-        verdict, why = (
-            "cannot decide",
-            (
-                f"the limit {limit:.3g} is as wide as the largest that was measured, "
-                f"{residual.scale:.3g}: nothing could fail it; accept a tighter one"
-            ),
-        )
-    name = residual.name if _scalar(residual) else f"{residual.quantity}.rms@{residual.load}"
-    return Check(
-        name, E, limit, u_val, u_D, u_num, u_input, residual.unit, residual.count, verdict, why,
-        seen.raw, seen.noise, numerical.words, kind_of(residual.quantity, residual.unit),
-        size_of(residual),
-    )  # fmt: skip
-
-
 @dataclass(frozen=True)
-class Error:
-    """E and u_D of a residual, its rms as it is, and the rms that its noise alone would have."""
+class PointErrors:
+    """PointErrors of what is judged (n,) with the measurement's standard uncertainty of each (n,).
 
-    E: float
-    u_D: float
+    `chance` (n,) is the |E| that noise alone shows somewhere among them in 4.6 % of repetitions,
+    and `systematic` the standard uncertainty that all points share. `raw` is the rms as it is,
+    `noise` the rms that noise alone would have.
+    """
+
+    E: Floats
+    u_D: Floats
+    chance: Floats
+    systematic: float
     raw: float
     noise: float
 
-
-def error_of(residual: Residual) -> Error:
-    """The error of a residual; see the module's head for E of many points."""
-    k, c = residual.values.shape
-    raw, noise = rms(residual.values), float(np.sqrt(c) * residual.sd)
-    if k == 1 and c == 1:
-        u_D = float(np.hypot(residual.sd, residual.systematic))
-        return Error(float(residual.values[0, 0]), u_D, raw, noise)
-    sign = np.copysign(1.0, residual.values.mean()) if c == 1 else 1.0
-    E = sign * np.sqrt(max(raw**2 - noise**2, 0.0))
-    m = residual.freedom or k * c
-    reach = noise * np.sqrt(max(float(chi_square_quantile(0.95, m)) / m - 1, 0.0))
-    u_D = float(np.hypot(reach / 2, np.sqrt(c) * residual.systematic))
-    return Error(float(E) + 0.0, u_D, raw, noise)  # no -0
+    def worst(self, shared: Floats) -> int:
+        """The index of the largest |E| + 2 u_val, `shared` (n,) being the rest of u_val."""
+        return int(np.argmax(np.abs(self.E) + 2 * np.hypot(self.u_D, shared)))
 
 
-def _verdict(
-    E: float, u_val: float, limit: float, parts: dict[str, float], numerical: Numerical
-) -> tuple[Verdict, str]:
-    if math.isinf(numerical.u):
-        return "cannot decide", numerical.words
-    holes = [name for name, u in {"E": E, "limit": limit, **parts}.items() if not math.isfinite(u)]
-    if holes or not math.isfinite(u_val):
-        return "cannot decide", f"not a finite number: {', '.join(holes) or 'u_val'}"
-    largest = max(parts, key=lambda name: parts[name])
-    if abs(E) > 2 * u_val:
-        return "differs", f"|E| is {abs(E) / u_val:.1f} u_val" if u_val else "u_val is zero"
-    if 2 * u_val > limit:
-        return "cannot decide", (
-            f"2 u_val = {2 * u_val:.3g} exceeds the limit {limit:.3g}; {_better(largest)} would "
-            "decide"
+def errors_of(residual: Residual, statistic: Statistic = "every") -> PointErrors:
+    """The errors that are judged of a residual (k, c): of every row, of their rms, or their mean.
+
+    A row of one component is signed; the length of a row of more components is not.
+    """
+    d, (k, c), sd = residual.values, residual.values.shape, residual.sd
+    raw, noise = rms(d), math.sqrt(c) * sd
+    m, common = residual.freedom or k * c, residual.systematic
+    if k > 1 and statistic == "rms":
+        own, u_noise = _noise_free(raw, noise, m)
+        spread = math.sqrt(c) * common
+        one = np.array([math.hypot(u_noise, spread)])
+        return PointErrors(np.array([own]), one, np.array([2 * u_noise]), spread, raw, noise)
+    rows = max(m / c, 1.0)
+    if k > 1 and statistic == "mean":
+        d, sd, rows = d.mean(axis=0)[None, :], sd / math.sqrt(rows), 1.0
+    E: Floats = d[:, 0] if c == 1 else np.linalg.norm(d, axis=1)
+    reach = math.sqrt(chdtri(c, ALPHA / rows)) * sd
+    u_D = np.full(len(E), math.hypot(sd, common))
+    # A length that a shared shift alone shows reaches further than two standard deviations.
+    shift = common * math.sqrt(chdtri(c, ALPHA)) / 2
+    return PointErrors(E, u_D, np.full(len(E), reach), shift, raw, noise)
+
+
+def judge(
+    residual: Residual,
+    accept: Accept,
+    numerical: Numerical,
+    inputs: Sequence[Sensitivity],
+) -> Check:
+    """Both answers about one residual; where nothing bounds u_num neither can be given."""
+    statistic: Statistic = accept.statistic if residual.count > 1 else "every"
+    found = errors_of(residual, statistic)
+    parts = {s.name: _by_row(s.change.values, found) for s in inputs}
+    u_input = np.sqrt(sum((p**2 for p in parts.values()), start=np.zeros(len(found.E))))
+    others = np.hypot(u_input, numerical.u)
+    w = found.worst(others)
+    reach = np.hypot(found.chance, 2 * np.hypot(found.systematic, others))
+    E, u_D, u_val = found.E[w], found.u_D[w], np.hypot(found.u_D, others)[w]
+    named = {"measurement": float(u_D)} | dict(numerical.parts) | {
+        name: float(part[w]) for name, part in parts.items()
+    }  # fmt: skip
+    interval = _Interval(
+        float(E), float(u_val), _ratio(found.E, reach), float((np.abs(found.E) - reach).max()),
+        accept.required, residual.scale, named, numerical, residual.unit,
+        _where(found.E, reach, w) if statistic == "every" else "",
+    )  # fmt: skip
+    validation, acceptance, why = interval.answers
+    return Check(
+        name_of(residual, statistic), float(E) + 0.0, accept.required, float(u_val), float(u_D),
+        numerical.u, float(u_input[w]), residual.unit, residual.count, validation, acceptance, why,
+        interval.ratio, accept.why, found.raw, found.noise, numerical.words,
+        kind_of(residual.quantity, residual.unit), size_of(residual),
+    )  # fmt: skip
+
+
+def name_of(residual: Residual, statistic: Statistic) -> str:
+    """The name of the check: of many points with what of them is judged."""
+    if residual.count == 1:
+        return residual.name
+    return f"{residual.quantity}.{_STATISTICS[statistic]}@{residual.load}"
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """E +- 2 u_val (or unbounded) against zero and against the limit."""
+
+    E: float
+    u_val: float
+    ratio: float
+    beyond: float  # the largest |E| less what chance reaches
+    limit: float | None
+    scale: float | None
+    parts: Mapping[str, float]
+    numerical: Numerical
+    unit: str
+    where: str
+
+    @property
+    def answers(self) -> tuple[Validation, Acceptance, str]:
+        if why := self._unbounded:
+            return "no answer", "no requirement" if self.limit is None else "undecided", why
+        validation: Validation = "differs" if self.ratio > 1 else "not distinguishable"
+        acceptance, decides = self._accepted()
+        words = (self._against_zero(validation), decides)
+        return validation, acceptance, "; ".join(w for w in words if w)
+
+    @property
+    def _unbounded(self) -> str:
+        if math.isinf(self.numerical.u):
+            return self.numerical.words
+        named = {"E": self.E, **self.parts}
+        holes = [name for name, u in named.items() if not math.isfinite(u)]
+        return f"not a finite number: {', '.join(holes)}" if holes else ""
+
+    def _against_zero(self, validation: Validation) -> str:
+        if self.u_val == 0:
+            return "E is exactly zero, and so is u_val" if self.E == 0 else "u_val is zero"
+        blunt = abs(self.E) / self.parts["measurement"] if self.parts["measurement"] else 0.0
+        beyond = f" but {blunt:.0f} times u_D" if blunt > 5 and validation != "differs" else ""
+        size = f"|E| is {abs(self.E) / self.u_val:.1f} u_val{beyond}, largest part: {self._largest}"
+        return f"{size}{self.where}"
+
+    def _accepted(self) -> tuple[Acceptance, str]:
+        limit = self.limit
+        if limit is None:
+            return "no requirement", ""
+        if self.scale is not None and limit >= self.scale:
+            return "undecided", (
+                f"the limit {self._shown(limit)} is as wide as the largest that was measured, "
+                f"{self._shown(self.scale)}: nothing could fail it; require a tighter one"
+            )
+        if abs(self.E) + 2 * self.u_val <= limit:
+            return "good enough", ""
+        if self.beyond > limit:
+            return "not good enough", ""
+        low, high = abs(self.E) - 2 * self.u_val, abs(self.E) + 2 * self.u_val
+        room = abs(limit - abs(self.E)) / 2
+        return "undecided", (
+            f"{max(low, 0.0):.3g} to {self._shown(high)} straddles the limit "
+            f"{self._shown(limit)}: a u_val below {self._shown(room)} would decide; "
+            f"{self._better} makes it smaller"
         )
-    if u_val == 0:
-        return "agrees", "the error is exactly zero, and so is u_val"
-    blunt = abs(E) / parts["measurement"] if parts["measurement"] else 0.0
-    beyond = f" but {blunt:.0f} times u_D" if blunt > 5 else ""
-    return "agrees", f"|E| is {abs(E) / u_val:.1f} u_val{beyond}; largest part: {largest}"
+
+    def _shown(self, value: float) -> str:
+        return f"{value:.3g} {self.unit}" if self.unit != "1" else f"{value:.3g}"
+
+    @property
+    def _largest(self) -> str:
+        return max(self.parts, key=lambda name: self.parts[name])
+
+    @property
+    def _better(self) -> str:
+        part = self._largest
+        known = self.numerical.deciding.get(part)
+        return known or _SMALLER.get(part, f"a better measurement of '{part}'")
 
 
-def _better(part: str) -> str:
-    """What would make a part of u_val smaller."""
-    return _OTHERWISE.get(part, f"a better measurement of '{part}'")
+def _noise_free(raw: float, noise: float, m: int) -> tuple[float, float]:
+    """The rms of an error itself from an rms with noise of m independent numbers, and half of the
+    wider side of its 95 % interval: m raw^2 / noise^2 is noncentral chi-square. An rms below its
+    noise says no more than one that equals it."""
+    if noise == 0:
+        return raw, 0.0
+    E = math.sqrt(max(raw**2 - noise**2, 0.0))
+    x = m * max(raw / noise, 1.0) ** 2
+    low, high = (noise * math.sqrt(float(chndtrinc(x, m, p)) / m) for p in (1 - ALPHA, ALPHA / 2))
+    return E, max(E - low, high - E) / 2
 
 
-def _scalar(residual: Residual) -> bool:
-    return residual.values.shape == (1, 1)
+def _by_row(change: Floats, found: PointErrors) -> Floats:
+    """What an input does to every error (n,); its rms where that is not known row by row."""
+    if len(found.E) == len(change):
+        return np.asarray(np.linalg.norm(change, axis=1))
+    return np.full(len(found.E), rms(change))
+
+
+def _ratio(E: Floats, reach: Floats) -> float:
+    """The largest |E| over what chance reaches; 0 for an exact zero without any uncertainty."""
+    zero = reach == 0
+    over = np.where(zero, np.where(E == 0, 0.0, np.inf), np.abs(E) / np.where(zero, 1.0, reach))
+    return float(over.max())
+
+
+def _where(E: Floats, reach: Floats, at: int) -> str:
+    """Which of many values is shown, and which one is furthest beyond chance where another is."""
+    if len(E) == 1:
+        return ""
+    words = f"; worst of {len(E)} values: number {at + 1}"
+    over = np.abs(E) / np.where(reach == 0, np.finfo(float).tiny, reach)
+    most = int(over.argmax())
+    if most == at or not over[most] > 1:
+        return words
+    return f"{words}; number {most + 1} differs, |E| {abs(E[most]):.3g} of {reach[most]:.3g}"

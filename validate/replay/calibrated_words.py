@@ -50,7 +50,7 @@ def predicted(results: Sequence[MethodResult]) -> str:
     found = [
         (c, f" by {m.name}" if several else "")
         for m in results for c in m.checks
-        if c.count and (c.evidence or c.verdict == "cannot decide")
+        if c.count and (c.evidence or c.verdict == "undecided")
     ]  # fmt: skip
     if not found:
         return f"predicted: nothing, for {_no_evidence(results)}"
@@ -62,7 +62,7 @@ def predicted(results: Sequence[MethodResult]) -> str:
 def _no_evidence(results: Sequence[MethodResult]) -> str:
     """Why none of the checks is evidence: what they are, most of them first."""
     kinds = Counter(c.verdict if c.count else "no match" for m in results for c in m.checks)
-    words = {"fitted": "served to fit", "repeats itself": "only repeat the model itself"}
+    words = {"fitted": "served to fit", "same model": "only repeat the model itself"}
     each = (f"{n} of {kinds.total()} checks {words.get(kind, 'compared nothing')}"
             for kind, n in kinds.most_common())  # fmt: skip
     return ", ".join(each) or "nothing is judged"

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from validate.compare.verdict import (
     Check,
     Sensitivity,
     as_fitted,
-    as_repeated,
+    as_same_model,
     judge,
+    nothing_compared,
 )
 from validate.errors import ComparisonError
 from validate.fem.locate import probe_rows
@@ -53,18 +55,18 @@ def variants_of(road: Road) -> list[Variant]:
 
 @dataclass(frozen=True)
 class Terms:
-    """What a residual is judged with: the accepted limit, u_num, and the parts of u_input.
+    """What a residual is judged with: the requirement, u_num, and the parts of u_input.
 
     `fitted` says why its data are no evidence; "" where they are.
     """
 
-    limit: float
+    accept: Accept
     numerical: Numerical
     inputs: tuple[Sensitivity, ...]
     fitted: str = ""
 
     def judge(self, residual: Residual) -> Check:
-        check = judge(residual, self.limit, self.numerical, self.inputs)
+        check = judge(residual, self.accept, self.numerical, self.inputs)
         return as_fitted(check, self.fitted) if self.fitted else check
 
 
@@ -88,14 +90,14 @@ def terms_of(road: Road, mine: Followed) -> list[tuple[Accept, dict[str, Terms]]
     refined = _refined(road, mine.method)
     inputs, own = _sensitivities(road, mine.method), _own_doubt(mine)
 
-    def terms(key: str, limit: float) -> Terms:
-        residual = mine.residuals[key]
+    def terms(key: str, accept: Accept) -> Terms:
+        residual, limit = mine.residuals[key], accept.required or inf
         numerical = refined.numerical(residual, limit) if refined else Numerical()
         parts = (*inputs.get(key, []), *own.get(key, []))
-        return Terms(limit, numerical, parts, _served(road, mine, residual))
+        return Terms(accept, numerical, parts, _served(road, mine, residual))
 
     return [
-        (a, {k: terms(k, a.limit) for k, r in mine.residuals.items() if _accepts(a, r)})
+        (a, {k: terms(k, a) for k, r in mine.residuals.items() if _accepts(a, r)})
         for a in road.experiment.accept
     ]
 
@@ -110,11 +112,11 @@ def _served(road: Road, mine: Followed, residual: Residual) -> str:
 
 
 def _classed(road: Road, check: Check) -> Check:
-    """The check as what it is: a model that repeats itself, or evidence."""
+    """The check as what it is: no evidence where the recording is the model's own."""
     if road.remade:
-        return as_repeated(check, "the recording was made again from this run's own parameters")
+        return as_same_model(check, "the recording was made again from this run's own parameters")
     if road.kind == "same model":
-        return as_repeated(check, "recording and judged model are the same model")
+        return as_same_model(check, "recording and judged model are the same model")
     return check
 
 
@@ -227,10 +229,7 @@ def _nothing(accept: Accept, mine: Followed, judged: Collection[str]) -> list[Ch
 
 def _empty(accept: Accept, name: str, why: str, mine: Followed) -> Check:
     units = {q: unit for seen in mine.seen.compared for q, unit in seen.units.items()}
-    return Check(
-        name, 0.0, accept.limit, 0.0, 0.0, 0.0, 0.0, units.get(accept.quantity, _NO_UNIT), 0,
-        "cannot decide", f"compared nothing: {why}",
-    )  # fmt: skip
+    return nothing_compared(accept, name, units.get(accept.quantity, _NO_UNIT), why)
 
 
 # --- effects --------------------------------------------------------------------------------------

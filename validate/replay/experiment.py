@@ -11,6 +11,7 @@ from typing import Any
 
 from validate.compare.effects import Sensor
 from validate.compare.exhibit import Exhibit
+from validate.compare.expected import Expected
 from validate.compare.published import Figure
 from validate.compare.result import Kind
 from validate.compare.score import Score
@@ -154,14 +155,15 @@ class Twin:
 
     `truth` repeats the twin: it scores the runs, and no method sees it. `remake` are prefixes of
     parameters that the twin reads: changing one makes the recording anew. `read` is what `load`
-    makes of a recording once read (outlines found in its images, say). `same_model`: the twin
-    shares law and mesh with the models, so it can only repeat itself. `notice` is printed.
+    makes of a recording once read (outlines found in its images, say). `kind`: a twin of "same
+    model" shares law and mesh with the judged models and can only repeat them; one of the "same
+    law, finer mesh" says nothing of physics. `notice` is printed.
     """
 
     record: Callable[[Any, Progress], Recording]
     truth: Callable[[Any, Registered], Truth] | None = None
     remake: tuple[str, ...] = ("twin.",)
-    same_model: bool = False
+    kind: Kind = "twin"
     seed: int | None = None
     notice: str = ""
     read: Callable[[Recording, Any], Recording] = _as_read
@@ -211,7 +213,8 @@ class Experiment:
     `locates` are parameters that only say where recordings lie, so that `follows` judges these.
     `specimen` names the one that a recording is of: repeats of one specimen count once over all
     experiments; without it all recordings are of one.
-    `kind` is what its recordings are where no twin makes them.
+    `kind` is what its recordings are where no twin makes them. `expected` are the verdicts that it
+    is known to have, with the reason.
     """
 
     name: str
@@ -246,6 +249,7 @@ class Experiment:
     specimen: Callable[[Recording], str] | None = None
     quick: Change = unchanged
     kind: Kind = "measured"
+    expected: tuple[Expected, ...] = ()
     path: Path | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -256,12 +260,12 @@ class Experiment:
         """What its recordings are, whether they are at hand or not."""
         if self.twin is None:
             return self.kind
-        return "same model" if self.twin.same_model else "twin"
+        return self.twin.kind
 
     @property
     def same_model(self) -> bool:
         """Whether recording and models are the same model."""
-        return self.twin is not None and self.twin.same_model
+        return self.twin is not None and self.twin.kind == "same model"
 
     @property
     def seed(self) -> int | None:

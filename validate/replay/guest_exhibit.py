@@ -14,8 +14,8 @@ from validate.replay.runs import Road
 from validate.solve.guests.asked import changes
 from validate.solve.guests.guest import Guest
 
-_HEAD = ("method", "program", "check", "error E", "2 u_val", "verdict", "rate / Hz",
-         "memory / MB", "ended")  # fmt: skip
+_HEAD = ("method", "program", "check", "error E", "2 u_val", "margin", "acceptance",
+         "validation", "rate / Hz", "memory / MB", "ended")  # fmt: skip
 _OURS = "this one"
 _MB = 1e-6
 _WORDS = (
@@ -62,8 +62,10 @@ def _rows(
     if not judged and not guest:
         return []
     if not judged or not run.finished:
-        return [(f.label, program, "-", None, None, "-", *cost)]
-    return [(f.label, program, c.name, *_figures(c), c.verdict, *cost) for c in judged]
+        return [(f.label, program, "-", None, None, None, "-", "-", *cost)]
+    return [
+        (f.label, program, c.name, *_figures(c), c.acceptance, c.validation, *cost) for c in judged
+    ]
 
 
 def _rate(f: Followed, settings: Any) -> float | None:
@@ -80,5 +82,7 @@ def _rate(f: Followed, settings: Any) -> float | None:
     return 1 / float(np.median(run.seconds[at]))
 
 
-def _figures(check: Check) -> tuple[TableCell, TableCell]:
-    return TableCell(check.value, check.unit), TableCell(2 * check.u_val, check.unit)
+def _figures(check: Check) -> tuple[TableCell, TableCell, TableCell]:
+    numbers = (check.value, 2 * check.u_val, check.margin)
+    value, doubt, margin = (TableCell(n, check.unit) for n in numbers)
+    return value, doubt, margin

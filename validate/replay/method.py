@@ -44,30 +44,40 @@ class Method:
     chosen: str = quantity("", "1", "what was chosen on the twin that judges it; empty: nothing")
     split: int = quantity(1, "1", "steps of this method in one of those, inputs interpolated")
 
-    def prepare(self, system: System, seen: Registered, given: Mapping[str, Any]) -> Stepper:
+    def prepare(
+        self,
+        system: System,
+        seen: Registered,
+        given: Mapping[str, Any],
+        declared: "Method | None" = None,
+    ) -> Stepper:
         """The prepared scheme or filter, with the experiment's settings where it has them.
 
-        Filters get what moves freely of their markers. Raises `UsageError` where a user set one of
-        the experiment's own settings to something else.
+        Filters get what moves freely of their markers. Raises as `given` does.
         """
-        settings = self.given(given)
+        settings = self.given(given, declared)
         if not self.markers:
             return cast(Stepper, settings.prepare(system))
         looks = measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
         return cast(Stepper, settings.prepare(system, looks))
 
-    def given(self, given: Mapping[str, Any]) -> Any:
-        """The settings with those that the experiment itself gives."""
-        return replace(self.settings, **self._taken(given))
+    def given(self, given: Mapping[str, Any], declared: "Method | None" = None) -> Any:
+        """The settings with those that the experiment itself gives.
 
-    def _taken(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        Raises `UsageError` where a user set one of these to something else: a value that is neither
+        the experiment's, nor the default, nor that of the method as `declared`.
+        """
+        return replace(self.settings, **self._taken(given, declared or Method()))
+
+    def _taken(self, given: Mapping[str, Any], declared: "Method") -> dict[str, Any]:
         defaults = {f.name: f.default for f in fields(self.settings)}
         mine = {k: v for k, v in given.items() if k in defaults}
         if "dt" in mine:
             mine["dt"] = self.stride / self.split * mine["dt"]
         for name, value in mine.items():
             own = getattr(self.settings, name)
-            if own not in (defaults[name], value) and defaults[name] is not MISSING:
+            known = (defaults[name], value, getattr(declared.settings, name, value))
+            if own not in known and defaults[name] is not MISSING:
                 raise UsageError(
                     f"{name} = {own} of '{self.label}': the experiment sets {value}; "
                     "change its own parameter"

@@ -34,14 +34,14 @@ def computed(recording: Recording) -> bool:
 
 
 def kind_of_recordings(
-    recordings: Sequence[Recording], *, same_model: bool, remade: bool = False
+    recordings: Sequence[Recording], twin: Kind = "twin", *, remade: bool = False
 ) -> Kind:
-    """What recordings are: measured, a twin's, the judged model's own, or computed by others."""
+    """What recordings are: measured, computed by third-party code, or what their `twin` is."""
     if recordings and all(computed(r) for r in recordings):
         return "reference"
     if not remade and not any(synthetic(r) for r in recordings):
         return "measured"
-    return "same model" if same_model else "twin"
+    return twin
 
 
 def _told(recording: Recording) -> str:

@@ -48,8 +48,9 @@ from validate.replay.standard_exhibits import error_at, standard_exhibits
 _AGAINST: Mapping[Kind, str] = {
     "measured": "measured recording",
     "twin": "recording of a twin",
+    "same law, finer mesh": "recording of the same law on a finer mesh",
     "same model": "recording of the same model",
-    "reference": "computation of others",
+    "reference": "computation by third-party code",
 }
 
 
@@ -180,6 +181,7 @@ def _compared(
         ),
         changed=out.differing,
         specimens=_specimens(experiment, road.recordings),
+        expected=experiment.expected,
     )
 
 

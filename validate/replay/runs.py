@@ -97,8 +97,10 @@ class Road:
     @property
     def kind(self) -> Kind:
         """What the recordings are: measured, a twin's, the judged model's own, or computed."""
-        same = self.experiment.same_model
-        return kind_of_recordings(self.recordings, same_model=same, remade=self.remade)
+        twin = self.experiment.twin
+        return kind_of_recordings(
+            self.recordings, twin.kind if twin else "twin", remade=self.remade
+        )
 
     def tell(self, what: str) -> None:
         if self._report:

@@ -1,42 +1,50 @@
 """The words that open a report and a terminal: what was judged by what, and what came of it."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from validate.compare.overall import Overall, judge_all
 from validate.compare.published import Published
 from validate.compare.result import Kind, MethodResult
-from validate.compare.verdict import Check, Verdict
+from validate.compare.verdict import Check
+from validate.report.numbers import with_unit
 
-_ALL_AGREE: dict[Kind, str] = {
-    "measured": "predicts what was measured within the error of the comparison",
-    "twin": "follows the twin, a recording of another model, within the error of the comparison",
-    "same model": "agrees with a recording of its own model",
-    "reference": "agrees with what others computed, within the error of the comparison",
+_AGAINST: dict[Kind, str] = {
+    "measured": "what was measured",
+    "twin": "a twin, a recording of another model",
+    "same law, finer mesh": "the same law on a finer mesh",
+    "same model": "a recording of its own model",
+    "reference": "what third-party code computed",
 }
-_COUNTED: tuple[tuple[Verdict, str], ...] = (
-    ("agrees", "agree"),
-    ("differs", "differ"),
-    ("cannot decide", "cannot be decided"),
-    ("fitted", "fitted, no evidence"),
-    ("repeats itself", "only repeat the model itself, no evidence"),
-)
-_NAMED = ("differs", "cannot decide")
+Answer = Callable[[Check], str]
+# How each answer is counted, and whether its checks are named.
+_ACCEPTANCE = {
+    "good enough": ("good enough", False),
+    "not good enough": ("not good enough", True),
+    "undecided": ("undecided", True),
+    "nothing compared": ("compared nothing", True),
+    "fitted": ("fitted, no evidence", False),
+    "same model": ("of the same model, no evidence", False),
+}
+_VALIDATION = {
+    "differs": ("differ from zero", True),
+    "not distinguishable": ("not distinguishable from zero", False),
+    "no answer": ("without a bound of the numerical error", True),
+    "nothing compared": ("compared nothing", True),
+    "fitted": ("fitted, no evidence", False),
+    "same model": ("of the same model, no evidence", False),
+}
 
 
 def verdict_sentence(results: tuple[MethodResult, ...], kind: Kind, *, quick: bool) -> str:
     """What was decided, for how many comparisons, and what was not."""
     checked = [m for m in results if m.checks]
     if not checked:
-        return "Nothing was decided: none of the accepted methods was run."
+        return "Nothing was compared: none of the accepted methods was run."
     parts = [_of(m, kind) for m in checked]
     ending = " (quick run: fewer comparisons, no published verdicts)" if quick else ""
-    return (
-        "; ".join(parts)
-        + ending
-        + "."
-        + _corrected(judge_all([c for m in checked for c in m.checks]))
-    )
+    found = judge_all([c for m in checked for c in m.checks])
+    return "; ".join(parts) + ending + "." + _closest(checked) + _corrected(found)
 
 
 def figures_sentence(published: tuple[Published, ...]) -> str:
@@ -49,21 +57,40 @@ def figures_sentence(published: tuple[Published, ...]) -> str:
 
 
 def _of(method: MethodResult, kind: Kind) -> str:
-    """One method: how many checks have which verdict."""
-    checks = method.checks
-    if all(c.verdict == "agrees" for c in checks):
-        points = sum(c.count for c in checks)
-        return (
-            f"{method.called} {_ALL_AGREE[kind]}: {len(checks)} of {len(checks)} checks agree over "
-            f"{points} compared values"
-        )
+    """One method: how many checks have which answer to both questions."""
+    required = [c for c in method.checks if c.acceptance != "no requirement"]
     told = []
-    for verdict, words in _COUNTED:
-        found = [c for c in checks if c.verdict == verdict]
-        if found:
-            which = f" ({_named(found)})" if verdict in _NAMED else ""
-            told.append(f"{len(found)} of {len(checks)} checks {words}{which}")
-    return f"{method.called}: " + ", ".join(told)
+    if required:
+        told.append(_counted(required, lambda c: c.acceptance, _ACCEPTANCE, "requirements"))
+    answered = [c for c in method.checks if c.evidence or c.acceptance == "undecided"]
+    rest = [c for c in method.checks if c not in required]
+    if answered or rest:
+        told.append(_counted(answered + [c for c in rest if c not in answered],
+                             lambda c: c.validation, _VALIDATION, "checks"))  # fmt: skip
+    return f"{method.called} against {_AGAINST[kind]}: " + "; ".join(told)
+
+
+def _counted(
+    checks: Sequence[Check], answer: Answer, words: dict[str, tuple[str, bool]], what: str
+) -> str:
+    found = []
+    for key, (text, named) in words.items():
+        there = [c for c in checks if answer(c) == key]
+        if there:
+            which = f" ({_named(there)})" if named else ""
+            found.append(f"{len(there)} of {len(checks)} {what} {text}{which}")
+    return ", ".join(found)
+
+
+def _closest(methods: Sequence[MethodResult]) -> str:
+    """The smallest margin of all requirements that are met."""
+    met = [c for m in methods for c in m.checks if c.acceptance == "good enough"]
+    if not met:
+        return ""
+    worst = min(met, key=lambda c: (c.margin or 0.0) / (c.limit or 1.0))
+    share = 100 * (worst.margin or 0.0) / (worst.limit or 1.0)
+    margin, limit = with_unit(worst.margin, worst.unit), with_unit(worst.limit, worst.unit)
+    return f" Smallest margin: {margin} of {limit} ({share:.0f} % of the limit), {worst.name}."
 
 
 def _corrected(found: Overall) -> str:

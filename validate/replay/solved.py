@@ -109,6 +109,7 @@ class _Runs:
         unknowns = f"{scene.mesh.nodes.size} unknowns"
         self._tell: Tell = lambda what: tell(f"{unknowns}, {what}")
         self._experiment, self._name, self._method = experiment, name, method
+        self._declared = experiment.methods.get(name)
         self._parameters, self._built = parameters, built
         self._system: System | None = None
         self._prepared: tuple[Stepper, float] | None = None
@@ -124,7 +125,7 @@ class _Runs:
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
         if isinstance(method.settings, SceneSolver) or isinstance(scene, Meshless):
-            settings = method.given(given)
+            settings = method.given(given, self._declared)
             return run_scheme(self._name, settings, scene, t, inputs, at, self._tell)
         stepper, setup = self._stepper(scene, seen, given)
         return march(self._name, stepper, t, inputs, at, setup, self._tell)
@@ -136,7 +137,7 @@ class _Runs:
         if self._prepared is None or self._method.markers:
             start = perf_counter()
             self._system = self._system or build_system(scene)
-            stepper = self._method.prepare(self._system, seen, given)
+            stepper = self._method.prepare(self._system, seen, given, self._declared)
             self._prepared = stepper, self._built + perf_counter() - start
         return self._prepared
 

@@ -21,7 +21,8 @@ _WHOLE = (
     "experiment", "created", "sentence", "passed", "quick", "kind", "overall", "parameters",
     "changed", "made",
 )  # fmt: skip
-_CHECK = ("name", "value", "raw", "limit", "u_val", "u_num", "unit", "count", "verdict")
+_CHECK = ("name", "value", "raw", "limit", "u_val", "u_num", "unit", "count", "verdict",
+          "validation", "margin")  # fmt: skip
 
 
 def line_of(content: Json) -> Json:

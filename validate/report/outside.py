@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 from validate.report.numbers import significant
 from validate.report.plain import Json
 
-_FAILS = ("differs", "cannot decide")
-_EVIDENCE = ("agrees", *_FAILS)
+_FAILS = ("not good enough", "undecided", "differs", "no answer", "nothing compared")
+_NO_EVIDENCE = ("fitted", "same model")
 _COUNTED = {"tests": "", "failures": "failure", "errors": "error", "skipped": "skipped"}
 _TEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
@@ -19,9 +19,11 @@ _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 def junit(content: Json) -> str:
     """A suite for the verdict over all checks, one a method, one for printed figures.
 
-    It fails where `validate run` does: a check that differs by itself but not after Holm's
-    correction passes and says so. What is no evidence (fitted, repeats itself) is skipped with its
-    reason; an accepted method that did not finish is an error; nothing compared is a failure.
+    It fails where `validate run` does: a requirement that is not met, and, where nothing is
+    required, a difference from zero; one that differs by itself but not after Holm's correction
+    passes and says so. What is no evidence (fitted, same model) is skipped with its reason; an
+    accepted method that did not finish is an error; nothing compared is a failure. A published
+    figure that moved is a failure of its own suite only.
     """
     name = _clean(str(content["experiment"]))
     root = ElementTree.Element("testsuites", name=name)
@@ -83,9 +85,11 @@ def _check(content: Json, method: Json, check: Json) -> ElementTree.Element:
     verdict, overall = check["verdict"], content["overall"]
     alone = verdict == "differs" and check["name"] not in overall["differs"]
     words = "differs by itself, not after Holm's correction" if alone else verdict
-    said = _clean(f"{words}: E {_value(check, 'value')}, u_val {_value(check, 'u_val')}, "
-                  f"{check['count']} values; {check['why']}")  # fmt: skip
-    if verdict not in _EVIDENCE:
+    said = _clean(f"{words} ({check['validation']}): E {_value(check, 'value')}, u_val "
+                  f"{_value(check, 'u_val')}, limit {_value(check, 'limit')}, margin "
+                  f"{_value(check, 'margin')}, {check['count']} values; {check['why']}; limit: "
+                  f"{check['requirement']}")  # fmt: skip
+    if verdict in _NO_EVIDENCE:
         ElementTree.SubElement(case, "skipped", message=said)
     elif verdict in _FAILS and method["accepted"] and not alone:
         ElementTree.SubElement(case, "failure", message=said, type=verdict)
@@ -115,15 +119,17 @@ def _clean(text: str) -> str:
 def latex(content: Json) -> str:
     """Checks of all methods as a `tabular` (no package is needed): SI values, units in a column."""
     rows = [
-        (*_escaped((m["label"], c["name"])), _number(c["value"]), _number(c["u_val"]),
-         *_escaped((c["unit"], str(c["count"]), c["verdict"])))
+        (*_escaped((m["label"], c["name"])),
+         *(_number(c[key]) for key in ("value", "u_val", "limit", "margin")),
+         *_escaped((c["unit"], str(c["count"]), c["acceptance"], c["validation"])))
         for m in content["methods"] for c in m["checks"]
     ]  # fmt: skip
-    head = ("method", "check", "$E$", r"$u_\mathrm{val}$", "unit", "values", "verdict")
+    head = ("method", "check", "$E$", r"$u_\mathrm{val}$", "limit", "margin", "unit", "values",
+            "acceptance", "validation")  # fmt: skip
     body = [" & ".join(row) for row in rows]
     lines = [
         f"% {content['experiment']}, {content['created']}: {' '.join(content['sentence'].split())}",
-        r"\begin{tabular}{llrrlrl}", r"\hline", " & ".join(head) + r" \\", r"\hline",
+        r"\begin{tabular}{llrrrrlrll}", r"\hline", " & ".join(head) + r" \\", r"\hline",
         *(line + r" \\" for line in body), r"\hline", r"\end{tabular}", "",
     ]  # fmt: skip
     return "\n".join(lines)

@@ -32,7 +32,7 @@ from validate.report.store_exhibits import exhibits, rounded
 from validate.seals import sealed
 from validate.solve.types import Run
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 _STEPS = 1000  # a run over time with more of them gives its traces at the output frames only
 _FRAMES = 100  # fewer frames than these are loads, which traces are not thinned to
 _VALUES = 60_000  # of all traces together: about 800 kB
@@ -68,6 +68,8 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "quick": result.quick,
         "kind": result.kind,
         "overall": overall_members(result.overall),
+        "expected": [members(e) for e in result.expected],
+        "moved": [members(m) for m in result.moved] if result.expected else [],
         "twin_notice": result.twin_notice,
         "seed": result.seed,
         "notes": list(result.notes),
@@ -203,6 +205,9 @@ def overall_members(found: Overall) -> Json:
         "verdict": found.word,
         "evidence": found.evidence,
         "checks": found.total,
+        "acceptance_correction": "none: intersection-union test",
+        "good_enough": [c.name for c in found.met],
+        "not_good_enough": [c.name for c in found.failed],
         "correction": "Holm",
         "differs": [c.name for c in found.differs],
         "differs_alone": [c.name for c in found.alone],
@@ -211,9 +216,12 @@ def overall_members(found: Overall) -> Json:
 
 
 def check_members(check: Check) -> Json:
-    """A check that compared nothing has no error and no uncertainty."""
+    """A check that compared nothing has no error and no uncertainty. `verdict` is the answer that
+    decides."""
     parts = ("value", "raw", "noise", "u_val", "u_D", "u_num", "u_input")
-    return members(check) | ({} if check.count else dict.fromkeys(parts))
+    found = {k: v for k, v in members(check).items() if k != "ratio"}
+    found |= {"verdict": check.verdict, "margin": check.margin}
+    return found | ({} if check.count else dict.fromkeys(parts))
 
 
 def figure_members(figure: Published) -> Json:

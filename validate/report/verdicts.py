@@ -9,26 +9,29 @@ from validate.compare.verdict import Check
 from validate.report.tables import unit_cell
 
 _EMPHASIS: dict[str, Emphasis] = {
-    "agrees": "good", "differs": "bad", "cannot decide": "open", "fitted": "", "repeats itself": "",
+    "good enough": "good", "not good enough": "bad", "undecided": "open", "differs": "bad",
+    "not distinguishable": "good", "no answer": "open", "nothing compared": "bad",
+    "no requirement": "", "fitted": "", "same model": "",
 }  # fmt: skip
 _BEYOND = 25.0  # %: a difference that a dozen draws of a linear model hardly show
 _HEADINGS = (
-    "method", "check", "verdict", "unit", "E", "2 u_val", "limit", "raw rms", "noise rms", "u_D",
-    "u_num", "u_input", "values", "why",
+    "method", "check", "acceptance", "validation", "unit", "E", "2 u_val", "limit", "margin",
+    "raw rms", "noise rms", "u_D", "u_num", "u_input", "values", "why",
 )  # fmt: skip
 _BANDS = {
-    "differs": ("bad", "Differs"),
-    "agrees": ("good", "Agrees"),
+    "good enough": ("good", "Good enough"),
+    "not good enough": ("bad", "Not good enough"),
     "undecided": ("open", "Undecided"),
+    "not distinguishable": ("good", "Not distinguishable"),
+    "differs": ("bad", "Differs"),
     "no evidence": ("open", "No evidence"),
+    "nothing compared": ("bad", "Nothing compared"),
 }
 
 
 def band(result: Result) -> tuple[str, str]:
     """The colour class of the sentence and the word that says the same."""
     colour, word = _BANDS[result.overall.word]
-    if result.fallen and result.overall.word != "differs":
-        return "bad", "A printed figure does not stand"
     return ("open", f"{word}, in doubt") if result.warnings and colour == "good" else (colour, word)
 
 
@@ -38,15 +41,19 @@ def checks(result: Result) -> Exhibit | None:
         return None
     table = NumberTable(
         "checks",
-        "E = simulation less measurement; for many points the part of the raw rms that noise does "
-        "not explain, with the sign of the mean where there is one. u_val² = u_D² (measurement) + "
-        "u_num² (mesh) + u_input² (declared ranges, and "
-        "what a filter claims of its own error), standard uncertainties. "
-        "Agrees: |E| ≤ 2 u_val ≤ limit. Differs: |E| > 2 u_val. Cannot "
-        "decide: 2 u_val exceeds the limit. Fitted: the data served to identify; repeats itself: "
-        "recording and model are one; neither is evidence.",
+        "E = simulation less measurement. max: of many points the one with the largest |E| + "
+        "2 u_val; rms: the rms of the error itself, noise removed. u_val² = u_D² (measurement) + "
+        "u_num² (mesh, step) + u_input² (declared ranges, and what a filter claims of its own "
+        "error), standard uncertainties. Acceptance: E ± 2 u_val against the limit; good enough "
+        "inside, not good enough outside, undecided where it straddles. Validation: differs where "
+        "E ± 2 u_val excludes zero. Margin: limit less |E| + 2 u_val. Fitted (the data served to "
+        "identify) and same model (the recording is the model's own) are no evidence.",
         _HEADINGS,
-        tuple((m.name, *_row(c), m.why(c)) for m in result.methods for c in m.checks),
+        tuple(
+            (m.name, *_row(c), f"{m.why(c)}. Limit: {c.requirement}.")
+            for m in result.methods
+            for c in m.checks
+        ),
         below="why",
     )
     checked = "; ".join(f"{m.name} ({m.called})" for m in result.methods if m.checks)
@@ -54,11 +61,19 @@ def checks(result: Result) -> Exhibit | None:
     found = result.overall
     corrected = (
         f"The recording is: {KINDS[result.kind]}. Verdict over all: {found.word}, "
-        f"{found.counted}. Of many checks of a perfect model some differ by chance (4.6 % each): "
-        f"corrected for {found.total} checks (Holm, 1979), {len(found.differs)} differ and "
-        f"{len(found.alone)} differ alone only."
+        f"{found.counted}. {found.corrections}"
     )
-    return Exhibit("checks", "Checks", (words, corrected), (table, *_inputs(result)))
+    return Exhibit(
+        "checks", "Checks", (words, corrected, *_as_declared(result)),
+        (table, *_inputs(result)),
+    )  # fmt: skip
+
+
+def _as_declared(result: Result) -> Iterator[str]:
+    """What the experiment declares of its verdicts, and which moved."""
+    for e in result.expected:
+        yield f"Expected: {e.check} of {e.method} is {e.verdict}, for {e.why}."
+    yield from (f"Moved: {m.words}." for m in result.moved if result.expected)
 
 
 def _inputs(result: Result) -> Iterator[NumberTable]:
@@ -95,16 +110,24 @@ def _row(check: Check) -> tuple[TableCell | int | str, ...]:
     E = _figures(check, check.value)
     if check.count and check.value == 0 < check.raw:
         E = (TableCell(0.0, check.unit, text="within noise"),)
+    limit = TableCell(check.limit, check.unit, text="" if check.limit else "none")
     return (
         TableCell(check.name, emphasis="strong"),
-        TableCell(check.verdict, emphasis=_EMPHASIS[check.verdict]),
+        TableCell(check.acceptance, emphasis=_EMPHASIS[check.acceptance]),
+        TableCell(check.validation, emphasis=_emphasis(check)),
         unit_cell(check.unit),
         *E,
         *_figures(check, 2 * check.u_val),
-        TableCell(check.limit, check.unit),
+        limit,
+        TableCell(check.margin, check.unit),
         *_figures(check, check.raw, check.noise, check.u_D, check.u_num, check.u_input),
         check.count,
     )
+
+
+def _emphasis(check: Check) -> Emphasis:
+    """Validation is coloured where it decides: where nothing is required."""
+    return _EMPHASIS[check.validation] if check.acceptance == "no requirement" else ""
 
 
 def _figures(check: Check, *values: float) -> tuple[TableCell, ...]:

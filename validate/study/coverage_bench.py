@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual, reached_end
-from validate.compare.verdict import Sensitivity
+from validate.compare.verdict import Accept, Sensitivity, Statistic, errors_of
 from validate.errors import ComparisonError
 from validate.identify.identification import Identification
 from validate.register.observation import Drawable, Observation
@@ -68,12 +68,18 @@ def _at(left: Floats, t: Floats, other: Floats, other_t: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Stated:
-    """What one check is judged with, as it is stored; None in `numerical`: nothing bounds it."""
+    """What one check is judged with, as it is stored; None in `numerical`: nothing bounds it.
+
+    `limit` is None without a requirement. `measurement` is half of what the measurement alone
+    reaches by chance where every point is judged; None where the draws say it themselves.
+    """
 
     name: str
     unit: str
     count: int
-    limit: float
+    limit: float | None
+    statistic: Statistic
+    measurement: float | None
     numerical: Mapping[str, float | None]
     words: str
     deciding: Mapping[str, str]
@@ -85,7 +91,8 @@ class Stated:
         parts = {k: inf if u is None else u for k, u in self.numerical.items()}
         inputs = (Sensitivity(k, _number(u, self.unit)) for k, u in self.inputs.items())
         numerical = Numerical(parts, self.words, self.deciding)
-        return Terms(self.limit, numerical, tuple(inputs), self.fitted)
+        accept = Accept(self.name, self.limit, "as declared", statistic=self.statistic)
+        return Terms(accept, numerical, tuple(inputs), self.fitted)
 
 
 @dataclass(frozen=True)
@@ -185,11 +192,19 @@ def run_terms(bench: CoverageBench, cell: TermsCell) -> AllStated:
 def _stated(residual: Residual, terms: Terms) -> Stated:
     numerical, names = terms.numerical, numbered([s.name for s in terms.inputs])
     return Stated(
-        terms.judge(residual).name, residual.unit, residual.count, terms.limit,
+        terms.judge(residual).name, residual.unit, residual.count, terms.accept.required,
+        terms.accept.statistic, _reached(residual, terms.accept.statistic),
         {k: u if isfinite(u) else None for k, u in numerical.parts.items()},
         numerical.words, numerical.deciding,
         dict(zip(names, (rms(s.change.values) for s in terms.inputs), strict=True)), terms.fitted,
     )  # fmt: skip
+
+
+def _reached(residual: Residual, statistic: Statistic) -> float | None:
+    if statistic != "every" or residual.count == 1:
+        return None
+    found = errors_of(residual)
+    return float(np.hypot(found.chance[0] / 2, found.systematic))
 
 
 def _number(u: float, unit: str) -> Residual:

@@ -14,7 +14,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.overall import judge_all
 from validate.compare.residual import Residual, residuals, stacked
-from validate.compare.verdict import Check, error_of
+from validate.compare.verdict import Check, PointErrors, errors_of, name_of, nothing_compared
 from validate.register.draws import AnyDraw, Draw, Exact
 from validate.register.registered import Registered
 from validate.replay.followed import Followed
@@ -33,24 +33,27 @@ PERFECT = ""  # the world in which the judged model is true
 
 @dataclass(frozen=True)
 class Judged:
-    """One check over some draws: E (None: compared nothing), u_D, u_val (None: not bounded),
-    verdicts."""
+    """One check over some draws: E (None: compared nothing), u_D, u_val (None: not bounded), and
+    both answers."""
 
     E: tuple[float | None, ...]
     u_D: tuple[float, ...]
     u_val: tuple[float | None, ...]
-    verdicts: tuple[str, ...]
+    validations: tuple[str, ...]
+    acceptances: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Some draws: checks by world and name, the verdict over all of a world's, E of the
-    measurement alone by name; and from the first cell only, rms of what one standard uncertainty
-    of each input to both sides does, by input and name, and how far a linear response was off."""
+    """Some draws: checks by world and name, whether all of a world's together differ, E of the
+    measurement alone by name, and the acceptances of models whose error is the limit; and from the
+    first cell only, rms of what one standard uncertainty of each input to both sides does, by input
+    and name, and how far a linear response was off."""
 
     worlds: Mapping[str, Mapping[str, Judged]]
-    overall: Mapping[str, tuple[str, ...]]
+    overall: Mapping[str, tuple[bool, ...]]
     measured: Mapping[str, tuple[float, ...]]
+    at_limit: Mapping[str, tuple[str, ...]]
     alone: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
     off: Mapping[str, float] = field(default_factory=dict)
 
@@ -111,9 +114,11 @@ class DrawBench:
                 self.mine.scene, seen,
             )  # fmt: skip
         found = stacked(r for pair in zip(seen, runs, strict=True) for r in residuals(*pair))
-        names = {s.name: s for s in self.given.stated}
-        named = ((_check_name(r), r) for r in found.values())
-        return {name: r for name, r in named if name in names}
+        return {
+            s.name: r
+            for s in self.given.stated for r in found.values()
+            if name_of(r, s.statistic) == s.name
+        }  # fmt: skip
 
     def _drawn(self, reading: ExactReading, draws: Sequence[AnyDraw]) -> tuple[Registered, ...]:
         left = iter(reading.left)
@@ -141,11 +146,6 @@ class DrawBench:
         return found
 
 
-def _check_name(residual: Residual) -> str:
-    one = residual.values.shape == (1, 1)
-    return residual.name if one else f"{residual.quantity}.rms@{residual.load}"
-
-
 def run_draws(bench: DrawBench, cell: DrawCell) -> Draws:
     """Judges every draw of the cell in every world."""
     given, numbers = bench.given, range(cell.first, cell.first + cell.count)
@@ -156,10 +156,11 @@ def run_draws(bench: DrawBench, cell: DrawCell) -> Draws:
         kept = [k for k in numbers if not label or k < most]
         checks = [_judged(bench, label, k) for k in kept]
         worlds[label] = {s.name: _over([c[s.name] for c in checks]) for s in given.stated}
-        overall[label] = tuple(judge_all(list(c.values())).word for c in checks)
+        overall[label] = tuple(bool(judge_all(list(c.values())).differs) for c in checks)
     first = cell.first == 0
     return Draws(
         worlds, overall, _measured(bench, numbers) if given.steps else _of_all(worlds[PERFECT]),
+        _at_limit(bench, numbers),
         _alone(bench) if first else {}, _off(bench) if first else {},
     )  # fmt: skip
 
@@ -175,9 +176,24 @@ def _judged(bench: DrawBench, label: str, draw: int) -> dict[str, Check]:
     }
 
 
+def _at_limit(bench: DrawBench, numbers: Sequence[int]) -> dict[str, tuple[str, ...]]:
+    """Acceptances of a model whose error is the limit itself, where a wrong answer is likeliest:
+    of every point, along the first component."""
+    required = [s for s in bench.given.stated if s.limit is not None and not s.fitted]
+    found: dict[str, list[str]] = {s.name: [] for s in required}
+    for k in numbers if required else ():
+        drawn = bench.residuals(bench.given.truth(k), bench.noise(k))
+        for s in (s for s in required if s.name in drawn):
+            off = np.zeros_like(drawn[s.name].values)
+            off[:, 0] = s.limit
+            wrong = replace(drawn[s.name], values=drawn[s.name].values + off, scale=None)
+            found[s.name].append(s.terms.judge(wrong).acceptance)
+    return {name: tuple(answers) for name, answers in found.items()}
+
+
 def _nothing(s: Stated) -> Check:
     why = "the run did not reach the end"
-    return Check(s.name, 0.0, s.limit, 0.0, 0.0, 0.0, 0.0, s.unit, 0, "cannot decide", why)
+    return nothing_compared(s.terms.accept, s.name, s.unit, why)
 
 
 def _over(checks: Sequence[Check]) -> Judged:
@@ -185,17 +201,23 @@ def _over(checks: Sequence[Check]) -> Judged:
         tuple(c.value if c.count else None for c in checks),
         tuple(c.u_D for c in checks),
         tuple(c.u_val if isfinite(c.u_val) else None for c in checks),
-        tuple(c.verdict for c in checks),
+        tuple(c.validation for c in checks),
+        tuple(c.acceptance for c in checks),
     )
 
 
 def _measured(bench: DrawBench, numbers: Sequence[int]) -> dict[str, tuple[float, ...]]:
     """E by the measurement alone: the inputs are as they are judged."""
     found: dict[str, list[float]] = {s.name: [] for s in bench.given.stated}
+    statistics = {s.name: s.statistic for s in bench.given.stated}
     for k in numbers:
         for name, residual in bench.residuals(bench.given.base, bench.noise(k)).items():
-            found[name].append(error_of(residual).E)
+            found[name].append(_alone_of(errors_of(residual, statistics[name])))
     return {name: tuple(errors) for name, errors in found.items()}
+
+
+def _alone_of(errors: PointErrors) -> float:
+    return float(errors.E[errors.worst(np.zeros(len(errors.E)))])
 
 
 def _of_all(judged: Mapping[str, Judged]) -> dict[str, tuple[float, ...]]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from validate.compare.coverage import LEAST, MOST, Share
+from validate.compare.coverage import FALSE_ACCEPTANCE, LEAST, MOST, Share
 from validate.compare.exhibit import Chart, Emphasis, Entry, Exhibit, NumberTable, Series, TableCell
 from validate.study.coverage import Coverage
 from validate.study.coverage_found import Power, Quantity
@@ -16,9 +16,12 @@ _WORDS: Mapping[str, Emphasis] = {
     "blunt": "open",
     "too narrow": "bad",
     "too wide": "open",
-    "cannot decide": "open",
+    "no answer": "open",
 }
-HEAD = ("method", "check", "differs / %", "95 % interval / %", "cannot decide / %", "verdict")
+HEAD = (
+    "method", "check", "differs / %", "95 % interval / %", "undecided / %", "not good enough / %",
+    "good enough at the limit / %", "not good enough at the limit / %", "finding",
+)  # fmt: skip
 
 
 def coverage_exhibits(study: Coverage) -> tuple[Exhibit, ...]:
@@ -28,8 +31,9 @@ def coverage_exhibits(study: Coverage) -> tuple[Exhibit, ...]:
 
 def share_row(q: Quantity) -> tuple[str, ...]:
     """A check's row as text."""
-    return (q.method, q.stated.name, percent(q.share), interval(q.share), percent(q.undecided),
-            q.finding.word)  # fmt: skip
+    false = (q.undecided, q.rejected, q.false_good, q.false_bad)
+    return (q.method, q.stated.name, percent(q.share), interval(q.share),
+            *("-" if s is None else percent(s) for s in false), q.finding.word)  # fmt: skip
 
 
 def percent(share: Share) -> str:
@@ -43,7 +47,7 @@ def interval(share: Share) -> str:
 def _shares(study: Coverage) -> Exhibit:
     rows: list[tuple[Entry | TableCell, ...]] = [
         (q.method, q.stated.name, TableCell(100 * q.share.value, text=percent(q.share)),
-         interval(q.share), TableCell(100 * q.undecided.value, text=percent(q.undecided)),
+         interval(q.share), *map(_cell, (q.undecided, q.rejected, q.false_good, q.false_bad)),
          TableCell(q.spread, q.stated.unit), TableCell(q.u_val, q.stated.unit),
          TableCell(q.finding.word, emphasis=_WORDS.get(q.finding.word, "")), q.finding.words)
         for q in study.quantities
@@ -51,17 +55,25 @@ def _shares(study: Coverage) -> Exhibit:
     rows += [
         (t.method, f"all {t.checks} together (Holm)",
          TableCell(100 * t.share.value, text=percent(t.share)), interval(t.share),
-         TableCell(100 * t.undecided.value, text=percent(t.undecided)), None, None,
+         None, None, None, None, None, None,
          TableCell("holds" if t.holds else "too narrow", emphasis="good" if t.holds else "bad"),
          "at most 7 %: the correction keeps it below its level")
         for t in study.together
     ]  # fmt: skip
-    head = (*HEAD[:5], "rms of E", "u_val", "verdict", "which term")
+    head = (*HEAD[:-1], "rms of E", "u_val", "finding", "which term")
     table = NumberTable("coverage", "How often a perfect model differs", head, tuple(rows),
-                        "No rms and no u_val of all checks together: they have no unit in common.",
+                        "At the limit: models whose error is the limit; at most 5 % may be called "
+                        "either. No rms and no u_val of all checks together: no common unit.",
                         below="which term")  # fmt: skip
     return Exhibit("coverage", "A perfect model under our own verdicts", tuple(_told(study)),
                    (table,))  # fmt: skip
+
+
+def _cell(share: Share | None) -> TableCell:
+    return TableCell(None) if share is None else TableCell(
+        100 * share.value, text=percent(share),
+        emphasis="bad" if share.value > FALSE_ACCEPTANCE else "",
+    )  # fmt: skip
 
 
 def _told(study: Coverage) -> Iterator[str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.compare.coverage import (
+    FALSE_ACCEPTANCE,
     MEASUREMENT,
     MOST,
     Finding,
@@ -26,6 +27,9 @@ from validate.study.store import Record
 class Quantity:
     """One check of a method: how often the perfect model differs, and by which term.
 
+    `undecided`: of the perfect model's acceptance; `rejected`: not good enough though perfect.
+    `false_good` and `false_bad`: answers about models whose error is the limit; None without one.
+
     `off` is the largest error of the linear response, in the check's unit; None: solved whole.
     """
 
@@ -33,6 +37,9 @@ class Quantity:
     stated: Stated
     share: Share
     undecided: Share
+    rejected: Share
+    false_good: Share | None
+    false_bad: Share | None
     terms: tuple[Term, ...]
     finding: Finding
     judged: Judged
@@ -42,7 +49,10 @@ class Quantity:
 
     @property
     def holds(self) -> bool:
-        return self.finding.word in ("holds", "blunt", "no evidence")
+        false = [s for s in (self.rejected, self.false_good, self.false_bad) if s is not None]
+        return self.finding.word in ("holds", "blunt", "no evidence") and all(
+            s.value <= FALSE_ACCEPTANCE for s in false
+        )
 
 
 @dataclass(frozen=True)
@@ -64,7 +74,6 @@ class JointShare:
 
     method: str
     share: Share
-    undecided: Share
     checks: int
 
     @property
@@ -79,34 +88,42 @@ def _joined(records: Sequence[Draws], label: str, name: str) -> Judged:
         tuple(e for p in parts for e in p.E),
         tuple(u for p in parts for u in p.u_D),
         tuple(u for p in parts for u in p.u_val),
-        tuple(v for p in parts for v in p.verdicts),
+        tuple(v for p in parts for v in p.validations),
+        tuple(v for p in parts for v in p.acceptances),
     )
 
 
 def quantity(given: Given, stated: Stated, records: Sequence[Draws], whole: bool) -> Quantity:
     """One check over all draws; `whole`: each was solved."""
     judged = _joined(records, PERFECT, stated.name)
-    n = len(judged.verdicts)
-    share = Share(judged.verdicts.count("differs"), n)
-    undecided = Share(judged.verdicts.count("cannot decide"), n)
+    n = len(judged.validations)
+    share = Share(judged.validations.count("differs"), n)
+    undecided, rejected = (
+        Share(judged.acceptances.count(word), n) for word in ("undecided", "not good enough")
+    )
+    at_limit = [a for r in records for a in r.at_limit.get(stated.name, ())]
+    false_good, false_bad = (
+        Share(at_limit.count(word), len(at_limit)) if at_limit else None
+        for word in ("good enough", "not good enough")
+    )
     terms = tuple(_terms_shown(given, stated, records, judged))
     known = [u for u in judged.u_val if u is not None]
     errors = np.array([e for e in judged.E if e is not None])
     off = {k: v for r in records for k, v in r.off.items()}
     return Quantity(
-        given.method, stated, share, undecided, terms,
-        _finding(stated, share, undecided, terms), judged,
+        given.method, stated, share, undecided, rejected, false_good, false_bad, terms,
+        _finding(stated, share, terms), judged,
         float(np.sqrt(np.mean(errors**2))) if len(errors) else 0.0,
         float(np.median(known)) if known else None,
         off.get(stated.name) if given.steps and not whole else None,
     )  # fmt: skip
 
 
-def _finding(stated: Stated, share: Share, undecided: Share, terms: tuple[Term, ...]) -> Finding:
+def _finding(stated: Stated, share: Share, terms: tuple[Term, ...]) -> Finding:
     if stated.fitted:
         return Finding("no evidence", None, stated.fitted)
-    if undecided.number == undecided.count and None in stated.numerical.values():
-        return Finding("cannot decide", None, f"nothing bounds u_num: {stated.words}")
+    if None in stated.numerical.values():
+        return Finding("no answer", None, f"nothing bounds u_num: {stated.words}")
     return find_fault(share, terms)
 
 
@@ -114,7 +131,8 @@ def _terms_shown(
     given: Given, stated: Stated, records: Sequence[Draws], judged: Judged
 ) -> Iterator[Term]:
     measured = np.array([e for r in records for e in r.measured[stated.name]])
-    u_D, own = float(np.median(judged.u_D)), stated.inputs.get(OWN_COVARIANCE)
+    u_D = float(np.median(judged.u_D)) if stated.measurement is None else stated.measurement
+    own = stated.inputs.get(OWN_COVARIANCE)
     shown = reach(measured)
     if own is None:
         yield term(MEASUREMENT, u_D, measured, "measurement")
@@ -134,9 +152,8 @@ def _terms_shown(
 
 def together(given: Given, records: Sequence[Draws]) -> JointShare:
     """The verdict over all checks of a method."""
-    words = [w for r in records for w in r.overall[PERFECT]]
-    differs, undecided = (Share(words.count(w), len(words)) for w in ("differs", "undecided"))
-    return JointShare(given.method, differs, undecided, len(given.stated))
+    differing = [d for r in records for d in r.overall[PERFECT]]
+    return JointShare(given.method, Share(sum(differing), len(differing)), len(given.stated))
 
 
 def power(
@@ -152,9 +169,9 @@ def power(
         if record.value is None:
             yield Power(given.method, None, path, by, None, record.why)
         elif world.label in given.wrong:
-            words = [w for r in records for w in r.overall[world.label]]
-            yield Power(given.method, None, path, by, Share(words.count("differs"), len(words)))
+            all_of = [d for r in records for d in r.overall[world.label]]
+            yield Power(given.method, None, path, by, Share(sum(all_of), len(all_of)))
             for name in names:
-                verdicts = _joined(records, world.label, name).verdicts
+                verdicts = _joined(records, world.label, name).validations
                 share = Share(verdicts.count("differs"), len(verdicts))
                 yield Power(given.method, name, path, by, share)

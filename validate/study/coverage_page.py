@@ -56,7 +56,7 @@ def document(study: Coverage) -> dict[str, Any]:
         "checks": [_quantity(q) for q in study.quantities],
         "together": [
             {"method": t.method, "checks": t.checks, "differs": _share(t.share),
-             "cannot_decide": _share(t.undecided), "holds": t.holds}
+             "holds": t.holds}
             for t in study.together
         ],
         "power": [_power(p) for p in study.power],
@@ -68,8 +68,11 @@ def document(study: Coverage) -> dict[str, Any]:
 def _quantity(q: Quantity) -> dict[str, Any]:
     return {
         "method": q.method, "name": q.stated.name, "unit": q.stated.unit, "count": q.stated.count,
-        "differs": _share(q.share), "cannot_decide": _share(q.undecided),
-        "verdict": q.finding.word, "why": q.finding.words,
+        "differs": _share(q.share), "undecided": _share(q.undecided),
+        "not_good_enough": _share(q.rejected),
+        "good_enough_at_limit": q.false_good and _share(q.false_good),
+        "not_good_enough_at_limit": q.false_bad and _share(q.false_bad),
+        "finding": q.finding.word, "why": q.finding.words,
         "fault": q.finding.fault.name if q.finding.fault else None,
         "rms_E": q.spread, "u_val": q.u_val, "line_off": q.off,
         "terms": [_term(t) for t in q.terms],
@@ -93,12 +96,12 @@ def _power(p: Power) -> dict[str, Any]:
 
 def draws_table(study: Coverage) -> CellsTable:
     """Every check of every draw of the perfect model, SI."""
-    head = ("method", "check", "unit", "draw", "E", "u_val", "verdict")
+    head = ("method", "check", "unit", "draw", "E", "u_val", "validation", "acceptance")
     rows = tuple(
-        (q.method, q.stated.name, q.stated.unit, k + 1, E, u, verdict)
+        (q.method, q.stated.name, q.stated.unit, k + 1, E, u, *answers)
         for q in study.quantities
-        for k, (E, u, verdict) in enumerate(
-            zip(q.judged.E, q.judged.u_val, q.judged.verdicts, strict=True)
+        for k, (E, u, *answers) in enumerate(
+            zip(q.judged.E, q.judged.u_val, q.judged.validations, q.judged.acceptances, strict=True)
         )
     )
     return head, rows

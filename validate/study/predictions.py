@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from validate.compare.verdict import NO_EVIDENCE
 from validate.errors import RecordingError
 from validate.report.folder import MARK
 from validate.seals import read_sealed
@@ -20,7 +21,7 @@ from validate.seals import read_sealed
 Json = dict[str, Any]
 # Parameters that say where recordings lie: which ones they are, their hashes say.
 _LOCATES = ("recording", "recordings", "data", "logs")
-_EVIDENCE = ("agrees", "differs", "cannot decide")
+_EVIDENCE = ("differs", "not distinguishable")
 _ROUGH = 0.25  # relative: a measurement as uncertain as that tells no ratio
 
 
@@ -157,7 +158,9 @@ def _count(left: dict[str, int], why: str, number: int) -> None:
 
 def _no_evidence(check: Json) -> str:
     """Why a check counts for nothing here."""
-    if check["verdict"] not in _EVIDENCE:
+    if "validation" not in check:
+        return "stored before there were two answers a check; run it again"
+    if check["verdict"] in NO_EVIDENCE or check["validation"] not in _EVIDENCE:
         return str(check["verdict"])
     if not check["count"]:
         return "compared nothing"

@@ -109,7 +109,7 @@ class Benchmark:
     def made(self, notice: str) -> Twin:
         """The experiment's twin, with what its report says of it."""
         prefixes = ("body.", "clock.", "twin.")
-        return Twin(self.record, self.truth, prefixes, True, RefinedTwin().seed, notice)
+        return Twin(self.record, self.truth, prefixes, "same model", RefinedTwin().seed, notice)
 
     def record(self, p: SolverTest, progress: Progress) -> Recording:
         made, twin = self.twin(p), p.twin

@@ -47,13 +47,13 @@ def _foreign(
 ) -> Experiment:
     """Another material: nothing of the printed one is taken for its own without saying so."""
     limit = _tenth(recordings, p)
-    source = f"a tenth of the force measured at {100 * p.limit_linear:g} % strain, these logs"
+    reason = f"a tenth of the force measured at {100 * p.limit_linear:g} % strain, these logs"
     other = f"printed for {MATERIAL}; not compared with this data ({', '.join(materials)})"
     uncertainty = experiment.uncertainty
     return replace(
         experiment,
         source=f"logs in {', '.join(sorted({Path(r.source.path).name for r in recordings}))}",
-        accept=tuple(replace(a, limit=limit, source=source) for a in experiment.accept),
+        accept=tuple(replace(a, limit=limit, reason=reason) for a in experiment.accept),
         published=tuple(replace(f, other=other) for f in experiment.published),
         uncertainty=uncertainty
         and replace(

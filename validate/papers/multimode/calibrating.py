@@ -47,7 +47,7 @@ def words_of(mode: StretchMode) -> str:
 
 
 def accepted(mode: StretchMode) -> Accept:
-    return Accept(f"stress.{mode}", LIMIT, "a tenth of the measured stress (ours)")
+    return Accept(f"stress.{mode}", LIMIT, "a tenth of the measured stress")
 
 
 def _seen(recording: Recording, p: Multimode) -> tuple[float, float]:

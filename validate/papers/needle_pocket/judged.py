@@ -29,4 +29,4 @@ def follows(experiment: Experiment, recordings: Sequence[Recording], p: NeedlePo
 
 def _of_space(accept: Accept, p: NeedlePocket) -> Accept:
     force = accept.quantity.startswith("force") and p.body.space == "solid"
-    return replace(accept, limit=accept.limit / _PLANE) if force else accept
+    return replace(accept, limit=accept.limit / _PLANE) if force and accept.limit else accept

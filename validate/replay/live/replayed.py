@@ -23,5 +23,5 @@ def as_given(experiment: Experiment, recording: Recording) -> Experiment:
     accept = tuple(Accept(name, _SAME, "rounding: the same method, replayed") for name in names)
     return replace(
         experiment, accept=accept, accepted=(method,), uncertainty=None, cases=(),
-        twin=replace(experiment.twin, remake=(), same_model=True),
+        twin=replace(experiment.twin, remake=(), kind="same model"),
     )  # fmt: skip
