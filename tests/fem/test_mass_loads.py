@@ -10,12 +10,12 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assemble import stiffness
 from validate.fem.loads import facet_integrals
-from validate.fem.locking import locking_warning
+from validate.fem.locking import locking_notes
 from validate.fem.system import System, build
 from validate.scene.box import box, centroids
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Load, Scene, Support
+from validate.scene.scene import Load, Scene, Support, Weight
 
 SOFT = Material(1e4, 0.3, rho=1000.0, mass_damping=2.0, stiffness_damping=0.1)
 HARD = Material(3e4, 0.4, rho=1500.0, mass_damping=5.0, stiffness_damping=0.02)
@@ -253,10 +253,11 @@ def test_linear_cells_near_incompressibility_are_warned_of(
     nu: float, order: int, dilatation: str, warned: bool
 ) -> None:
     scene = Scene(block(order), Material(1e4, nu), dilatation=dilatation)  # type: ignore[arg-type]
-    warning = locking_warning(scene)
-    assert (warning is not None) == warned
-    if warning:
-        assert f"nu = {nu:g}: linear tetrahedra lock" in warning
+    warnings = locking_notes([("fem", scene)])
+    assert bool(warnings) == warned
+    if warnings:
+        assert warnings[0].startswith("linear tetrahedra lock near incompressibility")
+        assert warnings[0].endswith(f"nu = {nu:g} (fem)")
 
 
 @pytest.mark.parametrize(
@@ -267,4 +268,21 @@ def test_few_linear_cells_across_a_slender_body_are_warned_of(
 ) -> None:
     rod = box((0.1, 0.02, 0.02), (5 * across, across, across))
     scene = Scene(quadratic(rod) if order == 2 else rod, Material(1e4, 0.3))
-    assert ("lock in bending" in (locking_warning(scene) or "")) == warned
+    assert ("lock in bending" in " ".join(locking_notes([("fem", scene)]))) == warned
+
+
+@pytest.mark.parametrize(("direction", "warned"), [((1.0, 0.0, 0.0), False), ((0, 0, -1.0), True)])
+def test_a_bar_that_is_only_stretched_does_not_lock_in_bending(
+    direction: tuple[float, ...], warned: bool
+) -> None:
+    rod = box((0.1, 0.02, 0.02), (5, 1, 1))
+    scene = Scene(rod, Material(1e4, 0.3), loads=(Weight("gravity", direction),))
+    assert bool(locking_notes([("fem", scene)])) == warned
+
+
+def test_warnings_of_one_cause_are_one_line() -> None:
+    """Two Poisson ratios and five methods: the cause once, with where it was found."""
+    scenes = [(f"m{i}", Scene(block(1), Material(1e4, nu)))
+              for i, nu in enumerate((0.49, 0.49, 0.49, 0.49, 0.4995))]  # fmt: skip
+    (line,) = locking_notes(scenes)
+    assert "nu = 0.49 (m0; m1; m2 and 1 more methods), nu = 0.4995 (m4)" in line

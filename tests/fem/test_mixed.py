@@ -8,7 +8,7 @@ import pytest
 
 from validate.errors import SceneError
 from validate.fem import mixed
-from validate.fem.locking import locking_warning
+from validate.fem.locking import locking_notes
 from validate.fem.mixed import mixed_static
 from validate.fem.system import build
 from validate.papers.accuracy.needle import MP2, needle_block
@@ -91,11 +91,10 @@ def test_the_rods_weight_bends_it_to_the_converged_tip() -> None:
 
 def test_the_warning_names_the_cells_and_leaves_plane_stress_alone() -> None:
     block = needle_block(4, MP2)
-    warning = locking_warning(block)
-    assert warning is not None
-    assert "nu = 0.495: linear quadrilaterals lock" in warning
-    assert "compare with mixed dilatation" in warning
-    assert locking_warning(replace(block, plane="stress")) is None
+    (warning,) = locking_notes([("fem", block)])
+    assert warning.startswith("linear quadrilaterals lock near incompressibility")
+    assert "compare with mixed dilatation: nu = 0.495 (fem)" in warning
+    assert locking_notes([("fem", replace(block, plane="stress"))]) == ()
 
 
 def test_pins_and_drives_are_held() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.locking import locking_warning
+from validate.fem.locking import locking_notes
 from validate.scene.box import box, centroids, grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
@@ -77,8 +77,9 @@ def test_few_cells_of_mean_dilatation_are_warned_of(nu: float, cells: int, warne
     """Two across a bonded cylinder at nu .4999 show 32 times the force of quadratic ones."""
     mesh = box((1.0, 1.0, 1.0), (cells,) * 3)
     body = Scene(mesh, Material(1e4, nu), (Support("z0", (0, 1, 2)),), dilatation="nodal_mean")
-    found = locking_warning(body) or ""
-    assert (f"{cells}.0 linear tetrahedra of nodal mean dilatation across" in found) == warned
+    found = " ".join(locking_notes([("fem", body)]))
+    assert ("few linear tetrahedra of nodal mean dilatation are too stiff" in found) == warned
+    assert (f"{cells}.0 across the body" in found) == warned
 
 
 def test_hexahedra_are_held_against_mixed_ones() -> None:

@@ -22,7 +22,6 @@ from validate.cli.progress import progress
 from validate.compare.overall import PASSES
 from validate.compare.result import KINDS, MethodResult, Result
 from validate.compare.verdict import Check
-from validate.fem.locking import locking_notes
 from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment
 from validate.replay.guests import with_guests
@@ -116,8 +115,7 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
     found = result.overall
     doubt = ", in doubt" if result.warnings and found.passed else ""
     say(f"{result.name}: {found.word}{doubt}; {found.counted}; {KINDS[result.kind]}", indent="  ")
-    locked = locking_notes((m.label, m.scene) for m in result.methods)
-    for warning in (*result.warnings, *locked):
+    for warning in (*result.warnings, *result.locking):
         warn(warning)
     say(result.title)
     for one in result.moved if result.expected else ():

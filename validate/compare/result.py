@@ -80,7 +80,7 @@ class Result:
     `kind` is what the recording is: measured, a twin, the judged model's own, or computed.
     `warnings` doubt what was given. `changed` parameters are not as the experiment declares them.
     `specimens` are those of the recordings, one name each. `expected` are the verdicts that the
-    experiment is known to have.
+    experiment is known to have. `locking` warns of elements that are too stiff, a line a cause.
     """
 
     name: str
@@ -106,6 +106,7 @@ class Result:
     changed: tuple[Changed, ...] = ()
     specimens: tuple[str, ...] = ()
     expected: tuple[Expected, ...] = ()
+    locking: tuple[str, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:

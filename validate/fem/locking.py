@@ -1,6 +1,7 @@
 """The warnings that linear elements lock: near incompressibility, and in bending."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +16,7 @@ LOCKING_FROM = 0.45
 # cells, 8 across: 1.77 with 2 across at nu .49, 32 at .4999; 1.16 and 1.30 with 4. Quadratic cells
 # have 1.12 and 1.22 with 2, 1.03 and 1.04 with 4: no warning of them.
 _MEAN_FROM, _MEAN_ACROSS = 0.49, 5.0
+_NAMED = 3  # methods in a warning
 _SLENDER, _ACROSS = 4.0, 4.0  # bending: length over thickness from, and cells across below
 _SHAPES = {
     "tri3": ("triangles", 2),
@@ -24,53 +26,66 @@ _SHAPES = {
 }  # and how many of them make a box
 
 
-def locking_warning(scene: AnyScene) -> str | None:
-    """One line where linear cells lock; None where they do not.
+@dataclass(frozen=True)
+class Locking:
+    """Why cells of a scene lock: `where`, which differs between scenes, and the `cause`."""
+
+    where: str
+    cause: str
+
+
+def locking_of(scene: AnyScene) -> tuple[Locking, ...]:
+    """Why the linear cells of a scene lock; empty where they do not.
 
     Pointwise ones lock from nu of .45 (in plane stress not: the thickness gives way), those of
     nodal mean dilatation from .49 where fewer than five lie across the body, all of them where few
-    lie across a slender one. A material point has no cells.
+    lie across a slender one that something bends. A material point has no cells.
     """
     if isinstance(scene, Meshless) or scene.mesh.order != 1:
-        return None
+        return ()
     cells = f"linear {_SHAPES[scene.mesh.kind][0]}"
-    found = [
-        words
-        for words in (_volume(scene, cells), _mean(scene, cells), _bending(scene.mesh, cells))
-        if words
-    ]
-    return "; ".join(found) or None
+    found = (_volume(scene, cells), _mean(scene, cells), _bending(scene, cells))
+    return tuple(locking for locking in found if locking)
 
 
 def locking_notes(scenes: Iterable[tuple[str, AnyScene]]) -> tuple[str, ...]:
-    """Each warning once, with the labels of the methods it is of."""
-    found: dict[str, list[str]] = {}
+    """Each cause once, with where it was found and the labels of the methods it concerns."""
+    found: dict[str, dict[str, list[str]]] = {}
     for label, scene in scenes:
-        warning = locking_warning(scene)
-        if warning:
-            found.setdefault(warning, []).append(label)
-    return tuple(f"{warning} ({'; '.join(labels)})" for warning, labels in found.items())
+        for one in locking_of(scene):
+            found.setdefault(one.cause, {}).setdefault(one.where, []).append(label)
+    return tuple(
+        f"{cause}: " + ", ".join(f"{where} ({_few(labels)})" for where, labels in places.items())
+        for cause, places in found.items()
+    )
 
 
-def _volume(scene: Scene, cells: str) -> str | None:
+def _few(labels: list[str]) -> str:
+    """The first methods by name."""
+    more = len(labels) - _NAMED
+    return "; ".join(labels[:_NAMED]) + (f" and {more} more methods" if more > 0 else "")
+
+
+def _volume(scene: Scene, cells: str) -> Locking | None:
     nu = float(scene.per_cell(lambda m: m.nu).max())
     if nu < LOCKING_FROM or scene.dilatation != "pointwise" or scene.plane == "stress":
         return None
     instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
-    return (
-        f"nu = {nu:g}: {cells} lock near incompressibility and are too stiff, silently; compare "
-        f"with {instead}"
+    return Locking(
+        f"nu = {nu:g}",
+        f"{cells} lock near incompressibility and are too stiff; compare with {instead}",
     )
 
 
-def _mean(scene: Scene, cells: str) -> str | None:
+def _mean(scene: Scene, cells: str) -> Locking | None:
     nu, across = float(scene.per_cell(lambda m: m.nu).max()), _across(scene.mesh)
     few = round(across, 1) < _MEAN_ACROSS
     if scene.dilatation != "nodal_mean" or nu < _MEAN_FROM or not few or scene.plane == "stress":
         return None
-    return (
-        f"nu = {nu:g}: {across:.1f} {cells} of nodal mean dilatation across a body are too stiff "
-        "where plates hold it; compare with order 2 or a finer mesh"
+    return Locking(
+        f"nu = {nu:g}, {across:.1f} across the body",
+        f"few {cells} of nodal mean dilatation are too stiff where plates hold the body; compare "
+        "with order 2 or a finer mesh",
     )
 
 
@@ -81,12 +96,22 @@ def _across(mesh: Mesh) -> float:
     return float(sides.min() / (np.prod(sides) / boxes) ** (1 / len(sides)))
 
 
-def _bending(mesh: Mesh, cells: str) -> str | None:
-    sides = np.ptp(mesh.nodes, axis=0)
-    across = _across(mesh)
+def _bending(scene: Scene, cells: str) -> Locking | None:
+    sides = np.ptp(scene.mesh.nodes, axis=0)
+    across = _across(scene.mesh)
     if sides.max() < _SLENDER * sides.min() or round(across, 1) >= _ACROSS:
         return None
-    return (
-        f"{across:.1f} {cells} across a body {sides.max() / sides.min():.0f} times as long lock in "
-        "bending; compare with order 2 or a finer mesh"
+    if not _bends(scene, int(sides.argmax())):
+        return None
+    return Locking(
+        f"{across:.1f} across a body {sides.max() / sides.min():.0f} times as long",
+        f"few {cells} lock in bending; compare with order 2 or a finer mesh",
     )
+
+
+def _bends(scene: Scene, along: int) -> bool:
+    """Whether anything acts across the long axis; drives and loads along it only stretch."""
+    if scene.contacts or scene.tracked or scene.tools or scene.cavities:
+        return True
+    acting = [np.asarray(one.direction) for one in (*scene.drives, *scene.loads)]
+    return not acting or any(np.abs(np.delete(d, along)).max(initial=0.0) > 1e-9 for d in acting)

@@ -85,7 +85,7 @@ def pressed(
     linear = law == "linear"
     if fluid and not linear:
         raise UsageError(f"method '{label}': fluid is for the linear law, not {law}")
-    slow = Tabulated(StaticNewton("none"), 1.0)
+    slow = Tabulated(StaticNewton("none"))
     settings = ExactPressure() if fluid else NoFluid() if linear else slow
     return Method(label, settings, Pressed(plates, law, order))
 

@@ -44,6 +44,7 @@ from validate.replay.room import coarser, require_room
 from validate.replay.runs import Road
 from validate.replay.sentence import figures_sentence, verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
+from validate.solve.guests.guest import Guest
 
 _AGAINST: Mapping[Kind, str] = {
     "measured": "measured recording",
@@ -141,6 +142,11 @@ def _compared(
     effects = effects_of(road, results)
     published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
+    locking = locking_notes(
+        (f.label, f.scene)
+        for name, f in main.items()
+        if not isinstance(methods[name].settings, Guest)  # its elements are its own
+    )
     parameters_used = marked(experiment, options, found, _settings(road.parameters, methods))
     warnings = (
         *(identified.doubts if identified else ()),
@@ -163,7 +169,8 @@ def _compared(
         effects=effects,
         published=published,
         identified=identified.scores if identified else (),
-        notes=_notes(remade, identified, main),
+        notes=_notes(remade, identified, main, locking),
+        locking=locking,
         warnings=warnings,
         quick=options.quick,
         kind=road.kind,
@@ -287,7 +294,10 @@ def _opening(identified: Identified | None) -> str:
 
 
 def _notes(
-    remade: tuple[str, ...], identified: Identified | None, main: Mapping[str, Followed]
+    remade: tuple[str, ...],
+    identified: Identified | None,
+    main: Mapping[str, Followed],
+    locking: tuple[str, ...],
 ) -> tuple[str, ...]:
     """What was made anew, identified, noticed by registration or schemes, not compared; locks."""
     first = next(iter(main.values()))
@@ -303,7 +313,7 @@ def _notes(
         *(identified.notes if identified else ()),
         *found,
         *gate_warnings(main),
-        *locking_notes((f.label, f.scene) for f in main.values()),
+        *locking,
     )
     return tuple(dict.fromkeys(said))
 

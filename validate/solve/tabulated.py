@@ -6,7 +6,7 @@ of fourth order between. Its step time is that of the interpolation, not of a so
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import prod
 from typing import ClassVar
 
@@ -15,6 +15,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
+from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.handles import LARGE_STATICS, Handles
 from validate.solve.types import Ending, Scheme, State, Stepper
@@ -30,7 +31,7 @@ class Tabulated:
     handles: ClassVar[Handles] = LARGE_STATICS
 
     inner: Scheme
-    step: float = field(metadata={"unit": "m", "doc": "between the loads that are solved"})
+    step: float = quantity(1e-3, "m", "between the loads that are solved")
 
     def __post_init__(self) -> None:
         if not self.step > 0:

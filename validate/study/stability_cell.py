@@ -13,7 +13,7 @@ from scipy.linalg import eigh, eigvalsh
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, ValidateError
-from validate.fem.locking import locking_warning
+from validate.fem.locking import locking_of
 from validate.fem.matrices import mass_of
 from validate.fem.mixed import mixed_static
 from validate.fem.system import System, build
@@ -99,7 +99,7 @@ def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
         locking=bench.locking(v),
         rounding=rounding(pulled, limit),
         drifts=tuple(_drifts(base, system, schemes, modes)) if cell.drift else (),
-        warning=locking_warning(system.scene) or "",
+        warning="; ".join(f"{one.cause}: {one.where}" for one in locking_of(system.scene)),
     )
 
 
