@@ -20,7 +20,8 @@ from validate.report.numbers import significant, with_unit
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- guests: begin -->", "<!-- guests: end -->"
 HEAD = (
-    "experiment", "check", "method", "error E", "2 u_val", "verdict", "rate, Hz", "memory, MB",
+    "experiment", "check", "method", "error E", "2 u_val", "margin", "acceptance", "validation",
+    "rate, Hz", "memory, MB",
 )  # fmt: skip
 _OURS = "this one"
 
@@ -41,7 +42,7 @@ def judged() -> tuple[Judged, ...]:
     under = {"recording": str(loaded), "load.mass": "52g"}
     beams = ("mixed", "still", "felupe", "calculix", "mujoco", "mujoco_45")
     cylinders = ("slip", "neo_slip", "svk_slip", "felupe", "calculix", "mujoco")
-    rest, rings = "tip.vertical.rms@settled", "ringing.frequency@swing"
+    rest, rings = "tip.vertical.max@settled", "ringing.frequency@swing"
     return (
         Judged("silicone_beam", beams, (rest,)),
         Judged("silicone_beam", beams, (rest, rings), "with 52 g", under),
@@ -71,15 +72,15 @@ def rows_of(one: Judged, result: Result) -> list[list[str]]:
 
 
 def _cells(row: tuple[Entry | TableCell, ...]) -> list[str]:
-    label, program, check, error, _, verdict, rate, memory, end = map(plain, row)
+    label, program, check, error, _, _, accepted, validated, rate, memory, end = map(plain, row)
     who = str(label) if program in (_OURS, "-") else f"{label} ({program})"
-    figures = [with_unit(c.value, c.unit) if isinstance(c, TableCell) else "-" for c in row[3:5]]
+    figures = [with_unit(c.value, c.unit) if isinstance(c, TableCell) else "-" for c in row[3:6]]
     if isinstance(error, float) and error == 0:
         figures[0] = "within noise"
     if check == "-":
-        return ["-", who, "-", "-", _short(str(end)), "-", "-"]
+        return ["-", who, "-", "-", "-", _short(str(end)), "-", "-", "-"]
     costs = [significant(x, 2) if isinstance(x, float) else "-" for x in (rate, memory)]
-    return [str(check), who, *figures, str(verdict), *costs]
+    return [str(check), who, *figures, str(accepted), str(validated), *costs]
 
 
 def _short(end: str) -> str:

@@ -17,7 +17,10 @@ from validate.report.numbers import with_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
-HEAD = ("experiment", "fitted on", "predicted", "error E", "2 u_val", "verdict")
+HEAD = (
+    "experiment", "fitted on", "predicted", "error E", "2 u_val", "margin", "acceptance",
+    "validation",
+)  # fmt: skip
 _SHOWN = 3  # kinds of quantity of an experiment, of each the check that is furthest off
 
 
@@ -57,7 +60,8 @@ def _told(result: Result, method: str) -> list[Check]:
 
 def _cells(c: Check) -> tuple[str, ...]:
     error = with_unit(c.value, c.unit) if c.value else "within noise"
-    return (c.name, error, with_unit(2 * c.u_val, c.unit), c.verdict)
+    doubt, margin = (with_unit(n, c.unit) for n in (2 * c.u_val, c.margin))
+    return (c.name, error, doubt, margin, c.acceptance, c.validation)
 
 
 def measured() -> tuple[Measured, ...]:

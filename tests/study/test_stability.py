@@ -199,7 +199,7 @@ def test_limits_agree_to_two_percent_and_cells_cost_what_the_note_says(
     assert stiff.locking < 0.1 * needle.locking < 0.1
     assert stiff.conditions["K"] > 5 * needle.conditions["K"]
     assert "lock" in stiff.warning
-    assert "nu = 0.47: linear" in needle.warning
+    assert needle.warning.endswith("nu = 0.47")
     assert needle.rounding is not None
     assert needle.rounding.positions is not None
     assert needle.rounding.velocities is not None
