@@ -175,3 +175,42 @@ def test_set_up_is_timed_from_the_scene_on(monkeypatch: pytest.MonkeyPatch) -> N
     t = np.array([1.0, 2.0])
     run = run_scheme("x", NoFluid(), scene, t, np.zeros((2, 1)), np.array([1]))
     assert run.setup_s == 1.0
+
+
+@dataclass(frozen=True)
+class Runs(Breaks):
+    """A stepper that goes on, but whose nodes are far away from one step on."""
+
+    far: float = 0.0  # m
+
+    def field(self, state: State) -> np.ndarray:
+        return self.inner.field(state) + (self.far if state.numbers.get("far") else 0.0)
+
+    def step(self, state: State, drives: np.ndarray) -> State:
+        new = self.inner.step(state, drives)
+        return replace(new, numbers={**new.numbers, "far": float(drives[0] > self.at)})
+
+
+@pytest.mark.parametrize(("far", "words"), [(6e5, "6e+05 m"), (np.nan, "no finite number")])
+def test_a_state_that_runs_away_has_diverged(coarse: Responses, far: float, words: str) -> None:
+    """Six hundred kilometres are no result: the run was called finished."""
+    run = march("far", Runs(NoFluid().on(coarse), 0.003, far), T, DRIVES, AT, 0.0)
+    assert run.outcome.state == "diverged"
+    assert f"a displacement of {words}, above 100 times the body's 0.07 m" in run.outcome.why
+    assert np.isfinite(run.u).all()
+    assert len(run.u) == 1 + (run.outcome.step > 20)
+
+
+@dataclass(frozen=True)
+class Singular(Breaks):
+    def step(self, state: State, drives: np.ndarray) -> State:
+        if drives[0] > self.at:
+            raise np.linalg.LinAlgError("S_yy (3, 3) is not positive definite")
+        return self.inner.step(state, drives)
+
+
+def test_a_matrix_that_becomes_singular_ends_the_run_with_the_reason(coarse: Responses) -> None:
+    run = march("singular", Singular(NoFluid().on(coarse), 0.003), T, DRIVES, AT, 0.0)
+    assert run.outcome.state == "diverged"
+    assert run.outcome.why == "a matrix became singular: S_yy (3, 3) is not positive definite"
+    assert len(run.t) == run.outcome.step > 0

@@ -31,6 +31,7 @@ from validate.solve.types import (
 _UNTIMED = 20  # first steps left out of the step times: caches and allocators settle
 _TOLD = 100  # times in a run that a step is told of: what is told costs time between the steps
 _AXES = "xyz"
+RUNAWAY = 100.0  # body sizes: a displacement beyond has left all bounds
 
 Tell = Callable[[str], None]  # what is being done, in words
 
@@ -148,13 +149,18 @@ def _walk(
         if i % often == 0:
             tell(f"step {i + 1} of {len(inputs)}")
         start = perf_counter()
-        state = stepper.step(state, value)
+        try:
+            state = stepper.step(state, value)
+        except np.linalg.LinAlgError as singular:
+            return walk, Outcome("diverged", i, f"a matrix became singular: {singular}")
         walk.seconds.append(perf_counter() - start)
         if isinstance(stepper, Noticing):
             walk.said.extend(w for w in stepper.notices(state) if w not in walk.said)
         if state.failure:
             return walk, Outcome(state.failure[0], i, state.failure[1])
         seen = shown(state)
+        if why := _run_away(stepper, seen, rows, shown=i in at):
+            return walk, Outcome("diverged", i, why)
         walk.updates.append(seen.updates)
         walk.numbers.append(seen.numbers)
         if rows is not None:
@@ -164,6 +170,19 @@ def _walk(
             if isinstance(stepper, Uncertain):
                 walk.sd.append(stepper.sd(seen))
     return walk, Outcome("finished", len(inputs))
+
+
+def _run_away(stepper: Stepper, state: State, rows: Rows | None, *, shown: bool) -> str:
+    """Why displacements at the probes, or where a field is kept at every node, are no result."""
+    if rows is None and not shown:
+        return ""
+    u = stepper.field(state)
+    found = float(np.abs(u if shown or rows is None else rows.apply(u)).max())
+    size = float(np.ptp(stepper.scene.mesh.nodes, axis=0).max())
+    if found <= RUNAWAY * size:
+        return ""
+    words = "no finite number" if not np.isfinite(found) else f"{found:.3g} m"
+    return f"a displacement of {words}, above {RUNAWAY:g} times the body's {size:.3g} m"
 
 
 def _listened(stepper: Stepper, walk: _Kept, outcome: Outcome) -> Outcome:
