@@ -1,51 +1,51 @@
-"""How far the answer on one mesh (or step) is from that on an infinitely fine one: u_num, earned.
+"""Numerical uncertainty of an answer on one mesh or time step (u_num), by grid refinement.
 
-Answers at three and more sizes h are fitted by f(h) = f0 + a h^p, the observed order p common to
-all components (Eca & Hoekstra 2014, least squares). The 95 % band of the judged answer is
-F |a h^p| + s + r: F the factor of safety (Roache 1994), s the fit's scatter, r its distance from
-the judged answer; u is half of it (ASME V&V 20, section 2). Three answers show no scatter: there s
-is what the formal order in place of p would change. F is 1.25 from p = 0.5 to 1.25 times the formal
-order, if three answers do not oscillate, else 3. An order above the formal one is not
-believed: that one extrapolates, from the judged size, those finer and the next coarser.
+Answers at three and more sizes h of similar meshes are fitted by f(h) = f0 + a h^p (Eca & Hoekstra
+2014, J. Comput. Phys. 262, 104-130): least squares, with equal weights and with weights 1/h; the
+fit with the smaller standard deviation s counts. The observed order p is used between 0.5 and 1.05
+times the formal order. Otherwise p is not trusted, and the best of f0 + a h^(q/2), f0 + a h^q and
+f0 + a h^(q/2) + b h^q is taken (q the formal order; above it only the first two).
 
-Not asymptotic: p below 0.5, or a trend hidden by scatter. Nothing bounds the error then.
+With the estimated error e of the judged answer, its distance r from the fit and the data range
+D = (max - min) / (n - 1), the 95 % band is
 
-Measured: for linear tetrahedra the band was short in 7 of 15 cases, by a factor of at most 1.36.
-The rule is kept as published, not tuned to them.
+    F e + s + r             where s < D, F = 1.25 for a trusted order, else 3,
+    3 (s / D) (e + s + r)   where s >= D.
+
+It is always finite. u is half of it (ASME V&V 20, section 2).
+
+Departures: answers may be arrays; one order then serves all components, and rms stands for the
+absolute value.
 
 `richardson` is for tables of studies: the observed order of three answers by a fixed point for
 unequal ratios, and the grid convergence index of the finest (Celik et al. 2008).
-
-Departures: answers may be arrays; one order then serves all components, and rms stands for the
-absolute value. Where Eca & Hoekstra enlarge the band of a bad fit, nothing is decided here.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import hypot, inf, isfinite
+from math import hypot
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validate.arrays import Floats, rms
 from validate.errors import ComparisonError
 
-NEAR, FAR = 1.25, 3.0  # Roache's factors of safety
-_LEAST = 0.5  # order below which nothing is asymptotic (Eca & Hoekstra 2014)
-_SLOWEST, _ABOVE = 0.05, 4.0  # orders looked for: from, and so far above the formal one
+NEAR, FAR = 1.25, 3.0  # factors of safety (Roache 1994)
+_LEAST, _MOST = 0.5, 1.05  # trusted orders: from, and to so many times the formal one
+_LOWEST, _ABOVE = 0.05, 4.0  # orders looked for: from, and to so far above the formal one
 _ZOOMS = 4
+_TINY = 1e-300
 
-BoolArray = NDArray[np.bool_]
-Conduct = Literal["monotone", "oscillating", "diverging", "at rounding"]
+Conduct = Literal["monotone", "oscillating", "no order", "at rounding"]
 
 
 @dataclass(frozen=True)
 class GridConvergence:
-    """Of answers at `sizes` sizes: the observed `order`, the factor of `safety`, and the standard
-    uncertainty `u` of the judged answer in its unit, infinite where they are not asymptotic.
+    """Convergence of answers at `sizes` sizes: the observed `order` (None: not trusted), the factor
+    of `safety`, and the standard uncertainty `u` of the judged answer in its unit.
 
     `range` is the largest rms difference to the judged answer, `finest` the smallest size over it.
     """
@@ -61,31 +61,32 @@ class GridConvergence:
 
     @property
     def asymptotic(self) -> bool:
-        return isfinite(self.u)
+        """Whether the observed order is trusted, or the answers do not differ."""
+        return self.order is not None or self.conduct == "at rounding"
 
     @property
     def words(self) -> str:
         if self.conduct == "at rounding":
             return f"{self.sizes} sizes differ by nothing that counts ({self.u:.1g})"
         if self.order is None:
-            return f"{self.conduct} over {self.sizes} sizes, not asymptotic"
+            return (
+                f"{self.conduct} over {self.sizes} sizes that can be trusted (formal "
+                f"{self.formal:g}), safety {self.safety:.3g}"
+            )
         return (
             f"{self.conduct} over {self.sizes} sizes, order {self.order:.2g} of formal "
-            f"{self.formal:g}, safety {self.safety:g}"
+            f"{self.formal:g}, safety {self.safety:.3g}"
         )
 
     def deciding(self, limit: float) -> float:
         """Size over the judged one at which 2 u would be half of `limit` (answer's unit).
 
-        Extrapolated by the order at hand; where there is none by the formal one from the range, and
-        then at most half the finest size.
+        Extrapolated by the trusted order, at most the formal one; without one by half the formal
+        order.
         """
         if self.conduct == "at rounding":
             return 1.0
-        if self.order is None:
-            size = (limit / 2 / (FAR * self.range)) ** (1 / self.formal)
-            return float(min(size, self.finest / 2))
-        order = min(self.order, self.formal)
+        order = self.formal / 2 if self.order is None else min(self.order, self.formal)
         return float(min(limit / 4 / self.u, 1.0) ** (1 / order))
 
 
@@ -93,7 +94,7 @@ class GridConvergence:
 class Numerical:
     """Standard uncertainties by what they come from ("mesh", "time step"), in the residual's unit.
 
-    Infinite where the answers are not asymptotic: nothing bounds the error. `words` say how each
+    Infinite where fewer than three sizes compare the same points. `words` say how each
     was found, `deciding` by part what would make it small enough. No parts: no discretisation.
     """
 
@@ -129,52 +130,82 @@ def convergence(
             "three and more different ones"
         )
     share = sizes / sizes[judged]
-    distance = max(_rms(v - values[judged], answers[judged]) for v in values)
+    like = answers[judged]
+    distance = max(_rms(v - values[judged], like) for v in values)
     found = (len(share), float(share.min()), formal)
     if distance <= rounding:
         return GridConvergence("at rounding", *found, None, 1.0, distance, distance)
-    order = _order(share, values, formal)
-    band, safety = _band(share, values, order, formal, answers[judged])
-    opposed = len(share) == 3 and _opposed(share, values)
-    conduct: Conduct = "oscillating" if opposed else "monotone" if isfinite(band) else "diverging"
-    return GridConvergence(
-        conduct, *found, order if isfinite(band) else None, safety, band / 2, distance
-    )
+    free = _best([_free(share, values, w, formal, like) for w in _weights(share)])
+    trusted = _LEAST <= free.order <= _MOST * formal
+    fit = free if trusted else _fixed(share, values, free.order, formal, like)
+    spread = max(_rms(a - b, like) for a in values for b in values) / (len(share) - 1)
+    safety = NEAR if trusted else FAR
+    off = _rms(fit.left[judged], like)
+    error = _rms(fit.error, like)
+    if fit.sd < spread:
+        band = safety * error + fit.sd + off
+    else:
+        safety = FAR * fit.sd / spread
+        band = safety * (error + fit.sd + off)
+    conduct: Conduct = "no order"
+    if trusted:
+        conduct = "oscillating" if _opposed(share, values) else "monotone"
+    order = free.order if trusted else None
+    return GridConvergence(conduct, *found, order, safety, band / 2, distance)
 
 
-def _band(
-    share: Floats, values: Floats, order: float, formal: float, like: Floats
-) -> tuple[float, float]:
-    """The 95 % band (infinite: not asymptotic) and its factor of safety."""
+@dataclass(frozen=True)
+class _Fit:
+    """f0 + terms: the `error` (m,) of the judged answer, what is `left` (n, m) and its `sd`."""
+
+    order: float
+    error: Floats
+    left: Floats
+    sd: float
+
+
+def _weights(share: Floats) -> tuple[Floats, Floats]:
+    """Equal weights, and those of Eca & Hoekstra; both with mean 1."""
+    return np.ones(len(share)), len(share) / share / np.sum(1 / share)
+
+
+def _best(fits: Sequence[_Fit]) -> _Fit:
+    return min(fits, key=lambda fit: fit.sd)
+
+
+def _free(share: Floats, values: Floats, weights: Floats, formal: float, like: Floats) -> _Fit:
+    order = _order(share, values, weights, formal)
+    return _fit(share, values, weights, (order,), like, known=False)
+
+
+def _fixed(share: Floats, values: Floats, order: float, formal: float, like: Floats) -> _Fit:
+    """The best fit by the formal order and half of it, where the observed one is not trusted."""
+    terms: list[tuple[float, ...]] = [(formal / 2,), (formal,)]
+    if order < _LEAST and len(share) > 3:
+        terms.append((formal / 2, formal))
+    return _best([_fit(share, values, w, t, like) for w in _weights(share) for t in terms])
+
+
+def _fit(
+    share: Floats,
+    values: Floats,
+    weights: Floats,
+    orders: tuple[float, ...],
+    like: Floats,
+    *,
+    known: bool = True,
+) -> _Fit:
+    """Weighted least squares of f0 + sum of a share^order; an order that is not `known` is one
+    parameter more, shared by the m components."""
     n, m = values.shape
-    a, left = _fit(share, values, order)
-    near = order <= 1.25 * formal and not (n == 3 and _opposed(share, values))
-    safety = NEAR if near else FAR
-    if order < _LEAST or _hidden(share, values, a, left):
-        return inf, safety
-    scatter = _rms(left, like) * np.sqrt(n / max(n - 2 - 1 / m, 1.0))
-    about = _about(share) if order > formal else share > 0
-    a, left = _fit(share[about], values[about], min(order, formal))
-    off = _rms(left[share[about] == 1][0], like)
-    if n == 3:
-        other = _fit(share[about], values[about], max(order, formal))[0]
-        scatter += abs(_rms(a, like) - _rms(other, like))
-    return safety * _rms(a, like) + scatter + off, safety
-
-
-def _about(share: Floats) -> BoolArray:
-    """The judged size, those finer and the next coarser; all where it is the finest or coarsest."""
-    inside = share.min() < 1 < share.max()
-    found: BoolArray = share <= share[share > 1].min() if inside else share > 0
-    return found
-
-
-def _hidden(share: Floats, values: Floats, a: Floats, left: Floats) -> bool:
-    """Whether scatter hides the trend: half of it from the coarsest to the finest, along a (m,)."""
-    n, along = len(share), a / max(float(np.linalg.norm(a)), 1e-300)
-    scatter = np.linalg.norm(left @ along) / np.sqrt(max(n - 3, 1))
-    trend = (values[share.argmax()] - values[share.argmin()]) @ along
-    return bool(2 * scatter >= abs(trend))
+    terms = np.stack([np.ones(n), *(share**p for p in orders)], axis=1)
+    root = np.sqrt(weights)[:, None]
+    found = np.linalg.lstsq(root * terms, root * values, rcond=None)[0]
+    left = values - terms @ found
+    free = n - 1 - len(orders) - (0 if known else 1 / m)
+    squares = sum(w * _rms(row, like) ** 2 for w, row in zip(weights, left, strict=True))
+    sd = float(np.sqrt(squares / free)) if free > 0 else 0.0
+    return _Fit(orders[0], found[1:].sum(axis=0), left, sd)
 
 
 def _rms(values: Floats, like: Floats) -> float:
@@ -183,30 +214,22 @@ def _rms(values: Floats, like: Floats) -> float:
 
 
 def _opposed(share: Floats, values: Floats) -> bool:
-    """Whether, of three, the step to the finest goes back on the one before."""
-    coarse, middle, fine = values[np.argsort(-share)]
+    """Whether the step to the finest answer goes back on the one before."""
+    coarse, middle, fine = values[np.argsort(-share)][-3:]
     return float(np.vdot(middle - coarse, fine - middle)) < 0
 
 
-def _fit(share: Floats, values: Floats, order: float) -> tuple[Floats, Floats]:
-    """a (m,), at the judged size, and what is left (n, m) of f0 + a share^order."""
-    x = share**order
-    x = x - x.mean()
-    about = values - values.mean(axis=0)
-    a = x @ about / (x @ x)
-    return a, about - np.outer(x, a)
-
-
-def _order(share: Floats, values: Floats, formal: float) -> float:
+def _order(share: Floats, values: Floats, weights: Floats, formal: float) -> float:
     """The order that leaves least: the best of a grid, then of one between its neighbours."""
-    about = values - values.mean(axis=0)
+    about = values - np.average(values, axis=0, weights=weights)
     gram = about @ about.T
 
     def explained(p: float) -> float:
-        x = share**p - np.mean(share**p)
-        return float(x @ gram @ x / (x @ x))
+        x = share**p - np.average(share**p, weights=weights)
+        along = weights * x
+        return float(along @ gram @ along / (along @ x))
 
-    low, high = _SLOWEST, formal + _ABOVE
+    low, high = _LOWEST, formal + _ABOVE
     for _ in range(_ZOOMS):
         grid = np.linspace(low, high, 31)
         best = int(np.argmax([explained(p) for p in grid]))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from math import ceil, sqrt
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from validate.parameters import quantity
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.replay.experiment import Change, MeshLadder
+from validate.replay.similar_grids import member
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.plates import plates_of_share, rubbing_share
@@ -114,18 +115,14 @@ class QuarterGrid:
     finer: float = quantity(1.3, "1", "how many times finer the finest mesh is, for u_num")
 
 
-#: Cells of the coarser meshes over those of the nominal one, along every edge; all cheap.
-COARSER = (0.5, 0.625, 0.75, 0.875)
-
-
 def scaled(share: float | None, *counts: str) -> Change:
-    """The mesh with `share` of its cells along every edge (none: its own `finer`), in the fields
-    `counts`, rounded up."""
+    """The similar mesh with about `share` of the cells along every edge (none: its own `finer`), in
+    the fields `counts`."""
 
     def change(p: Any) -> Any:
         by = p.mesh.finer if share is None else share
-        new = {k: ceil(getattr(p.mesh, k) * by) for k in counts}
-        return replace(p, mesh=replace(p.mesh, **new))
+        cells = member([getattr(p.mesh, k) for k in counts], by)
+        return replace(p, mesh=replace(p.mesh, **dict(zip(counts, cells, strict=True))))
 
     return change
 

@@ -9,7 +9,6 @@ and only what lies beyond is a prediction.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +32,7 @@ from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_drive import drive_kind, prescribed
 from validate.replay.measured_seen import LOW, place
 from validate.replay.method import Method
+from validate.replay.similar_grids import divided, fitting, member
 from validate.replay.solved import solve
 from validate.scene.box import box
 from validate.scene.cylinder import whole_cylinder
@@ -139,7 +139,7 @@ def _identify(
 def _build(
     recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
 ) -> Scene:
-    mesh = body(p.body, places=_places(p))
+    mesh = body(gridded(p).body, places=_places(p))
     scene = Scene(
         mesh,
         Material(known(p.material.E, "material.E"), p.material.nu, model.law, p.material.rho,
@@ -237,16 +237,37 @@ def _meshed(card: Solid, folder: Path, places: tuple[str, ...]) -> Mesh:
             scene = refined(scene)
         return scene.mesh
     if card.block:
-        edge = max(card.block) / card.cells
-        x, y, z = card.block
-        cells = tuple(2 * max(1, round(size / edge / 2)) for size in (x, y, z))  # a middle
-        return box((x, y, z), cells)
+        return box(card.block, card.divisions or divided(_ideal(card)))
     if card.cylinder:
         diameter, height = card.cylinder
-        edge = max(diameter, height) / card.cells
-        radial, axial = ceil(diameter / 2 / edge), ceil(height / edge)
-        return whole_cylinder(diameter, height, max(2, radial), max(2, axial))
+        radial, axial = card.divisions or divided(_ideal(card))
+        return whole_cylinder(diameter, height, radial, axial)
     raise UsageError("body: none is given; set body.file, body.block or body.cylinder")
+
+
+def gridded(p: MeasuredBody) -> MeasuredBody:
+    """With `body.divisions`: a grid near `body.cells` whose family of similar grids is rich, and
+    which has a node in the middle of a plate that the body slides on."""
+    if p.body.file is not None or p.body.divisions or not (p.body.block or p.body.cylinder):
+        return p
+    cells = divided(_ideal(p.body), _even(p))
+    return replace(p, body=replace(p.body, divisions=cells))
+
+
+def _ideal(card: Solid) -> tuple[float, ...]:
+    """Cells per axis, were they cubes: of a cylinder along radius and height."""
+    edge = max(card.block or card.cylinder) / card.cells
+    lengths = card.block or (card.cylinder[0] / 2, card.cylinder[1])
+    return tuple(length / edge for length in lengths)
+
+
+def _even(p: MeasuredBody) -> tuple[bool, ...]:
+    """Axes of a block along which every grid has a middle: in the plane of a place that slides,
+    whose middle is pinned. A cylinder has an axis."""
+    if not (p.held.slides and p.body.block):
+        return ()
+    across = _across(p.held.slides, body_of(p.body, folder=Path()))
+    return tuple(c != across for c in range(3))
 
 
 def _with_places(mesh: Mesh, places: tuple[str, ...]) -> Mesh:
@@ -259,22 +280,25 @@ def _with_places(mesh: Mesh, places: tuple[str, ...]) -> Mesh:
 
 
 def _level(share: float | None, halvings: int | None) -> Change:
-    """A grid with `share` of its cells along every edge (none: its own `finer`), or a mesh file
-    with its edges halved so many times more."""
+    """The similar grid with about `share` of the cells along every axis (none: its own `finer`, or
+    a coarser one where that does not fit into the memory), or a mesh file with its edges halved so
+    many times more."""
 
     def change(p: MeasuredBody) -> MeasuredBody:
         body = p.body
         if body.file is not None:
             return replace(p, body=replace(body, halvings=body.halvings + (halvings or 0)))
+        even = _even(p)
         by = body.finer if share is None else share
-        return replace(p, body=replace(body, cells=ceil(body.cells * by)))
+        cells = member(gridded(p).body.divisions, by, even)
+        return replace(p, body=replace(body, divisions=fitting(cells, even)))
 
     return change
 
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:
     """The edge m of a cube as large as a mean cell."""
-    return float(np.cbrt(cell_volumes(body(p.body, places=_places(p))).mean()))
+    return float(np.cbrt(cell_volumes(body(gridded(p).body, places=_places(p))).mean()))
 
 
 def _stiffer(p: MeasuredBody, z: float) -> float | None:

@@ -21,7 +21,10 @@ class Solid:
     unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
     block: tuple[float, ...] = quantity((), "m", "sizes along x, y, z of a block from the origin")
     cylinder: tuple[float, ...] = quantity((), "m", "diameter and height of a cylinder along z")
-    cells: int = quantity(6, "1", "cells along the longest edge of a block or cylinder")
+    cells: int = quantity(6, "1", "cells along the longest edge of a block or cylinder, about")
+    divisions: tuple[int, ...] = quantity(
+        (), "1", "cells along x, y, z of a block; radius, height of a cylinder; none: by cells"
+    )
     finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
     halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
 
@@ -31,6 +34,12 @@ class Solid:
             raise UsageError(
                 "body: one of file, block (three sizes) and cylinder (diameter, height); "
                 f"{sum(given)} are given, block {self.block}, cylinder {self.cylinder}"
+            )
+        axes = len(self.block) or len(self.cylinder)
+        if self.divisions and (len(self.divisions) != axes or min(self.divisions) < 1):
+            raise UsageError(
+                f"body.divisions = {self.divisions}: {axes} positive numbers of cells are needed "
+                "(a block: along x, y, z; a cylinder: along radius and height; a mesh file: none)"
             )
 
 

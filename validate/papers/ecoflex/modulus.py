@@ -6,7 +6,7 @@ apparent modulus as the material's, bonded ones divide it by the stiffening that
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, hypot, sqrt
+from math import hypot, sqrt
 from typing import TypeVar
 
 import numpy as np
@@ -42,6 +42,7 @@ from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Identified
 from validate.replay.method import Method
+from validate.replay.similar_grids import member
 
 T = TypeVar("T")
 
@@ -128,11 +129,10 @@ def _meshed(
     solve: Callable[[CylinderModel], T],
     value: Callable[[T], float],
 ) -> tuple[T, float]:
-    """What `solve` finds on the model's mesh, and the mesh's share from one of 2/3 the elements,
-    of 3/2 where two of them are the least."""
+    """What `solve` finds on the model's mesh, and the mesh's share from a similar one of about 2/3
+    the elements, of 3/2 where two of them are the least."""
     own = grid_of(p, model)
-    by = 2 / 3 if min(own) > 2 else 3 / 2
-    radial, axial = (ceil(by * n) for n in own)
+    radial, axial = member(own, 2 / 3 if min(own) > 2 else 3 / 2)
     found, again = solve(model), solve(replace(model, radial=radial, axial=axial))
     ratio = sqrt(own[0] * own[1] / (radial * axial))
     return found, mesh_share(value(found), value(again), ratio, CORNER_ORDER)
