@@ -112,7 +112,7 @@ def _amount(kind: Kind, support: Support, size: tuple[float, float, float], stra
     """m along the axis in the positive direction, or Pa."""
     x, _, z = size
     if (kind, support) == ("pad", "bent"):
-        return 4 * strain * z
+        return 2 * strain * z
     if support in ("bonded", "slipping"):
         # A slender column would buckle: it is stretched.
         return strain * x if kind == "cantilever" else -strain * z

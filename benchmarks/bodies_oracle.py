@@ -17,7 +17,7 @@ import numpy as np
 from bodies_drawn import Drawn, E
 from ngsolve.meshes import MakeStructured2DMesh, MakeStructured3DMesh
 
-STEPS, ITERATIONS, TOLERANCE = (2, 4, 8, 16), 8, 1e-8
+STEPS, ITERATIONS, TOLERANCE = (2, 4, 8), 8, 1e-8
 Array = np.ndarray[Any, Any]
 
 
@@ -37,7 +37,9 @@ def answer(body: Drawn, order: int, layers: int, start: Any = None) -> Answer:
     `layers`: of cells towards every edge, each 0.15 times as thick as the one before.
     """
     if body.kind == "cylinder":
-        return (_bent_round if body.support == "bent" else _round)(body, order, layers)
+        if body.support == "bent":
+            return _bent_round(body, order, layers)
+        return _round(body, order, layers, start)
     return _block(body, order, layers, start)
 
 
@@ -208,7 +210,7 @@ def _section(body: Drawn, layers: int) -> Any:
     )
 
 
-def _round(body: Drawn, order: int, layers: int) -> Answer:
+def _round(body: Drawn, order: int, layers: int, start: Any) -> Answer:
     mesh = _section(body, layers)
     ends = "bottom|top" if body.moves else "bottom"
     sideways = "left|top" if body.support == "slipping" else f"left|{ends}"
@@ -233,7 +235,8 @@ def _round(body: Drawn, order: int, layers: int) -> Answer:
     unit.components[1].Set(1.0, definedon=mesh.Boundaries("top"))
     moved = unit.vec.CreateVector()
     moved.data = (body.amount if body.moves else 0.0) * unit.vec
-    u = _newton(fes, form, moved, body, load)
+    u = _continued(fes, form, moved, body, load, start) if start else None
+    u = u or _newton(fes, form, moved, body, load)
     if body.moves:
         return Answer([_reaction(form, u, unit.vec)], mesh.ne, fes.ndof, u)
     found: list[float] = []

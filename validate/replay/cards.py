@@ -10,7 +10,7 @@ from validate.errors import UsageError
 from validate.parameters import quantity
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
-from validate.replay.experiment import Change, MeshLadder
+from validate.replay.experiment import CORNER_ORDER, Change, MeshLadder
 from validate.replay.similar_grids import member
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
@@ -130,7 +130,7 @@ def scaled(share: float | None, *counts: str) -> Change:
 def quarter_meshes(size: Callable[[Any], float]) -> MeshLadder:
     """Meshes of a quarter of a round body of `size` (m), the finest `finer` times as fine.
 
-    Order 2: corners of bonded plates limit that of quadratic elements.
+    The corners of bonded plates limit the order.
     """
     levels = [scaled(share, "radial", "axial") for share in (0.5, 0.75, None)]
 
@@ -138,7 +138,7 @@ def quarter_meshes(size: Callable[[Any], float]) -> MeshLadder:
         cells: int = p.mesh.radial**2 * p.mesh.axial
         return float(size(p) / cells ** (1 / 3))
 
-    return MeshLadder(tuple(levels), cell)
+    return MeshLadder(tuple(levels), cell, CORNER_ORDER)
 
 
 def require_used(given: Coefficients, laws: set[LawName]) -> None:

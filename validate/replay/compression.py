@@ -31,6 +31,7 @@ from validate.register.registered import Registered
 from validate.replay.cards import beside, moved, require_used, scaled
 from validate.replay.compression_cards import Compression, stated_sizes
 from validate.replay.experiment import (
+    CORNER_ORDER,
     Change,
     Experiment,
     Identified,
@@ -260,8 +261,8 @@ def _cell(p: Compression) -> float:
     return float(np.cbrt(cell_volumes(_body(p)).mean()) / 2**p.mesh.halvings)
 
 
-# A mesh file has no coarser ones. Order 2: corners of bonded plates limit that.
-_MESHES = MeshLadder((_level(0.5, 0), _level(0.75, 1), _level(None, 2)), _cell)
+# A mesh file has no coarser ones. The corners of bonded plates limit the order.
+_MESHES = MeshLadder((_level(0.5, 0), _level(0.75, 1), _level(None, 2)), _cell, CORNER_ORDER)
 
 
 def _stiffer(name: str) -> Callable[[Compression, float], float | None]:

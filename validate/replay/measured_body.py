@@ -21,6 +21,7 @@ from validate.parameters import known
 from validate.recording.types import Recording
 from validate.replay.cards import beside, moved
 from validate.replay.experiment import (
+    CORNER_ORDER,
     Change,
     Experiment,
     Identified,
@@ -80,10 +81,8 @@ def measured_body(
         partial(_build, body=body, folder=folder), partial(place, folder=folder),
         frames=parameters.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
-            mesh=MeshLadder((_level(0.5, 1), _level(0.75, 2), _level(None, None)),
-                            partial(_cell, body=body))
-            if parameters.body.file is None
-            else MeshLadder((_level(None, 1), _level(None, 2)), partial(_cell, body=body)),
+            mesh=MeshLadder(_LEVELS if parameters.body.file is None else _HALVINGS,
+                            partial(_cell, body=body), CORNER_ORDER),
             inputs=_INPUTS,
             surrogate=list(methods)[-1],
         ),
@@ -294,6 +293,10 @@ def _level(share: float | None, halvings: int | None) -> Change:
         return replace(p, body=replace(body, divisions=fitting(cells, even)))
 
     return change
+
+
+_LEVELS = (_level(0.5, 1), _level(0.75, 2), _level(None, None))
+_HALVINGS = (_level(None, 1), _level(None, 2))
 
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:

@@ -40,17 +40,13 @@ from validate.papers.ecoflex.specimens import (
 )
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
-from validate.replay.experiment import Identified
+from validate.replay.experiment import CORNER_ORDER, Identified
 from validate.replay.method import Method
 from validate.replay.similar_grids import member
 
 T = TypeVar("T")
 
 LAWS = ("svk_slip", "neo_slip", "neo_bonded")
-# Where a held plate meets the free side the displacement grows as r^0.595: the least root of
-# sin^2(pi l / 2) = 1 - l^2 (Williams, J. Appl. Mech. 19 (1952) 526, clamped and free sides at 90
-# degrees, incompressible), and the force converges at twice that.
-CORNER_ORDER = 1.19
 
 
 def identified(

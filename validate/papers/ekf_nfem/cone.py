@@ -70,7 +70,7 @@ class PressedCone:
     """Parameters; `recording` is a path."""
 
     material: ShearCard = ShearCard()
-    mesh: ConeMesh = ConeMesh(4, 5, finer=1.4)
+    mesh: ConeMesh = ConeMesh(4, 6, finer=1.5)
     clock: ScaledTime = ScaledTime()
     ranges: ConeRanges = ConeRanges()
     twin: ConeTwin = ConeTwin()

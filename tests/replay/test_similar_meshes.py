@@ -1,0 +1,151 @@
+"""Mesh families: every refinement scales every direction by the same factor."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from validate.arrays import Floats
+from validate.errors import UsageError
+from validate.parameters import describe, with_values
+from validate.replay import load, similar_grids
+from validate.replay.measured_body import body_of, gridded, measured_body, solid
+from validate.replay.measured_cards import HeldAt, MeasuredBody, Solid
+from validate.replay.similar_grids import divided, fitting, member, similarity
+
+PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
+_COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "nodes_z", "plane",
+           "solid", "squares", "cells", "halvings", "divisions")  # fmt: skip
+OPEN = {"skin_pads": {"pads.width": "8mm"}}  # what only the data tell
+
+
+def family(p: MeasuredBody) -> list[tuple[int, ...]]:
+    """Cells per axis of the nominal mesh and of every level."""
+    made = measured_body("b", "b", "x", p, {"m": solid("m")}, ("m",), (), Path())
+    assert made.uncertainty is not None
+    assert made.uncertainty.mesh is not None
+    levels = [level(p).body.divisions for level in made.uncertainty.mesh.levels]
+    return [gridded(p).body.divisions, *levels]
+
+
+@pytest.mark.parametrize("size", [PAD, BAR, BRICK])
+@pytest.mark.parametrize("cells", [4, 5, 6, 8, 10, 12])
+@pytest.mark.parametrize("slides", [None, "zmin"])
+def test_every_grid_of_a_block_is_similar_to_the_nominal_one(
+    size: tuple[float, ...], cells: int, slides: str | None
+) -> None:
+    p = MeasuredBody(body=Solid(block=size, cells=cells), held=HeldAt(slides=slides))
+    nominal, *levels = family(p)
+    assert max(nominal) == pytest.approx(cells, abs=2)
+    different = {nominal, *levels}
+    assert len(different) >= 3
+    for grid in different:
+        assert similarity(nominal, grid) == pytest.approx(1, abs=1e-12)
+        if slides:
+            assert grid[0] % 2 == grid[1] % 2 == 0
+
+
+@pytest.mark.parametrize("cells", [4, 6, 7, 9])
+def test_every_grid_of_a_cylinder_is_similar(cells: int) -> None:
+    nominal, *levels = family(MeasuredBody(body=Solid(cylinder=(0.03, 0.04), cells=cells)))
+    assert {round(similarity(nominal, grid), 12) for grid in levels} == {1.0}
+    assert len({nominal, *levels}) >= 3
+
+
+def test_the_grids_of_the_issue() -> None:
+    assert family(MeasuredBody(body=Solid(block=PAD))) == [
+        (6, 6, 2), (3, 3, 1), (3, 3, 1), (9, 9, 3)
+    ]  # fmt: skip
+    assert family(MeasuredBody(body=Solid(block=BAR))) == [
+        (6, 3, 3), (2, 1, 1), (4, 2, 2), (8, 4, 4)
+    ]  # fmt: skip
+
+
+def test_divisions_that_are_given_are_kept_and_refined_alike(tmp_path: Path) -> None:
+    p = MeasuredBody(body=Solid(block=PAD, divisions=(8, 8, 4)))
+    assert family(p) == [(8, 8, 4), (4, 4, 2), (6, 6, 3), (12, 12, 6)]
+    assert len(body_of(p.body, folder=tmp_path).nodes) == 9 * 9 * 5
+    for wrong in ((8, 8), (8, 8, 0)):
+        with pytest.raises(UsageError, match="3 positive numbers of cells"):
+            Solid(block=PAD, divisions=wrong)
+    with pytest.raises(UsageError, match="a mesh file: none"):
+        Solid(file="x.npz", divisions=(1, 1, 1))
+
+
+def test_a_grid_that_does_not_fit_into_the_memory_is_replaced_by_a_coarser_similar_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert fitting((12, 12, 6)) == (12, 12, 6)
+    monkeypatch.setattr(similar_grids, "free_memory", lambda: 2e8)
+    smaller = fitting((12, 12, 6))
+    assert (2, 2, 1) < smaller < (12, 12, 6)
+    assert similarity((12, 12, 6), smaller) == 1.0
+    monkeypatch.setattr(similar_grids, "free_memory", lambda: 1.0)
+    assert fitting((12, 12, 6)) == (2, 2, 1)
+
+
+def test_a_grid_without_a_common_factor_has_the_most_similar_neighbours() -> None:
+    assert similarity((8, 9, 14), member((8, 9, 14), 0.625)) < 1.07
+    assert member((5, 2), 2.0) == (10, 4)
+    assert np.prod(member((3, 5), 0.9)) < 15 < np.prod(member((3, 5), 1.1))
+
+
+def test_a_pad_s_cells_are_as_near_to_cubes_as_two_layers_allow() -> None:
+    assert divided((6.0, 6.0, 0.96)) == (6, 6, 2)
+    assert divided((6.0, 3.0, 3.0)) == (6, 3, 3)
+    assert divided((8.0, 8.0, 8.0)) == (8, 8, 8)
+
+
+def counts(parameters: Any) -> Floats:
+    """Numbers that say how many cells the grid in use has, from cards called mesh or body."""
+    space = getattr(getattr(parameters, "body", None), "space", "")
+    unused = {"plane": "solid", "solid": "plane"}.get(space)
+    found: list[float] = []
+    for p in describe(parameters):
+        card, _, name = p.path.rpartition(".")
+        whole = p.type.startswith(("int", "tuple[int"))
+        if card in ("mesh", "body") and name in _COUNTS and name != unused and whole and p.default is not None:
+            value = 2.0**p.default if name == "halvings" else p.default
+            less = 1 if name.startswith("nodes_") else 0
+            found += [float(x) - less for x in np.ravel(value)]
+    return np.array(found)
+
+
+def shipped(project_root: Path) -> list[Path]:
+    return sorted((project_root / "experiments").glob("*.py"))
+
+
+def test_every_level_of_every_shipped_experiment_is_similar(project_root: Path) -> None:
+    """Counts per axis are refined by one factor, within 10 % after rounding to whole cells."""
+    walked = 0
+    for path in shipped(project_root):
+        experiment = load(str(path))
+        ladder = experiment.uncertainty and experiment.uncertainty.mesh
+        if not ladder:
+            continue
+        p = with_values(experiment.parameters, OPEN.get(path.stem, {}))
+        own, sizes = counts(p), {round(ladder.size(p), 9)}
+        for level in ladder.levels:
+            changed = level(p)
+            n = counts(changed)
+            moved = n != own
+            ratio = n[moved] / own[moved] if moved.any() else np.ones(1)
+            still = own[~moved]
+            assert ratio.max() / ratio.min() < 1.10, (path.name, own, n)
+            assert not moved.any() or set(still) <= {1.0}, (path.name, own, n)  # 2**halvings
+            by = ladder.size(p) / ladder.size(changed)
+            assert by == pytest.approx(np.exp(np.mean(np.log(ratio))), rel=0.05), path.name
+            sizes.add(round(ladder.size(changed), 9))
+        assert len(sizes) >= 3, path.name
+        walked += 1
+    assert walked >= 10
+
+
+def test_a_level_that_scales_one_direction_alone_is_found(project_root: Path) -> None:
+    """The beam's levels of 4 and 3 cells along it and two across it were no family."""
+    p = load(str(project_root / "experiments" / "silicone_beam.py")).parameters
+    once = replace(p, mesh=replace(p.mesh, along=4))
+    ratio = counts(once) / counts(p)
+    assert ratio.max() / ratio.min() > 1.10
