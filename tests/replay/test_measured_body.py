@@ -33,7 +33,7 @@ from validate.replay import (
 )
 from validate.replay import measured_body as measured_body_module
 from validate.replay.experiment import Experiment
-from validate.replay.measured_body import body_of, measured_body, solid
+from validate.replay.measured_body import body_of, gridded, measured_body, solid
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,
@@ -325,7 +325,8 @@ def test_places_in_words() -> None:
 def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path) -> None:
     """A node at its edge stayed where none is in the middle, and all markers were off by that."""
     for cells in (3, 4, 5):
-        x = body_of(Solid(block=SIZE, cells=cells), folder=tmp_path).nodes
+        p = replace(BASE, body=Solid(block=SIZE, cells=cells), held=HeldAt(slides="zmin"))
+        x = body_of(gridded(p).body, folder=tmp_path).nodes
         assert np.isclose(x[:, :2], (0.02, 0.015)).all(axis=1).any()
     write_mesh(box(SIZE, (1, 1, 2)), tmp_path / "b.npz")
     p = replace(BASE, body=Solid("b.npz"), held=HeldAt(slides="zmin"))

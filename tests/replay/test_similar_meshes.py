@@ -106,7 +106,13 @@ def counts(parameters: Any) -> Floats:
     for p in describe(parameters):
         card, _, name = p.path.rpartition(".")
         whole = p.type.startswith(("int", "tuple[int"))
-        if card in ("mesh", "body") and name in _COUNTS and name != unused and whole and p.default is not None:
+        if (
+            card in ("mesh", "body")
+            and name in _COUNTS
+            and name != unused
+            and whole
+            and p.default is not None
+        ):
             value = 2.0**p.default if name == "halvings" else p.default
             less = 1 if name.startswith("nodes_") else 0
             found += [float(x) - less for x in np.ravel(value)]
