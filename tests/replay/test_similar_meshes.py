@@ -77,13 +77,18 @@ def test_divisions_that_are_given_are_kept_and_refined_alike(tmp_path: Path) -> 
 def test_a_grid_that_does_not_fit_into_the_memory_is_replaced_by_a_coarser_similar_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert fitting((12, 12, 6)) == (12, 12, 6)
+    def unknowns(cells: tuple[int, ...]) -> int:
+        return 3 * int(np.prod(2 * np.array(cells) + 1))
+
+    assert fitting((12, 12, 6), unknowns) == (12, 12, 6)
     monkeypatch.setattr(similar_grids, "free_memory", lambda: 2e8)
-    smaller = fitting((12, 12, 6))
+    smaller = fitting((12, 12, 6), unknowns)
     assert (2, 2, 1) < smaller < (12, 12, 6)
     assert similarity((12, 12, 6), smaller) == 1.0
     monkeypatch.setattr(similar_grids, "free_memory", lambda: 1.0)
-    assert fitting((12, 12, 6)) == (2, 2, 1)
+    assert fitting((12, 12, 6), unknowns) == (2, 2, 1)
+    p = MeasuredBody(body=Solid(cylinder=(0.03, 0.04), cells=6))
+    assert min(family(p)[1:]) == family(p)[-1]
 
 
 def test_a_grid_without_a_common_factor_has_the_most_similar_neighbours() -> None:

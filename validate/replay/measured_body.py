@@ -9,6 +9,7 @@ and only what lies beyond is a prediction.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -260,6 +261,12 @@ def _ideal(card: Solid) -> tuple[float, ...]:
     return tuple(length / edge for length in lengths)
 
 
+def _unknowns(cells: tuple[int, ...], *, round_: bool) -> int:
+    """Those of quadratic cells; a cylinder is twice its radial cells wide."""
+    along = (2 * cells[0], 2 * cells[0], cells[1]) if round_ else cells
+    return 3 * prod(2 * n + 1 for n in along)
+
+
 def _even(p: MeasuredBody) -> tuple[bool, ...]:
     """Axes of a block along which every grid has a middle: in the plane of a place that slides,
     whose middle is pinned. A cylinder has an axis."""
@@ -290,7 +297,8 @@ def _level(share: float | None, halvings: int | None) -> Change:
         even = _even(p)
         by = body.finer if share is None else share
         cells = member(gridded(p).body.divisions, by, even)
-        return replace(p, body=replace(body, divisions=fitting(cells, even)))
+        unknowns = partial(_unknowns, round_=bool(body.cylinder))
+        return replace(p, body=replace(body, divisions=fitting(cells, unknowns, even)))
 
     return change
 

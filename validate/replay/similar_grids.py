@@ -6,7 +6,7 @@ cells have no common factor has no exact family of a practical size; `member` th
 similar grid of whole cells.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import gcd, log, prod
 
 import numpy as np
@@ -53,16 +53,17 @@ def member(cells: Sequence[int], share: float, even: Sequence[bool] = ()) -> Cel
     return tuple(n // k * j for n in cells)
 
 
-def fitting(cells: Sequence[int], even: Sequence[bool] = ()) -> Cells:
+def fitting(
+    cells: Sequence[int], unknowns: Callable[[Cells], int], even: Sequence[bool] = ()
+) -> Cells:
     """Return `cells`, or the finest grid of their family whose system fits into the memory.
 
-    Counted in quadratic cells.
+    `unknowns` counts those of a grid, in space.
     """
     free = free_memory()
     k = _multiple(cells, even)
     grids = [tuple(n // k * j for n in cells) for j in range(k, 0, -1)]
-    d = len(cells)
-    fit = (g for g in grids if free is None or solvable_bytes(d * _nodes(g), d) < free)
+    fit = (g for g in grids if free is None or solvable_bytes(unknowns(g), 3) < free)
     return next(fit, grids[-1])
 
 
@@ -93,7 +94,3 @@ def _multiple(cells: Sequence[int], even: Sequence[bool]) -> int:
 
 def _steps(axes: int, even: Sequence[bool]) -> Cells:
     return tuple(2 if flag else 1 for flag in (tuple(even) or (False,) * axes))
-
-
-def _nodes(cells: Cells) -> int:
-    return prod(2 * n + 1 for n in cells)
