@@ -14,6 +14,7 @@ from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.compare.streams import StreamUse, stream_uses
 from validate.compare.verdict import Check
+from validate.identify.budget import IdentifiedValue
 from validate.parameters import Changed, Parameter
 from validate.recording.types import Recording
 from validate.register.registered import Registered
@@ -75,7 +76,8 @@ class Result:
 
     `kind` is what the recording is: measured, a twin, the judged model's own, or computed.
     `warnings` doubt what was given. `changed` parameters are not as the experiment declares them.
-    `specimens` are those of the recordings, one name each.
+    `specimens` are those of the recordings, one name each. `identified_values` carry their budgets;
+    `identified` are numbers that identification found besides.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Result:
     exhibits: tuple[Exhibit, ...] = ()
     changed: tuple[Changed, ...] = ()
     specimens: tuple[str, ...] = ()
+    identified_values: tuple[IdentifiedValue, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:

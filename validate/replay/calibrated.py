@@ -324,5 +324,5 @@ def identified_by(
     opening = "; ".join([headlines(fitted), *([own.headline] if own.headline else [])])
     return Identified(
         own.parameters, (*scores(fitted), *own.scores), told, opening,
-        (*served(fitted), *own.calibrated), own.doubts,
+        (*served(fitted), *own.calibrated), own.doubts, own.values, own.inputs, own.mesh,
     )  # fmt: skip

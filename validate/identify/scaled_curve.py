@@ -1,0 +1,165 @@
+"""Closed-form fit of a modulus: the scale of a law's unit curve, and where its load begins.
+
+A law whose force is proportional to its modulus needs one solution with a unit modulus: the modulus
+is the scale that fits the measured force, a linear least-squares problem. Where the load begins is
+a second parameter of a testing-machine log (the toe), found by Gauss-Newton.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, sqrt
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError
+from validate.identify.budget import dependence
+
+_STEPS = 50  # of Gauss-Newton, or of a law that is not proportional
+_CONVERGED = 1e-10  # relative
+PROPORTIONAL = 1e-6  # relative difference of two curves over their moduli
+
+
+@dataclass(frozen=True)
+class UnitCurve:
+    """Force (n,) N at displacements d (n,) m, from (0, 0), over the modulus `E` Pa it was solved
+    with; a cubic spline between and beyond."""
+
+    d: Floats
+    force: Floats
+    E: float = 1.0
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.d, self.force / self.E)
+
+    def __call__(self, d: Floats) -> Floats:
+        return np.asarray(self._spline(d))
+
+    def slope(self, d: Floats) -> Floats:
+        return np.asarray(self._spline(d, 1))
+
+    def scaled(self, force: float = 1.0, displacement: float = 1.0) -> "UnitCurve":
+        """The curve with both axes stretched."""
+        return replace(self, d=displacement * self.d, force=force * self.force)
+
+    @property
+    def coarser(self) -> "UnitCurve | None":
+        """Every second point, for the error of interpolation; None for fewer than seven."""
+        return replace(self, d=self.d[::2], force=self.force[::2]) if len(self.d) >= 7 else None
+
+
+@dataclass(frozen=True)
+class ScaledFit:
+    """force = scale * curve(d - shift) + residual.
+
+    `noise` is the sd of one sample, `dependence` how many samples count as one. `covariance` (2, 2)
+    of scale and shift; its second row is zero where no shift was fitted.
+    """
+
+    scale: float
+    shift: float
+    covariance: Floats
+    residual: Floats
+    noise: float
+    dependence: float
+    freedom: float
+
+    @property
+    def sd(self) -> float:
+        """Of the scale, with the shift free."""
+        return sqrt(self.covariance[0, 0])
+
+    @property
+    def along_shift(self) -> float:
+        """How the scale moves with one sd of the shift; its unit."""
+        sd = self.shift_sd
+        return float(self.covariance[0, 1]) / sd if sd else 0.0
+
+    @property
+    def shift_sd(self) -> float:
+        return sqrt(self.covariance[1, 1])
+
+    @property
+    def alone(self) -> float:
+        """The sd of the scale at a known shift."""
+        return sqrt(max(float(self.covariance[0, 0]) - self.along_shift**2, 0.0))
+
+
+def fit_scaled(
+    curve: UnitCurve, d: Floats, force: Floats, *, sd: float = 0.0, shifted: bool = False
+) -> ScaledFit:
+    """The scale, and where `shifted` the shift, by least squares over n samples.
+
+    The sd of a sample is what the residuals show, or `sd` (N, of the sensor) where that is larger.
+    Raises `ComparisonError` for fewer samples than parameters and one, for a curve that is zero,
+    and for a scale that is not positive.
+    """
+    p = 2 if shifted else 1
+    if len(d) <= p:
+        raise ComparisonError(f"{len(d)} samples of force to fit {p} parameters to; record more")
+    scale, shift = _scale(curve, d, force), 0.0
+    for _ in range(_STEPS if shifted else 0):
+        J = np.stack([curve(d - shift), -scale * curve.slope(d - shift)], axis=1)
+        step = np.linalg.lstsq(J, force - scale * J[:, 0], rcond=None)[0]
+        scale, shift = scale + float(step[0]), shift + float(step[1])
+        if abs(step[0]) <= _CONVERGED * abs(scale) and abs(step[1]) <= _CONVERGED * np.ptp(d):
+            break
+    if not scale > 0:
+        raise ComparisonError(
+            f"the force fitted over {len(d)} samples falls as the load rises (scale {scale:.3g}); "
+            "check sign and unit of the force"
+        )
+    f = curve(d - shift)
+    residual = force - scale * f
+    times = dependence(residual)
+    freedom = max(len(d) / times - p, 1.0)
+    seen = sqrt(float(residual @ residual) / (len(d) - p))
+    noise = max(seen, sd)
+    J = np.stack([f, -scale * curve.slope(d - shift)], axis=1)[:, :p]
+    covariance = np.zeros((2, 2))
+    # Modulus and shift differ by many orders of magnitude: unit columns before the inverse.
+    size = np.linalg.norm(J, axis=0)
+    covariance[:p, :p] = noise**2 * times * np.linalg.pinv((J / size).T @ (J / size))
+    covariance[:p, :p] /= np.outer(size, size)
+    return ScaledFit(
+        scale, shift, covariance, residual, noise, times, inf if sd > seen else freedom
+    )
+
+
+def _scale(curve: UnitCurve, d: Floats, force: Floats) -> float:
+    f = curve(d)
+    weight = float(f @ f)
+    if weight == 0 or not np.isfinite(weight):
+        raise ComparisonError(f"the model's force at unit modulus is 0 N over {len(d)} samples")
+    return float(f @ force) / weight
+
+
+def fit_modulus_of(
+    curve_of: Callable[[float], UnitCurve],
+    fit: Callable[[UnitCurve], ScaledFit],
+    E: float,
+) -> tuple[UnitCurve, ScaledFit, int]:
+    """The curve, its fit, and the number of solutions, from a first modulus `E`.
+
+    A second solution at the modulus found checks whether force is proportional to it: then the
+    closed form stands. Otherwise the fit is repeated at each modulus found. Raises
+    `ComparisonError` where that does not settle.
+    """
+    curve = curve_of(E)
+    found = fit(curve)
+    for solutions in range(2, _STEPS):
+        again = curve_of(found.scale)
+        off = np.abs(again(again.d) - curve(again.d)).max()
+        if off <= PROPORTIONAL * np.abs(again.force / again.E).max():
+            return curve, found, solutions
+        before, curve = found.scale, again
+        found = fit(curve)
+        if abs(found.scale - before) <= PROPORTIONAL * before:
+            return curve, found, solutions
+    raise ComparisonError(
+        f"no modulus settles after {_STEPS} solutions (last {found.scale:.4g} Pa): coefficients of "
+        "the law carry more of the force than the modulus; set material.E"
+    )
