@@ -113,12 +113,17 @@ def fit_scaled(
             "check sign and unit of the force"
         )
     f = curve(d - shift)
-    residual = force - scale * f
-    times = dependence(residual)
-    freedom = max(len(d) / times - p, 1.0)
-    seen = sqrt(float(residual @ residual) / (len(d) - p))
-    noise = max(seen, sd)
     J = np.stack([f, -scale * curve.slope(d - shift)], axis=1)[:, :p]
+    return _fitted(J, scale, shift, force - scale * f, sd)
+
+
+def _fitted(J: Floats, scale: float, shift: float, residual: Floats, sd: float) -> ScaledFit:
+    """The fit with its covariance, from the derivatives J (n, p) by what was fitted."""
+    n, p = J.shape
+    times = dependence(residual)
+    freedom = max(n / times - p, 1.0)
+    seen = sqrt(float(residual @ residual) / (n - p))
+    noise = max(seen, sd)
     covariance = np.zeros((2, 2))
     # Modulus and shift differ by many orders of magnitude: unit columns before the inverse.
     size = np.linalg.norm(J, axis=0)
@@ -129,11 +134,30 @@ def fit_scaled(
     )
 
 
+def fit_proportional(f: Floats, force: Floats, *, sd: float = 0.0) -> ScaledFit:
+    """The scale of f (n,), the force of a unit modulus, that fits `force` (n,) N.
+
+    Raises what `fit_scaled` does.
+    """
+    if len(f) < 2:
+        raise ComparisonError(f"{len(f)} samples of force to fit a modulus to; record more")
+    scale = _scale_of(f, force)
+    if not scale > 0:
+        raise ComparisonError(
+            f"the force fitted over {len(f)} samples falls as the load rises (scale {scale:.3g}); "
+            "check sign and unit of the force"
+        )
+    return _fitted(f[:, None], scale, 0.0, force - scale * f, sd)
+
+
 def _scale(curve: UnitCurve, d: Floats, force: Floats) -> float:
-    f = curve(d)
+    return _scale_of(curve(d), force)
+
+
+def _scale_of(f: Floats, force: Floats) -> float:
     weight = float(f @ f)
     if weight == 0 or not np.isfinite(weight):
-        raise ComparisonError(f"the model's force at unit modulus is 0 N over {len(d)} samples")
+        raise ComparisonError(f"the model's force at unit modulus is 0 N over {len(f)} samples")
     return float(f @ force) / weight
 
 
