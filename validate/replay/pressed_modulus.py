@@ -280,7 +280,9 @@ class _Budget:
         """Without its finest level where every mesh has the exact, uniform solution."""
         f = self.f
         uniform = f.linear and f.method.scene.plates == "slip" and f.p.specimen.mesh is None
-        return replace(ladder, levels=ladder.levels[:2]) if uniform else ladder
+        fewer = replace(ladder, levels=ladder.levels[:2])
+        sizes = {ladder.size(f.p), *(ladder.size(change(f.p)) for change in fewer.levels)}
+        return fewer if uniform and len(sizes) == 3 else ladder
 
     def value(self, *, first: bool) -> IdentifiedValue:
         f, p = self.f, self.f.p
@@ -298,7 +300,7 @@ class _Budget:
         kept = d >= f.p.fit_from * f.p.specimen.size.height
         at = d[kept] - f.toe
         curve, slope = f.curve(at), f.E * f.curve.slope(at)
-        followed = np.stack([curve, slope, np.ones_like(curve)], axis=1)
+        followed = np.stack([curve, slope], axis=1)
         shape = pattern(at, F[kept] - f.E * curve, followed, f.log.noise)
         return finding(f.method.scene.law, shape, self._u_predicted())
 
