@@ -18,7 +18,7 @@ from validate.identify.budget import dependence
 
 DEGREES = (2, 3, 4)
 BY_CHANCE = 0.01  # how often a right law is called wrong
-MATERIAL = 1.0  # in u_val: a smaller shape changes no verdict, however clearly it is seen
+MATERIAL = 1.0  # in u_val: a smaller misfit changes no verdict, however clearly it is seen
 _FEWEST = 12  # samples
 
 

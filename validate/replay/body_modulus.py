@@ -30,6 +30,7 @@ from validate.replay.fitted_moduli import (
     counts,
     effect,
     finding,
+    misfit,
     on_meshes,
     reidentified,
     sentence,
@@ -336,7 +337,8 @@ def _finding(
     followed = np.stack([force, np.ones(n)], axis=1)[order]
     residual = (bench.measured[:n] - force)[order]
     law = bench.methods[name].scene.law
-    return finding(law, pattern(load[order], residual, followed, bench.cell.sd), u)
+    off = misfit((bench.measured[:n] - force)[~bench.low[:n]], bench.cell.sd, u)
+    return finding(law, pattern(load[order], residual, followed, bench.cell.sd), off)
 
 
 def _inputs(

@@ -6,9 +6,11 @@ model: its name, its modulus Pa and the displacement m at which its load begins.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import hypot, sqrt
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from validate.arrays import Floats, rms
 from validate.compare.convergence import convergence
@@ -122,17 +124,38 @@ def counts(effect: float) -> bool:
     return abs(effect) > _NOTHING
 
 
-def finding(law: str, pattern: Pattern | None, u: float) -> str:
-    """How the residual of a law is no noise, "" where it is; `u` is that of the prediction, N."""
-    if pattern is None or not pattern.significant or pattern.rms < MATERIAL * u:
+@dataclass(frozen=True)
+class Misfit:
+    """By how much a prediction is off beyond what was fitted, N rms without its noise, and the
+    standard uncertainty of that, N: of the measurement and of what identification left."""
+
+    size: float
+    u: float
+
+
+def misfit(residual: Floats, noise: float, u: float) -> Misfit:
+    """Of `residual` (n,) N beyond the fit with a sensor's `noise`; `u` N is the identification's.
+
+    As for a check: what noise alone reaches in 5 % of repetitions is twice its uncertainty.
+    """
+    n = max(len(residual), 1)
+    square = float(residual @ residual) / n - noise**2
+    reach = noise * sqrt(max(float(chi2.ppf(0.95, n)) / n - 1, 0.0))
+    return Misfit(sqrt(max(square, 0.0)), hypot(u, reach / 2))
+
+
+def finding(law: str, pattern: Pattern | None, off: Misfit) -> str:
+    """How the residual of a law is no noise; "" where it is, or changes no prediction."""
+    if pattern is None or not pattern.significant or off.size < MATERIAL * off.u:
         return ""
     way = "faster" if pattern.stiffens else "slower"
-    times = f", {pattern.rms / u:.2g} times the uncertainty of the prediction" if u else ""
+    times = f", {off.size / off.u:.2g} times its uncertainty" if off.u else ""
     return (
-        f"the law '{law}' does not follow the force: at the largest loads the measured force rises "
-        f"{way} than it does (shape of {with_unit(pattern.rms, 'N')} rms{times}; by chance in "
-        f"{max(100 * pattern.chance, 0.01):.2g} % of runs or fewer); try a law that "
-        f"{'stiffens more' if pattern.stiffens else 'stiffens less'}, or a smaller strain limit"
+        f"the law '{law}' does not follow the force: the residual bends with the load, at the "
+        f"largest loads the measured force rises {way} than the law's; beyond the fit it is off by "
+        f"{with_unit(off.size, 'N')} rms{times} (by chance in "
+        f"{max(100 * pattern.chance, 0.01):.2g} % of runs or fewer); try a law that stiffens "
+        f"{'more' if pattern.stiffens else 'less'}, or a smaller strain limit"
     )
 
 

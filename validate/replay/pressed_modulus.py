@@ -35,6 +35,7 @@ from validate.replay.fitted_moduli import (
     counts,
     effect,
     finding,
+    misfit,
     on_meshes,
     reidentified,
     sentence,
@@ -301,8 +302,10 @@ class _Budget:
         at = d[kept] - f.toe
         curve, slope = f.curve(at), f.E * f.curve.slope(at)
         followed = np.stack([curve, slope], axis=1)
-        shape = pattern(at, F[kept] - f.E * curve, followed, f.log.noise)
-        return finding(f.method.scene.law, shape, self._u_predicted())
+        residual = F[kept] - f.E * curve
+        beyond = d[kept] > f.p.fit_to * f.p.specimen.size.height
+        off = misfit(residual[beyond], f.log.noise, self._u_predicted())
+        return finding(f.method.scene.law, pattern(at, residual, followed, f.log.noise), off)
 
     def _u_predicted(self) -> float:
         """Standard uncertainty of the force beyond the window, N rms, from identification."""
