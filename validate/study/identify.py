@@ -16,6 +16,7 @@ from validate.errors import ComparisonError
 from validate.identify.identification import Identification, identify
 from validate.identify.least_squares import Fit
 from validate.identify.profile import Side
+from validate.identify.space import Space
 from validate.replay.asked import asked
 from validate.replay.calibrated import Identify, identified
 from validate.replay.experiment import Experiment
@@ -26,10 +27,12 @@ from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.identify_cell import (
     IdentifyBench,
     Known,
+    LinearCell,
     Of,
     SideCell,
     StartCell,
     open_bench,
+    run_linear,
     run_side,
     run_start,
 )
@@ -122,6 +125,11 @@ class _Cells:
     def __init__(self, owner: InCells, of: Of, problem: Problem) -> None:
         self._owner, self._of = owner, of
         self._names, self._job = problem.space.names, owner.job(problem)
+
+    def linear(self, space: Space) -> Fit:
+        cell = _keyed(self._job, LinearCell(self._of, f"closed form of {self._names[0]}"))
+        plan = Plan(self._job, (cell,), open_bench, run_linear, Fit)
+        return self._owner.finished(plan)[0]
 
     def fits(self, starts: Floats) -> Sequence[Fit]:
         method = f"start {{}} of {len(starts)}, {', '.join(self._names)}"
