@@ -40,11 +40,14 @@ class Pattern:
         return self.chance < BY_CHANCE
 
 
-def pattern(load: Floats, residual: Floats, followed: Floats, sd: float = 0.0) -> Pattern | None:
+def pattern(
+    load: Floats, residual: Floats, followed: Floats, sd: float = 0.0, times: float = 1.0
+) -> Pattern | None:
     """Of `residual` (n,), measured less fitted, against `load` (n,) rising; None for few samples.
 
     `followed` (n, p) are the shapes that the fit can follow by itself: its derivatives by what was
-    fitted. `sd` is the sensor's, where it is known: noise is never taken as less.
+    fitted. `sd` is the sensor's: noise is never taken as less, and at least `times` samples count
+    as one.
     """
     n = len(load)
     if n < _FEWEST or np.ptp(load) == 0:
@@ -62,7 +65,7 @@ def pattern(load: Floats, residual: Floats, followed: Floats, sd: float = 0.0) -
     freedom = n - q.shape[1] - own.shape[1]
     if freedom < 2 or not len(amounts):
         return None
-    times = dependence(rough)
+    times = max(dependence(rough), times)
     noise = max(sqrt(float(rough @ rough) / freedom), sd)
     least = 1e-9 * float(np.abs(residual).max(initial=0.0)) or 1e-300
     ratio = float(amounts @ amounts) / len(amounts) / (times * max(noise, least) ** 2)

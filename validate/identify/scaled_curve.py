@@ -18,6 +18,7 @@ from validate.errors import ComparisonError
 from validate.identify.budget import dependence
 
 _STEPS = 50  # of Gauss-Newton, or of a law that is not proportional
+_HALVINGS = 12
 _CONVERGED = 1e-10  # relative
 PROPORTIONAL = 1e-6  # relative difference of two curves over their moduli
 
@@ -25,7 +26,7 @@ PROPORTIONAL = 1e-6  # relative difference of two curves over their moduli
 @dataclass(frozen=True)
 class UnitCurve:
     """Force (n,) N at displacements d (n,) m, from (0, 0), over the modulus `E` Pa it was solved
-    with; a cubic spline between and beyond."""
+    with; a cubic spline between and beyond, and nothing before the load begins."""
 
     d: Floats
     force: Floats
@@ -36,10 +37,10 @@ class UnitCurve:
         return CubicSpline(self.d, self.force / self.E)
 
     def __call__(self, d: Floats) -> Floats:
-        return np.asarray(self._spline(d))
+        return np.asarray(self._spline(np.maximum(d, 0.0)))
 
     def slope(self, d: Floats) -> Floats:
-        return np.asarray(self._spline(d, 1))
+        return np.where(d > 0, self._spline(d, 1), 0.0)
 
     def scaled(self, force: float = 1.0, displacement: float = 1.0) -> "UnitCurve":
         """The curve with both axes stretched."""
@@ -89,9 +90,16 @@ class ScaledFit:
 
 
 def fit_scaled(
-    curve: UnitCurve, d: Floats, force: Floats, *, sd: float = 0.0, shifted: bool = False
+    curve: UnitCurve,
+    d: Floats,
+    force: Floats,
+    *,
+    sd: float = 0.0,
+    shifted: bool = False,
+    start: float = 0.0,
 ) -> ScaledFit:
-    """The scale, and where `shifted` the shift, by least squares over n samples.
+    """The scale, and where `shifted` the shift, by least squares over n samples; `start` m is where
+    the search for the shift begins.
 
     The sd of a sample is what the residuals show, or `sd` (N, of the sensor) where that is larger.
     Raises `ComparisonError` for fewer samples than parameters and one, for a curve that is zero,
@@ -100,13 +108,10 @@ def fit_scaled(
     p = 2 if shifted else 1
     if len(d) <= p:
         raise ComparisonError(f"{len(d)} samples of force to fit {p} parameters to; record more")
-    scale, shift = _scale(curve, d, force), 0.0
-    for _ in range(_STEPS if shifted else 0):
-        J = np.stack([curve(d - shift), -scale * curve.slope(d - shift)], axis=1)
-        step = np.linalg.lstsq(J, force - scale * J[:, 0], rcond=None)[0]
-        scale, shift = scale + float(step[0]), shift + float(step[1])
-        if abs(step[0]) <= _CONVERGED * abs(scale) and abs(step[1]) <= _CONVERGED * np.ptp(d):
-            break
+    shift = start if shifted else 0.0
+    scale = _scale(curve, d - shift, force)
+    if shifted:
+        shift, scale = _shifted(curve, d, force, shift)
     if not scale > 0:
         raise ComparisonError(
             f"the force fitted over {len(d)} samples falls as the load rises (scale {scale:.3g}); "
@@ -132,6 +137,32 @@ def _fitted(J: Floats, scale: float, shift: float, residual: Floats, sd: float) 
     return ScaledFit(
         scale, shift, covariance, residual, noise, times, inf if sd > seen else freedom
     )
+
+
+def _shifted(curve: UnitCurve, d: Floats, force: Floats, shift: float) -> tuple[float, float]:
+    """Shift m and scale: Gauss-Newton with the scale eliminated, steps halved while they worsen."""
+
+    def left(at: float) -> tuple[float, float]:
+        scale = _scale(curve, d - at, force)
+        off = force - scale * curve(d - at)
+        return float(off @ off), scale
+
+    square, scale = left(shift)
+    for _ in range(_STEPS):
+        J = np.stack([curve(d - shift), -scale * curve.slope(d - shift)], axis=1)
+        size = np.linalg.norm(J, axis=0)
+        step = float(np.linalg.lstsq(J / size, force - scale * J[:, 0], rcond=None)[0][1] / size[1])
+        for _ in range(_HALVINGS):
+            there, other = left(shift + step)
+            if there <= square:
+                break
+            step /= 2
+        else:
+            break
+        shift, scale, square = shift + step, other, there
+        if abs(step) <= _CONVERGED * np.ptp(d):
+            break
+    return shift, scale
 
 
 def fit_proportional(f: Floats, force: Floats, *, sd: float = 0.0) -> ScaledFit:

@@ -337,8 +337,8 @@ def _finding(
     followed = np.stack([force, np.ones(n)], axis=1)[order]
     residual = (bench.measured[:n] - force)[order]
     law = bench.methods[name].scene.law
-    off = misfit((bench.measured[:n] - force)[~bench.low[:n]], bench.cell.sd, u)
-    return finding(law, pattern(load[order], residual, followed, bench.cell.sd), off)
+    off = misfit((bench.measured[:n] - force)[~bench.low[:n]], fit.noise, u, fit.dependence)
+    return finding(law, pattern(load[order], residual, followed, fit.noise), off)
 
 
 def _inputs(

@@ -91,8 +91,9 @@ class OnMeshes:
 def on_meshes(p: Any, ladder: MeshLadder, own: float, modulus: Callable[[Any], float]) -> OnMeshes:
     """`own` is the modulus on the judged mesh, `modulus` identifies it with other parameters.
 
-    Where three sizes show no order the largest difference stands for u; it is infinite where fewer
-    than three can be solved.
+    A mesh's error has the same sign in every repetition, so all of it, not half of its band, is one
+    standard uncertainty. Where three sizes show no order the largest difference stands for it; it
+    is infinite where fewer than three can be solved.
     """
     sizes, found, ratios = [ladder.size(p)], [0.0], []
     for change in ladder.levels:
@@ -109,7 +110,7 @@ def on_meshes(p: Any, ladder: MeshLadder, own: float, modulus: Callable[[Any], f
         return OnMeshes(float("inf"), tuple(ratios))
     answers = [np.array([[x]]) for x in found]
     conduct = convergence(sizes, answers, 0, ladder.order, _ROUNDING)
-    u = conduct.u if conduct.asymptotic else conduct.range
+    u = 2 * conduct.u / conduct.safety if conduct.asymptotic else conduct.range
     return OnMeshes(float(u), tuple(ratios))
 
 
@@ -133,13 +134,14 @@ class Misfit:
     u: float
 
 
-def misfit(residual: Floats, noise: float, u: float) -> Misfit:
-    """Of `residual` (n,) N beyond the fit with a sensor's `noise`; `u` N is the identification's.
+def misfit(residual: Floats, noise: float, u: float, times: float = 1.0) -> Misfit:
+    """Of `residual` (n,) N beyond the fit, with a sensor's `noise` N of which `times` samples count
+    as one; `u` N is the identification's.
 
     As for a check: what noise alone reaches in 5 % of repetitions is twice its uncertainty.
     """
-    n = max(len(residual), 1)
-    square = float(residual @ residual) / n - noise**2
+    square = float(residual @ residual) / max(len(residual), 1) - noise**2
+    n = max(len(residual) / times, 1.0)
     reach = noise * sqrt(max(float(chi2.ppf(0.95, n)) / n - 1, 0.0))
     return Misfit(sqrt(max(square, 0.0)), hypot(u, reach / 2))
 

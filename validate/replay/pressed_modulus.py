@@ -177,7 +177,8 @@ class _Fitting:
     def fitted(self, curve: UnitCurve, force: float = 0.0) -> ScaledFit:
         """The curve fitted in the window, with `force` N added to what was measured."""
         d, F = self.log.window
-        return fit_scaled(curve, d, F + force, sd=self.log.noise, shifted=True)
+        start = self.log.fit.toe * self.p.specimen.size.height
+        return fit_scaled(curve, d, F + force, sd=self.log.noise, shifted=True, start=start)
 
     def curve_of(
         self, p: Compression, E: float, limit: float, *, plates: str = "", law: str = ""
@@ -304,8 +305,9 @@ class _Budget:
         followed = np.stack([curve, slope], axis=1)
         residual = F[kept] - f.E * curve
         beyond = d[kept] > f.p.fit_to * f.p.specimen.size.height
-        off = misfit(residual[beyond], f.log.noise, self._u_predicted())
-        return finding(f.method.scene.law, pattern(at, residual, followed, f.log.noise), off)
+        off = misfit(residual[beyond], f.fit.noise, self._u_predicted(), f.fit.dependence)
+        shape = pattern(at, residual, followed, f.log.noise, f.fit.dependence)
+        return finding(f.method.scene.law, shape, off)
 
     def _u_predicted(self) -> float:
         """Standard uncertainty of the force beyond the window, N rms, from identification."""
