@@ -41,6 +41,7 @@ from validate.study.store import key_of
 
 KIND = "identify"
 STARTS, QUICK_STARTS = 10, 4
+STARTS_OF_ONE = 5  # of a single parameter: every fifth of its range has one
 SEED = 1
 _ALONE = 10.0  # s: less work than this is done here, for workers take longer to begin
 _TRIED = 2  # cells that are done here first
@@ -68,7 +69,7 @@ class InCells:
     """Evaluates fits and profiles as the cells of a study; counts them."""
 
     def __init__(
-        self, experiment: Experiment, options: Options, wanted: Sequence[str], starts: int,
+        self, experiment: Experiment, options: Options, wanted: Sequence[str], starts: int | None,
         out: Path | None, where: Where | None, report: Report | None,
     ) -> None:  # fmt: skip
         self._path, self._options = Path(str(experiment.path)), options
@@ -81,7 +82,11 @@ class InCells:
     def __call__(self, number: int, problem: Problem) -> Identification:
         """As `validate.replay.calibrated.Identify`."""
         of = Of(number, self._wanted, self._known)
-        found = identify(problem.space, _Cells(self, of, problem), self._starts, SEED)
+        alone = len(problem.space.ranges) == 1
+        usual = STARTS_OF_ONE if alone else STARTS
+        usual = QUICK_STARTS if self._options.quick else usual
+        starts = usual if self._starts is None else self._starts
+        found = identify(problem.space, _Cells(self, of, problem), starts, SEED)
         values = {e.name: e.value for e in found.estimates}
         self._known = (*self._known, *values.items())
         return found
@@ -158,8 +163,7 @@ def beside(
     experiment: Experiment, options: Options, out: Path | None = None, report: Report | None = None
 ) -> Identify:
     """For the road: what stands open, by the cells that `validate identify` keeps."""
-    starts = QUICK_STARTS if options.quick else STARTS
-    return InCells(experiment, options, (), starts, out, None, report)
+    return InCells(experiment, options, (), None, out, None, report)
 
 
 def identification(
@@ -179,9 +183,8 @@ def identification(
     """
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     options = Options(dict(values or {}), (), quick)
-    count = starts if starts is not None else QUICK_STARTS if quick else STARTS
     bench = IdentifyBench(found, options)
-    cells = InCells(found, options, wanted, count, out, where, report)
+    cells = InCells(found, options, wanted, starts, out, where, report)
     calibrating, free = asked(bench.experiment, bench.parameters, wanted)
     done, failed = identified(
         calibrating, bench.parameters, bench.methods, bench.recordings, cells, free
