@@ -9,6 +9,7 @@ for one in found.calibrated:
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 from validate.arrays import Floats
@@ -43,7 +44,7 @@ KIND = "identify"
 STARTS, QUICK_STARTS = 10, 4
 STARTS_OF_ONE = 5  # of a single parameter: every fifth of its range has one
 SEED = 1
-_ALONE = 10.0  # s: less work than this is done here, for workers take longer to begin
+_ALONE = 30.0  # s: less work than this is done here, for workers take as long to begin
 _TRIED = 2  # cells that are done here first
 
 
@@ -102,8 +103,12 @@ class InCells:
         first, done = replace(plan, cells=plan.cells[:_TRIED]), self._finish
         where = self._where
         if where.workers is None and not where.scheduler:
+            start = process_time()
             begun = done(first, Where(0))
-            seconds = min(r.seconds for r in begun.records.values())
+            # Seconds of work: a busy machine must not start workers, which make it busier.
+            fresh = len(first.cells) - begun.reused
+            work = [(process_time() - start) / fresh] if fresh > 0 else []
+            seconds = min([*work, *(r.seconds for r in begun.records.values())])
             where = Where(0) if seconds * (len(plan.cells) - _TRIED) < _ALONE else where
         found = done(plan, where)
         return [_value(found, cell) for cell in plan.cells]
