@@ -27,7 +27,7 @@ from validate.replay.compression_cards import (
     Specimen,
 )
 from validate.replay.experiment import Experiment
-from validate.replay.fitted_moduli import sentence
+from validate.replay.fitted_moduli import Moves, sentence
 from validate.replay.measured_body import measured_body, solid
 from validate.replay.measured_cards import (
     HeldAt,
@@ -173,6 +173,13 @@ def test_what_identification_and_prediction_share_cancels(
     assert one.u_input == pytest.approx(other.u_input, rel=1e-6)
 
 
+def test_an_input_moves_every_model_s_modulus_and_toe() -> None:
+    moves = Moves({"a": 1.1}, {"a": 2e-4})
+    found = moves.of((("a", 10.0, 1e-4), ("b", 5.0, 0.0)), 2.0)
+    assert found[0] == ("a", pytest.approx(12.1), pytest.approx(5e-4))
+    assert found[1] == ("b", 5.0, 0.0)
+
+
 def test_results_carry_interval_and_terms(folders: Sequence[Path]) -> None:
     content = document(judged(folders[1], large=True), "2026-11-24T00:00:00Z")
     jsonschema.validate(json.loads(json.dumps(content)), schema())
@@ -214,5 +221,7 @@ def test_a_body_s_modulus_is_its_own_law_s(tmp_path: Path) -> None:
     assert found["solid"].parts["load"] == pytest.approx(0.0099 * E, rel=0.05)
     assert found["solid"].parts["size x"] == pytest.approx(0.005 * E, rel=0.05)
     right, wrong = (checks(result, name)["force.rms@high"] for name in ("solid", "linear"))
+    # 1 % of the load would be 1 % of the force, were the modulus not identified under it.
+    assert wrong.u_input < 0.005 * wrong.size.measured
     assert abs(right.value) < 2 * right.u_val
     assert abs(wrong.value) > 2 * wrong.u_val
