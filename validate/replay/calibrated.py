@@ -321,7 +321,7 @@ def identified_by(
     if not fitted:
         return own
     own = own or Identified(parameters, (), ())
-    values = (*budgets(fitted, experiment), *own.values)
+    values = (*budgets(fitted, experiment, own.parameters), *own.values)
     told = (*(line for one in fitted for line in lines(one)), *own.notes)
     opening = "; ".join([headlines(fitted), *([own.headline] if own.headline else [])])
     return Identified(

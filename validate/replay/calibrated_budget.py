@@ -28,16 +28,18 @@ _ONLY_NOISE = "noise of these data alone: inputs and mesh are not in this interv
 _APART = "inputs and mesh of the predictions are counted with this value kept"
 
 
-def budgets(fitted: Sequence[Calibrated], experiment: Experiment) -> tuple[IdentifiedValue, ...]:
-    """Every identified parameter with its terms."""
-    return tuple(v for one in fitted for v in _of(one, experiment))
+def budgets(
+    fitted: Sequence[Calibrated], experiment: Experiment, used: Any
+) -> tuple[IdentifiedValue, ...]:
+    """Every identified parameter with its terms; `used` are the parameters of the predictions."""
+    return tuple(v for one in fitted for v in _of(one, experiment, used))
 
 
-def _of(one: Calibrated, experiment: Experiment) -> list[IdentifiedValue]:
+def _of(one: Calibrated, experiment: Experiment, used: Any) -> list[IdentifiedValue]:
     method = one.problem.calibration.method
     judged = method in experiment.accepted or one.problem.calibration.shared
     alone = len(one.found.estimates) == 1
-    more = _first_order(one, experiment) if judged and alone else {}
+    more = _first_order(one, experiment, used) if judged and alone else {}
     found = []
     for i, e in enumerate(one.found.estimates):
         pairs = zip(one.found.space.names, one.found.correlations[i].tolist(), strict=True)
@@ -56,7 +58,7 @@ def _of(one: Calibrated, experiment: Experiment) -> list[IdentifiedValue]:
     return found
 
 
-def _first_order(one: Calibrated, experiment: Experiment) -> dict[str, float]:
+def _first_order(one: Calibrated, experiment: Experiment, used: Any) -> dict[str, float]:
     """By input and for the mesh, what one standard uncertainty makes of the one parameter."""
     problem, space = one.problem, one.found.space
     (e,), x = one.found.estimates, one.found.best.x
@@ -77,7 +79,7 @@ def _first_order(one: Calibrated, experiment: Experiment) -> dict[str, float]:
 
     found: dict[str, float] = {}
     for source in (i for i in declared.inputs if not i.identified):
-        own = _moves_itself(one, source.by(1.0))
+        own = _moves_itself(one, used, source.by(1.0))
         try:
             value = own if own is not None else again(source.by(1.0))
         except ValidateError:
@@ -111,9 +113,9 @@ def _changed(problem: Problem, one: Calibrated, change: Callable[[Any], Any]) ->
     return replace(problem, parts=parts)
 
 
-def _moves_itself(one: Calibrated, change: Callable[[Any], Any]) -> float | None:
+def _moves_itself(one: Calibrated, used: Any, change: Callable[[Any], Any]) -> float | None:
     """Where an input moves the identified parameter; None where it does not."""
-    here = with_free(one.problem.parts[0].parameters, one.values)
+    here = with_free(used, one.values)
     ((name, value),) = one.values.items()
     moved = {p.path: p.default for p in describe(change(here))}[name]
     return None if moved == value or moved is None else float(moved)
