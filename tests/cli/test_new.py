@@ -101,7 +101,7 @@ def test_the_notes_of_a_pulled_body_speak_of_grips(tmp_path: Path) -> None:
     write_recording(replace(pressed, signals=pulled), tmp_path / "gel.mcap")
     in_folder(tmp_path, "new", "b", "--from", "gel.mcap")
     result = compare(load_file(tmp_path / "experiments" / "b.py"))
-    assert any("Pa for grips: they stiffen the body" in note for note in result.notes)
+    assert any("by bonded for grips" in note for note in result.notes)
 
 
 def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
+from validate.identify.closed_form import linear_fit
 from validate.identify.identification import InTurn, identify
 from validate.identify.least_squares import CalledOnce, Fit, Residual, fit
 from validate.identify.profile import RISE, Side, side
@@ -72,6 +73,41 @@ def test_a_skew_profile_is_not_a_symmetric_interval() -> None:
     exact = brentq(rise, 0.1, 1.0), brentq(rise, 1.0, 5.0)
     assert (e.low, e.high) == pytest.approx(exact, rel=2e-3)
     assert e.high - e.value > 1.1 * (e.value - e.low)
+
+
+def test_a_linear_residual_is_fitted_in_closed_form() -> None:
+    """On a logarithmic range of five decades: four evaluations, and the seeded search agrees."""
+    space, load = Space((Range("E", 0.1, 1e4),)), np.linspace(0.1, 1.0, 20)
+    noise = np.random.default_rng(8).normal(size=20)
+    calls: list[float] = []
+
+    def residual(x: Floats) -> Floats:
+        calls.append(float(x[0]))
+        return np.asarray((space.value(0, x[0]) - 40.0) * load + noise)
+
+    found = identify(space, InTurn(residual))
+    assert found.linear
+    assert len(calls) == 4
+    searched = InTurn(residual)
+    best = min(searched.fits(space.starts(10)), key=lambda f: f.chi_square)
+    assert found.best.x == pytest.approx(best.x, abs=1e-6)
+    assert found.best.chi_square == pytest.approx(best.chi_square, rel=1e-6)
+    (e,) = found.estimates
+    shift = -(load @ noise) / (load @ load)
+    half = np.sqrt(RISE * found.misfit / (load @ load))
+    assert (e.value, e.low, e.high) == pytest.approx(
+        (40 + shift, 40 + shift - half, 40 + shift + half), rel=1e-6
+    )
+    assert (e.low_open, e.high_open) == (False, False)
+
+
+@pytest.mark.parametrize("power", [0.7, 1.01, 2.0])
+def test_what_is_nearly_linear_is_searched(power: float) -> None:
+    space = Space((Range("k", 1.0, 9.0),))
+    found = identify(space, InTurn(lambda x: np.array([space.value(0, x[0]) ** power - 4.0])))
+    assert not found.linear
+    assert len(found.fits) == 10
+    assert found.estimates[0].value == pytest.approx(4.0 ** (1 / power), rel=1e-3)
 
 
 def test_a_misfit_widens_by_its_root_and_says_so() -> None:
@@ -221,6 +257,9 @@ class Deepening:
 
     def __init__(self, times: int) -> None:
         self.times, self.walked = times, 0
+
+    def linear(self, space: Space) -> Fit:
+        return linear_fit(lambda x: x**2, space)
 
     def fits(self, starts: Floats) -> list[Fit]:
         chi_square = 100.0 - 10.0 * self.walked

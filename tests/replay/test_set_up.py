@@ -13,8 +13,9 @@ def test_set_up_is_the_scene_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(solved, "perf_counter", count(100.0).__next__)
     monkeypatch.setattr(solved, "build_system", lambda scene: "system")
     scene = SimpleNamespace(mesh=box((1.0, 1.0, 1.0), (1, 1, 1)))
-    method = SimpleNamespace(markers=(), prepare=lambda system, seen, given: f"on {system}")
-    runs = solved._Runs(None, "x", method, None, scene, 0.25, lambda words: None)
+    method = SimpleNamespace(markers=(), prepare=lambda system, seen, given, own: f"on {system}")
+    own = SimpleNamespace(methods={})
+    runs = solved._Runs(own, "x", method, None, scene, 0.25, lambda words: None)
     assert runs._stepper(scene, None, {}) == ("on system", 1.25)
     assert runs._stepper(scene, None, {}) == ("on system", 1.25)  # made once
 

@@ -320,7 +320,7 @@ def coverage(name: str, **options: Any) -> int:
     metavar="A,B=LOW:HIGH",
     help="These (default: those that stand open); what is not declared needs bounds.",
 )
-@click.option("--seeds", type=int, help="Seeded starts (default: 10).")
+@click.option("--seeds", type=int, help="Seeded starts (default: 10; 5 for one parameter).")
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @_studied
 def identify(name: str, **options: Any) -> int:

@@ -24,6 +24,7 @@ from validate.compare.result import KINDS, MethodResult, Result
 from validate.compare.verdict import Check
 from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment
+from validate.replay.fitted_moduli import sentence
 from validate.replay.guests import with_guests
 from validate.replay.named_run import run_folder
 from validate.replay.options import Options, Report
@@ -127,6 +128,10 @@ def _summary(result: Result, page: Path, seconds: float) -> None:
             say(f"{method.name}: {ended.state} at step {ended.step}: {ended.why}", indent="  ")
         for words in dict.fromkeys(w for r in method.runs for w in r.said):
             say(f"{method.name}: {words}", indent="  ")
+    for value in result.identified_values:
+        say(f"{sentence(value)}.", indent="  ")
+        if value.finding:
+            warn(f"{value.name} by {value.by}: {value.finding}")
     if result.published:
         figures_table([figure_members(p) for p in result.published])
     say(f"\n{result.sentence}")

@@ -15,6 +15,7 @@ from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.compare.streams import StreamUse, stream_uses
 from validate.compare.verdict import Check
+from validate.identify.budget import IdentifiedValue
 from validate.parameters import Changed, Parameter
 from validate.recording.types import Recording
 from validate.register.registered import Registered
@@ -81,6 +82,8 @@ class Result:
     `warnings` doubt what was given. `changed` parameters are not as the experiment declares them.
     `specimens` are those of the recordings, one name each. `expected` are the verdicts that the
     experiment is known to have. `locking` warns of elements that are too stiff, a line a cause.
+    `identified_values` carry their budgets; `identified` are numbers that identification found
+    besides.
     """
 
     name: str
@@ -107,6 +110,7 @@ class Result:
     specimens: tuple[str, ...] = ()
     expected: tuple[Expected, ...] = ()
     locking: tuple[str, ...] = ()
+    identified_values: tuple[IdentifiedValue, ...] = ()
 
     @property
     def registered(self) -> tuple[Registered, ...]:

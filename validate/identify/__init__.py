@@ -10,6 +10,9 @@ _HOMES = {
     "whiten": ("whitened",),
     "interval": ("Interval", "mesh_share", "profile_interval"),
     "law": ("LawFit", "fit_scale"),
+    "budget": ("IdentifiedValue",),
+    "scaled_curve": ("ScaledFit", "UnitCurve", "fit_scaled"),
+    "residual_pattern": ("Pattern", "pattern"),
     "modulus": ("ModulusFit", "gent_correction", "identify_modulus"),
 }
 

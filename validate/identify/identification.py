@@ -17,6 +17,7 @@ from scipy.stats import chi2
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
+from validate.identify.closed_form import linear_fit, linear_side
 from validate.identify.least_squares import Fit, Residual, fit
 from validate.identify.profile import RISE, Side, side
 from validate.identify.space import Space
@@ -31,7 +32,10 @@ _UNIFORM = 12.0  # 1 / variance of what is only known to lie in the range search
 
 
 class Evaluates(Protocol):
-    """Fits from starts (n, p), and sides (parameter, sign) of profiles about the best one."""
+    """The closed form of one parameter, fits from starts (n, p), and sides (parameter, sign) of
+    profiles about the best one."""
+
+    def linear(self, space: Space) -> Fit: ...
 
     def fits(self, starts: Floats) -> Sequence[Fit]: ...
 
@@ -45,6 +49,9 @@ class InTurn:
     """Evaluates in this process, one after the other."""
 
     residual: Residual
+
+    def linear(self, space: Space) -> Fit:
+        return linear_fit(self.residual, space)
 
     def fits(self, starts: Floats) -> Sequence[Fit]:
         return [fit(self.residual, start) for start in starts]
@@ -82,7 +89,8 @@ class Identification:
     """The best fit of all starts with its profiles, two sides a parameter.
 
     `misfit` is chi-square per degree of freedom where that is more than chance, else 1: intervals
-    and covariance are wider by its root.
+    and covariance are wider by its root. `linear`: the residual is linear in the one parameter, so
+    that the best fit is known in closed form and no other start is needed.
     """
 
     space: Space
@@ -90,6 +98,7 @@ class Identification:
     best: Fit
     sides: tuple[Side, ...]
     misfit: float
+    linear: bool = False
 
     @cached_property
     def covariance(self) -> Floats:
@@ -170,10 +179,15 @@ class Identification:
 
 
 def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1) -> Identification:
-    """The identification from so many seeded starts, with a profile of every parameter.
+    """The identification from so many seeded starts, with a profile of every parameter; in closed
+    form where the residual is linear in the only one.
 
     Raises `ComparisonError` when no start converges, or fewer residuals than parameters are there.
     """
+    if len(space.ranges) == 1 and (found := evaluates.linear(space)).converged:
+        scale = misfit(best_of((found,), space))
+        sides = tuple(linear_side(found, space, sign, scale) for sign in (-1, 1))
+        return Identification(space, (found,), found, sides, scale, linear=True)
     fits = tuple(evaluates.fits(space.starts(starts, seed)))
     best = best_of(fits, space)
     wanted = tuple(product(range(len(space.ranges)), (-1, 1)))

@@ -17,6 +17,7 @@ from validate.identify.identification import identify as identify_in
 from validate.identify.least_squares import fit
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
+from validate.replay.calibrated_budget import budgets
 from validate.replay.calibrated_words import headlines, lines, not_identified, scores, unit_of
 from validate.replay.calibration import Calibrates, Calibration, Change, Free
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
@@ -320,9 +321,10 @@ def identified_by(
     if not fitted:
         return own
     own = own or Identified(parameters, (), ())
+    values = (*budgets(fitted, experiment, own.parameters), *own.values)
     told = (*(line for one in fitted for line in lines(one)), *own.notes)
     opening = "; ".join([headlines(fitted), *([own.headline] if own.headline else [])])
     return Identified(
         own.parameters, (*scores(fitted), *own.scores), told, opening,
-        (*served(fitted), *own.calibrated), own.doubts,
+        (*served(fitted), *own.calibrated), own.doubts, values, own.inputs, own.mesh,
     )  # fmt: skip

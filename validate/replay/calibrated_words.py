@@ -82,10 +82,15 @@ def lines(one: Calibrated) -> tuple[str, ...]:
         if found.misfit > 1
         else ""
     )
+    how = (
+        f"the residual is linear in it (checked at {found.best.evaluations} values), so the best "
+        "fit is known in closed form"
+        if found.linear
+        else f"{found.found_again} of {len(found.fits)} starts ended at the best fit"
+    )
     said = [
-        f"{', '.join(found.space.names)}: {found.found_again} of {len(found.fits)} starts ended at "
-        f"the best fit (chi-square {found.best.chi_square:.4g} over {found.best.count} residuals "
-        f"less {p}){misfit}."
+        f"{', '.join(found.space.names)}: {how} (chi-square {found.best.chi_square:.4g} over "
+        f"{found.best.count} residuals less {p}){misfit}."
     ]
     pairs = zip(found.estimates, one.problem.free, strict=True)
     said += [f"{not_identified(one, e, free)}." for e, free in pairs if not e.identified]

@@ -161,7 +161,7 @@ def _sensitivities(road: Road, judged: str = "") -> dict[str, list[Sensitivity]]
 
 def _moved_by(road: Road, uncertainty: Uncertainty, source: Input, judged: str) -> str:
     own = source.identified and judged in {c.method for c in road.experiment.calibrations}
-    return judged if own else uncertainty.surrogate
+    return judged if own or (source.each and judged) else uncertainty.surrogate
 
 
 def joint_inputs(road: Road) -> tuple[Joint, ...]:

@@ -6,7 +6,7 @@ fitted line reaches zero force), force from the cell's own offset; the first win
 the modulus where none is given, the second predicts.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,30 +17,25 @@ import numpy as np
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.fem.system import build as build_system
-from validate.fem.system import responses
-from validate.identify.modulus import (
-    MIN_SAMPLES,
-    fit_modulus,
-    identify_modulus,
-)
+from validate.identify.modulus import MIN_SAMPLES, fit_modulus
 from validate.parameters import quantity
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.cards import beside, moved, require_used, scaled
+from validate.replay.cards import beside, moved, scaled
 from validate.replay.compression_cards import Compression, stated_sizes
 from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
     Experiment,
-    Identified,
     Input,
     MeshLadder,
     Uncertainty,
 )
+from validate.replay.fitted_moduli import modulus_in, toe_in
 from validate.replay.method import Method
 from validate.replay.pressed import pressed_log
+from validate.replay.pressed_modulus import by_model, identify_pressed, model_name
 from validate.replay.pressed_outline import (
     OUTLINE_INPUTS,
     with_outline,
@@ -104,59 +99,28 @@ def compression(
     """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that
     `parameters` name at images of their own."""
     shown = parameters.outline.topic is not None
+    inputs = (
+        Input("modulus", moved("material", E=_stiffer("E"), E_bonded=_stiffer("E_bonded")),
+              "E within its declared uncertainty", "assumed"),
+        Input("diameter", _wider_body if shown else _stiffer_by_area,
+              "diameter within its declared range", "assumed"),
+        *(OUTLINE_INPUTS if shown else ()),
+    )  # fmt: skip
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, beside, _build,
-        partial(_place, shown=shown), sets=_sets, stated=stated_sizes, identify=_identify, frames=2,
+        partial(_place, shown=shown), sets=_sets, stated=stated_sizes,
+        identify=partial(
+            identify_pressed, build=_build, ladder=_MESHES, accepted=accepted,
+            declared=inputs if shown else (),
+        ),
+        frames=2,
         kind=kind,
         uncertainty=Uncertainty(
             mesh=_MESHES,
-            inputs=(
-                Input("modulus", moved("material", E=_stiffer("E"), E_bonded=_stiffer("E_bonded")),
-                      "E within its declared uncertainty", "assumed"),
-                Input("diameter", _wider_body if shown else _stiffer_by_area,
-                      "diameter within its declared range", "assumed"),
-                *(OUTLINE_INPUTS if shown else ()),
-            ),
+            inputs=inputs,
             surrogate=accepted[0],
         ),
     )  # fmt: skip
-
-
-def _identify(
-    recordings: Sequence[Recording], p: Compression, methods: Mapping[str, Method]
-) -> Identified:
-    require_used(p.material.coefficients, {m.scene.law for m in methods.values()})
-    if p.material.E is not None:
-        return Identified(p, (), ())
-    if p.specimen.fluid is not None:
-        raise UsageError(
-            "material.E is not set, and a body with fluid inside is not pressed uniformly: its "
-            "modulus is not the log's slope; give it with --set material.E=VALUE"
-        )
-    found = identify_modulus(recordings, p.specimen.size, (p.fit_from, p.fit_to), p.test)
-    E, ends = found.mean, "slipping plates" if p.test == "compression" else "ends free to contract"
-    note = (
-        f"E = {E:.5g} ± {2 * found.sd_mean:.3g} Pa (two sd of the fit; uniform {p.test} owes "
-        f"the mesh nothing) was identified from the recording in the window 'fit', {ends}."
-    )
-    material, notes = replace(p.material, E=E), [note]
-    if p.material.E_bonded is None and any(m.scene.plates == "bonded" for m in methods.values()):
-        material = replace(material, E_bonded=E / _stiffening(recordings[0], p))
-        held = "bonded plates" if p.test == "compression" else "grips"
-        notes.append(f"E = {material.E_bonded:.5g} Pa for {held}: they stiffen the body.")
-    return Identified(replace(p, material=material), (), tuple(notes), calibrated=("force@fit",))
-
-
-def _stiffening(recording: Recording, p: Compression) -> float:
-    """Force between bonded over force between slipping plates, of one body and modulus.
-
-    A rival is fitted as what it is: each contact gets the modulus that has the measured slope.
-    """
-    bonded, slip = (
-        responses(build_system(_build(recording, p, Pressed(contact)))).reactions[0, 0]
-        for contact in ("bonded", "slip")
-    )
-    return float(bonded / slip)
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -164,7 +128,8 @@ def _stiffening(recording: Recording, p: Compression) -> float:
 
 def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
     mesh, whole = _body(p), p.specimen.mesh is not None or p.outline.topic is not None
-    own = p.material.E_bonded if model.plates == "bonded" else None
+    own = modulus_in(p.material.by_method, model_name(model.law, model.plates, model.order))
+    own = own or (p.material.E_bonded if model.plates == "bonded" else None)
     scene = Scene(
         mesh,
         Material(
@@ -222,6 +187,7 @@ def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -
     seen = pressed_log(
         recording, fit, p.specimen.size.height, p.limit, strains, noise,
         share=repeats_share(recording), test=p.test,
+        toe=toe_in(p.material.by_method, by_model(scene)) if p.material.by_method else None,
     )  # fmt: skip
     for window in seen.selections:
         if window.t is not None and len(window.t) < MIN_SAMPLES:

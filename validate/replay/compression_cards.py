@@ -66,6 +66,9 @@ class Gel:
         None, "Pa", "of models with bonded plates; none: E, or identified with bonded plates"
     )
     nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
+    by_method: tuple[tuple[str, float, float], ...] = quantity(
+        (), "1", "found by the run: of each model, its modulus Pa and where its load begins, m"
+    )
     coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
 
 
@@ -79,10 +82,14 @@ class CylinderGrid:
 
 @dataclass(frozen=True)
 class CompressionRanges(Ranges):
-    E: float = quantity(0.05, "1", "relative, of the modulus")
+    E: float = quantity(0.05, "1", "relative, of a modulus that is given")
     diameter: float = quantity(0.005, "1", "relative, of the diameter")
-    height: float = quantity(0.005, "1", "relative, of the height; with outlines only")
-    nu: float = quantity(0.01, "1", "of the Poisson ratio, with outlines only")
+    height: float = quantity(0.005, "1", "relative, of the height; of outlines or an identified E")
+    nu: float = quantity(0.01, "1", "of the Poisson ratio; of outlines or an identified E")
+    friction: float = quantity(
+        0.05, "1", "of an identified E: share of the way from slipping to bonded ends, or back"
+    )
+    load: float = quantity(0.005, "1", "relative, of the load cell's scale; of an identified E")
 
 
 @dataclass(frozen=True)

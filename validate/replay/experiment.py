@@ -4,7 +4,7 @@ An experiment file is code: run only your own. A recording is data: nothing in i
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +17,7 @@ from validate.compare.result import Kind
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
+from validate.identify.budget import IdentifiedValue
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.calibration import Calibration
@@ -44,7 +45,8 @@ class Input:
     """An uncertain input: `move` takes parameters to where it is off by z standard uncertainties.
 
     z lies within +-sqrt(3), the half-width of a uniform range. `source` says where the range comes
-    from, or "assumed". `identified`: it is a share of the covariance of what was identified.
+    from, or "assumed". `identified`: it is a share of the covariance of what was identified;
+    `each`: each method is moved by itself, since each has a value of its own.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Input:
     doc: str
     source: str
     identified: bool = False
+    each: bool = False
 
     def __post_init__(self) -> None:
         if not self.source.strip():
@@ -128,7 +131,8 @@ class Identified:
 
     `headline` opens the verdict. `calibrated` names the residuals (a quantity, or quantity@load)
     whose data served: checks on them are fitted, and no evidence. `doubts` of what was given are
-    shown as warnings.
+    shown as warnings. `values` are the identified values with their budgets; `inputs` and `mesh`
+    stand in place of those declared, since each moves what was identified, too (None: as declared).
     """
 
     parameters: Any
@@ -137,6 +141,18 @@ class Identified:
     headline: str = ""
     calibrated: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    values: tuple[IdentifiedValue, ...] = ()
+    inputs: "tuple[Input, ...] | None" = None
+    mesh: "MeshLadder | None" = None
+
+    def of(self, experiment: "Experiment") -> "Experiment":
+        """The experiment with the inputs and meshes that the identification left uncertain."""
+        declared = experiment.uncertainty
+        if declared is None:
+            return experiment
+        inputs = declared.inputs if self.inputs is None else self.inputs
+        more = replace(declared, inputs=inputs, mesh=self.mesh or declared.mesh)
+        return replace(experiment, uncertainty=more)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ markers and outlines counts from there. An open modulus is identified up to a sh
 and only what lies beyond is a prediction.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from math import prod
@@ -20,25 +20,24 @@ from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
 from validate.parameters import known
 from validate.recording.types import Recording
+from validate.replay.body_modulus import identify_body, model_name
 from validate.replay.cards import beside, moved
 from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
     Experiment,
-    Identified,
     Input,
     MeshLadder,
     Uncertainty,
 )
+from validate.replay.fitted_moduli import modulus_in
 from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_drive import drive_kind, prescribed
-from validate.replay.measured_seen import LOW, place
+from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.similar_grids import divided, fitting, member
-from validate.replay.solved import solve
 from validate.scene.box import box
 from validate.scene.cylinder import whole_cylinder
-from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
@@ -50,8 +49,8 @@ from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
-_UNIT = 1e3  # Pa: a modulus to scale
 _FLAT = 5e-3  # of a sliding place's width
+_NU = 0.4999  # the largest Poisson ratio of these elements
 _AXES = {"all": (0, 1, 2), "x": (0,), "y": (1,), "z": (2,)}
 
 
@@ -88,49 +87,7 @@ def measured_body(
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
-    return replace(bare, identify=partial(_identify, experiment=bare))
-
-
-def _identify(
-    recordings: Sequence[Recording],
-    p: MeasuredBody,
-    methods: Mapping[str, Method],
-    *,
-    experiment: Experiment,
-) -> Identified:
-    """An open modulus by least squares of the force up to `fit_to` of the load, which is in
-    proportion to it: one solution of the first accepted method, with a modulus of 1 kPa.
-
-    Raises `UsageError` where no force under a displacement is judged, and for a law with further
-    moduli, with which no force is in proportion to E.
-    """
-    if p.material.E is not None:
-        return Identified(p, (), ())
-    if p.material.coefficients != Coefficients():
-        raise UsageError("material.E is not set, beside coefficients of its law: give them all")
-    if p.seen.force is None or drive_kind(recordings[0], p) != "moves":
-        raise UsageError(
-            "material.E is not set: an open modulus is identified on a force under a displacement "
-            "(seen.force, moved.by a signal in m); give it with --set material.E=VALUE"
-        )
-    unit = replace(p, material=replace(p.material, E=_UNIT))
-    name = next(n for n in (*experiment.accepted, *methods) if n in methods)
-    found = solve(experiment, tuple(recordings), name, methods[name], unit)
-    low = found.residuals[f"force@{LOW}"]
-    if low.reference is None:
-        raise UsageError(f"{methods[name].label}: no force up to {p.seen.fit_to:g} of the load")
-    measured = low.reference[:, 0]
-    per_unit = low.values[:, 0] + measured
-    share = float(per_unit @ measured / (per_unit @ per_unit))
-    left = measured - share * per_unit
-    sd = float(np.sqrt(left @ left / (len(left) - 1) / (per_unit @ per_unit))) / share
-    E = share * _UNIT
-    note = (
-        f"E = {E:.5g} ± {2 * sd * E:.3g} Pa (two sd of the fit) was identified by "
-        f"{methods[name].label} on the force up to {100 * p.seen.fit_to:g} % of the load."
-    )
-    fitted = replace(p, material=replace(p.material, E=E), ranges=replace(p.ranges, E=sd))
-    return Identified(fitted, (), (note,), calibrated=(f"force@{LOW}",))
+    return replace(bare, identify=partial(identify_body, experiment=bare))
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -140,9 +97,10 @@ def _build(
     recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
 ) -> Scene:
     mesh = body(gridded(p).body, places=_places(p))
+    E = modulus_in(p.material.by_method, model_name(model)) or p.material.E
     scene = Scene(
         mesh,
-        Material(known(p.material.E, "material.E"), p.material.nu, model.law, p.material.rho,
+        Material(known(E, "material.E"), p.material.nu, model.law, p.material.rho,
                  coefficients=p.material.coefficients.known_to(model.law)),
         _supports(p, mesh, recording),
         _pins(p, mesh),
@@ -316,6 +274,12 @@ def _stiffer(p: MeasuredBody, z: float) -> float | None:
     return p.material.E and p.material.E * (1 + z * p.ranges.E)
 
 
+def _of_poisson(p: MeasuredBody, z: float) -> float:
+    """Upwards, or downwards where one standard uncertainty upwards ends at .5."""
+    by = z * p.ranges.nu
+    return min(p.material.nu + (by if p.material.nu + p.ranges.nu < _NU else -by), _NU)
+
+
 def _more(p: MeasuredBody, z: float) -> float:
     return p.moved.scale * (1 + z * p.ranges.load)
 
@@ -323,7 +287,7 @@ def _more(p: MeasuredBody, z: float) -> float:
 _INPUTS = (
     Input("modulus", moved("material", E=_stiffer), "E within its declared uncertainty", "assumed"),
     Input("Poisson ratio",
-          moved("material", nu=lambda p, z: min(p.material.nu + z * p.ranges.nu, 0.4999)),
+          moved("material", nu=_of_poisson),
           "nu within its declared uncertainty", "assumed"),
     Input("load", moved("moved", scale=_more), "what moves the body, within its range", "assumed"),
 )  # fmt: skip

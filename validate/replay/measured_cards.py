@@ -48,6 +48,9 @@ class Tissue:
     E: float | None = quantity(None, "Pa", "Young's modulus; none: identified")
     nu: float = quantity(0.45, "1", "Poisson ratio")
     rho: float = quantity(1000.0, "kg/m3", "density; moves the body under gravity only")
+    by_method: tuple[tuple[str, float, float], ...] = quantity(
+        (), "1", "found by the run: of each model, its modulus Pa; the last number is 0"
+    )
     coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
 
 
@@ -119,6 +122,11 @@ class BodyRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of a modulus that is given")
     nu: float = quantity(0.01, "1", "of the Poisson ratio")
     load: float = quantity(0.01, "1", "relative, of what moves or pulls the body")
+    size: float = quantity(0.005, "1", "relative, of each size of the body; of an identified E")
+    contact: float = quantity(0.0, "m", "of where the load begins; of an identified E")
+    friction: float = quantity(
+        0.05, "1", "of an identified E: share of the way from sliding places to held ones"
+    )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """A log of a testing machine in the scene: displacement from contact, force from its zero."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,12 +23,14 @@ def pressed_log(
     role: Role = "validates",
     share: float = 0.0,
     test: TestKind = "compression",
+    toe: float | None = None,
 ) -> Registered:
     """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
 
     The force, of sd `noise` N, is read at the displacement's times and compared in the windows of
     strain; what an uncertain clock of either makes of it is counted. `share` is how far specimens
-    differ, relative, one standard uncertainty.
+    differ, relative, one standard uncertainty. `toe` m is where a method's own law begins to carry
+    load, counted from contact (none: where the fitted line does); windows are the same for all.
     """
     log = loading(recording, test)
     moved = log.d[:, None] - fit.contact - fit.toe * height
@@ -42,4 +45,7 @@ def pressed_log(
         share,
     )  # fmt: skip
     windows = {label: (a * height, b * height) for label, (a, b) in strains.items()}
-    return Registered((stage, cell), windows_of(stage, windows), outside=len(log.t) - last)
+    selections = windows_of(stage, windows)
+    if toe is not None:
+        stage = replace(stage, y=stage.y + fit.toe * height - toe)
+    return Registered((stage, cell), selections, outside=len(log.t) - last)

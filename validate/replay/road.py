@@ -119,6 +119,7 @@ def set_out(
     experiment = with_inputs(experiment, fitted)
     identified = identified_by(experiment, shipped, parameters, every, fitted)
     used = identified.parameters if identified else parameters
+    experiment = identified.of(experiment) if identified else experiment
     road = Road(
         experiment, methods, used, report,
         quick=options.quick, calibrated=identified.calibrated if identified else (),
@@ -189,6 +190,7 @@ def _compared(
         changed=out.differing,
         specimens=_specimens(experiment, road.recordings),
         expected=experiment.expected,
+        identified_values=identified.values if identified else (),
     )
 
 

@@ -8,7 +8,8 @@ from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
-from validate.report.numbers import at_load, duration, rate, shown_unit, spaced
+from validate.identify.budget import IdentifiedValue
+from validate.report.numbers import at_load, duration, rate, shown_unit, spaced, with_unit
 from validate.report.observed import timed
 from validate.report.tables import unit_cell
 
@@ -193,10 +194,31 @@ def _residuals(result: Result) -> NumberTable:
 
 def identified(result: Result) -> Exhibit:
     """What was identified from the recordings, and the experiment's notes."""
-    rows = tuple(_score_row(s) for s in result.identified)
+    named = {v.name for v in result.identified_values}
+    rows = tuple(_score_row(s) for s in result.identified if s.name not in named)
     table = NumberTable("identified", "Identified from the recordings.", _SCORE, rows)
     title = "Identified parameters and notes"
-    return Exhibit("identified", title, result.notes, (table,) if rows else ())
+    budgets = (_budget(result.identified_values),) if result.identified_values else ()
+    words = tuple(
+        f"{v.name} by {v.by}: {v.finding}." for v in result.identified_values if v.finding
+    )
+    return Exhibit(
+        "identified", title, (*words, *result.notes), (*budgets, *((table,) if rows else ()))
+    )
+
+
+def _budget(values: tuple[IdentifiedValue, ...]) -> NumberTable:
+    """One row a value: value, 95 % interval, and its standard uncertainties, one column a term."""
+    terms = tuple(dict.fromkeys(name for v in values for name in v.parts))
+    head = ("parameter", "identified by", "value", "95 % from", "to", "u", *terms, "n")
+    rows = []
+    for v in values:
+        numbers = (v.value, *v.interval, v.u)
+        parts = tuple(TableCell(v.parts[n], v.unit) if n in v.parts else None for n in terms)
+        cells = (TableCell(x, v.unit, with_unit(x, v.unit, 4)) for x in numbers)
+        rows.append((v.name, v.by, *cells, *parts, v.count))
+    words = "Identified values and their uncertainty budgets: standard uncertainties, one a term."
+    return NumberTable("identified_values", words, head, tuple(rows))
 
 
 def published(result: Result) -> Exhibit | None:

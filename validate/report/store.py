@@ -24,6 +24,7 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.file_names import safe_name
+from validate.identify.budget import IdentifiedValue
 from validate.report.environment import environment, file_name
 from validate.report.made import Made
 from validate.report.observed import timed
@@ -88,11 +89,30 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "domain": recorded(_domains(result)),
         "effects": recorded(result.effects),
         "rest": [_rest(r) for r in result.rest],
-        "identified": [_score(s) for s in result.identified],
+        "identified": identified_members(result),
         "published": [figure_members(p) for p in result.published],
         "uncertain_inputs": [members(i) for i in result.inputs],
         "joint_inputs": [members(j) | {"percent": recorded(j.percent)} for j in result.joint],
         "exhibits": exhibits(result.exhibits),
+    }  # fmt: skip
+
+
+def identified_members(result: Result) -> list[Json]:
+    """Identified values with interval and budget, then scores; a score of the same name as a value
+    is the same number."""
+    values = [_value(v) for v in result.identified_values]
+    named = {v.name for v in result.identified_values}
+    return [*values, *(_score(s) for s in result.identified if s.name not in named)]
+
+
+def _value(one: IdentifiedValue) -> Json:
+    low, high = one.interval
+    return {
+        "name": one.name, "value": recorded(one.value), "unit": one.unit, "count": one.count,
+        "against": "what calibrates", "definition": f"identified by {one.by} on {one.on}",
+        "interval": recorded((low, high)), "u": recorded(one.u),
+        "parts": {name: recorded(u) for name, u in one.parts.items()},
+        "by": one.by, "on": one.on, "correlation": one.correlation, "finding": one.finding,
     }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ for one in found.calibrated:
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 from validate.arrays import Floats
@@ -16,6 +17,7 @@ from validate.errors import ComparisonError
 from validate.identify.identification import Identification, identify
 from validate.identify.least_squares import Fit
 from validate.identify.profile import Side
+from validate.identify.space import Space
 from validate.replay.asked import asked
 from validate.replay.calibrated import Identify, identified
 from validate.replay.experiment import Experiment
@@ -26,10 +28,12 @@ from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.identify_cell import (
     IdentifyBench,
     Known,
+    LinearCell,
     Of,
     SideCell,
     StartCell,
     open_bench,
+    run_linear,
     run_side,
     run_start,
 )
@@ -38,8 +42,9 @@ from validate.study.store import key_of
 
 KIND = "identify"
 STARTS, QUICK_STARTS = 10, 4
+STARTS_OF_ONE = 5  # of a single parameter: every fifth of its range has one
 SEED = 1
-_ALONE = 10.0  # s: less work than this is done here, for workers take longer to begin
+_ALONE = 30.0  # s: less work than this is done here, for workers take as long to begin
 _TRIED = 2  # cells that are done here first
 
 
@@ -65,7 +70,7 @@ class InCells:
     """Evaluates fits and profiles as the cells of a study; counts them."""
 
     def __init__(
-        self, experiment: Experiment, options: Options, wanted: Sequence[str], starts: int,
+        self, experiment: Experiment, options: Options, wanted: Sequence[str], starts: int | None,
         out: Path | None, where: Where | None, report: Report | None,
     ) -> None:  # fmt: skip
         self._path, self._options = Path(str(experiment.path)), options
@@ -78,7 +83,11 @@ class InCells:
     def __call__(self, number: int, problem: Problem) -> Identification:
         """As `validate.replay.calibrated.Identify`."""
         of = Of(number, self._wanted, self._known)
-        found = identify(problem.space, _Cells(self, of, problem), self._starts, SEED)
+        alone = len(problem.space.ranges) == 1
+        usual = STARTS_OF_ONE if alone else STARTS
+        usual = QUICK_STARTS if self._options.quick else usual
+        starts = usual if self._starts is None else self._starts
+        found = identify(problem.space, _Cells(self, of, problem), starts, SEED)
         values = {e.name: e.value for e in found.estimates}
         self._known = (*self._known, *values.items())
         return found
@@ -94,8 +103,12 @@ class InCells:
         first, done = replace(plan, cells=plan.cells[:_TRIED]), self._finish
         where = self._where
         if where.workers is None and not where.scheduler:
+            start = process_time()
             begun = done(first, Where(0))
-            seconds = min(r.seconds for r in begun.records.values())
+            # Seconds of work: a busy machine must not start workers, which make it busier.
+            fresh = len(first.cells) - begun.reused
+            work = [(process_time() - start) / fresh] if fresh > 0 else []
+            seconds = min([*work, *(r.seconds for r in begun.records.values())])
             where = Where(0) if seconds * (len(plan.cells) - _TRIED) < _ALONE else where
         found = done(plan, where)
         return [_value(found, cell) for cell in plan.cells]
@@ -122,6 +135,11 @@ class _Cells:
     def __init__(self, owner: InCells, of: Of, problem: Problem) -> None:
         self._owner, self._of = owner, of
         self._names, self._job = problem.space.names, owner.job(problem)
+
+    def linear(self, space: Space) -> Fit:
+        cell = _keyed(self._job, LinearCell(self._of, f"closed form of {self._names[0]}"))
+        plan = Plan(self._job, (cell,), open_bench, run_linear, Fit)
+        return self._owner.finished(plan)[0]
 
     def fits(self, starts: Floats) -> Sequence[Fit]:
         method = f"start {{}} of {len(starts)}, {', '.join(self._names)}"
@@ -150,8 +168,7 @@ def beside(
     experiment: Experiment, options: Options, out: Path | None = None, report: Report | None = None
 ) -> Identify:
     """For the road: what stands open, by the cells that `validate identify` keeps."""
-    starts = QUICK_STARTS if options.quick else STARTS
-    return InCells(experiment, options, (), starts, out, None, report)
+    return InCells(experiment, options, (), None, out, None, report)
 
 
 def identification(
@@ -171,9 +188,8 @@ def identification(
     """
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     options = Options(dict(values or {}), (), quick)
-    count = starts if starts is not None else QUICK_STARTS if quick else STARTS
     bench = IdentifyBench(found, options)
-    cells = InCells(found, options, wanted, count, out, where, report)
+    cells = InCells(found, options, wanted, starts, out, where, report)
     calibrating, free = asked(bench.experiment, bench.parameters, wanted)
     done, failed = identified(
         calibrating, bench.parameters, bench.methods, bench.recordings, cells, free

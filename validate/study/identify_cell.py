@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from validate.identify.closed_form import linear_fit
 from validate.identify.least_squares import Fit, fit
 from validate.identify.profile import Side, side
 from validate.replay.asked import asked
@@ -35,6 +36,16 @@ class StartCell:
 
     of: Of
     start: tuple[float, ...]
+    label: str
+    key: str = ""
+    timed: bool = False
+
+
+@dataclass(frozen=True)
+class LinearCell:
+    """The closed form of a parameter that the residual may be linear in."""
+
+    of: Of
     label: str
     key: str = ""
     timed: bool = False
@@ -81,6 +92,11 @@ class IdentifyBench:
 
 def open_bench(job: Job) -> IdentifyBench:
     return IdentifyBench(job.experiment(), Options(dict(job.values), (), job.quick))
+
+
+def run_linear(bench: IdentifyBench, cell: LinearCell) -> Fit:
+    problem = bench.problem(cell.of)
+    return linear_fit(problem.residual, problem.space)
 
 
 def run_start(bench: IdentifyBench, cell: StartCell) -> Fit:

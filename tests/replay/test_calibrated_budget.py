@@ -1,0 +1,57 @@
+"""Budgets of calibrated parameters: inputs and meshes to first order, or noise alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calibrating import NU, OPEN, E, Open
+
+from validate.replay.calibrated import calibrated, closed, identified_by
+from validate.replay.calibration import Calibrates, Calibration
+from validate.replay.cards import moved
+from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+
+INPUTS = (
+    Input("Poisson ratio", moved("", nu=lambda p, z: (p.nu or 0.0) + 0.02 * z), "nu", "assumed"),
+    Input("other specimens", moved("", E=lambda p, z: p.E * (1 + 0.05 * z)), "E", "assumed"),
+)
+DOUBTED: Experiment = replace(OPEN, uncertainty=Uncertainty(inputs=INPUTS, surrogate="fem"))
+
+
+def identified(experiment: Experiment, p: Open) -> Identified:
+    shipped = experiment.load(p, None)  # type: ignore[arg-type]
+    fitted, _ = calibrated(experiment, p, experiment.methods, shipped)
+    found = identified_by(experiment, shipped, p, experiment.methods, fitted)
+    assert found is not None
+    return found
+
+
+def test_an_input_changes_the_value_as_a_new_identification_does() -> None:
+    (one,) = identified(DOUBTED, Open()).values
+    assert (one.name, one.unit, one.by) == ("E", "Pa", "fem")
+    exact = [
+        closed(DOUBTED, replace(Open(), nu=nu), DOUBTED.load(Open(), None)).E  # type: ignore[arg-type]
+        for nu in (0.3, 0.32)
+    ]
+    assert one.value == pytest.approx(exact[0], rel=1e-4)
+    # First order: the product of both changes is left out.
+    assert one.parts["Poisson ratio"] == pytest.approx(abs(exact[1] - exact[0]), rel=0.05)
+    assert one.parts["other specimens"] == pytest.approx(0.05 * one.value, rel=1e-6)
+    low, high = one.interval
+    rest = 1.96 * np.hypot(one.parts["Poisson ratio"], one.parts["other specimens"])
+    assert high - one.value > rest
+    assert one.value - low > rest
+
+
+def test_of_several_parameters_the_noise_and_the_correlation_are_told() -> None:
+    both = Calibration("fem", (E, NU), (Calibrates(("force", "node_B")),))
+    several = replace(DOUBTED, calibrations=(both,), accept=())
+    shipped = several.load(Open(), None)  # type: ignore[arg-type]
+    p = Open(nu=None)
+    fitted, _ = calibrated(several, p, several.methods, shipped, anyway=True)
+    found = identified_by(several, shipped, p, several.methods, fitted)
+    assert found is not None
+    one, other = found.values
+    assert set(one.parts) == set(other.parts) == {"noise"}
+    assert "correlation with nu" in one.correlation
+    assert "not in this interval" in one.correlation

@@ -1,0 +1,92 @@
+"""Uncertainty budget of an identified value, after GUM (JCGM 100): terms, factor, interval.
+
+from validate.identify.budget import IdentifiedValue
+E = IdentifiedValue("material.E", 25e3, "Pa", "neo_hooke", "force@fit", {"noise": 90.0}, 200)
+print(E.u, E.interval, E.dominant)
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import hypot, inf, isfinite
+from types import MappingProxyType
+
+import numpy as np
+from scipy.stats import norm, t
+
+from validate.arrays import Floats
+
+NOISE = "noise"
+_COVERED = 0.95
+_FEWEST = 10  # samples from which an autocorrelation is summed
+
+
+@dataclass(frozen=True)
+class IdentifiedValue:
+    """A value in `unit` with its standard uncertainties by term, in the same unit.
+
+    `by` is the method whose law was fitted, `on` the data, `count` their number. `freedom` is the
+    number of degrees of freedom of the term "noise". `correlation` says what it has in common with
+    the predictions, `finding` how the law's curve departs from the data ("": it does not).
+    """
+
+    name: str
+    value: float
+    unit: str
+    by: str
+    on: str
+    parts: Mapping[str, float]
+    count: int
+    freedom: float = inf
+    correlation: str = ""
+    finding: str = ""
+    given: tuple[float, float] | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
+
+    @property
+    def u(self) -> float:
+        """The combined standard uncertainty: the root of the sum of squares."""
+        return hypot(*self.parts.values())
+
+    @property
+    def factor(self) -> float:
+        """The coverage factor of 95 %: Student's, by the Welch-Satterthwaite formula (G.4)."""
+        noise = self.parts.get(NOISE, 0.0)
+        if not isfinite(self.freedom) or noise == 0 or not isfinite(self.u):
+            return float(norm.ppf(0.5 + _COVERED / 2))
+        freedom = max(self.freedom, 1.0) * (self.u / noise) ** 4
+        return float(t.ppf(0.5 + _COVERED / 2, freedom))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The ends of the 95 % interval; those of a profile where one was `given`."""
+        if self.given is not None:
+            return self.given
+        return self.value - self.factor * self.u, self.value + self.factor * self.u
+
+    @property
+    def dominant(self) -> str:
+        """The largest term; "" without any."""
+        return max(self.parts, key=lambda name: self.parts[name], default="")
+
+
+def dependence(residual: Floats) -> float:
+    """How many successive residuals (n,) count as one: 1 + 2 sum of their autocorrelations.
+
+    The sum ends before the first pair of neighbouring lags that is not positive (Geyer 1992,
+    initial positive sequence), so it is at least 1 and at most n / 2.
+    """
+    n = len(residual)
+    r = residual - residual.mean()
+    power = float(r @ r)
+    if n < _FEWEST or power == 0:
+        return 1.0
+    rho = np.correlate(r, r, "full")[n - 1 :] / power
+    total = -1.0
+    for k in range(0, n // 2, 2):
+        pair = float(rho[k] + rho[k + 1])
+        if pair <= 0:
+            break
+        total += 2 * pair
+    return float(np.clip(total, 1.0, n / 2))
