@@ -52,6 +52,25 @@ def test_an_order_above_the_formal_one_is_not_believed() -> None:
     assert found.u > 3.0 * 1.0 / 2
 
 
+def test_the_weights_that_leave_least_count() -> None:
+    """Scatter of the coarse answers: brute force over the order, equal weights and 1/h."""
+    h = np.array((4.0, 3.0, 2.5, 1.0, 0.75))
+    y = h**1.5 + np.array((0.1, -0.3, 0.3, 0.0, 0.0))
+    fits = []
+    for w in (np.ones(5), 5 / h / np.sum(1 / h)):
+        for p in np.linspace(0.5, 3.0, 5001):
+            A = np.stack([np.ones(5), h**p], axis=1) * np.sqrt(w)[:, None]
+            (f0, a), *_ = np.linalg.lstsq(A, np.sqrt(w) * y, rcond=None)
+            left = y - f0 - a * h**p
+            sd = float(np.sqrt(np.sum(w * left**2) / 2))  # 5 answers, 3 parameters
+            fits.append((sd, p, 1.25 * abs(a) + sd + abs(left[3])))
+    equal, weighted = min(fits[:5001]), min(fits[5001:])
+    assert weighted[0] < 0.9 * equal[0]
+    found = convergence(h.tolist(), [np.array([[v]]) for v in y], 3, 2.0)
+    assert found.order == pytest.approx(weighted[1], abs=2e-3)
+    assert 2 * found.u == pytest.approx(weighted[2], rel=2e-3)
+
+
 def test_a_trusted_order_above_the_formal_one_is_replaced_by_it() -> None:
     """Three answers of order 2.4: the fit by order 2 says f0 + a with its scatter and distance."""
     h, y = np.array((2.0, 1.0, 0.5)), np.array((2.0, 1.0, 0.5)) ** 2.4
