@@ -70,7 +70,7 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     paths = {p["path"]: p["default"] for p in json.loads(listed)["parameters"]}
     assert (paths["specimen.diameter"], paths["specimen.height"]) == (DIAMETER, HEIGHT)
     own = load_file(tmp_path / "experiments" / "my_gel.py")
-    result = compare(own, {"ranges.E": "0.01"})
+    result = compare(own)
     assert [(c.name, c.verdict) for c in result.checks] == [
         ("force.max@fit", "fitted"), ("force.max@beyond", "good enough"),
     ]  # fmt: skip
@@ -273,7 +273,7 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     assert 'test="tension",  # recorded' in text
     assert 'pressed("linear, gripped ends", "bonded")' in text
     mine = load_file(tmp_path / "experiments" / "strip.py")
-    result = compare(mine, {"ranges.E": "0.01"})
+    result = compare(mine)
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.02)
