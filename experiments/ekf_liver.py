@@ -8,6 +8,7 @@ body is the data folder's liver where that is here, else one made by formulas
 
 from pathlib import Path
 
+from validate.compare.expected import Expected
 from validate.compare.verdict import Accept
 from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
@@ -97,6 +98,13 @@ EXPERIMENT = Experiment(
             0.057e-3,
             "a tenth of the largest displacement there, rms over time",
             statistic="rms",
+        ),
+    ),
+    expected=(
+        Expected(
+            "undecided",
+            "the reduced filter claims a wider error than it has",
+            method="reduced_modes",
         ),
     ),
     load=load,

@@ -171,5 +171,5 @@ def test_a_method_whose_finest_mesh_does_not_fit_is_refused_before_anything_is_s
     with pytest.raises(MemoryShortError) as caught:
         compare(phantom, Options({}, ("p1_fluid", "p2_fluid")))
     said = str(caught.value)
-    assert "p2_fluid with up to 5.85e+04 unknowns in 3-D: about 0.761 GB" in said
+    assert "p2_fluid with up to 5.06e+04 unknowns in 3-D: about 0.658 GB" in said
     assert "take a coarser mesh, such as --set mesh.nodes_x=" in said

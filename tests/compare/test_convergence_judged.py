@@ -204,3 +204,19 @@ def test_answers_that_differ_by_rounding_need_no_factor() -> None:
 def test_differences_that_vanish_or_grow_have_no_order(e21: float, e32: float) -> None:
     assert observed_order(2.0, 2.0, e21, e32) is None
     assert observed_order(2.0, 2.0, 1.0, 4.0) == pytest.approx(2.0, abs=1e-9)
+
+
+def test_scatter_of_many_numbers_is_not_counted_as_a_lost_order() -> None:
+    """Meshes that cut a wall anew: 200 numbers with an error of second order and, on each mesh, its
+    own scatter as large. The band holds the error of the judged one, and is not many times as wide.
+    """
+    rng = np.random.default_rng(8)
+    h = np.array([1.55, 1.3, 1.15, 1.0, 0.8])
+    shape = rng.normal(size=(200, 1))
+    ratios = []
+    for _ in range(40):
+        answers = [0.1 * x**2 * shape + 0.1 * rng.normal(size=(200, 1)) for x in h]
+        found = convergence(h.tolist(), answers, 3, 2.0)
+        ratios.append(2 * found.u / float(np.sqrt(np.mean(answers[3] ** 2))))
+    assert min(ratios) > 1
+    assert float(np.median(ratios)) < 6
