@@ -252,7 +252,7 @@ def test_check_shows_every_figure_and_fails_when_one_moves(
     found = json.loads(out)[0]
     assert (code, found["holds"], len(found["published"])) == (0, True, 48)
     printed = " ".join(here("check", "--fresh", "fluid_phantom")[1].split())
-    assert "no longer stand; checks: agrees, evidence: 12 of 12 checks" in printed
+    assert "no longer stand; checks: good enough, evidence: 12 of 12 checks" in printed
     moved = replace(phantom_result.published[0], expected=1.0)
     spoiled = replace(phantom_result, published=(moved,))
     monkeypatch.setattr(checking, "compare", lambda *_: spoiled)

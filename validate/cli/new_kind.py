@@ -31,6 +31,7 @@ class NewKind:
     assumed: Callable[[Recording, Answers], Sequence[str]]
 
 
+_NOISY = ("contour",)  # many points of one image, each as uncertain as speckle: judged by their rms
 NOTHING = "none"  # the answer of a user who requires nothing
 
 
@@ -55,11 +56,12 @@ def reason_question(name: str, default: str = "") -> Question:
 def accept_line(name: str, unit: str, found: Answers) -> str:
     """The requirement as an experiment's file declares it."""
     answer = found[f"accept.{name}"]
+    whole = ', statistic="rms"' if name in _NOISY else ""
     if answer == NOTHING:
-        return f'Accept("{name}"),  # nothing is required'
+        return f'Accept("{name}"{whole}),  # nothing is required'
     reason = found.get(f"why.{name}", "")
     told = "" if reason else "; write why, or it is no requirement"
-    return f'Accept("{name}", {quantity_in(unit)(answer):.6g}, {reason!r}),  # {unit}{told}'
+    return f'Accept("{name}", {quantity_in(unit)(answer):.6g}, {reason!r}{whole}),  # {unit}{told}'
 
 
 def quantity_in(unit: str) -> Callable[[str], float]:
