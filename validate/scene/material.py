@@ -24,15 +24,15 @@ class Material:
 
     Every law has this E and nu at small strain, which is all that the linear schemes use;
     `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
-    whose isochoric stress comes late. At nu = 0.5 the volume is kept exactly: mixed cells and static
-    schemes only (`fem.incompressible`). Dynamic schemes need rho kg/m^3; Rayleigh
+    whose isochoric stress comes late. At nu = 0.5 mixed cells and static schemes keep the volume
+    exactly (`fem.incompressible`), others refuse it. Dynamic schemes need rho kg/m^3; Rayleigh
     damping is C = mass_damping M + stiffness_damping K, in 1/s and s (the alpha_0 and alpha_1 of
     paper 001, eq 7). Raises `SceneError` for values out of range, coefficients that the law does
     not know, and those that lose positive energy, with the stretch.
     """
 
     E: float = quantity(MISSING, "Pa", "Young's modulus at small strain")
-    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain, at most 0.5 (0.5: mixed cells)")
+    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells")
     law: LawName = quantity("linear", "1", "linear, or the law at large strain")
     rho: float | None = quantity(None, "kg/m^3", "density")
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")

@@ -300,8 +300,8 @@ class Scene:
                 continue
             if self.dilatation != "mixed":
                 raise SceneError(
-                    f"nu = 0.5 in {self.mesh.kind} cells of {self.dilatation} dilatation: they need "
-                    "nu < 0.5; use mixed cells (hexahedra or order 2, dilatation 'mixed') or "
+                    f"nu = 0.5 in {self.mesh.kind} cells of {self.dilatation} dilatation: they "
+                    "need nu < 0.5; use mixed cells (hexahedra or order 2, dilatation 'mixed') or "
                     "nu <= 0.4999"
                 )
             if material.law == "svk" or material.coefficients.volumetric == "coupled":

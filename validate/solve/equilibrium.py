@@ -34,8 +34,8 @@ class Balance:
     iteration the ones that it has foreseen (`Body.extrapolated`).
 
     `unbalanced` N is the residual's norm over the free unknowns, zero where it is the stress's own
-    rounding; `acting` N the norm of the forces that act; `gap` the largest error of V/V0, of cavities
-    and of cells with nu = 0.5, whose `multipliers` (e, q) Pa keep it (`fem.hyperelastic`).
+    rounding; `acting` N the norm of the forces that act; `gap` the largest error of V/V0, of
+    cavities and of cells with nu = 0.5, whose `multipliers` (e, q) Pa keep it (`fem.hyperelastic`).
     """
 
     u: Floats

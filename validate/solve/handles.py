@@ -42,9 +42,7 @@ class Handles:
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
 LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False, viscous=True)
-LARGE_STATICS = Handles(
-    LARGE, inertia=False, cavities=True, viscous=True, incompressible=True
-)
+LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, viscous=True, incompressible=True)
 
 
 class Handling(Protocol):

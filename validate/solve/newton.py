@@ -167,9 +167,7 @@ class NewtonStepper:
         """The equilibrium of a state: remembered, or its forces and tangent made again."""
         if self.memory.last.balance.u is at.u:
             return replace(self.memory.last, iterations=0, factorisations=0)
-        balance = self.problem.balance(
-            at.u, at.pressures, at.inputs, target, None, at.multipliers
-        )
+        balance = self.problem.balance(at.u, at.pressures, at.inputs, target, None, at.multipliers)
         return Found(balance, self.problem.tangent(balance), factorisations=1)
 
     def _walked(self, k: int, good: Found, inputs: Floats, target: Floats) -> State:

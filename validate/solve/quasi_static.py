@@ -17,9 +17,7 @@ from validate.solve.types import State, Stepper
 class QuasiStatic:
     """Linear statics of drives and loads, by superposition of one solved column per input."""
 
-    handles: ClassVar[Handles] = replace(
-        LINEAR_DYNAMICS, inertia=False, incompressible=True
-    )
+    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False, incompressible=True)
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""
