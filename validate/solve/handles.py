@@ -93,7 +93,7 @@ def _refused(handles: Handles, scene: AnyScene) -> tuple[str, str] | None:
     if any(m.prony.g for m in scene.materials) and not handles.viscous:
         return "viscous", "remembers no stress: it takes no Prony series"
     if any(m.incompressible for m in scene.materials) and not handles.incompressible:
-        return "incompressible", "needs nu < 0.5; take nu <= 0.4999"
+        return "incompressible", "solves nu <= 0.4999, not 0.5"
     if isinstance(scene, MaterialPoint):
         return None
     if scene.cavities and not handles.cavities:

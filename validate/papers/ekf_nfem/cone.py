@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from validate.errors import SceneError
 from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.papers.ekf_nfem.cone_twin import (
     ConeTwin,
@@ -105,6 +106,11 @@ def _material(p: PressedCone, model: ConeModel, nu: float, damping: float) -> Ma
 
 def _quarter(p: PressedCone, model: ConeModel) -> Scene:
     """A quarter between bonded plates, the upper one driven down."""
+    if p.material.nu == 0.5 and model.element != "p2_mixed":
+        raise SceneError(
+            f"material.nu = 0.5 with element '{model.element}': it needs nu < 0.5; choose element "
+            "p2_mixed (--methods plate_mixed), or nu <= 0.4999"
+        )
     s, grid = p.twin, p.mesh
     mesh = quarter_cone(s.bottom, s.top, s.height, grid.radial, grid.axial, grid.grading)
     scene = cone_scene(s)
