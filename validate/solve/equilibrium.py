@@ -96,6 +96,7 @@ class Equilibrium:
         x = self._places(u)
         ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
         loads = np.array([pressure_load(c, x).ravel() for c in cavities]).reshape(-1, len(u))
+        multipliers = self.body.multipliers if multipliers is None else multipliers
         inner = self.body.holding(multipliers).force(u)
         f = self.system.loads @ inputs[len(self.system.scene.drives) :]
         residual = inner - pressures @ loads - f

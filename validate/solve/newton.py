@@ -104,7 +104,7 @@ def _rest(problem: Equilibrium) -> Found:
     """The body at rest; `SceneError` where it can move rigidly."""
     cavities, inputs = len(problem.rest_volumes), np.zeros(len(problem.system.scene.inputs))
     u, ones = np.zeros(len(problem.system.moves)), np.ones(cavities)
-    balance = problem.balance(u, np.zeros(cavities), inputs, ones, None, problem.body.multipliers)
+    balance = problem.balance(u, np.zeros(cavities), inputs, ones)
     tangent = problem.tangent(balance)
     if tangent.factor.negative_pivots:
         raise SceneError(
