@@ -141,8 +141,15 @@ def test_it_is_the_limit_of_finite_bulk_moduli(kind: str, law: LawName) -> None:
     assert off[2] < 1e-3 * abs(limit)
 
 
+@pytest.mark.parametrize("law", ["linear", "neo_hooke"])
+def test_the_penalty_is_not_in_the_result(law: LawName, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = force("hex27", 0.5, law)
+    monkeypatch.setattr("validate.scene.material._PENALTY", 300.0)
+    assert force("hex27", 0.5, law) == pytest.approx(before, rel=1e-8)
+
+
 def test_stepping_on_from_a_state_takes_up_its_pressures() -> None:
-    """From an earlier state, which the stepper no longer remembers, a small step is a small step."""
+    """A small step from a state that the stepper no longer remembers takes few iterations."""
     stepper = StaticNewton().prepare(build(bonded("hex8", 0.5, "neo_hooke")))
     first = stepper.step(stepper.rest(), np.array([0.1]))
     stepper.step(first, np.array([0.2]))
