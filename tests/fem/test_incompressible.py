@@ -107,13 +107,14 @@ def test_a_softer_compressible_region_keeps_its_own_volume_change() -> None:
 @every
 @pytest.mark.parametrize("law", ["neo_hooke", "mooney_rivlin", "ogden"])
 def test_every_cell_keeps_its_volume(kind: str, law: LawName) -> None:
-    """Between bonded plates at 20 %; the deformed cells are integrated anew."""
+    """Between bonded plates at 20 %; the deformed cells are integrated anew. However
+    loose the tolerance of forces is, volumes are kept."""
     parts = {"mooney_rivlin": Coefficients(C01=100.0),
              "ogden": Coefficients(ogden_alpha=(2.0,))}  # fmt: skip
     scene = bonded(kind, 0.5, law)
     material = replace(scene.material, coefficients=parts.get(law, Coefficients()))
     scene = replace(scene, material=material)
-    stepper = StaticNewton().prepare(build(scene))
+    stepper = StaticNewton(tolerance=1e-2).prepare(build(scene))
     state = stepper.step(stepper.rest(), np.array([0.2]))
     assert state.failure is None
     body, u = Body(scene), stepper.field(state).ravel()
