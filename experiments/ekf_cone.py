@@ -40,6 +40,11 @@ QUASI_STATIC = Tabulated(StaticNewton("none"), 0.4e-3)
 A = ("node_A",)
 METHODS = {
     "plate_p2": Method("plate moved, P2 neo-Hooke", QUASI_STATIC, Model(True, "p2", "neo_hooke")),
+    "plate_mixed": Method(
+        "plate moved, P2 with a pressure in every cell, neo-Hooke",
+        QUASI_STATIC,
+        Model(True, "p2_mixed", "neo_hooke"),
+    ),
     "plate_mean": Method(
         "plate moved, P1 mean dilatation, neo-Hooke",
         QUASI_STATIC,

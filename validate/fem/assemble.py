@@ -125,12 +125,15 @@ def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
 
 
 def lame_constants(scene: Scene) -> tuple[Floats, Floats]:
-    """lambda and mu (e,) Pa of every cell; in plane stress lambda' = E nu/(1 - nu^2)."""
+    """lambda and mu (e,) Pa of every cell; in plane stress lambda' = E nu/(1 - nu^2).
+    At nu = 0.5 lambda is that of the penalty beside unknown pressures (`fem.incompressible`)."""
     stress = scene.plane == "stress"
     return scene.per_cell(_plane_stress if stress else _lambda), scene.per_cell(_mu)
 
 
 def _lambda(m: Material) -> float:
+    if m.incompressible:
+        return m.assembled_bulk_modulus - 2 / 3 * m.shear_modulus
     return float(lame_parameters(m.E, m.nu)[0])
 
 
@@ -139,7 +142,7 @@ def _plane_stress(m: Material) -> float:
 
 
 def _mu(m: Material) -> float:
-    return float(lame_parameters(m.E, m.nu)[1])
+    return m.shear_modulus
 
 
 def library_mesh(mesh: Mesh) -> Any:
@@ -179,6 +182,19 @@ def _assembled(scene: Scene, lam: Floats, mu: Floats) -> sparse.csr_array:
     cells = lam * outer + mu * (np.swapaxes(outer, 2, 4) + dots)
     cells = cells.reshape(e, a * d, a * d)
     return _summed(mesh, cells + volume if mixed else cells)
+
+
+def mean_divergence(scene: Scene) -> tuple[sparse.csr_array, Floats]:
+    """D (e q, N) so that D u is the projected volume strain of mixed cells at their points, and the
+    points' weights (e, q) m^d."""
+    points, mesh = stiffness_points(scene.mesh), scene.mesh
+    e, q, a, d = points.slopes.shape
+    mean = projections(mesh, points.places, points.weights) @ points.slopes.reshape(e, q, a * d)
+    unknowns = (mesh.cells[..., None] * d + np.arange(d)).reshape(e, 1, a * d)
+    columns = np.broadcast_to(unknowns, mean.shape).ravel()
+    starts = np.arange(0, mean.size + 1, a * d)
+    D = sparse.csr_array((mean.ravel(), columns, starts), shape=(e * q, mesh.nodes.size))
+    return D, points.weights
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,8 @@ _EYE = np.eye(3)
 @dataclass(frozen=True)
 class CellFields:
     """Green-Lagrange strain (e, 3, 3), at a linear law the small strain, and Cauchy stress
-    (e, 3, 3) Pa; None: plane stress, whose strain across is not among the displacements."""
+    (e, 3, 3) Pa; None: plane stress, whose strain across is not among the displacements, and
+    nu = 0.5, whose pressure is not."""
 
     strain: Floats
     stress: Floats | None
@@ -45,7 +46,7 @@ def cell_fields(scene: Scene, u: Floats) -> CellFields:
     linear = scene.material.law == "linear"
     strain = (H + np.swapaxes(H, -1, -2)) / 2 if linear else green_strain(H)
     mean = np.einsum("eqij,eq->eij", strain, share)
-    if d == 2 and scene.plane == "stress":
+    if (d == 2 and scene.plane == "stress") or any(m.incompressible for m in scene.materials):
         return CellFields(mean, None)
     stress = np.empty_like(H)
     own = np.zeros(len(H), dtype=np.int64)

@@ -10,6 +10,11 @@ p' = U'(theta(u)) + U''(theta(u)) dtheta (`extrapolated`): the pressure that a s
 at its end, kappa d^2 too large, then stiffens or softens nothing (Magisano, Leonetti & Garcea 2017
 for stresses at points). At a solution both are one.
 
+At nu = .5 the mean J - 1 of every cell is kept at zero by multipliers, p = multiplier + U'(theta)
+with a finite kappa in U (augmented Lagrangian: Hestenes 1969; Simo & Taylor 1991 for volumes). The
+pressures that an iteration has foreseen are the next multipliers; at a solution theta = 0 in every
+cell and p is the multiplier alone.
+
 In two dimensions H is completed: by nothing in plane strain, in plane stress by the stretch that
 leaves no stress across (`fem.plane_laws`). Forces are those of the scene's thickness.
 
@@ -90,7 +95,11 @@ class Body:
         springs = [foundation_stiffness(mesh, f) for f in scene.foundations]
         self.springs: sparse.csr_array | None = sum(springs[1:], springs[0]) if springs else None
         self.pattern = NodePattern(mesh.cells, len(mesh.nodes), mesh.dimension)
-        moduli = scene.per_cell(lambda m: m.bulk_modulus + m.shear_modulus)
+        kept = scene.per_cell(lambda m: m.incompressible) > 0
+        #: (e,): cells with nu = 0.5, if any, and the multipliers (e, q) Pa that keep their volume.
+        self.kept = kept if kept.any() else None
+        self.multipliers = np.zeros(self.weights.shape) if kept.any() else None
+        moduli = scene.per_cell(lambda m: m.assembled_bulk_modulus + m.shear_modulus)
         spread = np.linalg.norm(self.gradients, axis=-1) * self.weights[..., None]
         spread *= moduli[:, None, None]
         #: N, norm of the nodal forces that a stress of kappa + mu in every cell would add up to.
@@ -101,6 +110,27 @@ class Body:
         lagged = copy(self)
         lagged.lag = branches.lag(memory, dt)
         return lagged
+
+    def holding(self, multipliers: Floats | None) -> "Body":
+        """The body with these multipliers (e, q) Pa of its cells with nu = 0.5."""
+        if multipliers is self.multipliers:
+            return self
+        held = copy(self)
+        held.multipliers = multipliers
+        return held
+
+    def kept_pressures(self, pressures: Floats) -> Floats | None:
+        """Pressures (e, q) Pa as multipliers: of the cells with nu = 0.5, zero in others."""
+        return None if self.kept is None else np.where(self.kept[:, None], pressures, 0.0)
+
+    def volume_error(self, u: Floats) -> float:
+        """The largest |theta| = |projected J - 1| of the cells with nu = 0.5."""
+        if self.kept is None:
+            return 0.0
+        error = np.empty(self.weights.shape)
+        for b in self._blocks(u):
+            error[b.cells] = self._mean(b, volume_change(b.H))
+        return float(np.abs(error[self.kept]).max())
 
     def isochoric(self, u: Floats) -> Floats:
         """The second Piola-Kirchhoff stress (e, q, 3, 3) Pa of the relaxed isochoric law."""
@@ -226,6 +256,8 @@ class Body:
     def _slopes(self, b: _Block, s: Floats, ds: Floats | None = None) -> tuple[Floats, Floats]:
         """Pressures (b, q) Pa and U'' Pa of the measures s, with the change that `ds` makes."""
         _, p, stiff = b.law.volumetric(self._mean(b, s), b.kappa)
+        if self.multipliers is not None:
+            p = p + self.multipliers[b.cells]
         return self._mean(b, p if ds is None else p + stiff * self._mean(b, ds)), stiff
 
     def _nodal_pressures(self, u: Floats) -> Floats | None:

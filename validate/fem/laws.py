@@ -147,7 +147,7 @@ def parts_of(material: Material, *, averaged: bool) -> tuple[Law, float]:
     Raises `SceneError` as `law_of` does where the volume change is `averaged`: what is left of a
     coupled law is not isochoric.
     """
-    law, kappa = law_of(material), material.bulk_modulus
+    law, kappa = law_of(material), material.assembled_bulk_modulus
     if averaged or material.coefficients.volumetric == "split":
         return law_of(instant(material), isochoric=True), kappa
     bulk = coupled_lambda(material.coefficients, law.mu, kappa)
@@ -168,9 +168,13 @@ def instant(material: Material) -> Material:
 def stiffened(material: Material, factor: float) -> Material:
     """Another shear modulus and coefficients by a factor, at the same bulk modulus."""
     c, mu, kappa = material.coefficients, factor * material.shear_modulus, material.bulk_modulus
+    if material.incompressible:
+        scaled_modulus, nu = 3 * mu, 0.5
+    else:
+        scaled_modulus = 9 * kappa * mu / (3 * kappa + mu)
+        nu = (3 * kappa - 2 * mu) / (2 * (3 * kappa + mu))
     scaled = replace(
         c, C01=factor * c.C01, C20=factor * c.C20, C30=factor * c.C30,
         ogden_mu=tuple(factor * m for m in c.ogden_mu),
     )  # fmt: skip
-    E, nu = 9 * kappa * mu / (3 * kappa + mu), (3 * kappa - 2 * mu) / (2 * (3 * kappa + mu))
-    return replace(material, E=E, nu=nu, coefficients=scaled, prony=Prony())
+    return replace(material, E=scaled_modulus, nu=nu, coefficients=scaled, prony=Prony())

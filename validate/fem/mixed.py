@@ -63,9 +63,10 @@ def mixed_static(scene: Scene) -> MixedStatic:
     basis = Basis(domain, ElementVector(fine()), intorder=5)
     pressure = basis.with_element(coarse())
     lam, mu = (scene.thickness * c for c in lame_constants(scene))
+    soft = np.where(scene.per_cell(lambda m: m.incompressible), 0.0, scene.thickness**2 / lam)
     A = asm(BilinearForm(_shear), basis, mu=mu[:, None])
     B = asm(BilinearForm(_volume), basis, pressure)
-    D = asm(BilinearForm(_squeeze), pressure, by=scene.thickness**2 / lam[:, None])
+    D = asm(BilinearForm(_squeeze), pressure, by=soft[:, None])
     B = scene.thickness * B
     free = np.setdiff1d(np.arange(basis.N), _held(scene, domain, basis))
     saddle = sparse.block_array([[A[free][:, free], -B[:, free].T], [-B[:, free], -D]]).tocsc()

@@ -12,6 +12,9 @@ from validate.scene.laws import Coefficients, law_kind
 from validate.scene.prony import Prony
 from validate.scene.stability import require_stable
 
+#: Bulk modulus over shear modulus of the penalty beside unknown pressures at nu = 0.5.
+_PENALTY = 1000.0
+
 LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"]
 
 
@@ -21,14 +24,15 @@ class Material:
 
     Every law has this E and nu at small strain, which is all that the linear schemes use;
     `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
-    whose isochoric stress comes late. Dynamic schemes need rho kg/m^3; Rayleigh
+    whose isochoric stress comes late. At nu = 0.5 mixed cells and static schemes keep the volume
+    exactly (`fem.incompressible`), others refuse it. Dynamic schemes need rho kg/m^3; Rayleigh
     damping is C = mass_damping M + stiffness_damping K, in 1/s and s (the alpha_0 and alpha_1 of
     paper 001, eq 7). Raises `SceneError` for values out of range, coefficients that the law does
     not know, and those that lose positive energy, with the stretch.
     """
 
     E: float = quantity(MISSING, "Pa", "Young's modulus at small strain")
-    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain")
+    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells")
     law: LawName = quantity("linear", "1", "linear, or the law at large strain")
     rho: float | None = quantity(None, "kg/m^3", "density")
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
@@ -39,10 +43,10 @@ class Material:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.E) and self.E > 0):
             raise SceneError(f"modulus E = {self.E:g} Pa: it must be positive")
-        if not -1 < self.nu < 0.5:
+        if not -1 < self.nu <= 0.5:
             raise SceneError(
-                f"Poisson ratio nu = {self.nu:g}: displacement elements need -1 < nu < 0.5 "
-                "(1/(1 - 2 nu) is infinite at 0.5); use at most 0.4999"
+                f"Poisson ratio nu = {self.nu:g}: needs -1 < nu <= 0.5; use at most 0.4999, or 0.5 "
+                "with mixed cells"
             )
         if self.rho is not None and not (np.isfinite(self.rho) and self.rho > 0):
             raise SceneError(f"density rho = {self.rho:g} kg/m3: it must be positive")
@@ -81,8 +85,18 @@ class Material:
 
     @property
     def bulk_modulus(self) -> float:
-        """kappa Pa."""
-        return self.E / (3 * (1 - 2 * self.nu))
+        """kappa Pa, infinite at nu = 0.5."""
+        return np.inf if self.incompressible else self.E / (3 * (1 - 2 * self.nu))
+
+    @property
+    def incompressible(self) -> bool:
+        """Whether the volume is kept exactly."""
+        return self.nu == 0.5
+
+    @property
+    def assembled_bulk_modulus(self) -> float:
+        """kappa Pa; at nu = 0.5 the finite penalty that is assembled beside unknown pressures."""
+        return _PENALTY * self.shear_modulus if self.incompressible else self.bulk_modulus
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from validate.errors import SceneError
 from validate.scene.material import Material
 from validate.scene.meshless import Meshless
 
@@ -20,6 +21,10 @@ class MaterialPoint(Meshless):
 
     material: Material
     mode: StretchMode
+
+    def __post_init__(self) -> None:
+        if self.material.incompressible:
+            raise SceneError("nu = 0.5 at a material point: it needs nu < 0.5; use nu <= 0.49999")
 
     @property
     def materials(self) -> tuple[Material, ...]:

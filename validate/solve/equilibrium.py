@@ -34,7 +34,8 @@ class Balance:
     iteration the ones that it has foreseen (`Body.extrapolated`).
 
     `unbalanced` N is the residual's norm over the free unknowns, zero where it is the stress's own
-    rounding; `acting` N the norm of the forces that act; `gap` the largest error of V/V0.
+    rounding; `acting` N the norm of the forces that act; `gap` the largest error of V/V0, of
+    cavities and of cells with nu = 0.5, whose `multipliers` (e, q) Pa keep it (`fem.hyperelastic`).
     """
 
     u: Floats
@@ -47,6 +48,7 @@ class Balance:
     unbalanced: float
     acting: float
     stresses: Floats | None = None
+    multipliers: Floats | None = None
 
     def merit(self, force: float) -> float:
         """What a line search lowers: the residual in units of `force` N and the volume error."""
@@ -87,13 +89,15 @@ class Equilibrium:
         inputs: Floats,
         target: Floats,
         stresses: Floats | None = None,
+        multipliers: Floats | None = None,
     ) -> Balance:
         """The forces at u, P and the inputs, with volumes asked for as ratios `target` (c,)."""
         cavities = self.system.cavities
         x = self._places(u)
         ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
         loads = np.array([pressure_load(c, x).ravel() for c in cavities]).reshape(-1, len(u))
-        inner = self.body.force(u)
+        multipliers = self.body.multipliers if multipliers is None else multipliers
+        inner = self.body.holding(multipliers).force(u)
         f = self.system.loads @ inputs[len(self.system.scene.drives) :]
         residual = inner - pressures @ loads - f
         rounding = 4 * np.finfo(float).eps * self.body.unit_force
@@ -101,10 +105,12 @@ class Equilibrium:
         pushing = float(np.abs(pressures) @ np.linalg.norm(loads, axis=1))
         acting = max(*(float(np.linalg.norm(x)) for x in (inner, f)), pushing, rounding)
         gap = float(np.abs(ratios - target).max(initial=0.0)) if self.constrained else 0.0
+        gap = max(gap, self.body.volume_error(u))
         unbalanced = free if free > rounding else 0.0
         return Balance(
-            u, pressures, inputs, residual, loads, ratios, gap, unbalanced, acting, stresses
-        )
+            u, pressures, inputs, residual, loads, ratios, gap, unbalanced, acting, stresses,
+            multipliers,
+        )  # fmt: skip
 
     def tangent(self, at: Balance) -> Tangent:
         """Factorises A at a balance; `SceneError` where a pivot vanishes."""
@@ -121,7 +127,7 @@ class Equilibrium:
         return Tangent(factor, np.hstack([driven, loaded]), pressed, negative, at.u)
 
     def _matrix(self, at: Balance) -> sparse.csr_array:
-        A = self.body.tangent(at.u, at.stresses)
+        A = self.body.holding(at.multipliers).tangent(at.u, at.stresses)
         x = self._places(at.u)
         for P, cavity in zip(at.pressures, self.system.cavities, strict=True):
             if P:

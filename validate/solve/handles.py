@@ -22,7 +22,8 @@ class Handles:
     them ("rigid", "needle").
 
     `inertia` says that it marches in time with masses; the others which parts a scene may have.
-    `mesh` is False for what solves a scene without one; `viscous`: that stress may relax.
+    `mesh` is False for what solves a scene without one; `viscous`: that stress may relax;
+    `incompressible`: nu = 0.5.
     """
 
     law: tuple[LawName, ...]
@@ -33,6 +34,7 @@ class Handles:
     contact: tuple[ContactName, ...] = ("foundations",)
     mesh: bool = True
     viscous: bool = False
+    incompressible: bool = False
 
     def covers(self, scene: AnyScene) -> bool:
         return not _refused(self, scene)
@@ -40,7 +42,7 @@ class Handles:
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
 LARGE_DYNAMICS = Handles(LARGE, inertia=True, cavities=False, viscous=True)
-LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, viscous=True)
+LARGE_STATICS = Handles(LARGE, inertia=False, cavities=True, viscous=True, incompressible=True)
 
 
 class Handling(Protocol):
@@ -56,6 +58,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "point": ("StretchTest",),
     "linear": ("ExactPressure", "Newmark"),
     **dict.fromkeys(LARGE, ("StaticNewton", "NewtonDynamics")),
+    "incompressible": ("QuasiStatic", "StaticNewton"),
     "viscous": ("StaticNewton", "NewtonDynamics"),
     "cavities": ("ExactPressure", "StaticNewton"),
     "loads": ("QuasiStatic", "NewtonDynamics"),
@@ -89,6 +92,8 @@ def _refused(handles: Handles, scene: AnyScene) -> tuple[str, str] | None:
         return law, f"cannot solve the law '{law}', only {', '.join(handles.law)}"
     if any(m.prony.g for m in scene.materials) and not handles.viscous:
         return "viscous", "remembers no stress: it takes no Prony series"
+    if any(m.incompressible for m in scene.materials) and not handles.incompressible:
+        return "incompressible", "solves nu <= 0.4999, not 0.5"
     if isinstance(scene, MaterialPoint):
         return None
     if scene.cavities and not handles.cavities:

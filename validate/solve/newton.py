@@ -117,11 +117,12 @@ def _rest(problem: Equilibrium) -> Found:
 @dataclass(frozen=True)
 class Loaded:
     """Displacements u (N,) m and pressures (c,) Pa in equilibrium under inputs (k + l,): drives in
-    m, then loads in N and weights in m/s^2."""
+    m, then loads in N and weights in m/s^2; at nu = 0.5 the multipliers (e, q) Pa of the cells."""
 
     u: Floats
     pressures: Floats
     inputs: Floats
+    multipliers: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ class NewtonStepper:
         """The equilibrium of a state: remembered, or its forces and tangent made again."""
         if self.memory.last.balance.u is at.u:
             return replace(self.memory.last, iterations=0, factorisations=0)
-        balance = self.problem.balance(at.u, at.pressures, at.inputs, target)
+        balance = self.problem.balance(at.u, at.pressures, at.inputs, target, None, at.multipliers)
         return Found(balance, self.problem.tangent(balance), factorisations=1)
 
     def _walked(self, k: int, good: Found, inputs: Floats, target: Floats) -> State:
@@ -247,8 +248,9 @@ class NewtonStepper:
         if bad:
             words = f"{bad.count} of {bad.points} quadrature points inverted (det F <= 0)"
             return Failed("invalid", f"{words}, first in element {bad.first}")
-        stresses = body.extrapolated(last.u, at.u - last.u)
-        return self.problem.balance(at.u, at.pressures, at.inputs, target, stresses)
+        stresses = body.holding(last.multipliers).extrapolated(last.u, at.u - last.u)
+        multipliers = body.kept_pressures(stresses)
+        return self.problem.balance(at.u, at.pressures, at.inputs, target, stresses, multipliers)
 
     def _settled(self, at: Balance) -> bool:
         return at.unbalanced <= self.settings.tolerance * at.acting and at.gap <= _VOLUME
@@ -286,7 +288,8 @@ class NewtonStepper:
             float(found.factorisations),
         )
         named = MappingProxyType(dict(zip(self.units, numbers, strict=True)))
-        return State(k, Loaded(at.u, at.pressures, at.inputs), failure, found.iterations, named)
+        reached = Loaded(at.u, at.pressures, at.inputs, at.multipliers)
+        return State(k, reached, failure, found.iterations, named)
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""

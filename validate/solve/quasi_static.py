@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from validate.arrays import Floats
+from validate.fem.incompressible import keep_volumes
 from validate.fem.system import System
 from validate.solve.dynamic import InertialStepper, reactions
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
@@ -16,22 +17,29 @@ from validate.solve.types import State, Stepper
 class QuasiStatic:
     """Linear statics of drives and loads, by superposition of one solved column per input."""
 
-    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False)
+    handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False, incompressible=True)
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""
         require_handled(system.scene, self)
         columns = np.hstack([system.moves, np.zeros_like(system.loads)])
         forces = np.hstack([-(system.K @ system.moves), system.loads])
-        columns[system.free] = system.factor().solve(forces[system.free])
-        return QuasiStaticStepper(system, reactions(system, None), columns)
+        factor = system.factor()
+        columns[system.free] = factor.solve(forces[system.free])
+        pressed = np.zeros((len(system.scene.drives), columns.shape[1]))
+        if any(m.incompressible for m in system.scene.materials):
+            columns, held = keep_volumes(system, factor, columns, system.loads)
+            pressed = system.moves.T @ held
+        return QuasiStaticStepper(system, reactions(system, None), columns, pressed)
 
 
 @dataclass(frozen=True)
 class QuasiStaticStepper(InertialStepper):
-    """States carry displacements (N,) m; `columns` (N, k + l) are those of a unit input each."""
+    """States carry displacements (N,) m; `columns` (N, k + l) are those of a unit input each,
+    `pressed` (k, k + l) N the drives' forces of multipliers at nu = 0.5."""
 
     columns: Floats
+    pressed: Floats
 
     def rest(self) -> State:
         return State(0, np.zeros(len(self.columns)))
@@ -39,8 +47,8 @@ class QuasiStaticStepper(InertialStepper):
     def step(self, state: State, inputs: Floats) -> State:
         """The static state under the inputs: drives in m, then loads in N."""
         u = self.columns @ inputs
-        still = np.zeros_like(u)
-        numbers = self.reactions.numbers(u, still, still, inputs[len(self.scene.drives) :])
+        r, loads = self.reactions, inputs[len(self.scene.drives) :]
+        numbers = r.named(r.K @ u - r.loads @ loads + self.pressed @ inputs)
         return State(state.k + 1, u, numbers=numbers)
 
     def field(self, state: State) -> Floats:

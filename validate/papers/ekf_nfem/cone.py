@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from validate.errors import SceneError
 from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.papers.ekf_nfem.cone_twin import (
     ConeTwin,
@@ -29,10 +30,15 @@ from validate.replay.followed import Truth
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.mesh_file import read_mesh
-from validate.scene.scene import Drive, Load, Probe, Scene, Support
+from validate.scene.scene import Dilatation, Drive, Load, Probe, Scene, Support
 
 REACH = ConeTwin().force
 SHEAR = {"paper": 22_081.0, "cylinders_slip": 31_200.0, "cylinders_bonded": 18_500.0}  # Pa
+
+
+_DILATATION: Mapping[str, Dilatation] = {
+    "p1": "pointwise", "p1_mean": "nodal_mean", "p2": "pointwise", "p2_mixed": "mixed",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,9 @@ class ConeModel:
     """`plate`: moved by the tracked plate; else pushed by the force, lateral motion held on top."""
 
     plate: bool = quantity(False, "1", "moved by the plate, not pushed by the force")
-    element: Literal["p1", "p1_mean", "p2"] = quantity("p1", "1", "p1_mean: nodal mean dilatation")
+    element: Literal["p1", "p1_mean", "p2", "p2_mixed"] = quantity(
+        "p1", "1", "p1_mean: nodal mean dilatation; p2_mixed: a pressure in every cell"
+    )
     law: Literal["svk", "neo_hooke"] = quantity("svk", "1", "law of the material")
 
 
@@ -98,15 +106,20 @@ def _material(p: PressedCone, model: ConeModel, nu: float, damping: float) -> Ma
 
 def _quarter(p: PressedCone, model: ConeModel) -> Scene:
     """A quarter between bonded plates, the upper one driven down."""
+    if p.material.nu == 0.5 and model.element != "p2_mixed":
+        raise SceneError(
+            f"material.nu = 0.5 with element '{model.element}': it needs nu < 0.5; choose element "
+            "p2_mixed (--methods plate_mixed), or nu <= 0.4999"
+        )
     s, grid = p.twin, p.mesh
     mesh = quarter_cone(s.bottom, s.top, s.height, grid.radial, grid.axial, grid.grading)
     scene = cone_scene(s)
     inside = {n: at for n, at in marker_places(s).items() if (at >= 0).all()}
     return replace(
         scene,
-        mesh=quadratic(mesh) if model.element == "p2" else mesh,
+        mesh=quadratic(mesh) if model.element in ("p2", "p2_mixed") else mesh,
         material=_material(p, model, p.material.nu, 0.0),
-        dilatation="nodal_mean" if model.element == "p1_mean" else "pointwise",
+        dilatation=_DILATATION[model.element],
         drives=(Drive("plate", "top", (0.0, 0.0, -1.0)),),
         probes=tuple(Probe(n, tuple(at)) for n, at in inside.items()),
     )

@@ -5,7 +5,7 @@ so slowly that every instant is static. The machine raises the force linearly; i
 the compression plus its own compliance and the seating of the plate, while a camera follows the
 plate (node_A) and the side (node_B to node_E).
 
-Departures from the paper: nu 0.4995 for its 0.5, which no displacement element has; a neo-Hookean
+Departures from the paper: nu 0.4995 for its 0.5, which only mixed cells have; a neo-Hookean
 law for its St. Venant-Kirchhoff; a tracked plate, where the paper does not say what it measured.
 Its 0.15 N compress this cone by a few hundredths of a millimetre at most: `force` is a setting.
 """
