@@ -30,5 +30,5 @@ def test_newton_where_no_other_method_solves_the_law() -> None:
 def test_a_scheme_of_one_law_lists_and_takes_no_other(phantom: Experiment) -> None:
     listed = {p.path: p.type for p in parameters_of(phantom)}
     assert listed["methods.p1_loop.law"] == "linear"
-    with pytest.raises(UsageError, match="methods.p1_loop.law=svk: PressureLoop solves linear; "):
+    with pytest.raises(UsageError, match=r"methods\.p1_loop\.law=svk: PressureLoop solves linear; "):
         all_methods(phantom, Options({"methods.p1_loop.law": "svk"}))
