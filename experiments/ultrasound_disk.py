@@ -30,7 +30,9 @@ EXPERIMENT = Experiment(
     parameters=ImagedDisk(),
     methods={"rigid": Method("rigid disk of nominal diameter", RigidMotion())},
     accepted=("rigid",),
-    accept=(Accept("diameter", 1e-3, "a twentieth of the diameter"),),
+    accept=(
+        Accept("diameter", 1e-3, "a twentieth of the diameter, rms over images", statistic="rms"),
+    ),
     load=load,
     build=build,
     place=place,

@@ -130,7 +130,7 @@ def test_a_run_without_an_accepted_method_fails_but_reports(tmp_path: Path) -> N
     arguments = ["run", "fluid_phantom", "--methods", "p1_fluid,p1_loop", "--out", str(tmp_path)]
     done = called(*arguments, *COARSE, cwd=tmp_path)
     assert done.returncode == 1, done.stderr
-    assert "Nothing was decided" in done.stdout
+    assert "Nothing was compared" in done.stdout
     (folder,) = tmp_path.glob("fluid_phantom+methods+*")  # other methods, another folder
     assert f"{folder.name}/report.html" in done.stdout
     results = json.loads((folder / "results.json").read_text("utf-8"))

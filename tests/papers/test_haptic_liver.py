@@ -198,7 +198,7 @@ def test_live_in_a_thread_of_its_own_replays_to_the_same_numbers(
     traces = again.methods[0].runs[0].traces
     force = np.column_stack([traces[f"tool.force.{a}"].y for a in "xyz"])
     assert np.array_equal(force[-len(done.F) :], done.F)
-    assert {c.name for c in again.checks} == {f"given.{a}.rms@all" for a in "xyz"}
+    assert {c.name for c in again.checks} == {f"given.{a}.max@all" for a in "xyz"}
     assert again.passed
 
 

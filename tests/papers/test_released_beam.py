@@ -306,9 +306,10 @@ def test_the_swing_under_gravity_is_fitted_and_rest_is_evidence(
 ) -> None:
     result = compare(beam, Options({}))
     assert result.kind == "measured"
-    assert result.passed
+    assert result.as_expected
     verdicts = {c.name: c.verdict for c in result.methods[0].checks}
-    assert {v for n, v in verdicts.items() if n.startswith("tip.")} == {"good enough"}
+    assert verdicts["tip.axial.max@settled"] == "good enough"
+    assert verdicts["tip.vertical.max@settled"] == "undecided"  # measured to 0.8 mm of 1 mm
     assert {v for n, v in verdicts.items() if not n.startswith("tip.")} == {"fitted"}
     (fast,) = (s for s in result.identified if s.name == "material.relaxation.fast")
     assert fast.value == pytest.approx(0.219, abs=0.01)
@@ -324,10 +325,9 @@ def test_the_loaded_swing_is_predicted_from_the_one_under_gravity(
     result = compare(beam, Options(given))
     checks = {c.name: c for c in result.methods[0].checks}
     assert abs(checks["ringing.frequency@swing"].value) < 0.3
-    assert checks["ringing.frequency@swing"].verdict == "good enough"
-    assert all(c.value < 0.1 for n, c in checks.items() if n.startswith("swing."))
+    assert checks["ringing.frequency@swing"].validation == "not distinguishable"
     assert abs(checks["tip.vertical.max@settled"].value) < 1e-3
-    assert not {c.verdict for c in checks.values()} & {"fitted", "differs"}
+    assert not {c.validation for c in checks.values()} & {"fitted", "differs"}
     assert {p.verdict for p in result.published} == {"reproduced"}
 
 

@@ -124,7 +124,7 @@ def test_a_wrong_landmark_differs(tmp_path: Path, shared_data: Path) -> None:
     devices.write_text(text.replace('Name="#3" Position="104.3 45.0 0.0"',
                                     'Name="#3" Position="104.3 45.0 3.0"'))  # fmt: skip
     result = compare(experiment("stylus_phantom"), {"landmarks": str(devices)})
-    assert result.checks[0].verdict == "differs"
+    assert result.checks[0].validation == "differs"
     assert not [p for p in result.published if p.verdict == "reproduced"]
 
 

@@ -280,7 +280,7 @@ def test_a_motion_that_was_only_noted_is_judged_by_outlines(tmp_path: Path) -> N
     assert verdicts(compare(experiment(tmp_path, p, seen, "contour"))) == names
     twice = replace(p, moved=replace(by, noted=(0.0, 2e-3)))
     found = verdicts(compare(experiment(tmp_path, twice, seen, "contour")))
-    assert found["contour.max@high"] == "differs"
+    assert found["contour.max@high"] == "not good enough"
     for noted in ((), (1e-3,), (1e-3, 1e-3)):
         with pytest.raises(UsageError, match="two amounts or more that differ"):
             compare(experiment(tmp_path, replace(p, moved=replace(by, noted=noted)), seen))

@@ -179,9 +179,12 @@ def test_set_up_is_timed_from_the_scene_on(monkeypatch: pytest.MonkeyPatch) -> N
 
 @dataclass(frozen=True)
 class Runs(Breaks):
-    """A stepper that goes on, but whose nodes are far away from one step on."""
+    """A filter that goes on, but whose nodes are far away from one step on."""
 
     far: float = 0.0  # m
+
+    def unheard(self, numbers: object) -> str:
+        return ""
 
     def field(self, state: State) -> np.ndarray:
         return self.inner.field(state) + (self.far if state.numbers.get("far") else 0.0)

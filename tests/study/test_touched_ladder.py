@@ -11,14 +11,14 @@ from validate.fem.system import build
 from validate.papers.async_regions.bodies import block
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.ladder import Trial
+from validate.replay.ladder import RUNGS, Trial
 from validate.replay.ladder_default import body_of, trial_of
 from validate.replay.ladder_touched import Divided
 from validate.solve.regions import AsyncRegions
 from validate.solve.types import StepTimes
 from validate.study.choose import Wanted, meeting, misses
 from validate.study.choose_facts import facts
-from validate.study.climb import rungs
+from validate.study.climb import Climb, require_judged
 from validate.study.job import Where
 from validate.study.trade import Trade, TradeRow
 from validate.study.trade_exhibits import trade_exhibits
@@ -91,7 +91,9 @@ def test_a_rate_is_held_by_the_slow_steps_of_regions(trial: Trial) -> None:
 
 @pytest.mark.slow
 def test_sizes_are_told_by_what_was_measured(touched: Experiment, tmp_path: Path) -> None:
-    trades = dict(rungs(touched, quick=True, out=tmp_path, where=Where(workers=0)))
+    climbed = Climb(touched, quick=True, out=tmp_path, where=Where(workers=0))
+    reached = {rung: climbed(rung, None) for rung in RUNGS}
+    trades = {rung: found.trade for rung, found in reached.items() if found is not None}
     assert list(trades) == ["modal", "prefactored", "regions"]
     assert regions_exhibit(trades["prefactored"]) is None
     told: Trade = trades["regions"]
@@ -102,3 +104,7 @@ def test_sizes_are_told_by_what_was_measured(touched: Experiment, tmp_path: Path
     assert facts(told, 1e-3)[1].name == "strain level (pilot, coarse mesh)"
     reduced = min(r.error for r in trades["modal"].rows if r.error is not None)
     assert reduced < 0.1 * told.moved
+    forces = [r.force for record in told.done.records.values() if record.value
+              for r in record.value.strides if r.u is not None]  # fmt: skip
+    assert all(force is not None and np.abs(force).max() > 0 for force in forces)
+    require_judged(told.trial, "N")

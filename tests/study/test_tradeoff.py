@@ -1,7 +1,7 @@
 """A small trade whose answers are known, and fronts and memory by hand."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +13,7 @@ from scipy import sparse
 
 from validate.cli import studying
 from validate.cli.main import run
-from validate.errors import ComparisonError, SceneError
+from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.factor import factorise
 from validate.fem.system import build
 from validate.replay.experiment import Experiment
@@ -21,7 +21,7 @@ from validate.replay.ladder import RUNGS, LawPair, Rival, Rung, Trial
 from validate.scene.box import box
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Load, Scene, Support
+from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.implicit import NewtonDynamics
 from validate.solve.modal import Modal
@@ -154,65 +154,100 @@ def test_a_trade_is_told_in_numbers_that_are_finite(measured: Trade) -> None:
     assert {row[-1] for row in cells_table(measured)} == {r.failed or None for r in measured.rows}
     assert None in {row[-1] for row in cells_table(measured)}
     assert len(told["cells"]) == len(measured.rows)
-    climb = [(rung, measured) for rung in RUNGS]
-    choice = choose(climb, wanted("1mm", "1Hz"), False, lambda trade, row, dt: row)
+    choice = choose(climbing(measured, []), wanted("1mm", "1Hz"), False, lambda trade, row, dt: row)
     assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
-    assert {c.verdict for c in choice.ladder[1:]} == {"not climbed"}
 
 
-def climbing(whole: Trade, asked: list[str]) -> Iterator[tuple[Rung, Trade]]:
-    """The trade rung by rung, with those that were asked for."""
+def climbing(
+    whole: Trade, asked: list[tuple[str, float | None]], left_out: tuple[str, ...] = ()
+) -> Callable[[Rung, float | None], climb.Reached | None]:
+    """The trade rung by rung, with those that were asked for; solvers `left_out` have a bound."""
     solvers: set[str] = set()
-    for rung in RUNGS:
-        asked.append(rung)
-        solvers |= {s.name for s in whole.trial.solvers if s.rung == rung}
+
+    def climbed(rung: Rung, fastest: float | None) -> climb.Reached | None:
+        asked.append((rung, fastest))
+        mine = {s.name for s in whole.trial.solvers if s.rung == rung}
+        out = [name for name in mine if name in left_out and fastest is not None]
+        solvers.update(mine - set(out))
         rows = tuple(r for r in whole.rows if r.solver.name in solvers)
-        yield rung, replace(whole, rows=rows)
+        bounds = tuple(
+            climb.Excluded(rung, f"{n}, P1", f"{n}, P1 mesh 1", 2e-3, fastest or 0.0) for n in out
+        )
+        return climb.Reached(replace(whole, rows=rows), bounds)
+
+    return climbed
 
 
-def test_the_climb_ends_at_the_first_rung_that_meets_both(measured: Trade) -> None:
-    asked: list[str] = []
-    best = {s.rung: min((r.total for r in rows_of(measured, s.name) if r.total), default=1.0)
-            for s in measured.trial.solvers}  # fmt: skip
-    assert best["modal"] < best["static superposition"]
-    between = (best["modal"] + best["static superposition"]) / 2
-    want = Wanted(between, 1.0)
-    choice = choose(climbing(measured, asked), want, False, lambda trade, row, dt: row)
-    assert asked == ["static superposition", "modal"]
+def retimed(whole: Trade, times: dict[str, float]) -> Trade:
+    """All cells of a solver with the same time s of a step."""
+    rows = []
+    for r in whole.rows:
+        t = times.get(r.solver.name, 1.0)
+        rows.append(replace(r, step=r.step and StepTimes(t, t, t, 9), field_s=0.0))
+    return replace(whole, rows=tuple(rows))
+
+
+def test_the_pick_is_the_fastest_of_all_rungs(measured: Trade) -> None:
+    asked: list[tuple[str, float | None]] = []
+    times = {"static": 1e-6, "all modes": 2e-4, "average": 1e-4}
+    static = min(r.total or 1.0 for r in measured.rows if r.solver.name == "static")
+    average = max(r.total or 0.0 for r in rows_of(measured, "average"))
+    assert average < static
+    want = Wanted((average + static) / 2, 1.0)
+    choice = choose(climbing(retimed(measured, times), asked), want, False,
+                    lambda trade, row, dt: row)  # fmt: skip
+    assert [rung for rung, _ in asked] == list(RUNGS)
+    assert asked[2] == ("condensed", 2e-4)  # bounds are held against the pick so far
+    assert asked[-1] == ("large strain", 1e-4)
     assert choice.pick is not None
-    assert choice.pick.solver.rung == "modal"
-    assert [c.verdict for c in choice.ladder] == ["too wrong", "meets both", *5 * ["not climbed"]]
-    assert choice.ladder[2].evidence == "skipped: 'modal' meets both"
-    assert {r.solver.rung for r in choice.trade.rows} == {"static superposition", "modal"}
-    assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
+    assert choice.pick.solver.name == "average"  # above 'modal', that meets both too
+    assert choice.excluded == ()
+
+
+def test_a_rung_that_a_bound_excludes_says_so(measured: Trade) -> None:
+    times = {"static": 1e-6, "all modes": 2e-4, "average": 1e-4}
+    climbed = climbing(retimed(measured, times), [], left_out=("explicit",))
+    choice = choose(climbed, Wanted(1.0, 1.0), False, lambda trade, row, dt: row)
+    explicit = next(c for c in choice.ladder if c.rung == "explicit")
+    assert explicit.verdict == "excluded"
+    assert "at least 2e+03 us a step, more than 1 us of the pick" in explicit.evidence
+    tables = [t for e in choose_exhibits(choice) for t in e.tables if t.name == "excluded"]
+    assert [row[:2] for row in tables[0].rows] == [("explicit", "explicit, P1")]
+
+
+def test_a_bound_is_the_fastest_step_less_what_the_clock_hides() -> None:
+    steps = [StepTimes(t, 9.0, 9.0, 4) for t in (3.0, 2.0)]
+    strides = tuple(trade_cell.Stride(1.0, step=s, field_s=0.5) for s in steps)
+    assert climb.time_bound(Measured(strides)) == pytest.approx(2.5 / 1.25)
+    assert climb.time_bound(Measured((trade_cell.Stride(1.0, failed="refused"),))) is None
+    assert climb.time_bound(None) is None
 
 
 def test_where_nothing_meets_both_every_rung_is_climbed(measured: Trade) -> None:
-    asked: list[str] = []
-    climb = climbing(measured, asked)
-    choice = choose(climb, Wanted(1e-12, 1.0), False, lambda trade, row, dt: row)
-    assert (choice.pick, tuple(asked)) == (None, RUNGS)
-    assert "not climbed" not in {c.verdict for c in choice.ladder}
+    asked: list[tuple[str, float | None]] = []
+    climbed = climbing(measured, asked)
+    choice = choose(climbed, Wanted(1e-12, 1.0), False, lambda trade, row, dt: row)
+    assert (choice.pick, asked) == (None, [(rung, None) for rung in RUNGS])
 
 
 def test_a_rung_that_meets_both_only_at_its_own_step_is_left_for_the_next(measured: Trade) -> None:
-    asked: list[str] = []
+    asked: list[tuple[str, float | None]] = []
     slow = StepTimes(9.0, 9.0, 9.0, 9)
     choice = choose(
         climbing(measured, asked), Wanted(0.1, 1e3), False,
         lambda trade, row, dt: replace(row, dt=dt, step=slow),
     )  # fmt: skip
-    assert (choice.pick, tuple(asked)) == (None, RUNGS)
+    assert (choice.pick, asked) == (None, [(rung, None) for rung in RUNGS])
     assert len(choice.rejected) > 4
 
 
-def test_no_cell_of_a_rung_runs_before_it_is_asked_for(
-    phantom: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ran: list[str] = []
+@pytest.fixture
+def ran(monkeypatch: pytest.MonkeyPatch) -> list[TradeCell]:
+    """Cells that a climb of the small trade has run."""
+    ran: list[TradeCell] = []
 
     def noted(trial: Trial, cell: TradeCell) -> Measured:
-        ran.append(cell.solver)
+        ran.append(cell)
         return run_cell(trial, cell)
 
     monkeypatch.setattr(climb, "trial_of", lambda *_: small())
@@ -220,14 +255,72 @@ def test_no_cell_of_a_rung_runs_before_it_is_asked_for(
     monkeypatch.setattr(
         climb, "plan_of", lambda job, cells: Plan(job, cells, small, noted, Measured)
     )
-    climbed = climb.rungs(phantom, declared_law=True, out=tmp_path, where=Where(0))
+    return ran
+
+
+def test_no_cell_of_a_rung_runs_before_it_is_asked_for(
+    phantom: Experiment, tmp_path: Path, ran: list[TradeCell]
+) -> None:
+    climbed = climb.Climb(phantom, declared_law=True, out=tmp_path, where=Where(0))
     assert ran == []
-    rung, first = next(climbed)
-    assert (rung, set(ran)) == ("static superposition", {"", "static"})
-    rung, second = next(climbed)
-    assert (rung, set(ran)) == ("modal", {"", "static", "all modes"})
-    assert second.rows[: len(first.rows)] == first.rows
-    assert second.done.records.keys() > first.done.records.keys()
+    first = climbed("static superposition", None)
+    assert {c.solver for c in ran} == {"", "static"}
+    second = climbed("modal", None)
+    assert {c.solver for c in ran} == {"", "static", "all modes"}
+    assert first is not None
+    assert second is not None
+    assert second.trade.rows[: len(first.trade.rows)] == first.trade.rows
+    assert second.trade.done.records.keys() > first.trade.done.records.keys()
+    assert climbed("condensed", None) is None
+    assert climbed("large strain", None) is None  # --declared-law
+
+
+def test_a_candidate_slower_than_the_pick_is_timed_on_its_coarsest_mesh_only(
+    phantom: Experiment, tmp_path: Path, ran: list[TradeCell]
+) -> None:
+    climbed = climb.Climb(phantom, out=tmp_path, where=Where(0))
+    climbed("static superposition", None)
+    del ran[:]
+    reached = climbed("prefactored", 1e-12)
+    assert [(c.element, c.level, c.budget) for c in ran] == [("P1", 1, 0.0), ("P2", 1, 0.0)]
+    assert reached is not None
+    assert [e.candidate for e in reached.excluded] == ["average, P1", "average, P2"]
+    assert all(e.bound > e.pick == 1e-12 for e in reached.excluded)
+    assert {r.solver.name for r in reached.trade.rows} == {"static"}
+    reached = climbed("modal", 1e3)
+    assert reached is not None
+    assert (len(reached.excluded), {r.solver.name for r in reached.trade.rows}) == (
+        0, {"static", "all modes"},
+    )  # fmt: skip
+
+
+def test_errors_of_forces_are_those_of_what_drives_the_scene(
+    phantom: Experiment, tmp_path: Path
+) -> None:
+    """Without Poisson's ratio the force is E A d / h on every mesh: 4 kPa, 0.1 m, 1 mm: 0.4 N."""
+
+    def driven(element: str, level: int, law: LawName) -> Scene:
+        held = block(element, level, law)
+        material = Material(4e3, 0.0, law)
+        stage = Drive("stage", "z1", (0.0, 0.0, -1.0))
+        return replace(held, material=material, loads=(), drives=(stage,))
+
+    trial = replace(
+        small(), build=driven, inputs=lambda t: np.full((len(t), 1), 1e-3), pair=None,
+        solvers=(STATIC,), best=lambda dt: QuasiStatic(), dynamic=False,
+    )  # fmt: skip
+    cells = trade_cells(trial, Job("", ""))
+    done = finish(Plan(Job("", ""), cells, lambda job: trial, run_cell, Measured), tmp_path,
+                  Where(workers=0))  # fmt: skip
+    found = traded(phantom, trial, cells, done, False, "N")
+    assert found.moved == pytest.approx(0.4, rel=1e-9)
+    assert [r.error for r in found.rows] == pytest.approx([0.0] * 3, abs=1e-12)
+    assert found.shown(0.2) == "0.2 N"
+    climb.require_judged(trial, "N")
+    with pytest.raises(UsageError, match=r"--error in Pa: .* it has m: displacements; N: stage.fo"):
+        climb.require_judged(trial, "Pa")
+    assert trade_exhibits(found)[0].tables[0].headings[6] == "error / N"
+    assert "error_N" in trade_document(found)["cells"][0]
 
 
 @pytest.fixture
@@ -235,7 +328,7 @@ def commanded(measured: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command line's trade is the one above."""
     monkeypatch.setattr(studying, "find", lambda *_: measured.experiment)
     monkeypatch.setattr(studying, "trade", lambda experiment, **rest: measured)
-    monkeypatch.setattr(studying, "rungs", lambda experiment, **rest: climbing(measured, []))
+    monkeypatch.setattr(studying, "Climb", lambda experiment, **rest: climbing(measured, []))
 
 
 @pytest.mark.slow
@@ -316,7 +409,7 @@ def test_a_ladder_has_the_error_of_its_rungs(
     best = timed("fast", 2e-3, 4e-6)
     rungs = (Made(rung="modal", verdict="meets", best=best, evidence="one"),
              Made(rung="large", verdict="nothing ran", best=None, evidence="none"))  # fmt: skip
-    choice = Made(trade=measured, facts=(), ladder=rungs, by="error", rejected=())
+    choice = Made(trade=measured, facts=(), ladder=rungs, by="error", rejected=(), excluded=())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studying, "words", lambda choice: ())
         studying._show_choice(choice)

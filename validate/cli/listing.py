@@ -1,6 +1,7 @@
 """`validate list NAME`: one experiment with every parameter."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ from validate.cli.display import say, table
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
+from validate.replay.law_solver import laws_of
 from validate.report.plain import members
 
 
@@ -22,8 +24,14 @@ def show(name: str, named: tuple[Path, ...], as_json: bool) -> None:
 
 
 def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:
-    """Every settable path of an experiment, methods included."""
-    return describe(experiment.parameters) + describe(experiment.methods, "methods.")
+    """Every settable path of an experiment, methods included; a method's law with those choices
+    alone that it can take."""
+    laws = {f"methods.{name}.law": laws_of(m) for name, m in experiment.methods.items()}
+    methods = (
+        replace(p, type="|".join(known)) if (known := laws.get(p.path)) else p
+        for p in describe(experiment.methods, "methods.")
+    )
+    return (*describe(experiment.parameters), *methods)
 
 
 def _summary(experiment: Experiment) -> dict[str, Any]:

@@ -283,7 +283,10 @@ def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
 
 
 @study.command()
-@click.option("--error", required=True, metavar="LENGTH", help="The largest error, as in 0.5mm.")
+@click.option(
+    "--error", required=True, metavar="ERROR",
+    help="The largest error; its unit says of what: 0.5mm (displacement), 0.2N (force), 300Pa.",
+)  # fmt: skip
 @click.option("--rate", required=True, metavar="RATE", help="The least rate, as in 1000Hz.")
 @click.option("--declared-law", is_flag=True, help="Leave out what the linear law itself costs.")
 @_studied

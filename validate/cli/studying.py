@@ -20,8 +20,9 @@ from validate.report.made import made
 from validate.report.numbers import MISSING, significant
 from validate.study import filter_page, stability_page, still_page, trade_page
 from validate.study.choose import Choice, choose, error_of, wanted
+from validate.study.choose_effects import stored_effects
 from validate.study.choose_exhibits import words
-from validate.study.climb import rungs
+from validate.study.climb import Climb
 from validate.study.engine import CELLS, Finished, study_folder
 from validate.study.filter_exhibits import RANKING, ranking_row
 from validate.study.filters import SEEDS, FilterStudy, study
@@ -142,19 +143,20 @@ def tradeoff(name: str, common: StudyOptions, guests: tuple[str, ...] = ()) -> i
 
 
 def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared_law: bool) -> int:
-    """Runs the pilots, climbs the ladder; 0 when a method meets both, else 1."""
+    """Runs the pilots of all candidates; 0 when a method meets both, else 1."""
     want = wanted(error, rate)
     experiment = find(name, Path.cwd(), common.named)
     words = ["quick"] * common.quick + [error, rate] + ["declared_law"] * declared_law
     place = f"choose{tag(words, [common.quick, want, declared_law])}"
     with running(experiment, place, "pilot runs", common) as report:
-        climb = rungs(
-            experiment, declared_law=declared_law, quick=common.quick, out=common.out,
-            where=common.where, report=report,
+        effects = stored_effects(experiment, common.out)
+        climb = Climb(
+            experiment, unit=want.unit, effects=effects, declared_law=declared_law,
+            quick=common.quick, out=common.out, where=common.where, report=report,
         )  # fmt: skip
         choice = choose(
             climb, want, declared_law,
-            lambda trade, row, dt: again(trade, row, dt, common.out, common.where),
+            lambda trade, row, dt: again(trade, row, dt, common.out, common.where), effects,
         )  # fmt: skip
     page = written(experiment, trade_page.told_choice(choice), place, common)
     if not common.as_json:
@@ -278,11 +280,17 @@ def _show_choice(choice: Choice) -> None:
         warn(warning)
     rows = [[f.name, f.value, f.means] for f in choice.facts]
     table("The scene's own numbers", ("what", "value", "asks for"), rows)
-    rows = []
+    rows, scale = [], choice.trade.scale
     for c in choice.ladder:
         error = None if c.best is None else error_of(c.best, choice.by)
-        rows.append([c.rung, c.verdict, _text(None if error is None else 1e3 * error), c.evidence])
-    table("The ladder", ("rung", "verdict", "error / mm", "evidence"), rows)
+        rows.append(
+            [c.rung, c.verdict, _text(None if error is None else scale * error), c.evidence]
+        )
+    head = ("rung", "verdict", f"error / {choice.trade.shown_unit}", "evidence")
+    table("The ladder", head, rows)
+    if choice.excluded:
+        rows = [[e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded]
+        table("Left out by a bound", ("rung", "candidate", "at least / us", "why"), rows)
     say("")
     for line in (*choice.rejected, *words(choice)):
         say(line, indent="  ")

@@ -10,6 +10,7 @@ from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, nearest_names, with_values
 from validate.replay.experiment import Experiment
 from validate.replay.guests import added_guests
+from validate.replay.law_solver import with_laws
 from validate.replay.method import Method
 from validate.scene.abaqus_lines import files_named
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
@@ -48,13 +49,14 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
 
 def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
     """Every method with the user's values, whether it is run or not: what identifies follows."""
-    return dict(with_values(experiment.methods, _split(options.values)[1]))
+    return dict(with_values(*with_laws(experiment.methods, _split(options.values)[1])))
 
 
 def doubtful(experiment: Experiment, values: Mapping[str, str]) -> tuple[str, ...]:
     """A line for each value that looks like one whose unit was forgotten."""
     mine, theirs = _split(values)
-    return (*doubts(experiment.parameters, mine), *doubts(experiment.methods, theirs))
+    methods, rest = with_laws(experiment.methods, theirs)
+    return (*doubts(experiment.parameters, mine), *doubts(methods, rest))
 
 
 def _split(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:

@@ -173,8 +173,10 @@ def _walk(
 
 
 def _run_away(stepper: Stepper, state: State, rows: Rows | None, *, shown: bool) -> str:
-    """Why displacements at the probes, or where a field is kept at every node, are no result."""
-    if rows is None and not shown:
+    """Why a filter's displacements at the probes, or at every node where a field is kept, are no
+    result."""
+    filtering = isinstance(stepper, Listening | Uncertain)  # schemes know their own limits
+    if not filtering or (rows is None and not shown):
         return ""
     u = stepper.field(state)
     found = float(np.abs(u if shown or rows is None else rows.apply(u)).max())

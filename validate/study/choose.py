@@ -1,39 +1,45 @@
 """The cheapest method of a scene that meets an error and a rate: a ladder, climbed by pilot runs.
 
-The pilots are the cells of the trade, run rung by rung from the cheapest methods on. The first rung
-with a cell that meets both ends the climb: its fastest such cell is the choice, and the rungs above
-are never run. For a scene with inertia it is run again with a new state at every tick of the rate
-before it is named.
+The pilots are the cells of the trade, run rung by rung from the cheapest methods on. The choice is
+the fastest cell of all that meet both. Once one does, candidates are left out whose step on their
+coarsest mesh already takes longer; the bound is shown. For a scene with inertia a cell is run again
+with a new state at every tick of the rate before it is named.
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from validate.errors import UsageError
 from validate.replay.ladder import RUNGS, Rung
+from validate.study.choose_effects import ShownEffects
 from validate.study.choose_facts import Fact, facts
-from validate.study.trade import Trade, TradeRow
-from validate.units import si_factor
+from validate.study.climb import Excluded, Reached
+from validate.study.trade import ErrorUnit, Trade, TradeRow
+from validate.units import in_si
 
 _TRIES = 4  # cells that are run again at the rate's own step
 _QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
 
+_UNITS: tuple[ErrorUnit, ...] = ("m", "N", "Pa")
+
 Again = Callable[[Trade, TradeRow, float], TradeRow]
+Climbs = Callable[[Rung, float | None], Reached | None]  # see `Climb`
 Meets = Literal[
-    "meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran", "not climbed"
+    "meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran", "excluded"
 ]
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """The largest error m and the least rate 1/s."""
+    """The largest error, in `unit`, and the least rate 1/s."""
 
     error: float
     rate: float
+    unit: ErrorUnit = "m"
 
     def __post_init__(self) -> None:
         for value, what in ((self.error, "error"), (self.rate, "rate")):
@@ -66,6 +72,7 @@ class Choice:
     by: str
     facts: tuple[Fact, ...]
     ladder: tuple[Climbed, ...]
+    excluded: tuple[Excluded, ...]
     pick: TradeRow | None
     confirmed: TradeRow | None
     nearest: TradeRow
@@ -73,13 +80,22 @@ class Choice:
 
 
 def wanted(error: str, rate: str) -> Wanted:
-    """`0.5mm` and `1000Hz` in SI; raises `UsageError`, or `RecordingError` for an unknown unit."""
+    """`0.5mm` (or `0.2N`, `300Pa`) and `1000Hz` in SI; the unit says what is judged.
+
+    Raises `UsageError`.
+    """
     number, unit = _split(error, "--error", "0.5mm")
     hertz, per = _split(rate, "--rate", "1000Hz")
     factors = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
     if per.lower() not in factors:
         raise UsageError(f"--rate {rate}: unit '{per}' is none of Hz, kHz, MHz; as in 1000Hz")
-    return Wanted(number * si_factor(unit, "length"), hertz * factors[per.lower()])
+    for si in _UNITS:
+        if (factor := in_si(1.0, unit, si)) is not None:
+            return Wanted(number * factor, hertz * factors[per.lower()], si)
+    raise UsageError(
+        f"--error {error}: '{unit}' is no unit of displacement, force or pressure; as in 0.5mm, "
+        "0.2N, 300Pa"
+    )
 
 
 def _split(text: str, option: str, example: str) -> tuple[float, str]:
@@ -129,35 +145,40 @@ def nearest(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> T
 
 
 def choose(
-    climb: Iterable[tuple[Rung, Trade]], want: Wanted, declared_law: bool, again: Again
+    climb: Climbs,
+    want: Wanted,
+    declared_law: bool,
+    again: Again,
+    effects: ShownEffects | None = None,
 ) -> Choice:
-    """The choice from trades that grow rung by rung, taken until a cell of the last rung meets
-    both; `again` runs a row's cell with another step s.
+    """The choice from trades that grow rung by rung; `again` runs a row's cell with another step s.
 
     Where large strain could not be solved, what the declared law costs is not counted either.
     Raises `UsageError` where no rung has a cell, or no cell an error.
     """
-    rejected: list[str] = []
-    climbed, trade = list[Rung](), None
-    pick = confirmed = None
-    for rung, trade in climb:
-        climbed.append(rung)
-        pick, confirmed = _picked(trade, rung, want, declared_law, again, rejected)
-        if pick is not None:
-            break
+    rejected, excluded = list[str](), list[Excluded]()
+    trade = pick = confirmed = None
+    for rung in RUNGS:
+        reached = climb(rung, None if pick is None else pick.time_s)
+        if reached is None:
+            continue
+        trade = reached.trade
+        excluded += reached.excluded
+        found = _picked(trade, rung, want, declared_law, again, rejected, pick)
+        if found is not None:
+            pick, confirmed = found
     if trade is None:
         raise UsageError("no rung of the ladder has a cell for this scene; see 'study tradeoff'")
     by, rows = _by(trade, declared_law), _judged(trade, declared_law)
     unsolved = left_out(declared_law, trade.law_words)
     ladder = tuple(
-        _climbed(trade, rung, rows, want, by, unsolved) if pick is None or rung in climbed
-        else Climbed(rung, 0, 0, None, "not climbed", f"skipped: '{climbed[-1]}' meets both")
-        for rung in RUNGS
-    )  # fmt: skip
+        _bounded(_climbed(trade, rung, rows, want, by, unsolved), excluded) for rung in RUNGS
+    )
     closest = nearest(rows, want, by, trade.trial.dynamic)
     return Choice(
-        trade, want, by, facts(trade, want.error), ladder, pick, confirmed, closest, tuple(rejected)
-    )
+        trade, want, by, facts(trade, want.error, effects), ladder, tuple(excluded), pick,
+        confirmed, closest, tuple(rejected),
+    )  # fmt: skip
 
 
 def _by(trade: Trade, declared_law: bool) -> str:
@@ -170,19 +191,27 @@ def _judged(trade: Trade, declared_law: bool) -> list[TradeRow]:
 
 
 def _picked(
-    trade: Trade, rung: Rung, want: Wanted, declared_law: bool, again: Again, rejected: list[str]
-) -> tuple[TradeRow | None, TradeRow | None]:
-    """The rung's fastest cell that meets both, and its run at the rate's own step where it has a
-    longer one; those that fail it are added to `rejected`."""
+    trade: Trade, rung: Rung, want: Wanted, declared_law: bool, again: Again, rejected: list[str],
+    best: TradeRow | None,
+) -> tuple[TradeRow, TradeRow | None] | None:  # fmt: skip
+    """The rung's fastest cell that meets both and is faster than the `best` of the rungs below, and
+    its run at the rate's own step where it has a longer one; those that fail it are added to
+    `rejected`."""
     by, dynamic = _by(trade, declared_law), trade.trial.dynamic
     rows = [r for r in _judged(trade, declared_law) if r.solver.rung == rung]
-    for row in meeting(rows, want, by, dynamic)[:_TRIES]:
+    faster = [
+        r for r in meeting(rows, want, by, dynamic)
+        if best is None or (r.time_s or 0.0) < (best.time_s or 0.0)
+    ]  # fmt: skip
+    for row in faster[:_TRIES]:
         dt = _rate_step(trade, row, want)
         tried = None if dt is None else again(trade, row, dt)
         if tried is None or max(misses(tried, want, by, dynamic)) <= 1:
             return row, tried
-        rejected.append(_refusal(tried, by))
-    return None, None
+        rejected.append(_refusal(trade, tried, by))
+    if len(faster) > _TRIES:
+        rejected.append(f"{rung}: {len(faster) - _TRIES} slower cells were not run again")
+    return None
 
 
 def _rate_step(trade: Trade, row: TradeRow, want: Wanted) -> float | None:
@@ -193,13 +222,13 @@ def _rate_step(trade: Trade, row: TradeRow, want: Wanted) -> float | None:
     return float(apart / np.ceil(apart * want.rate - 1e-9))
 
 
-def _refusal(row: TradeRow, by: str) -> str:
+def _refusal(trade: Trade, row: TradeRow, by: str) -> str:
     error, time = error_of(row, by), row.time_s
     if error is None or time is None:
         return f"{row.label}: with a state every {1e3 * row.dt:.3g} ms: {row.failed}"
     return (
         f"{row.label}: with a state every {1e3 * row.dt:.3g} ms its error is "
-        f"{1e3 * error:.3g} mm and a step takes {1e6 * time:.3g} us"
+        f"{trade.shown(error)} and a step takes {1e6 * time:.3g} us"
     )
 
 
@@ -222,10 +251,9 @@ def _climbed(
         )
         why = unsolved if left else _why_not(mine, dynamic)
         return Climbed(rung, len(mine), 0, None, "nothing ran", why)
-    lacks = scored[0].solver.lacks
-    if lacks:
+    if all(r.solver.lacks for r in scored):
         best = min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
-        words = f"{evidence(best, by)}; never chosen: it leaves out {lacks}"
+        words = f"{evidence(trade, best, by)}; never chosen: it leaves out {best.solver.lacks}"
         return Climbed(rung, len(mine), len(scored), best, "not the scene", words)
     good = meeting(scored, want, by, dynamic)
     best = good[0] if good else nearest(scored, want, by, dynamic)
@@ -233,16 +261,32 @@ def _climbed(
     verdict: Meets = "meets both"
     if wrong > 1 or late > 1:
         verdict = "neither" if min(wrong, late) > 1 else "too wrong" if wrong > 1 else "too slow"
-    words = f"{evidence(best, by)}; {len(good)} of its cells meet both"
+    words = f"{evidence(trade, best, by)}; {len(good)} of its cells meet both"
     return Climbed(rung, len(mine), len(scored), best, verdict, words)
 
 
-def evidence(row: TradeRow, by: str) -> str:
+def _bounded(climbed: Climbed, excluded: Sequence[Excluded]) -> Climbed:
+    """The rung with what bounds leave out of it."""
+    mine = [e for e in excluded if e.rung == climbed.rung]
+    if not mine:
+        return climbed
+    least = min(mine, key=lambda e: e.bound)
+    words = (
+        f"{len(mine)} candidates are left out: at least {1e6 * least.bound:.3g} us a step, more "
+        f"than {1e6 * least.pick:.3g} us of the pick"
+    )
+    if not climbed.run:
+        return replace(climbed, verdict="excluded", evidence=words)
+    return replace(climbed, evidence=f"{climbed.evidence}; {words}")
+
+
+def evidence(trade: Trade, row: TradeRow, by: str) -> str:
     """What a rung's best row reached, and what its error is made of."""
     error, time = error_of(row, by) or 0.0, row.time_s or np.nan
-    words = f"{row.label}: {1e3 * error:.3g} mm at {1 / time:.3g} Hz"
+    words = f"{row.label}: {trade.shown(error)} at {1 / time:.3g} Hz"
     if row.solver_error is not None and row.mesh_error is not None:
-        words += f" (mesh {1e3 * row.mesh_error:.3g} mm, solver {1e3 * row.solver_error:.3g} mm)"
+        mesh, solver = trade.shown(row.mesh_error), trade.shown(row.solver_error)
+        words += f" (mesh {mesh}, solver {solver})"
     return words
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.study.choose import Choice, error_of, meeting, misses
 from validate.study.ranking import SAME_TIME
-from validate.study.trade import TradeRow
+from validate.study.trade import ERRORS, TradeRow
 from validate.study.trade_exhibits import trade_exhibits
 from validate.study.trade_regions import pays
 
@@ -19,18 +19,20 @@ def choose_exhibits(choice: Choice) -> tuple[Exhibit, ...]:
     return (
         Exhibit("choice", "The choice", tuple(words(choice)), charts=(_chart(choice),)),
         Exhibit("numbers", "The scene's own numbers", tables=(_facts(choice),)),
-        Exhibit("ladder", "The ladder", tuple(choice.rejected), tables=(_ladder(choice),)),
+        Exhibit("ladder", "The ladder", tuple(choice.rejected),
+                tables=(_ladder(choice), *((_excluded(choice),) if choice.excluded else ()))),
         *trade_exhibits(choice.trade),
-    )
+    )  # fmt: skip
 
 
 def words(choice: Choice) -> Iterator[str]:
     """The verdict in sentences, plainly."""
     want = choice.wanted
-    asked = f"{_MM * want.error:.3g} mm and {want.rate:.4g} Hz"
+    asked = f"{choice.trade.shown(want.error)} and {want.rate:.4g} Hz"
     if choice.pick is not None:
-        first = f"the fastest cell of '{choice.pick.solver.rung}', the first rung that does"
+        first = f"the fastest cell that does (rung '{choice.pick.solver.rung}')"
         yield f"{described(choice.pick, choice)} meets {asked}: {first}."
+        yield from _left_out(choice)
         yield from _confirmed(choice)
         yield from _as_fast(choice)
     else:
@@ -40,16 +42,30 @@ def words(choice: Choice) -> Iterator[str]:
     yield from pays(choice.trade)
     floor = choice.trade.floor
     if want.error < floor:
-        yield f"The reference is itself off by {_MM * floor:.2g} mm: no cell can show that."
+        off = choice.trade.shown(floor, 2)
+        yield f"The reference is itself off by {off}: no cell can show that."
     what = "with what the linear law costs" if choice.by == "total" else "within the linear law"
     yield f"Errors are {what}; the rate is that of median steps with all displacements."
+    if choice.trade.unit != "m":
+        yield f"An error is the {ERRORS[choice.trade.unit]}."
 
 
 def described(row: TradeRow, choice: Choice) -> str:
     """A row by its numbers."""
     error, time = error_of(row, choice.by) or 0.0, row.time_s or 0.0
     step = f", steps of {_MM * row.dt:.3g} ms" if row.solver.stepped else ""
-    return f"{row.label}{step}: {_MM * error:.3g} mm at {1 / time:.4g} Hz ({_US * time:.3g} us)"
+    reached = choice.trade.shown(error)
+    return f"{row.label}{step}: {reached} at {1 / time:.4g} Hz ({_US * time:.3g} us)"
+
+
+def _left_out(choice: Choice) -> Iterator[str]:
+    if choice.excluded:
+        n = len(choice.excluded)
+        who = "1 candidate was" if n == 1 else f"{n} candidates were"
+        yield (
+            f"{who} left out by a bound: the step on the coarsest mesh takes longer than the "
+            "pick's, and finer meshes are slower."
+        )
 
 
 def _confirmed(choice: Choice) -> Iterator[str]:
@@ -119,7 +135,7 @@ def _ladder(choice: Choice) -> NumberTable:
         "verdict",
         "cells",
         "scored",
-        "error / mm",
+        f"error / {choice.trade.shown_unit}",
         "time / us",
         "rate / Hz",
         "evidence",
@@ -131,31 +147,42 @@ def _ladder(choice: Choice) -> NumberTable:
             error, time = error_of(rung.best, choice.by), rung.best.time_s
         rows.append(
             (rung.rung, rung.verdict, rung.run, rung.scored,
-             None if error is None else _MM * error, None if time is None else _US * time,
+             None if error is None else choice.trade.scale * error,
+             None if time is None else _US * time,
              None if time is None else 1 / time, rung.evidence)
         )  # fmt: skip
     title = "Every rung's fastest cell that meets both, else its nearest"
     return NumberTable("ladder", title, head, tuple(rows))
 
 
+def _excluded(choice: Choice) -> NumberTable:
+    head = ("rung", "candidate", "a step takes at least / us", "pick / us", "why")
+    rows = tuple((e.rung, e.candidate, _US * e.bound, _US * e.pick, e.why) for e in choice.excluded)
+    note = f"A bound is the pilot's median step over {SAME_TIME:g}: the clock is noisy."
+    return NumberTable("excluded", "Candidates left out by a bound", head, rows, note)
+
+
 def _chart(choice: Choice) -> Chart:
     by, want = choice.by, choice.wanted
     rows = [r for r in choice.trade.rows if error_of(r, by) and r.time_s]
     rungs = dict.fromkeys(r.solver.rung for r in rows)
-    series = [_series(rung, [r for r in rows if r.solver.rung == rung], by) for rung in rungs]
+    scale = choice.trade.scale
+    series = [
+        _series(rung, [r for r in rows if r.solver.rung == rung], by, scale) for rung in rungs
+    ]
     left = 0.5 * min(r.time_s or 1.0 for r in rows)
     low = 0.5 * min(error_of(r, by) or 1.0 for r in rows)
     x = _US * np.array([min(left, 0.5 / want.rate), 1 / want.rate, 1 / want.rate])
-    y = _MM * np.array([want.error, want.error, min(low, 0.5 * want.error)])
+    y = scale * np.array([want.error, want.error, min(low, 0.5 * want.error)])
     series.append(Series("wanted: left of and below this line", x, y))
     shown = choice.pick or choice.nearest
-    series.append(_series("the choice" if choice.pick else "the nearest", [shown], by))
+    series.append(_series("the choice" if choice.pick else "the nearest", [shown], by, scale))
     return Chart(
         "choice", "What is wanted and what there is", "time of a step with its displacements / µs",
-        "error / mm", tuple(series), log="xy",
+        f"error / {choice.trade.shown_unit}", tuple(series), log="xy",
     )  # fmt: skip
 
 
-def _series(label: str, rows: list[TradeRow], by: str) -> Series:
+def _series(label: str, rows: list[TradeRow], by: str, scale: float) -> Series:
     x = np.array([_US * (r.time_s or 0.0) for r in rows])
-    return Series(label, x, np.array([_MM * (error_of(r, by) or 0.0) for r in rows]), "points")
+    return Series(label, x, np.array([scale * (error_of(r, by) or 0.0) for r in rows]), "points")

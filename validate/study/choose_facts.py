@@ -14,6 +14,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.fluid import ExactPressure
 from validate.solve.quasi_static import QuasiStatic
+from validate.study.choose_effects import ShownEffects, effect_words
 from validate.study.trade import Trade
 
 _WATER = 1000.0  # kg/m3, of a soft tissue whose density nobody declared
@@ -30,15 +31,16 @@ class Fact:
     means: str
 
 
-def facts(trade: Trade, error: float) -> tuple[Fact, ...]:
-    """Loading against the lowest frequency, strain, law, Poisson ratio, fluid, noise; `error` m is
-    the one that is wanted."""
+def facts(trade: Trade, error: float, effects: ShownEffects | None = None) -> tuple[Fact, ...]:
+    """Loading against the lowest frequency, strain, law, Poisson ratio, fluid, noise, and `effects`
+    of the recording; `error` is the one that is wanted, in the trade's unit."""
     scene = trade.trial
     element = "P1" if "P1" in scene.meshes else next(iter(scene.meshes))
     body = scene.build(element, scene.meshes[element][0], "linear")
     return (
         _loading(scene, body), _strain(scene, body, trade), _poisson(body), _fluid(body),
-        _noise(scene, error), _mesh(trade),
+        _noise(trade, error), _mesh(trade),
+        *(Fact(*words) for words in effect_words(effects, trade.experiment, scene)),
     )  # fmt: skip
 
 
@@ -66,7 +68,7 @@ def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
     peak, most = float(strain.max()), float(np.quantile(strain, 0.95))
     cost = f"large strain was not solved ({trade.law_words})"
     if trade.law_error is not None:
-        moved = f"{1e3 * trade.law_error:.3g} mm"
+        moved = trade.shown(trade.law_error)
         cost = f"large strain changes the answer by {moved} ({trade.law_words})"
     means = "within small strain" if peak < _SMALL_STRAIN else "large strain is on the ladder"
     return Fact(f"strain level ({'' if body.tools else 'static '}pilot, coarse mesh)",
@@ -111,10 +113,14 @@ def _fluid(body: Scene) -> Fact:
     return Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means)
 
 
-def _noise(scene: Trial, error: float) -> Fact:
+def _noise(trade: Trade, error: float) -> Fact:
+    scene = trade.trial
     if scene.noise is None:
         return Fact("noise", "no recording", "nothing to say")
     sd, where = scene.noise
+    if trade.unit != "m":
+        means = f"nothing to say of an error in {trade.shown_unit}"
+        return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
     means = "a recording can tell such an error" if sd < error else (
         "a recording could not tell such an error at a single point"
     )  # fmt: skip
@@ -124,5 +130,5 @@ def _noise(scene: Trial, error: float) -> Fact:
 def _mesh(trade: Trade) -> Fact:
     return Fact(
         "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its own error "
-        f"about {1e3 * trade.floor:.2g} mm (Richardson)", "errors below it say nothing",
+        f"about {trade.shown(trade.floor, 2)} (Richardson)", "errors below it say nothing",
     )  # fmt: skip

@@ -7,6 +7,8 @@ rest is the solver's; what the declared law costs is a pair of runs at large str
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
 
 from validate.arrays import Floats, rms
 from validate.compare.convergence import Richardson, richardson
@@ -35,17 +37,25 @@ from validate.study.trade_cell import (
 from validate.study.trade_guests import with_guests_beside
 
 KIND = "tradeoff"
-ERROR = (
-    "root mean square over the frames and points of the length of u - u_reference, the mesh's "
-    "displacements read at the same points of the body on every mesh"
+ErrorUnit = Literal["m", "N", "Pa"]
+ERRORS: Mapping[ErrorUnit, str] = MappingProxyType(
+    {
+        "m": "root mean square over the frames and points of the length of u - u_reference, the "
+        "mesh's displacements read at the same points of the body on every mesh",
+        "N": "root mean square over the frames and drives of the force less the reference's",
+        "Pa": "root mean square over the frames and cavities of the pressure less the reference's",
+    }
 )
-Answers = Mapping[tuple[str, int], Floats]  # (no, p, d) m by element and level
+_SHOWN: Mapping[ErrorUnit, tuple[float, str]] = MappingProxyType(
+    {"m": (1e3, "mm"), "N": (1.0, "N"), "Pa": (1.0, "Pa")}
+)
+Answers = Mapping[tuple[str, int], Floats]  # by element and level, as `Trade.reference`
 
 
 @dataclass(frozen=True)
 class TradeRow:
-    """One solver on one mesh with one step dt s, measured. Errors in m, None where `failed` says
-    why, or where what they are taken from failed.
+    """One solver on one mesh with one step dt s, measured. Errors in the trade's unit, None where
+    `failed` says why, or where what they are taken from failed.
 
     `error` is against the reference of its own law, `total` against the one at large strain;
     `mesh_error` is that of `Trial.best` on this mesh, `solver_error` the distance from it.
@@ -113,10 +123,11 @@ class ParetoFront:
 
 @dataclass(frozen=True)
 class Trade:
-    """All rows and convergences; `reference` (no, p, d) m is the answer, `gap` its law's share
-    (None: the pair of laws gave none, for the reason `law_words`).
+    """All rows and convergences; `reference` (no, p, d) is the answer, `gap` its law's share
+    (None: the pair of laws gave none, for the reason `law_words`). All errors are in `unit`: m for
+    displacements at points, N for the forces of what drives the scene, Pa for its cavities.
 
-    `floor` m is the reference's own error (Richardson; 0: only one mesh of its element): smaller
+    `floor` is the reference's own error (Richardson; 0: only one mesh of its element): smaller
     errors than it are all the same.
     """
 
@@ -129,6 +140,21 @@ class Trade:
     law_words: str
     done: Finished[Measured]
     quick: bool = False
+    unit: ErrorUnit = "m"
+
+    @property
+    def scale(self) -> float:
+        """Shown units in one SI unit of an error."""
+        return _SHOWN[self.unit][0]
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit that errors are shown in."""
+        return _SHOWN[self.unit][1]
+
+    def shown(self, error: float, digits: int = 3) -> str:
+        """An error as text with its unit."""
+        return f"{self.scale * error:.{digits}g} {self.shown_unit}"
 
     @property
     def reference(self) -> Floats:
@@ -141,12 +167,12 @@ class Trade:
 
     @property
     def moved(self) -> float:
-        """Rms length m of the reference's displacements."""
+        """Rms of the reference."""
         return rms(self.reference)
 
     @property
     def law_error(self) -> float | None:
-        """Rms length m of what large strain changes."""
+        """Rms of what large strain changes."""
         return None if self.gap is None else rms(self.gap)
 
     @property
@@ -164,7 +190,7 @@ class Trade:
 
 
 def front(rows: tuple[TradeRow, ...], by: str, floor: float = 0.0) -> ParetoFront:
-    """See `Trade.front`; rows without this error or a time are left out, errors below `floor` m
+    """See `Trade.front`; rows without this error or a time are left out, errors below `floor`
     count as equal."""
     good = [r for r in rows if getattr(r, by) is not None and r.time_s is not None]
     if by == "error":  # one law, one reference
@@ -230,7 +256,7 @@ def again(
     cell = keyed(job, bare)
     folder = study_folder(trade.experiment, KIND, out) / CELLS
     record = finish(plan_of(job, (cell,)), folder, where).records[cell.key]
-    return _rows(trade.trial, cell, record, trade.answers, trade.gap)[0]
+    return _rows(trade.trial, cell, record, trade.answers, trade.gap, trade.unit)[0]
 
 
 # --- rows from records ----------------------------------------------------------------------------
@@ -242,58 +268,81 @@ def traded(
     cells: tuple[TradeCell, ...],
     done: Finished[Measured],
     quick: bool,
+    unit: ErrorUnit = "m",
 ) -> Trade:
-    """Errors, and convergence over meshes and steps, of finished cells."""
+    """Errors in `unit`, and convergence over meshes and steps, of finished cells."""
     records = [(c, done.records[c.key]) for c in cells]
     answers = {
         (c.element, c.level): u
         for c, record in records
-        if c.part == "best" and (u := _answer(record)) is not None
+        if c.part == "best" and (u := _answer(record, unit)) is not None
     }
     if trial.reference not in answers:
         why = next(r.why for c, r in records if c.part == "best")
+        why = why or f"the reference solver has no number in {unit}"
         raise ComparisonError(f"no reference, 0 compared: {why}")
-    gap, words = _law_gap(trial, {c.part: r for c, r in records})
+    gap, words = _law_gap(trial, {c.part: r for c, r in records}, unit)
     solved = [(c, r) for c, r in records if c.part == "solver"]
-    rows = tuple(row for c, r in solved for row in _rows(trial, c, r, answers, gap))
-    refinements = (*_over_meshes(trial, answers), *_over_steps(trial, solved))
-    return Trade(experiment, trial, rows, refinements, answers, gap, words, done, quick)
+    rows = tuple(row for c, r in solved for row in _rows(trial, c, r, answers, gap, unit))
+    refinements = (*_over_meshes(trial, answers), *_over_steps(trial, solved, unit))
+    return Trade(experiment, trial, rows, refinements, answers, gap, words, done, quick, unit)
 
 
-def _answer(record: Record[Measured]) -> Floats | None:
-    return None if record.value is None else record.value.strides[0].u
+def _answer(record: Record[Measured], unit: ErrorUnit) -> Floats | None:
+    return None if record.value is None else _found(record.value.strides[0], unit)
 
 
-def _law_gap(trial: Trial, records: Mapping[Part, Record[Measured]]) -> tuple[Floats | None, str]:
+def _found(stride: Stride, unit: ErrorUnit) -> Floats | None:
+    """What a stride found of the quantity that is judged."""
+    return {"m": stride.u, "N": stride.force, "Pa": stride.pressure}[unit]
+
+
+def _law_gap(
+    trial: Trial, records: Mapping[Part, Record[Measured]], unit: ErrorUnit
+) -> tuple[Floats | None, str]:
     """What large strain changes, at frames and points: the pair's difference, and on what."""
     p = trial.pair
     if p is None:
         return None, "the ladder has no pair of laws"
-    declared, large = (_answer(records[part]) for part in ("declared", "large"))
+    declared, large = (_answer(records[part], unit) for part in ("declared", "large"))
     if declared is None or large is None:
-        return None, records["large"].why or records["declared"].why
+        why = records["large"].why or records["declared"].why
+        return None, why or f"the pair of laws has no number in {unit}"
     return large - declared, f"{p.element} mesh {p.level}, steps of {p.dt:.3g} s"
 
 
 def _rows(
-    trial: Trial, cell: TradeCell, record: Record[Measured], answers: Answers, gap: Floats | None
+    trial: Trial,
+    cell: TradeCell,
+    record: Record[Measured],
+    answers: Answers,
+    gap: Floats | None,
+    unit: ErrorUnit,
 ) -> list[TradeRow]:
     if record.value is None:
         strides = [Stride(dt, failed=record.why) for dt in cell.steps]
     else:
         strides = list(record.value.strides)
-    return [_row(trial, cell, stride, answers, gap) for stride in strides]
+    return [_row(trial, cell, stride, answers, gap, unit) for stride in strides]
 
 
 def _row(
-    trial: Trial, cell: TradeCell, s: Stride, answers: Answers, gap: Floats | None
+    trial: Trial,
+    cell: TradeCell,
+    s: Stride,
+    answers: Answers,
+    gap: Floats | None,
+    unit: ErrorUnit,
 ) -> TradeRow:
     errors: dict[str, float | None] = {}
-    if s.u is not None:
-        errors = _errors(trial, cell, s.u, answers, gap)
+    failed = s.failed
+    if (found := _found(s, unit)) is not None:
+        errors = _errors(trial, cell, found, answers, gap)
+    elif s.u is not None:
+        failed = f"the solver has no number in {unit}"
     return TradeRow(
         trial.solver(cell.solver), cell.element, cell.level, s.dt, s.unknowns, s.setup_s, s.step,
-        s.field_s, s.memory, s.assembled, failed=s.failed, **errors,
+        s.field_s, s.memory, s.assembled, failed=failed, **errors,
     )  # fmt: skip
 
 
@@ -325,7 +374,7 @@ def _over_meshes(trial: Trial, answers: Answers) -> Iterator[Refinement]:
 
 
 def _over_steps(
-    trial: Trial, solved: list[tuple[TradeCell, Record[Measured]]]
+    trial: Trial, solved: list[tuple[TradeCell, Record[Measured]]], unit: ErrorUnit
 ) -> Iterator[Refinement]:
     """Every stepped linear solver on a middle mesh of the first element."""
     element, levels = next(iter(trial.meshes.items()))
@@ -335,9 +384,9 @@ def _over_steps(
         linear = solver.law == "linear" and solver.stepped
         if not linear or (cell.element, cell.level) != (element, level) or record.value is None:
             continue
-        rising = sorted((s.dt, i) for i, s in enumerate(record.value.strides) if s.u is not None)
+        answered = [(s.dt, u) for s in record.value.strides if (u := _found(s, unit)) is not None]
+        rising = sorted(answered, key=lambda pair: pair[0])
         if len(rising) > 1:
-            dts = tuple(dt for dt, _ in rising)
-            us = [u for _, i in rising if (u := record.value.strides[i].u) is not None]
+            dts, us = tuple(dt for dt, _ in rising), [u for _, u in rising]
             found = richardson(dts, us, solver.order)
             yield Refinement(f"steps of {solver.name}, {element} mesh {level}", dts, "s", found)

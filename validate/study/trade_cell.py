@@ -19,6 +19,7 @@ from validate.fem.system import System, build
 from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_default import trial_of
 from validate.scene.material import LawName
+from validate.scene.scene import Scene
 from validate.solve.march import march
 from validate.solve.types import Run, SceneSolver, Scheme, Stepper, StepTimes
 from validate.study.held import held_bytes
@@ -61,8 +62,9 @@ class TradeCell:
 @dataclass(frozen=True)
 class Stride:
     """One step dt s of a solver: its costs, and displacements u (no, p, d) m at the ladder's frames
-    and points, None where `failed` says why. `field_s`: all displacements formed from a state.
-    `memory` bytes; `assembled`: matrices that set-up made.
+    and points, None where `failed` says why. `force` (no, k, 1) N of what drives the scene and
+    `pressure` (no, c, 1) Pa of its cavities, None where the solver has no such number. `field_s`:
+    all displacements formed from a state. `memory` bytes; `assembled`: matrices that set-up made.
     """
 
     dt: float
@@ -74,6 +76,8 @@ class Stride:
     memory: int = 0
     assembled: str = ""
     failed: str = ""
+    force: Floats | None = None
+    pressure: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,7 @@ def run_cell(trial: Trial, cell: TradeCell) -> Measured:
             f"the reference run on {cell.element} mesh {cell.level} ended at step "
             f"{run.outcome.step}: {run.outcome.why}"
         )
-    return Measured((Stride(dt, _read(trial, system, run)),))
+    return Measured((_answered(Stride(dt), trial, system, run),))
 
 
 def _scheme(trial: Trial, cell: TradeCell) -> tuple[Scheme, LawName]:
@@ -125,9 +129,35 @@ def _march(trial: Trial, stepper: Stepper, dt: float, setup: float, steps: int =
     return march("cell", stepper, t, trial.inputs(t), at, setup)
 
 
-def _read(trial: Trial, system: System, run: Run) -> Floats:
+def _answered(stride: Stride, trial: Trial, system: System, run: Run) -> Stride:
+    """The stride with what the run found at the ladder's frames."""
     rows = barycentric_rows(system.scene.mesh, trial.points)
-    return np.array([rows.apply(u) for u in run.u])
+    return replace(
+        stride,
+        u=np.array([rows.apply(u) for u in run.u]),
+        force=_at_frames(run, driving(system.scene)),
+        pressure=_at_frames(run, cavity_pressures(system.scene)),
+    )
+
+
+def driving(scene: Scene) -> tuple[str, ...]:
+    """Traces of the forces on what drives the scene: drives, moving bodies, probes."""
+    names = [d.name for d in scene.drives] + [m.name for m in scene.movers]
+    return tuple(f"{name}.force" for name in (*names, *(tool.name for tool in scene.tools)))
+
+
+def cavity_pressures(scene: Scene) -> tuple[str, ...]:
+    """Traces of the pressure in every cavity."""
+    return tuple(f"{cavity.name}.pressure" for cavity in scene.cavities)
+
+
+def _at_frames(run: Run, names: tuple[str, ...]) -> Floats | None:
+    """Traces (no, k, 1) at the frames, of a force with axes all of them; None where one lacks."""
+    found = [[t for t in run.traces if t == name or t.startswith(f"{name}.")] for name in names]
+    if not names or not all(found):
+        return None
+    columns = [run.traces[t].y[run.at] for traces in found for t in sorted(traces)]
+    return np.stack(columns, axis=1)[..., None]
 
 
 # --- a solver, measured ---------------------------------------------------------------------------
@@ -165,7 +195,7 @@ def _whole(trial: Trial, solver: SceneSolver, system: System, dt: float) -> Stri
     if not run.finished:
         return replace(stride, step=None, failed=f"{run.outcome.state}: {run.outcome.why}")
     at = np.round(trial.frames / dt).astype(np.int64) - 1
-    return replace(stride, u=_read(trial, system, replace(run, at=at, u=run.u[at])))
+    return _answered(stride, trial, system, replace(run, at=at, u=run.u[at]))
 
 
 def _stride(
@@ -197,7 +227,7 @@ def _stride(
     if not run.finished:
         why = f"{run.outcome.state} at step {run.outcome.step + 1}: {run.outcome.why}"
         return replace(stride, failed=why)
-    return replace(stride, step=run.step_s, u=_read(trial, system, run))
+    return _answered(replace(stride, step=run.step_s), trial, system, run)
 
 
 def _warm(trial: Trial, stepper: Stepper) -> Floats:

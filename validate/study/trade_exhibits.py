@@ -8,7 +8,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.replay.ladder import SHOWN
 from validate.study.held import DEFINITION
 from validate.study.ranking import SAME_TIME
-from validate.study.trade import ERROR, ParetoFront, Refinement, Trade, TradeRow
+from validate.study.trade import ERRORS, ParetoFront, Refinement, Trade, TradeRow
 from validate.study.trade_regions import regions_exhibit
 
 _MM, _US, _MB = 1e3, 1e6, 1e-6
@@ -38,8 +38,9 @@ def case(row: TradeRow) -> tuple[Entry, ...]:
     return (row.solver.name, row.element, row.level, step)
 
 
-def millimetres(value: float | None) -> float | None:
-    return None if value is None else _MM * value
+def shown(value: float | None, trade: Trade) -> float | None:
+    """An error in the unit that the trade shows."""
+    return None if value is None else trade.scale * value
 
 
 def dominant(row: TradeRow, trade: Trade) -> str:
@@ -59,9 +60,10 @@ def dominant(row: TradeRow, trade: Trade) -> str:
 def _front_exhibit(trade: Trade) -> Exhibit:
     scene = trade.trial
     words = [
-        f"Error: {ERROR}. {len(scene.points)} points, {len(scene.frames)} frames; the reference "
-        f"({scene.reference[0]} mesh {scene.reference[1]}, no solver error) moves "
-        f"{_MM * trade.moved:.4g} mm rms and is itself off by about {_MM * trade.floor:.2g} mm "
+        f"Error: {ERRORS[trade.unit]}. {len(scene.points)} points, {len(scene.frames)} frames; "
+        f"the reference ({scene.reference[0]} mesh {scene.reference[1]}, no solver error) "
+        f"{'moves' if trade.unit == 'm' else 'has'} {trade.shown(trade.moved, 4)} rms and is "
+        f"itself off by about {trade.shown(trade.floor, 2)} "
         "(Richardson): smaller errors count as equal.",
         _law_words(trade),
         _TIMES,
@@ -82,7 +84,7 @@ def _law_words(trade: Trade) -> str:
         return f"What large strain changes is not known: {trade.law_words}."
     return (
         f"Fronts of the linear law. On a coarse pair ({trade.law_words}) large strain changes the "
-        f"answer by {_MM * trade.law_error:.3g} mm rms; the second front adds that difference to "
+        f"answer by {trade.shown(trade.law_error)} rms; the second front adds that difference to "
         "the reference and so holds the linear and the large-strain solvers against one truth."
     )
 
@@ -94,8 +96,9 @@ def _dominated(front: ParetoFront) -> Iterable[str]:
 
 
 def _front_table(front: ParetoFront, trade: Trade) -> NumberTable:
-    head = (*_CASE, "time / us", "rate / Hz", f"{_NAMES[front.by]} / mm", "of the motion / %",
-            "mesh's share / mm", "solver's share / mm", "dominates")  # fmt: skip
+    unit, whole = trade.shown_unit, "motion" if trade.unit == "m" else "reference"
+    head = (*_CASE, "time / us", "rate / Hz", f"{_NAMES[front.by]} / {unit}", f"of the {whole} / %",
+            f"mesh's share / {unit}", f"solver's share / {unit}", "dominates")  # fmt: skip
     rows = tuple(_front_row(r, front.by, trade) for r in front.rows)
     title = f"Pareto front of {_NAMES[front.by]}, fastest first: nothing is less wrong and faster"
     return NumberTable(f"front_{front.by}", title, head, rows)
@@ -104,8 +107,8 @@ def _front_table(front: ParetoFront, trade: Trade) -> NumberTable:
 def _front_row(row: TradeRow, by: str, trade: Trade) -> tuple[Entry, ...]:
     time, error = row.time_s or 0.0, float(getattr(row, by))
     return (
-        *case(row), _US * time, 1 / time, _MM * error, 100 * error / trade.moved,
-        millimetres(row.mesh_error), millimetres(row.solver_error), dominant(row, trade),
+        *case(row), _US * time, 1 / time, trade.scale * error, 100 * error / trade.moved,
+        shown(row.mesh_error, trade), shown(row.solver_error, trade), dominant(row, trade),
     )  # fmt: skip
 
 
@@ -115,14 +118,15 @@ def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
     for rung in SHOWN:
         mine = [r for r in rows if r.solver.rung == rung]
         if mine:
-            series.append(Series(rung, *_points(mine, front.by), "points"))
-    series.append(Series("Pareto front", *_points(front.rows, front.by)))
-    levels = [("reference's own error", _MM * trade.floor)]
+            series.append(Series(rung, *_points(mine, front.by, trade.scale), "points"))
+    series.append(Series("Pareto front", *_points(front.rows, front.by, trade.scale)))
+    levels = [("reference's own error", trade.scale * trade.floor)]
     if front.by == "total":
         levels += _law_level(trade)
     return Chart(
         f"front_{front.by}", f"{_NAMES[front.by].capitalize()} against time per step",
-        "time of a step with its displacements / µs", f"{_NAMES[front.by]} / mm", tuple(series),
+        "time of a step with its displacements / µs", f"{_NAMES[front.by]} / {trade.shown_unit}",
+        tuple(series),
         levels=tuple(levels), log="xy",
         caption="A point is one solver on one mesh with one element and one step. Levels: the "
         "reference's own error" + (", what the linear law costs" if len(levels) > 1 else ""),
@@ -130,12 +134,12 @@ def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
 
 
 def _law_level(trade: Trade) -> list[tuple[str, float]]:
-    return [] if trade.law_error is None else [("the linear law", _MM * trade.law_error)]
+    return [] if trade.law_error is None else [("the linear law", trade.scale * trade.law_error)]
 
 
-def _points(rows: Sequence[TradeRow], by: str) -> tuple[np.ndarray, np.ndarray]:
+def _points(rows: Sequence[TradeRow], by: str, scale: float) -> tuple[np.ndarray, np.ndarray]:
     x = np.array([_US * (r.time_s or 0.0) for r in rows])
-    return x, np.array([_MM * float(getattr(r, by)) for r in rows])
+    return x, np.array([scale * float(getattr(r, by)) for r in rows])
 
 
 # --- what an error is made of --------------------------------------------------------------------
@@ -144,11 +148,12 @@ def _points(rows: Sequence[TradeRow], by: str) -> tuple[np.ndarray, np.ndarray]:
 def _shares(trade: Trade) -> Exhibit:
     """Mesh beside solver, for every solver and element over the meshes at its best step."""
     rows = _least(trade.rows)
-    head = (*_CASE, "unknowns", "error / mm", "mesh's share / mm", "solver's share / mm",
-            "with the law's / mm", "dominates")  # fmt: skip
-    shown = tuple(
-        (*case(r), r.unknowns, millimetres(r.error), millimetres(r.mesh_error),
-         millimetres(r.solver_error), millimetres(r.total), dominant(r, trade))
+    unit = trade.shown_unit
+    head = (*_CASE, "unknowns", f"error / {unit}", f"mesh's share / {unit}",
+            f"solver's share / {unit}", f"with the law's / {unit}", "dominates")  # fmt: skip
+    cells = tuple(
+        (*case(r), r.unknowns, shown(r.error, trade), shown(r.mesh_error, trade),
+         shown(r.solver_error, trade), shown(r.total, trade), dominant(r, trade))
         for r in rows
     )  # fmt: skip
     counts: dict[str, int] = {}
@@ -163,7 +168,7 @@ def _shares(trade: Trade) -> Exhibit:
         f"Of {len(scored)} cells the largest share is that of: {named}.",
     )
     note = "Of every solver, element and mesh the step with the least error; cells.csv has all."
-    table = NumberTable("shares", "What each error is made of", head, shown, note)
+    table = NumberTable("shares", "What each error is made of", head, cells, note)
     return Exhibit("shares", "Mesh error beside solver error", words, tables=(table,),
                    charts=(_mesh_chart(trade),))  # fmt: skip
 
@@ -186,10 +191,13 @@ def _mesh_chart(trade: Trade) -> Chart:
         at = [level for level in levels if level in found]
         if at:
             x = _MM * np.array([trade.trial.size(level) for level in at])
-            series.append(Series(element, x, _MM * np.array([found[level] for level in at])))
+            series.append(
+                Series(element, x, trade.scale * np.array([found[level] for level in at]))
+            )
     return Chart(
-        "mesh_error", "What the mesh costs", "cell size / mm", "mesh's share / mm", tuple(series),
-        levels=(("reference's own error", _MM * trade.floor), *_law_level(trade)), log="xy",
+        "mesh_error", "What the mesh costs", "cell size / mm",
+        f"mesh's share / {trade.shown_unit}", tuple(series),
+        levels=(("reference's own error", trade.scale * trade.floor), *_law_level(trade)), log="xy",
     )  # fmt: skip
 
 
@@ -201,7 +209,7 @@ def _costs(trade: Trade) -> Exhibit:
             "steps timed", "field / us", "memory / MB")  # fmt: skip
     shortest = {(r.solver.name, r.element, r.level): r
                 for r in trade.rows if r.step is not None}  # fmt: skip
-    shown = tuple(_cost_row(r) for r in shortest.values())
+    cells = tuple(_cost_row(r) for r in shortest.values())
     words = (
         "Set-up is from the scene to the first step, at the first of the solver's steps. Matrices "
         "are assembled when first asked for: K stiffness, M mass, C damping, m lumped masses; a "
@@ -209,7 +217,7 @@ def _costs(trade: Trade) -> Exhibit:
         f"Memory: {DEFINITION}.",
     )
     note = "Of every solver, element and mesh one step; cells.csv has all."
-    table = NumberTable("costs", "Set-up, time per step, memory", head, shown, note)
+    table = NumberTable("costs", "Set-up, time per step, memory", head, cells, note)
     return Exhibit("costs", "Set-up, steps and memory", words, tables=(table,))
 
 
@@ -226,45 +234,48 @@ def _cost_row(r: TradeRow) -> tuple[Entry, ...]:
 
 
 def _convergence(trade: Trade) -> Exhibit:
+    unit, whole = trade.shown_unit, "motion" if trade.unit == "m" else "reference"
     head = ("ladder", "sizes, finest first", "conduct", "observed order", "order used",
-            "last difference / mm", "Richardson's error / mm", "index (GCI) / mm",
-            "GCI of the motion / %")  # fmt: skip
-    shown = tuple(_ladder_row(x, trade.moved) for x in trade.refinements)
+            f"last difference / {unit}", f"Richardson's error / {unit}", f"index (GCI) / {unit}",
+            f"GCI of the {whole} / %")  # fmt: skip
+    ladders = tuple(_ladder_row(x, trade) for x in trade.refinements)
     words = (
         "Of the finest answer of each ladder: the observed order from three answers, Richardson's "
         "estimate of its error, and the grid convergence index, 1.25 times that where the order is "
         "observed and plausible, else 3 times (Roache 1994; Celik et al. 2008). Two answers show "
         "no order: the theoretical one is used. Refinements over steps are on one mesh.",
-        _compared(trade.refinements),
+        _compared(trade),
     )
-    table = NumberTable("convergence", "Discretisation error", head, shown)
+    table = NumberTable("convergence", "Discretisation error", head, ladders)
     return Exhibit("convergence", "Observed order and grid convergence index", words,
                    tables=(table,))  # fmt: skip
 
 
-def _compared(ladders: Sequence[Refinement]) -> str:
+def _compared(trade: Trade) -> str:
     """The meshes' largest and the steps' largest estimate side by side."""
-    meshes = [x.found.error for x in ladders if x.unit == "m"]
-    steps = [x.found.error for x in ladders if x.unit == "s"]
+    meshes = [x.found.error for x in trade.refinements if x.unit == "m"]
+    steps = [x.found.error for x in trade.refinements if x.unit == "s"]
     if not (meshes and steps):
         return "The scene has no time steps: the meshes are all there is to refine."
+    first = "mesh" if max(meshes) > max(steps) else "step"
     return (
-        f"At the finest of each ladder meshes leave {_MM * min(meshes):.2g} to "
-        f"{_MM * max(meshes):.2g} mm, time steps {_MM * min(steps):.2g} to {_MM * max(steps):.2g} "
-        f"mm: refine the {'mesh' if max(meshes) > max(steps) else 'step'} first."
+        f"At the finest of each ladder meshes leave {trade.shown(min(meshes), 2)} to "
+        f"{trade.shown(max(meshes), 2)}, time steps {trade.shown(min(steps), 2)} to "
+        f"{trade.shown(max(steps), 2)}: refine the {first} first."
     )
 
 
-def _ladder_row(x: Refinement, moved: float) -> tuple[Entry, ...]:
+def _ladder_row(x: Refinement, trade: Trade) -> tuple[Entry, ...]:
     f, sizes = x.found, ", ".join(f"{_MM * s:.3g}" for s in x.sizes)
     return (
-        x.what, f"{sizes} m{x.unit}", f.conduct, f.order, f.used, _MM * f.differences[0],
-        _MM * f.error, _MM * f.index, 100 * f.index / moved,
+        x.what, f"{sizes} m{x.unit}", f.conduct, f.order, f.used,
+        trade.scale * f.differences[0], trade.scale * f.error, trade.scale * f.index,
+        100 * f.index / trade.moved,
     )  # fmt: skip
 
 
 def _failures(rows: Sequence[TradeRow]) -> Exhibit:
-    shown = tuple((*case(r), r.failed) for r in rows)
-    table = NumberTable("unscored", "Cells without an error", (*_CASE, "why"), shown)
+    cells = tuple((*case(r), r.failed) for r in rows)
+    table = NumberTable("unscored", "Cells without an error", (*_CASE, "why"), cells)
     words = (f"{len(rows)} cells were refused, ended early or were timed only; none is hidden.",)
     return Exhibit("unscored", "Cells without an error", words, tables=(table,))

@@ -6,7 +6,7 @@ from typing import Any
 from validate.study.choose import Choice, error_of
 from validate.study.choose_exhibits import choose_exhibits, words
 from validate.study.study_page import Findings, Row
-from validate.study.trade import ERROR, Refinement, Trade, TradeRow
+from validate.study.trade import ERRORS, Refinement, Trade, TradeRow
 from validate.study.trade_exhibits import trade_exhibits
 
 _HEAD = (
@@ -17,10 +17,23 @@ _HEAD = (
 )  # fmt: skip
 
 
+# Of `_HEAD` in the trade's unit, and in SI as its suffix.
+_ERRORS = ("error_m", "with_law_m", "mesh_share_m", "solver_share_m")
+
+
+def _head(trade: Trade) -> tuple[str, ...]:
+    return tuple(_in_unit(name, trade) if name in _ERRORS else name for name in _HEAD)
+
+
+def _in_unit(name: str, trade: Trade) -> str:
+    return name.removesuffix("m") + trade.unit
+
+
 def told(trade: Trade) -> Findings:
     return Findings(
         f"Trade: {trade.experiment.title}", sentence(trade), trade_exhibits(trade),
-        {"kind": "tradeoff", **trade_document(trade)}, (_HEAD, cells_table(trade)), trade.quick,
+        {"kind": "tradeoff", **trade_document(trade)}, (_head(trade), cells_table(trade)),
+        trade.quick,
     )  # fmt: skip
 
 
@@ -29,7 +42,7 @@ def told_choice(choice: Choice) -> Findings:
     document = {"kind": "choose", **_choice_document(choice), **trade_document(trade)}
     return Findings(
         f"Choice: {trade.experiment.title}", next(words(choice)), choose_exhibits(choice),
-        document, (_HEAD, cells_table(trade)), trade.quick,
+        document, (_head(trade), cells_table(trade)), trade.quick,
     )  # fmt: skip
 
 
@@ -41,9 +54,9 @@ def sentence(trade: Trade) -> str:
     if on.rows:
         first, last = on.rows[0], on.rows[-1]
         ends = (
-            f"; the front runs from {first.label} ({1e3 * (first.error or 0):.3g} mm, "
-            f"{1e6 * (first.time_s or 0):.3g} us) to {last.label} ({1e3 * (last.error or 0):.3g} "
-            f"mm, {1e6 * (last.time_s or 0):.3g} us)"
+            f"; the front runs from {first.label} ({trade.shown(first.error or 0)}, "
+            f"{1e6 * (first.time_s or 0):.3g} us) to {last.label} ({trade.shown(last.error or 0)}, "
+            f"{1e6 * (last.time_s or 0):.3g} us)"
         )
     return f"{len(trade.rows)} cells, {scored} with an error{ends}."
 
@@ -69,12 +82,13 @@ def trade_document(trade: Trade) -> dict[str, Any]:
     """The trade's part of results.json: SI, nothing that is not finite."""
     fronts = {by: trade.front(by) for by in ("error", "total")}
     return {
-        "error": ERROR,
+        "error": ERRORS[trade.unit],
         "points_m": trade.trial.points.tolist(),
         "frames_s": trade.trial.frames.tolist(),
         "reference": {"element": trade.trial.reference[0], "mesh": trade.trial.reference[1],
-                      "moved_rms_m": trade.moved, "own_error_m": trade.floor},
-        "law_error_m": trade.law_error,
+                      _in_unit("moved_rms_m", trade): trade.moved,
+                      _in_unit("own_error_m", trade): trade.floor},
+        _in_unit("law_error_m", trade): trade.law_error,
         "law_pair": trade.law_words,
         "threads": 1,
         "reused": trade.done.reused,
@@ -82,24 +96,27 @@ def trade_document(trade: Trade) -> dict[str, Any]:
         "workers": trade.done.workers,
         "dominated": {by: list(f.dominated) for by, f in fronts.items()},
         "fronts": {by: [r.label for r in f.rows] for by, f in fronts.items()},
-        "convergence": [_refinement(x) for x in trade.refinements],
-        "cells": [dict(zip(_HEAD, row, strict=True)) for row in cells_table(trade)],
+        "convergence": [_refinement(x, trade) for x in trade.refinements],
+        "cells": [dict(zip(_head(trade), row, strict=True)) for row in cells_table(trade)],
     }  # fmt: skip
 
 
-def _refinement(x: Refinement) -> dict[str, Any]:
+def _refinement(x: Refinement, trade: Trade) -> dict[str, Any]:
     f = x.found
     return {
         "what": x.what, "sizes": list(x.sizes), "unit": x.unit, "conduct": f.conduct,
-        "observed_order": f.order, "order_used": f.used, "differences_m": list(f.differences),
-        "richardson_error_m": f.error, "gci_m": f.index,
+        "observed_order": f.order, "order_used": f.used,
+        _in_unit("differences_m", trade): list(f.differences),
+        _in_unit("richardson_error_m", trade): f.error,
+        _in_unit("gci_m", trade): f.index,
     }  # fmt: skip
 
 
 def _choice_document(choice: Choice) -> dict[str, Any]:
     want = choice.wanted
     return {
-        "wanted": {"error_m": want.error, "rate_hz": want.rate, "by": choice.by},
+        "wanted": {_in_unit("error_m", choice.trade): want.error, "rate_hz": want.rate,
+                   "by": choice.by},
         "verdict": list(words(choice)),
         "pick": _named(choice.pick, choice),
         "at_every_tick": _named(choice.confirmed, choice),
@@ -110,6 +127,11 @@ def _choice_document(choice: Choice) -> dict[str, Any]:
              "evidence": c.evidence, "best": _named(c.best, choice)}
             for c in choice.ladder
         ],
+        "excluded": [
+            {"rung": e.rung, "candidate": e.candidate, "bound_s": e.bound, "pick_s": e.pick,
+             "why": e.why}
+            for e in choice.excluded
+        ],
     }  # fmt: skip
 
 
@@ -118,5 +140,5 @@ def _named(row: TradeRow | None, choice: Choice) -> dict[str, Any] | None:
         return None
     return {
         "solver": row.solver.name, "element": row.element, "mesh": row.level, "dt_s": row.dt,
-        "error_m": error_of(row, choice.by), "time_s": row.time_s,
+        _in_unit("error_m", choice.trade): error_of(row, choice.by), "time_s": row.time_s,
     }  # fmt: skip

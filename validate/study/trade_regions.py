@@ -16,10 +16,10 @@ def regions_exhibit(trade: Trade) -> Exhibit | None:
     if not any(r.solver.rung == "regions" for r in rows):
         return None
     head = ("mesh", "unknowns", "solver", "step / ms", "median / ms", "slow steps (p99) / ms",
-            "worst / ms", "error / mm")  # fmt: skip
+            "worst / ms", f"error / {trade.shown_unit}")  # fmt: skip
     shown = tuple(
         (r.level, r.unknowns, r.solver.name, _MS * r.dt, _MS * r.step.p50, _MS * r.step.p99,
-         _MS * r.step.max, None if r.error is None else 1e3 * r.error)
+         _MS * r.step.max, None if r.error is None else trade.scale * r.error)
         for r in rows if r.step
     )  # fmt: skip
     table = NumberTable("regions", "Times of a step by size, displacements not formed", head, shown)

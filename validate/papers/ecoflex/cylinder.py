@@ -1,6 +1,6 @@
 """The cylinders of Dawood et al. (2026): parameters, logs, scene and registration."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -152,7 +152,10 @@ def place(recording: Recording, parameters: LoggedCylinder, scene: Scene) -> Reg
 
 
 def stiffening(p: LoggedCylinder, model: CylinderModel) -> float:
-    """Apparent over true modulus of a method's meshed cylinder: E_app = F h / (A d) at E = 1 Pa."""
-    scene = model_scene(p, model, 1.0)
+    """Apparent over true modulus of a method's meshed cylinder: E_app = F h / (A d) at E = 1 Pa.
+
+    At small strain, where every law is the linear one.
+    """
+    scene = model_scene(p, replace(model, law="linear"), 1.0)
     force = responses(build_system(scene)).reactions[0, 0]
     return float(force * p.specimen.size.height / p.specimen.size.area)
