@@ -170,3 +170,11 @@ def test_what_is_no_stored_run_is_one_line(broken: str, tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text(broken)
     done = CliRunner().invoke(cli, ["export", str(tmp_path), "--junit", str(tmp_path / "x.xml")])
     assert re.search(r"results\.json: not believed \(.*\); run it again", str(done.exception))
+
+
+def test_a_run_of_an_earlier_schema_says_so(tmp_path: Path) -> None:
+    old = content(check("a", "good enough")) | {"schema_version": 1}
+    (tmp_path / "results.json").write_text(json.dumps(sealed(old)))
+    done = CliRunner().invoke(cli, ["export", str(tmp_path), "--junit", str(tmp_path / "x.xml")])
+    words = "stored with schema version 1, today's is 2 (two answers a check); run it again"
+    assert words in str(done.exception)

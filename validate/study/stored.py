@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from validate.errors import ComparisonError, RecordingError, UsageError
+from validate.report.store import SCHEMA_VERSION
 from validate.seals import read_sealed
 
 T = TypeVar("T")
@@ -85,7 +86,14 @@ def read_as(path: Path, make: Callable[[Any], T]) -> T:
     if not file.exists():
         raise UsageError(f"no stored run at {path}; name a report folder or its results.json")
     try:
-        return make(read_sealed(file))
+        content = read_sealed(file)
+        version = content.get("schema_version", SCHEMA_VERSION)
+        if version != SCHEMA_VERSION:
+            raise RecordingError(
+                f"{file}: stored with schema version {version}, today's is {SCHEMA_VERSION} (two "
+                "answers a check)"
+            )
+        return make(content)
     except RecordingError as error:
         from validate.recording.readers import told_apart  # all formats: only where needed
 
