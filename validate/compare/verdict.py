@@ -13,7 +13,7 @@ One number is signed. Of many points or times every one is held against the limi
 decides: the E and u_val shown are those of the point where |E| + 2 u_val is largest. All points are
 good enough where each one is (an intersection-union test needs no correction, Berger 1982).
 "Differs" and "not good enough" hold where one point alone is beyond what noise shows somewhere
-among that many: the noise's quantile is Bonferroni's, for the number of independent points.
+among that many: the distribution of the largest of as many as are independent, with what all share.
 
 Where the requirement is an rms, E = sqrt(rms^2 - noise^2) estimates the rms of the model error
 itself, and u_D is half of the wider side of its 95 % interval, from the noncentral chi-square
@@ -26,10 +26,12 @@ model*: neither is evidence.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtri, chndtrinc, ndtr
+from numpy.polynomial.hermite_e import hermegauss
+from scipy.special import chdtri, chndtr, chndtrinc, ndtr
 
 from validate.arrays import Floats, rms
 from validate.compare.convergence import Numerical
@@ -48,6 +50,7 @@ Acceptance = Literal[
 Statistic = Literal["every", "rms", "mean"]
 Origin = Literal["ours", "source"]
 
+_DROWNED = 30.0  # a shift so many times the noise: then it alone decides
 ALPHA = 2 * float(ndtr(-2.0))  # 4.6 %: two standard uncertainties of a normal law to both sides
 # The name of the part of u_val that a filter itself claims.
 OWN_COVARIANCE = "the filter's own covariance"
@@ -200,17 +203,25 @@ class Sensitivity:
 class PointErrors:
     """PointErrors of what is judged (n,) with the measurement's standard uncertainty of each (n,).
 
-    `chance` (n,) is the |E| that noise alone shows somewhere among them in 4.6 % of repetitions,
-    and `systematic` the standard uncertainty that all points share. `raw` is the rms as it is,
-    `noise` the rms that noise alone would have.
+    `sd` is the noise of every of its `components`, independent in so many `rows`; `systematic` the
+    standard uncertainty that all points share. `raw` is the rms as it is, `noise` the rms that
+    noise alone would have.
     """
 
     E: Floats
     u_D: Floats
-    chance: Floats
+    sd: float
+    components: int
+    rows: float
     systematic: float
     raw: float
     noise: float
+
+    def reach(self, others: Floats) -> Floats:
+        """The |E| (n,) that chance shows somewhere among all in 4.6 % of repetitions, where
+        `others` (n,) is the standard uncertainty that a point has besides the measurement's."""
+        shared = np.hypot(self.systematic, others)
+        return _reach(self.sd, shared, self.components, self.rows)
 
     def worst(self, shared: Floats) -> int:
         """The index of the largest |E| + 2 u_val, `shared` (n,) being the rest of u_val."""
@@ -229,16 +240,40 @@ def errors_of(residual: Residual, statistic: Statistic = "every") -> PointErrors
         own, u_noise = _noise_free(raw, noise, m)
         spread = math.sqrt(c) * common
         one = np.array([math.hypot(u_noise, spread)])
-        return PointErrors(np.array([own]), one, np.array([2 * u_noise]), spread, raw, noise)
+        return PointErrors(np.array([own]), one, u_noise, 1, 1.0, spread, raw, noise)
     rows = max(m / c, 1.0)
     if k > 1 and statistic == "mean":
         d, sd, rows = d.mean(axis=0)[None, :], sd / math.sqrt(rows), 1.0
     E: Floats = d[:, 0] if c == 1 else np.linalg.norm(d, axis=1)
-    reach = math.sqrt(chdtri(c, ALPHA / rows)) * sd
     u_D = np.full(len(E), math.hypot(sd, common))
     # A length that a shared shift alone shows reaches further than two standard deviations.
     shift = common * math.sqrt(chdtri(c, ALPHA)) / 2
-    return PointErrors(E, u_D, np.full(len(E), reach), shift, raw, noise)
+    return PointErrors(E, u_D, sd, c, rows, shift, raw, noise)
+
+
+def _reach(sd: float, shared: Floats, components: int, rows: float) -> Floats:
+    """T (n,) that the largest length of `rows` vectors of noise `sd` a component, all moved by one
+    normal shift of standard deviation `shared` (n,), exceeds with probability `ALPHA`."""
+    if sd == 0 or (components == 1 and rows == 1):
+        return np.asarray(2 * np.hypot(sd, shared))
+    ratio = np.minimum(shared / sd, _DROWNED)
+    grid = np.append(0.0, np.geomspace(1e-2, _DROWNED, 40))
+    grid = grid[: int(np.searchsorted(grid, ratio.max())) + 1]
+    known = np.array([_largest(float(r), components, rows) for r in grid])
+    return np.asarray(sd * np.interp(ratio, grid, known) * np.maximum(shared / sd / _DROWNED, 1.0))
+
+
+@lru_cache(maxsize=4096)
+def _largest(ratio: float, components: int, rows: float) -> float:
+    """`_reach` for noise of 1 and one shift: bisection, the shift integrated by Gauss-Hermite."""
+    z, w = hermegauss(40)
+    w = w / w.sum()
+    low, high = 0.0, math.sqrt(chdtri(components, ALPHA / rows)) + 4 * ratio
+    for _ in range(50):
+        T = (low + high) / 2
+        below = w @ chndtr(T**2, components, (ratio * z) ** 2) ** rows
+        low, high = (low, T) if below > 1 - ALPHA else (T, high)
+    return (low + high) / 2
 
 
 def judge(
@@ -254,7 +289,7 @@ def judge(
     u_input = np.sqrt(sum((p**2 for p in parts.values()), start=np.zeros(len(found.E))))
     others = np.hypot(u_input, numerical.u)
     w = found.worst(others)
-    reach = np.hypot(found.chance, 2 * np.hypot(found.systematic, others))
+    reach = found.reach(others)
     E, u_D, u_val = found.E[w], found.u_D[w], np.hypot(found.u_D, others)[w]
     named = {"measurement": float(u_D)} | dict(numerical.parts) | {
         name: float(part[w]) for name, part in parts.items()

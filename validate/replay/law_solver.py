@@ -43,14 +43,15 @@ def with_laws(
     rest = {path: text for path, text in values.items() if path not in laws}
     methods = dict(with_values(declared, laws))
     for path in laws:
-        name = path.removesuffix(".law")
+        name = path.partition(".")[0]
         methods[name] = _solved(name, methods[name], declared)
     return methods, rest
 
 
 def _is_law(declared: Mapping[str, Method], path: str) -> bool:
     name, _, field = path.partition(".")
-    return field == "law" and name in declared and laws_of(declared[name]) is not None
+    named = field in ("law", "scene.law") and name in declared
+    return named and laws_of(declared[name]) is not None
 
 
 def _solved(name: str, method: Method, declared: Mapping[str, Method]) -> Method:

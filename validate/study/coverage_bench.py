@@ -71,7 +71,8 @@ class Stated:
     """What one check is judged with, as it is stored; None in `numerical`: nothing bounds it.
 
     `limit` is None without a requirement. `measurement` is half of what the measurement alone
-    reaches by chance where every point is judged; None where the draws say it themselves.
+    reaches by chance where every point is judged; None where the draws say it themselves. `inputs`
+    are what one standard uncertainty of each does, by point where every one is judged.
     """
 
     name: str
@@ -83,13 +84,13 @@ class Stated:
     numerical: Mapping[str, float | None]
     words: str
     deciding: Mapping[str, str]
-    inputs: Mapping[str, float]
+    inputs: Mapping[str, tuple[float, ...]]
     fitted: str
 
     @property
     def terms(self) -> Terms:
         parts = {k: inf if u is None else u for k, u in self.numerical.items()}
-        inputs = (Sensitivity(k, _number(u, self.unit)) for k, u in self.inputs.items())
+        inputs = (Sensitivity(k, _numbers(u, self.unit)) for k, u in self.inputs.items())
         numerical = Numerical(parts, self.words, self.deciding)
         accept = Accept(self.name, self.limit, "as declared", statistic=self.statistic)
         return Terms(accept, numerical, tuple(inputs), self.fitted)
@@ -196,7 +197,8 @@ def _stated(residual: Residual, terms: Terms) -> Stated:
         terms.accept.statistic, _reached(residual, terms.accept.statistic),
         {k: u if isfinite(u) else None for k, u in numerical.parts.items()},
         numerical.words, numerical.deciding,
-        dict(zip(names, (rms(s.change.values) for s in terms.inputs), strict=True)), terms.fitted,
+        dict(zip(names, (_moved(s, terms.accept.statistic) for s in terms.inputs), strict=True)),
+        terms.fitted,
     )  # fmt: skip
 
 
@@ -204,8 +206,16 @@ def _reached(residual: Residual, statistic: Statistic) -> float | None:
     if statistic != "every" or residual.count == 1:
         return None
     found = errors_of(residual)
-    return float(np.hypot(found.chance[0] / 2, found.systematic))
+    return float(found.reach(np.zeros(len(found.E))).max() / 2)
 
 
-def _number(u: float, unit: str) -> Residual:
-    return Residual("u", "all", np.array([[u]]), 0.0, 0.0, unit, "a standard uncertainty")
+def _moved(input_: Sensitivity, statistic: Statistic) -> tuple[float, ...]:
+    change = input_.change.values
+    if statistic != "every":
+        return (rms(change),)
+    return tuple(np.linalg.norm(change, axis=1).tolist())
+
+
+def _numbers(u: tuple[float, ...], unit: str) -> Residual:
+    values = np.array(u)[:, None]
+    return Residual("u", "all", values, 0.0, 0.0, unit, "a standard uncertainty")

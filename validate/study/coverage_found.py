@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from validate.arrays import rms
 from validate.compare.coverage import (
     FALSE_ACCEPTANCE,
     MEASUREMENT,
@@ -132,7 +133,7 @@ def _terms_shown(
 ) -> Iterator[Term]:
     measured = np.array([e for r in records for e in r.measured[stated.name]])
     u_D = float(np.median(judged.u_D)) if stated.measurement is None else stated.measurement
-    own = stated.inputs.get(OWN_COVARIANCE)
+    own = rms(stated.inputs[OWN_COVARIANCE]) if OWN_COVARIANCE in stated.inputs else None
     shown = reach(measured)
     if own is None:
         yield term(MEASUREMENT, u_D, measured, "measurement")
@@ -147,7 +148,7 @@ def _terms_shown(
         plus, minus = (*by_check.get(stated.name, ()), 0.0, 0.0)[:2]
         z = given.z[:, i]
         errors = np.where(z > 0, z * plus, -z * minus)
-        yield term(f"u_input ({name})", stated.inputs.get(name, 0.0), errors)
+        yield term(f"u_input ({name})", rms(stated.inputs.get(name, (0.0,))), errors)
 
 
 def together(given: Given, records: Sequence[Draws]) -> JointShare:
