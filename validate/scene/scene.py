@@ -301,14 +301,14 @@ class Scene:
             if self.dilatation != "mixed":
                 raise SceneError(
                     f"Poisson ratio nu = 0.5 in {self.mesh.kind} cells of {self.dilatation} "
-                    "dilatation: they need nu < 0.5; use mixed cells (hexahedra or order 2, dilatation 'mixed') or "
-                    "nu <= 0.4999"
+                    "dilatation: they need nu < 0.5; use mixed cells (hexahedra or order 2, "
+                    "dilatation 'mixed') or nu <= 0.4999"
                 )
             if material.law == "svk" or material.coefficients.volumetric == "coupled":
                 raise SceneError(
                     f"Poisson ratio nu = 0.5 with law '{material.law}' "
-                    f"({material.coefficients.volumetric}): it has no incompressible form; take linear, or neo_hooke, mooney_rivlin, yeoh or "
-                    "ogden with volumetric 'split'"
+                    f"({material.coefficients.volumetric}): it has no incompressible form; take "
+                    "linear, or neo_hooke, mooney_rivlin, yeoh or ogden with volumetric 'split'"
                 )
 
     @property
