@@ -79,7 +79,7 @@ def test_another_models_twin_is_evidence_but_no_measurement() -> None:
 
 @pytest.mark.slow
 def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
-    result = judged(other_model(), sd="2e-5")
+    result = judged(other_model(), sd="1e-6")
     assert result.notes[0].startswith("The twin was recorded anew")
     assert [c.verdict for c in result.checks] == ["same model"]
     assert "made again from this run's own parameters" in result.checks[0].why
