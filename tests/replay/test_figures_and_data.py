@@ -33,7 +33,7 @@ def tiny(frames: float, **settings: str) -> Result:
 def test_run_fails_and_says_so_where_our_value_moved() -> None:
     assert tiny(3.0).passed
     moved = tiny(4.0)
-    assert not moved.passed
+    assert moved.fallen
     assert [p.verdict for p in moved.published] == ["moved"]
     assert moved.sentence.endswith("1 of 1 printed figures do not stand (frames).")
 

