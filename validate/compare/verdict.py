@@ -201,7 +201,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class PointErrors:
-    """PointErrors of what is judged (n,) with the measurement's standard uncertainty of each (n,).
+    """Errors of what is judged (n,) with the measurement's standard uncertainty of each (n,).
 
     `sd` is the noise of every of its `components`, independent in so many `rows`; `systematic` the
     standard uncertainty that all points share. `raw` is the rms as it is, `noise` the rms that
