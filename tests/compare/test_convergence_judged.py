@@ -220,3 +220,6 @@ def test_scatter_of_many_numbers_is_not_counted_as_a_lost_order() -> None:
         ratios.append(2 * found.u / float(np.sqrt(np.mean(answers[3] ** 2))))
     assert min(ratios) > 1
     assert float(np.median(ratios)) < 6
+    # Without a trend nothing but the scatter is there, and it must be held too.
+    bare = [0.1 * rng.normal(size=(200, 1)) for _ in h]
+    assert convergence(h.tolist(), bare, 3, 2.0).u * 2 > 1.9 * 0.1

@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 from tiny import TINY, Card, record, scene
 
+from validate.cli import checking, running
 from validate.cli.running import _summary
 from validate.cli.running import run as run_command
+from validate.compare.expected import Expected
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
@@ -212,3 +214,59 @@ def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(
     assert line.startswith("warning: ")
     (stored,) = tmp_path.rglob("results.json")
     assert said in stored.read_text("utf-8")
+
+
+# --- declared verdicts ----------------------------------------------------------------------------
+
+
+def declaring(verdict: str, limit: float = 1e-9) -> Experiment:
+    """A model that cannot be good enough, with the verdict that its experiment declares."""
+    accept = (Accept("node_B", limit, "ours"),)
+    return replace(other_model(), accept=accept, expected=(Expected(verdict, "it is stiff"),))
+
+
+@pytest.fixture(scope="module")
+def known() -> Result:
+    """A model of a tenth of the stiffness: its error is many times any limit."""
+    softer = replace(declaring("not good enough"), parameters=Card(E=9e4))
+    return judged(softer)
+
+
+def test_a_declared_verdict_is_as_expected_though_the_run_fails(known: Result) -> None:
+    assert (known.overall.word, known.passed, known.as_expected) == (
+        "not good enough", False, True
+    )  # fmt: skip
+    moved = replace(known, expected=(Expected("good enough", "it was"),))
+    assert not moved.as_expected
+    assert [m.found for m in moved.moved] == ["not good enough"]
+
+
+def test_check_holds_the_declared_verdict_and_fails_where_it_moves(known: Result) -> None:
+    assert checking._holds(checking._content(known), declared=False)
+    moved = replace(known, expected=(Expected("good enough", "it was"),))
+    assert not checking._holds(checking._content(moved), declared=False)
+    assert not checking._holds(checking._content(replace(known, expected=())), declared=False)
+
+
+def test_declared_verdicts_are_those_of_what_is_shipped() -> None:
+    """What a user set has no declared verdict."""
+    result = judged(declaring("not good enough"), E="9e4")
+    assert (result.expected, result.as_expected, result.passed) == ((), False, False)
+
+
+@pytest.mark.parametrize(("names", "code"), [(("tiny",), 1), ((), 0)])
+def test_all_pass_by_declared_verdicts_and_one_by_its_own(
+    names: tuple[str, ...], code: int, known: Result, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    shipped = declaring("not good enough")
+    monkeypatch.setattr("validate.cli.chosen.find", lambda name, start, named: shipped)
+    monkeypatch.setattr(
+        "validate.cli.chosen.experiment_files", lambda start, named: {"tiny": shipped}
+    )
+    monkeypatch.setattr(running, "_reported", lambda *_, **__: (known, tmp_path / "report.html"))
+    found = run_command(
+        names, named=(), quick=False, out=tmp_path, values=(), methods="", as_json=False,
+        anyway=False,
+    )  # fmt: skip
+    assert found == code

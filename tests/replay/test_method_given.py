@@ -76,6 +76,15 @@ def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> N
     assert plain.given({"dt": 0.01, "colour": 3}).dt == 0.01
 
 
+def test_a_declared_step_gives_way_to_the_clocks() -> None:
+    """`needle_block` declares its methods with the paper's step: `clock.dt` was refused."""
+    declared = Method("m", Newmark(dt=1 / 30))
+    assert declared.given({"dt": 0.02}, declared).dt == 0.02
+    own = Method("m", Newmark(dt=0.5))
+    with pytest.raises(UsageError, match=r"dt = 0.5 of 'm': the experiment sets 0.02"):
+        own.given({"dt": 0.02}, declared)
+
+
 @pytest.mark.parametrize(
     ("call", "error", "says"),
     [

@@ -109,6 +109,15 @@ def test_many_numbers_at_once_hold_too() -> None:
     assert found.together[0].share.value <= 0.07
 
 
+def test_models_whose_error_is_the_limit_are_rarely_called_either() -> None:
+    """And not all undecided: were nothing added to the error, all of them would be good enough."""
+    (quantity, *_) = studied(draws=100).quantities
+    assert quantity.rejected.number == 0
+    for share in (quantity.false_good, quantity.false_bad):
+        assert share is not None
+        assert (share.count, share.value <= 0.08) == (100, True)
+
+
 @pytest.mark.slow
 def test_an_input_alone_never_leaves_its_uniform_range() -> None:
     found = studied(uncertain=0.2)
