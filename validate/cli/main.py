@@ -251,10 +251,15 @@ def _common(options: dict[str, Any]) -> Any:
     metavar="PATH=VALUES",
     help="log:1e-6:1e-1:7, lin:1kPa:5kPa:5 or a,b,c of a parameter; several make a grid.",
 )
-@click.option("--seeds", default="10", show_default=True, metavar="N|A,B,C", help="Noise samples.")
+@click.option("--seeds", default="", metavar="N|A,B,C", help="Noise samples of a twin (else 10).")
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
-@click.option("--by", default="all.rmse", show_default=True, metavar="SCORE", help="Rank by it.")
+@click.option(
+    "--by", default="", metavar="SCORE", help="Rank by it; else truth, or what was withheld."
+)
+@click.option(
+    "--hold-out", "hold_out", default="", metavar="each|A,B", help="Markers kept from all filters."
+)
 @_studied
 def filters(name: str, **options: Any) -> int:
     """Settings, rates, noise and seeds of filters: ranking, Pareto front, consistency."""

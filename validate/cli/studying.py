@@ -22,25 +22,22 @@ from validate.study import filter_page, stability_page, still_page, trade_page
 from validate.study.choose import Choice, choose, error_of, wanted
 from validate.study.choose_effects import stored_effects
 from validate.study.choose_exhibits import words
+from validate.study.chosen_exhibits import chosen_line
 from validate.study.climb import Climb
 from validate.study.engine import CELLS, Finished, study_folder
-from validate.study.filter_exhibits import RANKING, ranking_row
-from validate.study.filters import SEEDS, FilterStudy, study
+from validate.study.filter_exhibits import ranking_head, ranking_row
+from validate.study.filters import FilterStudy, study
 from validate.study.gain import GainMap, gain_map
 from validate.study.job import Where
 from validate.study.ranking import Ranking
-from validate.study.score import POOLED
 from validate.study.stability import Stability, stability
 from validate.study.study_page import Findings, write_study
 from validate.study.sweep import named
 from validate.study.trade import Trade, again, trade
 
 _PLACES = 10  # of every ranking on the terminal
-_COLUMNS = ("place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
-            "against #1", "NIS per dof / 1", "filter is", "step / ms",
-            "gains repeat from step")  # fmt: skip
-# Where those have no room: the report has all.
-_FEW = ("place", "method", "settings", "error / mm", "± 95 % / mm", "against #1")
+_COLUMNS = (0, 1, 2, 3, 4, 8, 9, 10, 12, 13)  # of a ranking, and where those have no room
+_FEW = (0, 1, 2, 3, 4, 8)
 
 
 @dataclass(frozen=True)
@@ -69,6 +66,7 @@ def filters(
     values: tuple[str, ...],
     methods: str,
     by: str,
+    hold_out: str,
 ) -> int:
     """Ranks filters; 0."""
     experiment = find(name, Path.cwd(), common.named)
@@ -77,13 +75,14 @@ def filters(
     ask_about(experiment, given)
     words, content = differences(experiment, Options(given, chosen, common.quick))
     words += [text.partition("=")[0].strip() for text in sweeps]
-    words += ["seeds"] * (seeds_of(seeds) != SEEDS) + [by] * (by != POOLED)
-    place = f"filters{tag(words, [content, sorted(sweeps), seeds_of(seeds), by])}"
+    words += ["seeds"] * bool(seeds) + [by] * bool(by) + ["hold_out"] * bool(hold_out)
+    kept = tuple(m.strip() for m in hold_out.split(",") if m.strip())
+    place = f"filters{tag(words, [content, sorted(sweeps), seeds, by, kept])}"
     with running(experiment, place, "filters", common) as report:
         found = study(
             experiment, sweeps, methods=chosen, values=given,
-            seeds=seeds_of(seeds), by=by, quick=common.quick, out=common.out, where=common.where,
-            report=report,
+            seeds=seeds_of(seeds) if seeds else None, by=by, hold_out=kept,
+            quick=common.quick, out=common.out, where=common.where, report=report,
         )  # fmt: skip
     page = written(experiment, filter_page.told(found), place, common)
     if not common.as_json:
@@ -224,19 +223,27 @@ def end(done: Finished[Any], page: Path) -> None:
 def _show_filters(found: FilterStudy) -> None:
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        columns = _COLUMNS if fits(_COLUMNS, _places(ranking, _COLUMNS)) else _FEW
-        table(f"Ranking by {found.by}{under}", columns, _places(ranking, columns))
+        head = ranking_head(found.unit)
+        for pick in (_COLUMNS, _FEW):
+            columns = tuple(head[i] for i in pick)
+            rows = _places(ranking, pick, found.by)
+            if fits(columns, rows):
+                break
+        table(f"Ranking by {found.by}{under}", columns, rows)
+        if len(found.plan.seeds) == 1 and ranking.blocks is not None:
+            say(f"{ranking.blocks.words}", indent="  ")
+        if ranking.nested is not None and len(found.plan.seeds) == 1:
+            say(chosen_line(ranking.nested, found), indent="  ")
     failed = [pair for r in found.rankings for pair in r.failed]
     for cell, why in failed[:_PLACES]:
-        say(f"failed: {cell.method} ({named(cell.values)}): {why}", indent="  ")
+        say(f"failed: {cell.name} ({named(cell.values)}): {why}", indent="  ")
     say(f"\n{filter_page.sentence(found)}")
     for best in found.best:
         say(best.line, indent="  ")
 
 
-def _places(ranking: Ranking, columns: Sequence[str]) -> list[list[str]]:
-    pick = [RANKING.index(c) for c in columns]
-    rows = [ranking_row(r) for r in ranking.rows[:_PLACES]]
+def _places(ranking: Ranking, pick: Sequence[int], by: str) -> list[list[str]]:
+    rows = [ranking_row(r, by) for r in ranking.rows[:_PLACES]]
     return [[_text(row[i]) for i in pick] for row in rows]
 
 

@@ -1,60 +1,72 @@
-"""Many seeds of one experiment in one walk: they share the gains, which no measurement changes."""
+"""Many recordings of one experiment filtered together: they share the gains, which need no data."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats, Ints, checked
-from validate.errors import ComparisonError
-from validate.estimate.displacement_filter import DisplacementStepper, InModes
+from validate.arrays import Floats, Ints
+from validate.estimate.coordinates import InModes
+from validate.estimate.covariance import Decoupled, Dense
 from validate.estimate.gains import GainSequence
-from validate.estimate.kalman import Gain
-from validate.estimate.modal_kernel import walked
+from validate.estimate.kalman import Gain, log_likelihood
 
 
 @dataclass(frozen=True)
 class Batch:
-    """values (seeds, nt, p) m read from the estimates; nis (seeds, nt) with its degrees (nt,)."""
+    """Estimates `values` (seeds, nt, p) m, innovations y (seeds, nt, m) m, `nis` (seeds, nt) with
+    degrees of freedom `dof` (nt,) and `log_likelihood` (seeds, nt).
+
+    `frozen` is the step from which the gains repeat; None where they never do.
+    """
 
     values: Floats
+    y: Floats
     nis: Floats
     dof: Floats
+    log_likelihood: Floats
+    frozen: int | None
 
 
-def shared_gain_run(stepper: DisplacementStepper, inputs: Floats, z: Floats, rows: Floats) -> Batch:
-    """Filters z (seeds, nt, m) m, NaN = missing, one row for each step of inputs (nt, k).
+class OneAtATime:
+    """A filter whose gains depend on what is measured: recordings are filtered one by one."""
 
-    `stepper` is a `ModalKf(gains="shared")` prepared with measurements of the same schedule;
-    rows (p, N) read what is wanted. Raises `ComparisonError` for other steppers and schedules.
-    """
-    modes, gains = stepper.coordinates, stepper.gains
-    if not isinstance(modes, InModes) or gains is None or stepper.smooth:
-        raise ComparisonError('seeds share a walk of ModalKf(gains="shared"); prepare that')
-    m, nt = len(stepper.sensor.names), len(inputs)
-    z = checked(z, "z [m]", (None, nt, m), nan=True, error=ComparisonError)
-    _require_schedule(stepper, z)
-    forces, q, begin = stepper.excitation.walk(inputs)
-    which, stack, S_yy = _stacked(gains, nt, m, len(modes.shapes.T))
-    free, rule = stepper.system.free, modes.rule
-    read, moved = rows[:, free] @ modes.shapes, q @ (rows @ stepper.system.moves).T
-    offset = q @ stepper.sensor.driven.T
-    factors = np.array(modes.factors)
-    weights = np.array([rule.h, rule.b0, rule.b1, rule.g0, rule.g1])
-    towards_prior = stepper.recursion == "prior"
-    walks = [
-        walked(factors, weights, forces, begin, towards_prior, which, stack, stepper.sensor.H,
-               own - offset, read)
-        for own in z
-    ]  # fmt: skip
-    values = np.array([found + moved for found, _ in walks])
-    nis = _nis(np.array([y for _, y in walks]), which, S_yy)
-    dof = np.array([float(sum(stepper.when.get(k + 1, ()))) for k in range(nt)])
-    return Batch(values, nis, dof)
+    def batch(self, inputs: Floats, z: Floats, rows: Floats) -> Batch | None:
+        """None."""
+        return None
 
 
-def _stacked(gains: GainSequence, nt: int, m: int, n: int) -> tuple[Ints, Floats, Floats]:
-    """Which gain (nt,) every step takes, -1 for none; all gains (k, m, n), zero for what they do
-    not see, and their S_yy (k, m, m) m^2, there the unit."""
+def batch_of(
+    gains: GainSequence, values: Floats, y: Floats, stacked: "StackedGains", dof: Floats
+) -> Batch:
+    """The statistics of innovations y (seeds, nt, m) m that these gains left."""
+    nis, log_det = stacked.statistics(y)
+    density = np.asarray(log_likelihood(nis, dof, log_det))
+    return Batch(values, y, nis, dof, density, gains.frozen)
+
+
+@dataclass(frozen=True)
+class StackedGains:
+    """Gain number `which` (nt,) of every step, -1 for none; all gains `G` (k, m, n), zero for what
+    they do not see, and `S_yy` (k, m, m) m^2, the unit matrix there."""
+
+    which: Ints
+    G: Floats
+    S_yy: Floats
+
+    def statistics(self, y: Floats) -> tuple[Floats, Floats]:
+        """NIS (seeds, nt) of innovations y (seeds, nt, m) m and ln det S_yy (nt,), zero where
+        nothing was measured."""
+        nis, log_det, seen = np.zeros(y.shape[:2]), np.zeros(y.shape[1]), self.which >= 0
+        if seen.any():
+            S = self.S_yy[self.which[seen]]
+            scaled = np.linalg.solve(S, np.moveaxis(y[:, seen], 0, 2))
+            nis[:, seen] = np.einsum("stm,tms->st", y[:, seen], scaled)
+            log_det[seen] = np.linalg.slogdet(self.S_yy)[1][self.which[seen]]
+        return nis, log_det
+
+
+def stacked_gains(gains: GainSequence, nt: int, m: int, n: int) -> StackedGains:
+    """The gains of nt steps in arrays: m components measured, n numbers in the state."""
     places: dict[int, int] = {}
     which = np.full(nt, -1)
     distinct: list[Gain] = []
@@ -70,27 +82,30 @@ def _stacked(gains: GainSequence, nt: int, m: int, n: int) -> tuple[Ints, Floats
         else:
             seen = np.array(gain.seen)
             G[:, seen], S[:] = gain.G, np.where(np.outer(seen, seen), gain.S_yy, np.eye(m))
-    return which, np.ascontiguousarray(stack.swapaxes(1, 2)), S_yy
+    return StackedGains(which, np.ascontiguousarray(stack.swapaxes(1, 2)), S_yy)
 
 
-def _nis(y: Floats, which: Ints, S_yy: Floats) -> Floats:
-    """y^T S_yy^-1 y (seeds, nt) of innovations (seeds, nt, m), zero where nothing was measured."""
-    nis, seen = np.zeros(y.shape[:2]), which >= 0
-    if seen.any():
-        scaled = np.linalg.solve(S_yy[which[seen]], np.moveaxis(y[:, seen], 0, 2))
-        nis[:, seen] = np.einsum("stm,tms->st", y[:, seen], scaled)
-    return nis
+def in_amplitudes(nodal: Dense, modes: InModes) -> Decoupled:
+    """The recursion of nodal displacements in amplitudes of all modes: its transition is
+    diagonal."""
+    Q = _white(nodal.Q, modes)
+    if Q is None:
+        Q = modes.amplitudes(modes.amplitudes(nodal.Q).T)
+    P0 = _scaled(nodal.P0, nodal.Q, Q)
+    if P0 is None:
+        P0 = modes.amplitudes(modes.amplitudes(nodal.P0).T)
+    H = np.ascontiguousarray(nodal.H @ modes.shapes)
+    return Decoupled(modes.factors[0], Q, H, nodal.R, P0)
 
 
-def _require_schedule(stepper: DisplacementStepper, z: Floats) -> None:
-    """The gains are those of one schedule: every seed must have been measured by it."""
-    planned = np.zeros(z.shape[1:], dtype=bool)
-    for step, seen in stepper.when.items():
-        if step <= len(planned):
-            planned[step - 1] = seen
-    other = (np.isfinite(z) != planned).any(axis=(1, 2))
-    if other.any():
-        raise ComparisonError(
-            f"{int(other.sum())} of {len(z)} seeds miss other samples than the gains were made "
-            "for; run those one by one"
-        )
+def _scaled(one: Floats, other: Floats, turned: Floats) -> Floats | None:
+    """`one` turned, where it is a multiple of `other`; saves two products of full matrices."""
+    largest = float(np.abs(other).max())
+    factor = float(np.abs(one).max()) / largest if largest else 0.0
+    return factor * turned if np.array_equal(one, factor * other) else None
+
+
+def _white(Q: Floats, modes: InModes) -> Floats | None:
+    """`Q` turned, where every unknown has the same variance and shares none with another."""
+    q = float(Q[0, 0])
+    return q * modes.white if np.array_equal(Q, q * np.eye(len(Q))) else None

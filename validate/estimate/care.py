@@ -120,23 +120,34 @@ class Care:
         claimed then, the innovation, and `late`."""
         late = self.late(moved)
         S_yy = recursion.H @ claim.PHt + noise(recursion.R, late)
+        offered = z
         z, gated = self.passed(z, predicted, S_yy)
         seen = np.isfinite(z)
         if not seen.any():
-            return None, claim, replace(nothing(len(z)), gated=gated), late
+            return None, claim, gated_out(nothing(len(z)), offered, predicted, gated), late
         gain, claim = recursion.update(claim, tuple(seen.tolist()), late)
-        return gain, claim, replace(innovation(z, predicted, gain), gated=gated), late
+        found = innovation(z, predicted, gain)
+        return gain, claim, gated_out(found, offered, predicted, gated), late
 
     def linear_update(
         self, prior: Gaussian, z: Floats, H: Floats, R: Floats, moved: Floats
     ) -> tuple[Update | None, Innovation]:
         """`kf_update` with care; None where nothing passed."""
-        R, shown = R + self.together(moved), H @ prior.x
+        R, shown, offered = R + self.together(moved), H @ prior.x, z
         z, gated = self.passed(z, shown, H @ prior.P @ H.T + R)
         if not np.isfinite(z).any():
-            return None, replace(nothing(len(z)), gated=gated)
+            return None, gated_out(nothing(len(z)), offered, shown, gated)
         update = kf_update(prior, z, H, R)
-        return update, replace(update.innovation, gated=gated)
+        return update, gated_out(update.innovation, offered, shown, gated)
+
+
+def gated_out(
+    found: Innovation, offered: Floats, predicted: Floats, gated: Gated | None
+) -> Innovation:
+    """The innovation with the differences y of rejected samples too: they were measured; their sd
+    stays zero."""
+    y = np.where(np.isfinite(offered), offered - predicted, 0.0)
+    return replace(found, y=y, gated=gated)
 
 
 def _squared(y: Floats, S: Floats) -> float:

@@ -7,15 +7,16 @@ knows nothing of them. Its transition J^-1 A alone decides P, hence the gains ne
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.estimate.batch import Batch, batch_of, in_amplitudes, stacked_gains
 from validate.estimate.care import Care, gate_numbers, gate_units
-from validate.estimate.covariance import Claim, Covariance
+from validate.estimate.coordinates import Coordinates, InModes, Nodal, excitation_in, in_modes
+from validate.estimate.covariance import Claim, Covariance, Dense
 from validate.estimate.gains import Claims, GainSequence
 from validate.estimate.kalman import (
     Gain,
@@ -25,114 +26,32 @@ from validate.estimate.kalman import (
     innovation_units,
     nothing,
 )
-from validate.estimate.measurements import Timetable
+from validate.estimate.measurements import Measurements, Timetable
+from validate.estimate.modal_kernel import walked
+from validate.estimate.observable import shared_gains
 from validate.estimate.smoother import Look, Note, look_of, smoothed
 from validate.fem.system import System
 from validate.solve.dynamic import InertialStepper
 from validate.solve.excitation import Excitation, Inputs
-from validate.solve.newmark_rule import Propagation, Rule
 from validate.solve.types import State
 
 Recursion = Literal["prior", "posterior"]
 Structure = Literal["white", "load"]
 
 
-class Coordinates(Protocol):
-    """In what the state (n,) is kept: nodal displacements or modal amplitudes."""
-
-    def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
-        """x' under forces f (n,) in these coordinates."""
-        ...
-
-    def forces(self, f: Floats) -> Floats:
-        """Forces (m, k) N on the free unknowns, in these coordinates (n, k)."""
-        ...
-
-    def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]: ...
-
-    def free(self, x: Floats) -> Floats:
-        """Values (m,) of the free unknowns."""
-        ...
-
-    def amplitudes(self, u: Floats) -> Floats:
-        """The coordinates of u (m,) or (m, k)."""
-        ...
-
-    def variances(self, P: Floats) -> Floats:
-        """Diagonal (m,) of the free unknowns' covariance."""
-        ...
-
-
-@dataclass(frozen=True)
-class Nodal:
-    """The free unknowns themselves."""
-
-    propagation: Propagation
-
-    def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
-        return self.propagation.predict(x, v, a, f)
-
-    def forces(self, f: Floats) -> Floats:
-        return f
-
-    def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
-        return self.propagation.rates(new, x, v, a)
-
-    def free(self, x: Floats) -> Floats:
-        return x
-
-    def amplitudes(self, u: Floats) -> Floats:
-        return u
-
-    def variances(self, P: Floats) -> Floats:
-        return np.diag(P)
-
-
-@dataclass(frozen=True)
-class InModes:
-    """Amplitudes of all modes: `shapes` (m, r), M-orthonormal, `dual` = M shapes.
-
-    `factors` (r,) each of q, v, a and the modal force make the step.
-    """
-
-    shapes: Floats
-    dual: Floats
-    factors: tuple[Floats, Floats, Floats, Floats]
-    rule: Rule
-
-    @cached_property
-    def white(self) -> Floats:
-        """What equal variance of every unknown is in amplitudes (r, r)."""
-        return np.asarray(self.dual.T @ self.dual)
-
-    def predict(self, x: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
-        fq, fv, fa, ff = self.factors
-        return fq * x + fv * v + fa * a + ff * f
-
-    def forces(self, f: Floats) -> Floats:
-        return np.ascontiguousarray(self.shapes.T @ f)
-
-    def rates(self, new: Floats, x: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
-        return self.rule.rates(new, x, v, a)
-
-    def free(self, x: Floats) -> Floats:
-        return self.shapes @ x
-
-    def amplitudes(self, u: Floats) -> Floats:
-        return self.dual.T @ u
-
-    def variances(self, P: Floats) -> Floats:
-        return np.asarray(np.einsum("ij,ij->i", self.shapes @ P, self.shapes))
-
-
 @dataclass(frozen=True)
 class Sensed:
-    """Where measurements land, and rows: H (m, n) of the coordinates, `driven` (m, k) of drives."""
+    """What is measured and where it lands; rows H (m, n) of the coordinates, `driven` (m, k) of
+    drives."""
 
-    names: tuple[str, ...]
+    offered: Measurements
     table: Timetable
     H: Floats
     driven: Floats
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.offered.names
 
 
 @dataclass(frozen=True)
@@ -200,6 +119,10 @@ class DisplacementStepper(InertialStepper):
         gate = gate_units(self.care)
         return {**innovation_units(self.sensor.names), **gate, **super().units}
 
+    @property
+    def offered(self) -> Measurements:
+        return self.sensor.offered
+
     def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
         """Why no measurement reached the estimate; empty where one did."""
         return self.sensor.table.unheard(len(numbers), numbers)
@@ -224,6 +147,63 @@ class DisplacementStepper(InertialStepper):
             return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
         numbers = {**seen.numbers(self.sensor.names), **gate_numbers(self.care, seen)}
         return State(k, inner, numbers={**numbers, **self._forces(inner)})
+
+    def batch(self, inputs: Floats, z: Floats, rows: Floats) -> Batch | None:
+        """Filter z (seeds, nt, m) m, NaN = missing, one row for each step of inputs (nt, k); `rows`
+        (p, N) read the estimates.
+
+        Estimates equal those of single runs, to rounding and the filter's own `settled`. None where
+        gains depend on the data, damping couples the modes, the filter smooths, or the recordings
+        were not measured at the same instants.
+        """
+        when, nt = dict(self.when), len(inputs)
+        planned = np.array([when.get(k + 1, (False,) * z.shape[2]) for k in range(nt)])
+        if (np.isfinite(z) != planned).any() or (shared := self._sharing()) is None:
+            return None
+        modes, gains, excited = shared.coordinates, shared.gains, shared.excitation
+        assert isinstance(modes, InModes)
+        assert gains is not None
+        forces, q, begin = excited.walk(inputs)
+        stacked = stacked_gains(gains, nt, z.shape[2], len(modes.shapes.T))
+        read = rows[:, self.system.free] @ modes.shapes
+        moved = q @ (rows @ self.system.moves).T
+        rule, offset = modes.rule, q @ self.sensor.driven.T
+        weights = np.array([rule.h, rule.b0, rule.b1, rule.g0, rule.g1])
+        walks = [
+            walked(np.array(modes.factors), weights, forces, begin, self.recursion == "prior",
+                   stacked.which, stacked.G, shared.sensor.H, own - offset, read)
+            for own in z
+        ]  # fmt: skip
+        values, y = (np.array(column) for column in zip(*walks, strict=True))
+        return batch_of(gains, values + moved, y, stacked, planned.sum(axis=1).astype(float))
+
+    def _sharing(self) -> "DisplacementStepper | None":
+        """The same filter in modes with gains computed beforehand; None where there is none."""
+        if self.care is not None or self.smooth:
+            return None
+        modes, covariance = self.claimed, self.covariance
+        if not isinstance(modes, InModes):
+            try:
+                modes = in_modes(self.system, self.excitation.rule)
+            except SceneError:  # damping couples the modes
+                return None
+        if isinstance(covariance, Dense):
+            covariance = in_amplitudes(covariance, modes)
+        gains, nodal = self.gains, isinstance(self.coordinates, Nodal)
+        if gains is None:
+            gains = shared_gains(self.system, covariance, self.sensor.table, self.settled)
+        elif nodal:
+            known = gains.before if self.claimed is modes else None
+            gains = known or gains.mapped(modes.amplitudes)
+        return replace(
+            self,
+            excitation=excitation_in(modes, self.excitation) if nodal else self.excitation,
+            coordinates=modes,
+            claimed=modes,
+            covariance=covariance,
+            gains=gains,
+            sensor=replace(self.sensor, H=covariance.H),
+        )
 
     def _forces(self, e: Estimate) -> Mapping[str, float]:
         if not self.reactions.names:

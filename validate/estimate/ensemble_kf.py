@@ -22,7 +22,6 @@ from validate.estimate.sampled_kalman import Corrected, Reach, ensemble_update
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import Handles, require_handled
-from validate.solve.types import Stepper
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class EnsembleKf(MemberModel):
                 f"{self.runs} members, walks {self.walk:g} and {self.bias_walk:g}: at least 3, 0, 0"
             )
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> MemberStepper:
         """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
         scene does not have and for localised shapes, `ComparisonError` for times off the steps."""
         require_handled(system.scene, self)

@@ -8,10 +8,11 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.estimate import node_ekf_kernel as kernel
+from validate.estimate.batch import OneAtATime
 from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.explicit_step import ExplicitStep
 from validate.estimate.kalman import Innovation, innovation_units, nothing
-from validate.estimate.measurements import Timetable
+from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Look, Note, Transition, smoothed
 from validate.scene.scene import Scene
 from validate.solve.types import Ending, State
@@ -77,16 +78,20 @@ class AtInputs:
 
 
 @dataclass(frozen=True)
-class ExplicitFilterStepper:
+class ExplicitFilterStepper(OneAtATime):
     """`refusal` says why no step is made; empty where the step is small enough."""
 
     explicit: ExplicitStep
     core: ExplicitCore
-    names: tuple[str, ...]
+    offered: Measurements
     times: Timetable
     refusal: str
     care: Care | None
     smooth: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.offered.names
 
     @property
     def scene(self) -> Scene:

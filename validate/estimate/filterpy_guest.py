@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting, gated_out
 from validate.estimate.filterpy_names import (
     EnsembleKalmanFilter,
     KalmanFilter,
@@ -31,7 +31,6 @@ from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_s
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.types import Stepper
 
 Make = Callable[[LinearModel], Any]
 
@@ -139,7 +138,7 @@ class FilterpyGuest:
     clock: float | None = clock_setting()
     smooth: bool = smooth_setting()
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
         """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
         shapes are not the model's, `UsageError` for smoothing one whose covariances are its own."""
         require_handled(system.scene, self)
@@ -154,7 +153,7 @@ class FilterpyGuest:
         care = care_of(measurements, self.gate, self.clock, self.dt)
         core = GuestCore(reduced, first, self.seed, care)
         table = timetable(measurements, self.dt)
-        return CoreStepper(system, core, measurements.names, table, care, self.smooth)
+        return CoreStepper(system, core, measurements, table, care, self.smooth)
 
 
 def _made(make: Make | str) -> Make:
@@ -242,15 +241,15 @@ class GuestCore:
     def _update(self, guest: Any, z: Floats, moved: Floats) -> tuple[Look | None, Innovation]:
         """Changes the guest, unless a gate rejects part of z (m,) m."""
         H, R, gated = self.reduced.model.H, self.reduced.model.R, None
-        PHt, shown = guest.P @ H.T, H @ guest.x
+        PHt, shown, offered = guest.P @ H.T, H @ guest.x, z
         if self.care is not None:
             R = R + self.care.together(moved)
             z, gated = self.care.passed(z, shown, H @ PHt + R)
         if not np.isfinite(z).all():
-            return None, replace(nothing(len(H)), gated=gated)
+            return None, gated_out(nothing(len(H)), offered, shown, gated)
         gain = best_gain(PHt, H @ PHt + R)
         guest.update(z, R=R) if self.care else guest.update(z)
-        found = replace(innovation(z, shown, gain), gated=gated)
+        found = gated_out(innovation(z, shown, gain), offered, shown, gated)
         return look_of(gain, found), found
 
     def free(self, inner: Visit) -> Floats:

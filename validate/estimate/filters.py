@@ -2,6 +2,8 @@
 
 from typing import ClassVar, Protocol
 
+from validate.arrays import Floats
+from validate.estimate.batch import Batch
 from validate.estimate.ensemble_kf import EnsembleKf
 from validate.estimate.filterpy_guest import FilterpyGuest
 from validate.estimate.kf_fem import KfFem
@@ -17,12 +19,26 @@ from validate.solve.handles import Handles
 from validate.solve.types import Stepper
 
 
+class FilterStepper(Stepper, Protocol):
+    """A prepared filter: it tells what it was given, steps, and may filter many recordings."""
+
+    @property
+    def offered(self) -> Measurements:
+        """The measurements that it was given."""
+        ...
+
+    def batch(self, inputs: Floats, z: Floats, rows: Floats) -> Batch | None:
+        """Filter z (seeds, nt, m) m of the components of `offered`, NaN = missing, by step of
+        inputs (nt, k); `rows` (p, N) read the estimates. None where it cannot."""
+        ...
+
+
 class Filter(Protocol):
     """Settings of a filter: it sees a system and its measurements, never the truth."""
 
     handles: ClassVar[Handles]
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper: ...
+    def prepare(self, system: System, measurements: Measurements) -> FilterStepper: ...
 
 
 FILTERS: tuple[type[Filter], ...] = (

@@ -8,6 +8,7 @@ Updates are in Joseph's form, which stays symmetric and positive for any gain.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_solve
@@ -17,6 +18,7 @@ from validate.arrays import Floats
 
 Function = Callable[[Floats], Floats]
 Seen = tuple[bool, ...]
+_LN_2_PI = float(np.log(2 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,11 @@ class Gain:
     def sd(self) -> Floats:
         """Standard deviations (m,) of the innovations, zero where nothing is seen."""
         return np.where(self.seen, np.sqrt(np.diag(self.S_yy)), 0.0)
+
+    @cached_property
+    def log_det(self) -> float:
+        """Natural logarithm of the determinant of S_yy over the seen components."""
+        return 2 * float(np.log(np.diag(self.root)).sum())
 
     def nis(self, y: Floats) -> Floats:
         """y^T S_yy^-1 y of innovations (k,) or (k, s) of the seen components."""
@@ -85,27 +92,35 @@ class Gated:
 
 @dataclass(frozen=True)
 class Innovation:
-    """y = z - H u_prior (m,) m, zero where nothing was measured; sd (m,) m, zero there too.
+    """y = z - H u_prior (m,) m, zero where nothing was measured; sd (m,) m, zero there too, and of
+    samples that a gate rejected.
 
     `nis` = y^T S_yy^-1 y of the `dof` components that were measured, and passed the gate if there
-    is one.
+    is one; `log_det` is the logarithm of the determinant of their S_yy.
     """
 
     y: Floats
     sd: Floats
     nis: float
     dof: int
+    log_det: float = 0.0
     gated: Gated | None = None
+
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the density, in metres, that the filter gave to what was measured."""
+        return float(log_likelihood(self.nis, self.dof, self.log_det))
 
     def after(self, other: "Innovation") -> "Innovation":
         """This one, with the counts and sums of another in the same step before it."""
         gated = (self.gated and other.gated and other.gated.and_then(self.gated)) or self.gated
-        nis, dof = self.nis + other.nis, self.dof + other.dof
-        return Innovation(self.y, self.sd, nis, dof, gated)
+        nis, dof, log_det = self.nis + other.nis, self.dof + other.dof, self.log_det + other.log_det
+        return Innovation(self.y, self.sd, nis, dof, log_det, gated)
 
     def numbers(self, names: tuple[str, ...]) -> Mapping[str, float]:
         """By trace name, for `State.numbers`."""
         numbers = {"nis": self.nis, "nis.dof": float(self.dof)}
+        numbers["log_likelihood"] = self.log_likelihood
         for name, y, sd in zip(names, self.y.tolist(), self.sd.tolist(), strict=True):
             numbers[f"innovation.{name}"] = y
             numbers[f"innovation.{name}.sd"] = sd
@@ -116,7 +131,12 @@ def innovation(z: Floats, predicted: Floats, gain: Gain) -> Innovation:
     """Of z (m,) where the gain has seen it, against the predicted (m,)."""
     seen = np.array(gain.seen)
     y = np.where(seen, z - predicted, 0.0)
-    return Innovation(y, gain.sd, float(gain.nis(y[seen])), int(seen.sum()))
+    return Innovation(y, gain.sd, float(gain.nis(y[seen])), int(seen.sum()), gain.log_det)
+
+
+def log_likelihood(nis: Any, dof: Any, log_det: Any) -> Any:
+    """-(nis + ln det S_yy + dof ln 2 pi) / 2: of Gaussian innovations of `dof` components."""
+    return -(nis + log_det + dof * _LN_2_PI) / 2
 
 
 def nothing(m: int) -> Innovation:
@@ -126,7 +146,7 @@ def nothing(m: int) -> Innovation:
 
 def innovation_units(names: tuple[str, ...]) -> dict[str, str]:
     """Units of what `Innovation.numbers` tells."""
-    units = {"nis": "1", "nis.dof": "1"}
+    units = {"nis": "1", "nis.dof": "1", "log_likelihood": "1"}
     for name in names:
         units |= {f"innovation.{name}": "m", f"innovation.{name}.sd": "m"}
     return units

@@ -10,7 +10,7 @@ Departures: P is kept symmetric. White Q, the printed one, carries a correction 
 not measured; `structure="load"` does.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -18,31 +18,27 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.coordinates import Coordinates, InModes, Nodal, excitation_in, in_modes
 from validate.estimate.covariance import Covariance, Decoupled, Dense
 from validate.estimate.displacement_filter import (
-    Coordinates,
     DisplacementStepper,
-    InModes,
-    Nodal,
     Recursion,
     Sensed,
     Structure,
     load_shapes,
 )
-from validate.estimate.gains import GainSequence, gain_sequence, schedule
-from validate.estimate.measurements import Measurements, Timetable, timetable
-from validate.estimate.observable import Spaces, observed
+from validate.estimate.gains import GainSequence, schedule
+from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.observable import shared_gains
 from validate.estimate.smoother import smooth_setting
-from validate.fem.modes import modes_of
 from validate.fem.once import once
 from validate.fem.system import System
 from validate.memory import require_memory
 from validate.parameters import quantity
 from validate.solve.dynamic import reactions
-from validate.solve.excitation import Excitation, StartName, excitation
+from validate.solve.excitation import StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.newmark_rule import Rule, RuleName, per_mode, propagation, rule_of
-from validate.solve.types import Stepper
+from validate.solve.newmark_rule import RuleName, propagation, rule_of
 
 _DENSE = 8  # matrices of all unknowns that the printed recursion holds at once
 
@@ -97,7 +93,7 @@ class KfFem(DisplacementNoise):
     modes.
     """
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
         """Raises `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
         load; `ComparisonError` for measurements that land on no step."""
         require_handled(system.scene, self)
@@ -129,31 +125,6 @@ class KfFem(DisplacementNoise):
         except SceneError:  # damping couples the modes
             return nodal, self._dense(system, measurements, nodal)
         return modes, modal_covariance(self, system, measurements, modes)
-
-
-def shared_gains(
-    system: System, covariance: Covariance, table: Timetable, settled: float
-) -> GainSequence:
-    """All gains of the measurements, from the narrowest recursion that gives them."""
-    when = schedule(table)
-    if isinstance(covariance, Decoupled):
-        known: Spaces = once(system, "spaces of what is observed", dict)
-        narrow = observed(covariance, max(when, default=1), known)
-        if narrow is not None:
-            return replace(gain_sequence(narrow, when, settled), basis=narrow.space.W)
-    return gain_sequence(covariance, when, settled)
-
-
-def in_modes(system: System, rule: Rule) -> InModes:
-    """All modes, kept with the system; raises `SceneError` where damping couples them."""
-    return once(system, ("in modes", rule), lambda: _in_modes(system, rule))
-
-
-def _in_modes(system: System, rule: Rule) -> InModes:
-    modes = modes_of(system)
-    M = system.M[system.free][:, system.free]
-    factors = per_mode(rule, modes.damping, modes.omega**2)
-    return InModes(modes.shapes, np.asarray(M @ modes.shapes), factors, rule)
 
 
 def modal_covariance(
@@ -196,7 +167,7 @@ def stepper_of(
         coordinates,
         excitation_in(coordinates, excited),
         covariance,
-        Sensed(measurements.names, table, seen, np.asarray(measurements.H @ system.moves)),
+        Sensed(measurements, table, seen, np.asarray(measurements.H @ system.moves)),
         schedule(table),
         gains,
         settings.recursion,
@@ -204,17 +175,4 @@ def stepper_of(
         settings.settled,
         settings.care(measurements),
         settings.smooth,
-    )
-
-
-def excitation_in(coordinates: Coordinates, nodal: Excitation) -> Excitation:
-    """What inputs do, in the coordinates: forces are linear in its columns."""
-    of = coordinates.forces
-    return replace(
-        nodal,
-        loads=of(nodal.loads),
-        stiffness=of(nodal.stiffness),
-        damping=of(nodal.damping),
-        mass=of(nodal.mass),
-        starts=None if nodal.starts is None else coordinates.amplitudes(nodal.starts),
     )

@@ -31,7 +31,6 @@ from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_s
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.types import Stepper
 
 _OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
 
@@ -52,7 +51,7 @@ class LoadScale:
     clock: float | None = clock_setting()
     smooth: bool = smooth_setting()
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
         require_handled(system.scene, self)
         if len(system.scene.loads) != 1:
@@ -62,7 +61,7 @@ class LoadScale:
         care = care_of(measurements, self.gate, self.clock, self.dt)
         core = _core(self, system, shape, H @ shape, measurements.variances(self.R), care)
         table = timetable(measurements, self.dt)
-        return CoreStepper(system, core, measurements.names, table, care, self.smooth)
+        return CoreStepper(system, core, measurements, table, care, self.smooth)
 
 
 def _core(

@@ -14,6 +14,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
 from validate.estimate import node_ekf_kernel as kernel
+from validate.estimate.batch import OneAtATime
 from validate.estimate.care import (
     Care,
     care_of,
@@ -21,6 +22,7 @@ from validate.estimate.care import (
     gate_numbers,
     gate_setting,
     gate_units,
+    gated_out,
 )
 from validate.estimate.doubtful import Doubts, doubts
 from validate.estimate.explicit_step import FAR, MARGIN, explicit_step
@@ -140,7 +142,7 @@ class Sight:
     """What is measured of a member: `rows` (m, c) of the columns `at` (c,) of its state; its noise
     R (m, m) m^2, and the care it is taken with."""
 
-    names: tuple[str, ...]
+    offered: Measurements
     times: Timetable
     rows: Floats
     at: Ints
@@ -159,7 +161,7 @@ def sight(model: MemberModel, members: Members, measurements: Measurements) -> S
     rows = H[:, at].toarray() if shapes is None else H @ shapes.T
     times, R = timetable(measurements, model.h), np.diag(measurements.variances(model.R))
     care = care_of(measurements, model.gate, model.clock, model.h)
-    return Sight(measurements.names, times, np.asarray(rows), at.astype(np.int64), R, care)
+    return Sight(measurements, times, np.asarray(rows), at.astype(np.int64), R, care)
 
 
 @dataclass(frozen=True)
@@ -173,7 +175,7 @@ class MemberStates:
 
 
 @dataclass(frozen=True)
-class MemberStepper:
+class MemberStepper(OneAtATime):
     """`limit` s is the step that a member as stiff as the model bears."""
 
     model: MemberModel
@@ -183,6 +185,10 @@ class MemberStepper:
     limit: float
 
     @property
+    def offered(self) -> Measurements:
+        return self.sight.offered
+
+    @property
     def scene(self) -> Scene:
         return self.members.system.scene
 
@@ -190,7 +196,7 @@ class MemberStepper:
     def units(self) -> Mapping[str, str]:
         """NIS with its degrees, innovations with their sd, and the estimates: value, 95 % interval,
         share of the start's sd that is left, correlations."""
-        units = {**innovation_units(self.sight.names), **gate_units(self.sight.care)}
+        units = {**innovation_units(self.offered.names), **gate_units(self.sight.care)}
         for p in self.members.doubts.parameters:
             name = f"estimate.{p.name}"
             units |= {name: p.unit, f"{name}.low": p.unit, f"{name}.high": p.unit}
@@ -212,7 +218,7 @@ class MemberStepper:
         """The posterior at the end of a step of `substeps` parts; `inputs` are the loads there."""
         if state.k == 0 and (failure := self._refused(state.inner.x)):
             return replace(state, failure=failure)
-        last, found = cast(MemberStates, state.inner), nothing(len(self.sight.names))
+        last, found = cast(MemberStates, state.inner), nothing(len(self.offered.names))
         now, parts = last, self.model.substeps
         for part in range(parts):
             begin, end = (
@@ -233,7 +239,10 @@ class MemberStepper:
             if failure := self._away(now.x) or self._refused(now.x):
                 return replace(state, failure=failure)
             now = replace(now, ready=self._ready(before, now.x))
-        numbers = {**found.numbers(self.sight.names), **gate_numbers(self.sight.care, found)}
+        numbers = {
+            **found.numbers(self.offered.names),
+            **gate_numbers(self.sight.care, found),
+        }
         return State(state.k + 1, now, numbers=numbers | dict(self._estimates(now.x)))
 
     def unheard(self, numbers: Sequence[Mapping[str, float]]) -> str:
@@ -259,15 +268,17 @@ class MemberStepper:
         if self.model.inflation != 1:
             Z = Z.mean(axis=0) + self.model.inflation * (Z - Z.mean(axis=0))
         seen, R, gated, care = self.sight.of(Z), self.sight.R, None, self.sight.care
+        offered = z
         shown = seen.mean(axis=0)
         if care is not None:
             R = R + care.together(shown - self.sight.of(before.X).mean(axis=0))
             z, gated = care.passed(z, shown, self.analysis.claimed(seen) + R)
         if not np.isfinite(z).any():
-            return now, replace(nothing(len(z)), gated=gated)
+            return now, gated_out(nothing(len(z)), offered, shown, gated)
         after = self.analysis.corrected(Z, seen, z, R, number)
         X, x = np.ascontiguousarray(after.members[:, :n]), after.members[:, n:]
-        return MemberStates(X, x, now.ready, now.inputs), replace(after.innovation, gated=gated)
+        found = gated_out(after.innovation, offered, shown, gated)
+        return MemberStates(X, x, now.ready, now.inputs), found
 
     def _refused(self, x: Floats) -> tuple[Ending, str] | None:
         """Of a step that the stiffest member does not bear."""

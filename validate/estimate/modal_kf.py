@@ -7,21 +7,20 @@ dense in amplitudes: shapes are orthonormal in M, not in the unknowns).
 
 from dataclasses import dataclass
 
-from validate.estimate.displacement_filter import DisplacementStepper, InModes
+from validate.estimate.coordinates import InModes, in_modes
+from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.kf_fem import (
     DisplacementNoise,
     Gains,
-    in_modes,
     modal_covariance,
-    shared_gains,
     stepper_of,
 )
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.observable import shared_gains
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import require_handled
 from validate.solve.newmark_rule import rule_of
-from validate.solve.types import Stepper
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class ModalKf(DisplacementNoise):
 
     gains: Gains = quantity("every_step", "1", "computed beforehand, or at every step")
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
         """Raises `SceneError` for what linear schemes refuse and for damping that couples modes."""
         require_handled(system.scene, self)
         return self.with_modes(system, measurements, in_modes(system, rule_of(self.rule, self.dt)))

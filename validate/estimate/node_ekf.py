@@ -17,7 +17,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, UsageError
 from validate.estimate import node_ekf_kernel as kernel
-from validate.estimate.care import Care, care_of, clock_setting, gate_setting
+from validate.estimate.care import Care, care_of, clock_setting, gate_setting, gated_out
 from validate.estimate.covariance import noise
 from validate.estimate.explicit_filter import ExplicitFilterStepper
 from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
@@ -27,7 +27,7 @@ from validate.fem.explicit import Precision
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
-from validate.solve.types import Ending, Stepper
+from validate.solve.types import Ending
 
 Block = Literal["component", "node", "companion"]
 _PURE = 1e-9  # how far a row's largest weight may lie from 1 to read a node
@@ -68,7 +68,7 @@ class NodeEKF:
         if min(self.P0, self.Qp) < 0 or (self.Qm is not None and self.Qm <= 0):
             raise UsageError("P0 and Qp are variances >= 0, Qm one above 0")
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> ExplicitFilterStepper:
         """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
         measurements that are no components of nodes or that land between the steps."""
         require_handled(system.scene, self)
@@ -80,7 +80,7 @@ class NodeEKF:
         core = NodeCore(self, explicit, rows, R, free, self.Qp * free, care)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
         times = timetable(measurements, explicit.h)
-        return ExplicitFilterStepper(explicit, core, measurements.names, times, refusal, care)
+        return ExplicitFilterStepper(explicit, core, measurements, times, refusal, care)
 
 
 @dataclass(frozen=True)
@@ -144,10 +144,10 @@ class NodeCore:
             return self._corrected(memory, z, self.R)
         shown, late = memory.u[self.rows], self.care.late((memory.u - memory.before)[self.rows])
         S_yy = self._predicted(memory.P) + noise(self.R, late)
-        z, gated = self.care.passed(z, shown, S_yy)
+        passed, gated = self.care.passed(z, shown, S_yy)
         R = self.R if late is None else self.R + late**2
-        memory, found = self._corrected(memory, z, R)
-        return memory, replace(found, gated=gated)
+        memory, found = self._corrected(memory, passed, R)
+        return memory, gated_out(found, z, shown, gated)
 
     def _predicted(self, P: Floats) -> Floats:
         """H P H^T (m, m) m^2: only components of one node are correlated, if blocks are nodes."""
@@ -161,11 +161,13 @@ class NodeCore:
         c, before, y, sd = self.settings, memory.before, np.empty(len(z)), np.empty(len(z))
         if c.correct_previous or c.block == "companion":
             before = before.copy()  # which is the last state's own
-        nis, dof = kernel.correct(
+        nis, log_det, dof = kernel.correct(
             memory.u, before, memory.P, self.rows, z, R,
             c.covariance == "joseph", c.correct_previous, y, sd,
         )  # fmt: skip
-        return NodeMemory(memory.u, before, memory.P, memory.held), Innovation(y, sd, nis, dof)
+        return NodeMemory(memory.u, before, memory.P, memory.held), Innovation(
+            y, sd, nis, dof, log_det
+        )
 
     def sd(self, memory: NodeMemory, number: int) -> Floats:
         P = memory.P

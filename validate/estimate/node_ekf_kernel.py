@@ -157,13 +157,13 @@ def innovations(
 def correct_components(
     u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
     joseph: bool, shift: bool,
-) -> float:  # fmt: skip
-    """Eqs 37-39 at the measured components (m,), NaN = missing; returns NIS.
+) -> tuple[float, float]:  # fmt: skip
+    """Eqs 37-39 at the measured components (m,), NaN = missing; returns NIS and ln det S.
 
     `shift` adds the correction to `before` (U_t) too. "printed" P - K P loses all of P where
     P >> R; "joseph" is (1 - K)^2 P + K^2 R.
     """
-    nis, p = 0.0, P[0]
+    nis, log_det, p = 0.0, 0.0, P[0]
     for m in range(len(rows)):
         i = rows[m]
         if np.isnan(z[m]):
@@ -175,15 +175,16 @@ def correct_components(
             before[i] += G * y
         p[i] = (1 - G) * p[i] * (1 - G) + G * R[m] * G if joseph else p[i] - G * p[i]
         nis += y / S * y
-    return nis
+        log_det += np.log(S)
+    return nis, log_det
 
 
 @_compiled
 def correct_companions(
     u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool
-) -> float:
-    """The update of (U_t, U_{t-dt}) together, measured in U_t; returns NIS."""
-    nis, now, cross, old = 0.0, P[0], P[1], P[2]
+) -> tuple[float, float]:
+    """The update of (U_t, U_{t-dt}) together, measured in U_t; returns NIS and ln det S."""
+    nis, log_det, now, cross, old = 0.0, 0.0, P[0], P[1], P[2]
     for m in range(len(rows)):
         i = rows[m]
         if np.isnan(z[m]):
@@ -200,19 +201,21 @@ def correct_companions(
         else:
             now[i], cross[i], old[i] = p - G * p, x - G * x, b - L * x
         nis += y / S * y
-    return nis
+        log_det += np.log(S)
+    return nis, log_det
 
 
 @_compiled
 def correct_nodes(
     u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
     joseph: bool, shift: bool,
-) -> float:  # fmt: skip
-    """The 3 x 3 update of the measured nodes, one component after the other; returns NIS.
+) -> tuple[float, float]:  # fmt: skip
+    """The 3 x 3 update of the measured nodes, one component after the other; returns NIS and
+    ln det S.
 
     R is diagonal, so this is the joint update of a node's components.
     """
-    nis, G, T = 0.0, np.empty(3), np.empty((3, 3))
+    nis, log_det, G, T = 0.0, 0.0, np.empty(3), np.empty((3, 3))
     for m in range(len(rows)):
         n, i = divmod(rows[m], 3)
         if np.isnan(z[m]):
@@ -234,7 +237,8 @@ def correct_nodes(
                 if joseph:
                     P[ROW[j, k], n] += G[j] * R[m] * G[k] - T[j, i] * G[k]
         nis += y / S * y
-    return nis
+        log_det += np.log(S)
+    return nis, log_det
 
 
 @_compiled
@@ -260,11 +264,14 @@ def clip(P: Floats) -> int:
 def correct(
     u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
     joseph: bool, shift: bool, y: Floats, sd: Floats,
-) -> tuple[float, int]:  # fmt: skip
-    """`innovations`, then the update of the kind that P has: NIS, and how many were measured."""
+) -> tuple[float, float, int]:  # fmt: skip
+    """`innovations`, then the update of the kind that P has: NIS, ln det S, and how many were
+    measured."""
     dof = innovations(u, P, rows, z, R, y, sd)
     if P.shape[0] == 3:
-        return correct_companions(u, before, P, rows, z, R, joseph), dof
-    if P.shape[0] == 6:
-        return correct_nodes(u, before, P, rows, z, R, joseph, shift), dof
-    return correct_components(u, before, P, rows, z, R, joseph, shift), dof
+        nis, log_det = correct_companions(u, before, P, rows, z, R, joseph)
+    elif P.shape[0] == 6:
+        nis, log_det = correct_nodes(u, before, P, rows, z, R, joseph, shift)
+    else:
+        nis, log_det = correct_components(u, before, P, rows, z, R, joseph, shift)
+    return nis, log_det, dof

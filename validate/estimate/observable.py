@@ -9,15 +9,19 @@ covariance to rounding.
 """
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
 
 from validate.arrays import Floats
-from validate.estimate.covariance import Claim, Decoupled, claimed, noise
+from validate.estimate.covariance import Claim, Covariance, Decoupled, claimed, noise
+from validate.estimate.gains import GainSequence, gain_sequence, schedule
 from validate.estimate.kalman import Gain, Seen, best_gain
+from validate.estimate.measurements import Timetable
 from validate.estimate.modal_kernel import advance_observed
+from validate.fem.once import once
+from validate.fem.system import System
 
 _LEFT = 1e-12  # share of A^k H^T outside the space that is taken as none
 _NOTHING = 1e-14  # singular value, of the largest, that is rounding
@@ -130,3 +134,16 @@ def _holds(V: Floats, f: Floats, X: Floats, steps: int) -> bool:
         if np.linalg.norm(moved - V @ (V.T @ moved)) > _LEFT * np.linalg.norm(moved):
             return False
     return True
+
+
+def shared_gains(
+    system: System, covariance: Covariance, table: Timetable, settled: float
+) -> GainSequence:
+    """All gains of the measurements, from the narrowest recursion that gives them."""
+    when = schedule(table)
+    if isinstance(covariance, Decoupled):
+        known: Spaces = once(system, "spaces of what is observed", dict)
+        narrow = observed(covariance, max(when, default=1), known)
+        if narrow is not None:
+            return replace(gain_sequence(narrow, when, settled), basis=narrow.space.W)
+    return gain_sequence(covariance, when, settled)

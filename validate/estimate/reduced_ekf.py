@@ -39,7 +39,7 @@ from validate.estimate.smoother import (
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
-from validate.solve.types import Ending, Stepper
+from validate.solve.types import Ending
 
 _SETTLED = 1e-9  # change of a gain from one update to the next: with slow modes 1e-6 is too early
 
@@ -75,7 +75,7 @@ class ReducedEKF:
         if min(self.load_walk, self.load_sd, self.process) < 0:
             raise UsageError("load_walk, load_sd and process are standard deviations >= 0")
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> ExplicitFilterStepper:
         """Raises `SceneError` for what the explicit step cannot do, `UsageError` for a basis that
         does not exist, `ComparisonError` for a steady gain that does not, or times off the steps.
         """
@@ -94,7 +94,7 @@ class ReducedEKF:
         rows = np.ascontiguousarray(measurements.H[:, sensed].toarray())
         core = ShapesCore(explicit, basis.Phi, model, recursion, updates, sensed, rows, care)
         return ExplicitFilterStepper(
-            explicit, core, measurements.names, times, refusal, care, self.smooth
+            explicit, core, measurements, times, refusal, care, self.smooth
         )
 
     def _basis(self, steps: ExplicitStep) -> Basis:

@@ -32,7 +32,6 @@ from validate.estimate.smoother import (
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.types import Stepper
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
 _DIES = 1 - 1e-6  # of an error, from one look to the next: what never dies has no steady gain
@@ -62,7 +61,7 @@ class ReducedKf:
     clock: float | None = clock_setting()
     smooth: bool = smooth_setting()
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
         """Raises `SceneError` for scenes with drives, large strain, or coupled damping, and
         `ComparisonError` for measurements off the steps, or a steady gain of irregular ones."""
         require_handled(system.scene, self)
@@ -74,7 +73,7 @@ class ReducedKf:
         care = care_of(measurements, self.gate, self.clock, self.dt)
         make = _steady if self.gains == "steady" else _exact
         core = make(model, schedule(table), self.settled, care)
-        return CoreStepper(system, core, measurements.names, table, care, self.smooth)
+        return CoreStepper(system, core, measurements, table, care, self.smooth)
 
 
 def dense_covariance(model: LinearModel) -> Dense:

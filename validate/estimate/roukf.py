@@ -17,7 +17,6 @@ from validate.estimate.sampled_kalman import Corrected
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import Handles, require_handled
-from validate.solve.types import Stepper
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Roukf(MemberModel):
 
     points: SigmaName = quantity("simplex", "1", "sigma points of p parameters: p + 1, or 2 p")
 
-    def prepare(self, system: System, measurements: Measurements) -> Stepper:
+    def prepare(self, system: System, measurements: Measurements) -> MemberStepper:
         """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
         scene does not have, `ComparisonError` for measurements off the steps."""
         require_handled(system.scene, self)

@@ -7,9 +7,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from validate.arrays import Floats
+from validate.estimate.batch import OneAtATime
 from validate.estimate.care import Care, gate_numbers, gate_units
 from validate.estimate.kalman import Innovation, innovation_units
-from validate.estimate.measurements import Timetable
+from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Note, Transition, smoothed
 from validate.fem.system import System
 from validate.scene.scene import Scene
@@ -58,15 +59,19 @@ class SmoothCore(Core, Protocol):
 
 
 @dataclass(frozen=True)
-class CoreStepper:
+class CoreStepper(OneAtATime):
     """States carry what the core does."""
 
     system: System
     core: Core
-    names: tuple[str, ...]
+    offered: Measurements
     table: Timetable
     care: Care | None
     smooth: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.offered.names
 
     @property
     def scene(self) -> Scene:

@@ -293,6 +293,11 @@ class Experiment:
         return self.twin is not None and self.twin.kind == "same model"
 
     @property
+    def repeats(self) -> bool:
+        """Whether a twin makes its recordings anew with other noise, and knows their truth."""
+        return self.twin is not None and self.twin.truth is not None
+
+    @property
     def seed(self) -> int | None:
         return self.twin.seed if self.twin else None
 

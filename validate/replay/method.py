@@ -5,7 +5,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Protocol, cast, runtime_checkable
 
 from validate.errors import UsageError
-from validate.estimate.measurements import measurements
+from validate.estimate.measurements import Measurements, measurements
 from validate.fem.system import System
 from validate.parameters import part, quantity
 from validate.register.registered import Registered
@@ -58,8 +58,11 @@ class Method:
         settings = self.given(given, declared)
         if not self.markers:
             return cast(Stepper, settings.prepare(system))
-        looks = measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
-        return cast(Stepper, settings.prepare(system, looks))
+        return cast(Stepper, settings.prepare(system, self.offered(system, seen)))
+
+    def offered(self, system: System, seen: Registered) -> Measurements:
+        """The measurements of its markers that a filter is given: of what moves freely."""
+        return measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
 
     def given(self, given: Mapping[str, Any], declared: "Method | None" = None) -> Any:
         """The settings with those that the experiment itself gives.

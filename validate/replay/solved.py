@@ -2,7 +2,7 @@
 
 import resource
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -10,9 +10,11 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.residual import residuals, stacked
+from validate.fem.locate import Rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.recording.types import Recording
+from validate.register.observation import nearest_samples
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.followed import MAIN, Followed
@@ -77,6 +79,17 @@ def _scenes(
     return (first, *others)
 
 
+@dataclass(frozen=True)
+class Kept:
+    """What a run keeps besides its traces: fields at times t (m,) s (None: as the experiment has
+    it), and the displacements of `points` at every step. `system`: that of the scene, where it is
+    built already."""
+
+    t: Floats | None = None
+    points: Rows | None = None
+    system: System | None = None
+
+
 def run_on(
     experiment: Experiment,
     name: str,
@@ -84,9 +97,10 @@ def run_on(
     parameters: Any,
     scene: AnyScene,
     seen: Sequence[Registered],
+    kept: Kept = Kept(),
 ) -> tuple[Run, ...]:
     """Runs of a method on recordings as they are registered: a filter's on other samples, say."""
-    runs = _Runs(experiment, name, method, parameters, scene, 0.0, lambda _: None)
+    runs = _Runs(experiment, name, method, parameters, scene, 0.0, lambda _: None, kept)
     return tuple(runs.on(one, scene) for one in seen)
 
 
@@ -105,13 +119,14 @@ class _Runs:
         scene: AnyScene,
         built: float,
         tell: Tell,
+        kept: Kept = Kept(),
     ) -> None:
         unknowns = f"{scene.mesh.nodes.size} unknowns"
         self._tell: Tell = lambda what: tell(f"{unknowns}, {what}")
         self._experiment, self._name, self._method = experiment, name, method
         self._declared = experiment.methods.get(name)
         self._parameters, self._built = parameters, built
-        self._system: System | None = None
+        self._kept, self._system = kept, kept.system
         self._prepared: tuple[Stepper, float] | None = None
 
     def on(self, seen: Registered, scene: AnyScene) -> Run:
@@ -122,13 +137,17 @@ class _Runs:
         steps = method.steps or len(t)
         self._tell("set-up")
         at = seen.frames(t, self._experiment.frames)
+        if self._kept.t is not None:
+            at = np.unique(nearest_samples(t, self._kept.t, "the run"))
         t, inputs, at = t[:steps], inputs[:steps], at[at < steps]
         given = self._experiment.sets(self._parameters, seen)
         if isinstance(method.settings, SceneSolver) or isinstance(scene, Meshless):
             settings = method.given(given, self._declared)
-            return run_scheme(self._name, settings, scene, t, inputs, at, self._tell)
+            return run_scheme(
+                self._name, settings, scene, t, inputs, at, self._tell, self._kept.points
+            )
         stepper, setup = self._stepper(scene, seen, given)
-        return march(self._name, stepper, t, inputs, at, setup, self._tell)
+        return march(self._name, stepper, t, inputs, at, setup, self._tell, self._kept.points)
 
     def _stepper(
         self, scene: Scene, seen: Registered, given: Mapping[str, Any]

@@ -48,6 +48,7 @@ def run_scheme(
     inputs: Floats,
     at: Ints,
     tell: Tell = _untold,
+    points: Rows | None = None,
 ) -> Run:
     """A run by what steps through a scene, or by what solves it as a whole.
 
@@ -57,12 +58,13 @@ def run_scheme(
         whole = settings.solve(scene, t, inputs)
         kept = np.isin(whole.at, at)
         sd = None if whole.sd is None else whole.sd[kept]
-        return replace(whole, method=name, at=whole.at[kept], u=whole.u[kept], sd=sd)
+        x = None if points is None else np.array([points.apply(u) for u in whole.u])
+        return replace(whole, method=name, at=whole.at[kept], u=whole.u[kept], sd=sd, points=x)
     require_handled(scene, settings)
     assert isinstance(scene, Scene)
     start = perf_counter()
     stepper = settings.prepare(build(scene))
-    return march(name, stepper, t, inputs, at, perf_counter() - start, tell)
+    return march(name, stepper, t, inputs, at, perf_counter() - start, tell, points)
 
 
 def march(
@@ -73,8 +75,10 @@ def march(
     at: Ints,
     setup_s: float,
     tell: Tell = _untold,
+    points: Rows | None = None,
 ) -> Run:
-    """Steps through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`.
+    """Steps through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`, and
+    the displacements of `points` at every step.
 
     `tell` is given the step, now and then.
 
@@ -85,7 +89,9 @@ def march(
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
     smooths = isinstance(stepper, Smoothing) and stepper.smooth
-    walk, outcome = (_smoothed if smooths else _walk)(stepper, inputs, frozenset(at.tolist()), tell)
+    frames = frozenset(at.tolist())
+    shown = _smoothed(stepper, inputs, frames) if smooths else _filtered
+    walk, outcome = _walk(stepper, inputs, frames, tell, shown, points)
     outcome = _listened(stepper, walk, outcome)
     done = len(walk.updates)
     traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
@@ -100,9 +106,11 @@ def march(
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     at = at[at < done]
+    x = None if points is None else np.array(walk.points).reshape(done, -1, u.shape[2])
     return Run(
-        method, t[:done], at, u, traces, outcome, setup_s, times, sd, seconds, tuple(walk.said)
-    )
+        method, t[:done], at, u, traces, outcome, setup_s, times, sd, seconds, tuple(walk.said),
+        points=x,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,15 +121,14 @@ class _Kept:
     numbers: list[Mapping[str, float]] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     probes: list[Floats] = field(default_factory=list)
+    points: list[Floats] = field(default_factory=list)
     fields: list[Floats] = field(default_factory=list)
     sd: list[Floats] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
 
 
-def _smoothed(
-    stepper: Stepper, inputs: Floats, at: frozenset[int], tell: Tell
-) -> tuple[_Kept, Outcome]:
-    """The second walk shows what the first one's measurements say of every step."""
+def _smoothed(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> Callable[[State], State]:
+    """The first of two walks, whose measurements say what the second one shows of every step."""
     assert isinstance(stepper, Smoothing)
     notes, state = [], stepper.rest()
     for i, value in enumerate(inputs):
@@ -129,7 +136,7 @@ def _smoothed(
         if state.failure:
             break
         notes.append(stepper.note(state, i in at))
-    return _walk(stepper, inputs, at, tell, stepper.smoother(notes))
+    return stepper.smoother(notes)
 
 
 def _filtered(state: State) -> State:
@@ -141,7 +148,8 @@ def _walk(
     inputs: Floats,
     at: frozenset[int],
     tell: Tell,
-    shown: Callable[[State], State] = _filtered,
+    shown: Callable[[State], State],
+    points: Rows | None,
 ) -> tuple[_Kept, Outcome]:
     walk, state, rows = _Kept(), stepper.rest(), _probe_rows(stepper)
     often = -(-len(inputs) // _TOLD)
@@ -165,6 +173,8 @@ def _walk(
         walk.numbers.append(seen.numbers)
         if rows is not None:
             walk.probes.append(rows.apply(stepper.field(seen)))
+        if points is not None:
+            walk.points.append(points.apply(stepper.field(seen)))
         if i in at:
             walk.fields.append(stepper.field(seen))
             if isinstance(stepper, Uncertain):

@@ -175,6 +175,7 @@ class Run:
     `u` keeps the output frames only, and so does a filter's `sd`; `traces` every step, and
     `seconds` (nt,) what each took, where it was timed. `said`: what a `Noticing` stepper noticed.
     `memory` bytes is the peak of the process that it ran in, until its end; 0: not measured.
+    `points` (nt, p, d) m are the displacements of points that were asked for, at every step.
     """
 
     method: str
@@ -189,6 +190,7 @@ class Run:
     seconds: Floats | None = None
     said: tuple[str, ...] = ()
     memory: int = 0
+    points: Floats | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", checked(self.t, "run t [s]", (None,)))

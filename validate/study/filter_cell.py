@@ -1,218 +1,212 @@
-"""A filter study's cell: the road of `validate run`, with recordings made in memory.
+"""A filter study's cell: one method with its settings, on every seed or on the measured recordings.
 
-Scenes, systems, registrations and truths are kept from cell to cell. Seeds change the noise only:
-a linear filter whose gains need no data runs them all at once, everything else one by one.
+Seeds change the noise only: a linear filter whose gains need no data runs them all at once, every
+other method one by one.
 """
 
-from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import ComparisonError
-from validate.estimate.batch import shared_gain_run
-from validate.estimate.displacement_filter import DisplacementStepper
-from validate.estimate.gains import schedule
-from validate.estimate.kalman import Seen
-from validate.estimate.measurements import Timetable, measurements, timetable
+from validate.errors import ComparisonError, UsageError
+from validate.estimate.filters import FilterStepper
+from validate.estimate.measurements import Measurements, timetable
 from validate.fem.locate import probe_rows
-from validate.fem.system import System
-from validate.fem.system import build as build_system
-from validate.parameters import describe
-from validate.register.markers import MarkerObservation
-from validate.register.registered import Registered
-from validate.replay.experiment import Experiment
-from validate.replay.followed import Truth
-from validate.replay.method import Method
-from validate.replay.own_body import meshed
-from validate.scene.scene import Scene
-from validate.solve.march import march
-from validate.solve.types import Run, Stepper
-from validate.study.filter_plan import FilterCell, set_up
-from validate.study.job import Job
-from validate.study.kept import Kept, fingerprint
-from validate.study.score import NIS, FilterScores, error_scores
-from validate.study.shared import sharing
+from validate.replay.solved import Kept as KeptFields
+from validate.solve.types import Run, Stepper, StepTimes
+from validate.study.filter_bench import Bench, Ready
+from validate.study.filter_plan import EACH, FilterCell
+from validate.study.score import NIS, FilterScores, error_scores, withheld_scores
+from validate.study.withheld import (
+    Innovations,
+    MarkerTracks,
+    Segments,
+    Withheld,
+    ahead_errors,
+    by_seed,
+    in_a_row,
+    innovations_of,
+    joined_innovations,
+    other_errors,
+    other_times,
+    read_innovations,
+)
 
-_TIMED = 25  # steps that are timed where the seeds run together
-_TIMED_S = 0.01  # s after which no more of them are
-_MANY = 40  # recordings and registrations kept, of seeds mostly
-
-
-@dataclass(frozen=True)
-class Ready:
-    """A cell prepared for one seed; `mark` names all that `seen` and the scene come from."""
-
-    parameters: Any
-    method: Method
-    system: System
-    seen: Registered
-    mark: Hashable
+_TIMED = 200  # steps that are timed where the seeds run together
+_TIMED_S = 0.05  # s after which no more of them are
 
 
 @dataclass(frozen=True)
-class Looks:
-    """Measurements by step: their timetable, which are there, and z (nt, m) m, NaN = none."""
+class Scored:
+    """What one recording says of a method: errors at the truth's probes by score, at what was
+    withheld, its innovations, NIS with its degrees of freedom."""
 
-    table: Timetable
-    when: Mapping[int, Seen]
-    z: Floats
-
-
-class Bench:
-    """One worker's memory of an experiment: what cells share is made once."""
-
-    def __init__(self, experiment: Experiment, job: Job) -> None:
-        self.experiment, self.job = experiment, job
-        assert experiment.twin is not None
-        self.twin = experiment.twin
-        self._systems: Kept[System] = Kept(4)
-        self._seen: Kept[tuple[str, Registered]] = Kept(_MANY)
-        self._looks: Kept[Looks | None] = Kept(_MANY)
-        self._recordings: Kept[Any] = Kept(_MANY)
-        self._truths: Kept[Truth] = Kept(4)
-
-    def ready(self, cell: FilterCell, seed: int) -> Ready:
-        parameters, method = set_up(self.experiment, self.job, cell, seed)
-        key = _text(parameters)
-        mark = (key, fingerprint(method.scene))
-        body, seen = self._seen.get(mark, lambda: self._registered(key, parameters, method))
-        system = self._systems.get(body, lambda: build_system(self._scene(key, parameters, method)))
-        return Ready(parameters, method, system, seen, mark)
-
-    def looks(self, ready: Ready, names: tuple[str, ...]) -> Looks | None:
-        """Those components' measurements on the recorded steps; None where they are not there."""
-        return self._looks.get((ready.mark, names), lambda: _looks(ready, names))
-
-    def _recording(self, key: str, parameters: Any) -> Any:
-        return self._recordings.get(key, lambda: self.twin.made(parameters, lambda _: None))
-
-    def _scene(self, key: str, parameters: Any, method: Method) -> Scene:
-        recording = self._recording(key, parameters)
-        return meshed(self.experiment.build(recording, parameters, method.scene))
-
-    def _registered(self, key: str, parameters: Any, method: Method) -> tuple[str, Registered]:
-        """The registration, behind the fingerprint of its scene: seeds share their system."""
-        scene = self._scene(key, parameters, method)
-        body = fingerprint(scene)
-        system = self._systems.get(body, lambda: build_system(scene))
-        recording = self._recording(key, parameters)
-        return body, self.experiment.place(recording, parameters, system.scene)
-
-    def truth(self, ready: Ready) -> Mapping[str, Floats]:
-        """The twin's motion: noise does not touch it, so the first seed's serves all."""
-        return self._truths.get(
-            _text(ready.parameters),
-            lambda: replace(self._true(ready), u=None, mesh=None),
-        ).probes
-
-    def stepper(self, ready: Ready) -> Stepper:
-        given = self.experiment.sets(ready.parameters, ready.seen)
-        return ready.method.prepare(ready.system, ready.seen, given)
-
-    def _true(self, ready: Ready) -> Truth:
-        assert self.twin.truth is not None
-        return self.twin.truth(ready.parameters, ready.seen)
+    truth: Mapping[str, float]
+    withheld: tuple[Withheld, ...]
+    innovations: Innovations | None = None
+    nis: float = 0.0
+    dof: int = 0
 
 
-def open_bench(job: Job) -> Bench:
-    return Bench(job.experiment(), job)
+@dataclass(frozen=True)
+class Fold:
+    """One run of a method: the markers it is given, and those that score it."""
+
+    given: tuple[str, ...]
+    scores: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds of set-up, and median and 99 % quantile of a step where steps were timed."""
+
+    setup_s: float = 0.0
+    p50: list[float] = field(default_factory=list)
+    p99: list[float] = field(default_factory=list)
+
+    def add(self, times: StepTimes | None) -> None:
+        if times is not None:
+            self.p50.append(times.p50)
+            self.p99.append(times.p99)
 
 
 def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
     """Raises what the cell's settings, its filter or its run end with."""
-    first = bench.ready(cell, cell.seeds[0])
-    start = perf_counter()
-    stepper = bench.stepper(first)
-    setup = perf_counter() - start
-    if isinstance(stepper, DisplacementStepper):
-        shared = _all_seeds(bench, cell, stepper, first)
-        if shared is not None:
-            return replace(shared, step_s=_step_time(stepper, first.seen.inputs), setup_s=setup)
-    return _one_by_one(bench, cell, stepper, first, setup)
+    first = bench.ready(cell, cell.seeds[0])[0]
+    if cell.baseline == "persistence":
+        return _persistence(bench, cell, first)
+    folds = folds_of(cell, first)
+    if first.method.markers and not cell.baseline and len(folds) == 1:
+        ready = first.with_markers(folds[0].given)
+        start = perf_counter()
+        stepper = cast(FilterStepper, ready.stepper())
+        setup = perf_counter() - start
+        if other_times(first.seen) is None:
+            together = _all_seeds(bench, cell, stepper, ready, folds[0])
+            if together is not None:
+                p50, p99 = _step_times(stepper, ready.seen.inputs)
+                return replace(together, step_s=p50, step_p99_s=p99, setup_s=setup)
+    return _one_by_one(bench, cell, folds)
+
+
+def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
+    """The runs of a cell.
+
+    Markers given to no filter score every method. Where there are none, or with `--hold-out each`,
+    every marker is held out in turn of a method that is given two and more.
+    """
+    moving = ready.tracks.names if ready.tracks else ()
+    given = ready.method.markers
+    if cell.hold_out and cell.hold_out != EACH:
+        return (Fold(_left(given, cell.hold_out, moving), cell.hold_out),)
+    if not given or cell.baseline:
+        return (Fold(given, cell.scored(moving)),)
+    whole = Fold(given, tuple(n for n in moving if n not in given))
+    if not cell.in_turn(moving):
+        return (whole,)
+    turns = tuple(Fold(tuple(n for n in given if n != m), (m,)) for m in given if len(given) > 1)
+    return (whole, *turns)
+
+
+def _left(
+    given: tuple[str, ...], held_out: tuple[str, ...], moving: Sequence[str]
+) -> tuple[str, ...]:
+    """The markers that a method keeps. Raises `UsageError` for names that do not move."""
+    absent = [n for n in held_out if n not in moving]
+    if absent:
+        raise UsageError(f"--hold-out {absent[0]}: no marker that moves; there are {list(moving)}")
+    left = tuple(n for n in given if n not in held_out)
+    if given and not left:
+        raise UsageError(
+            f"--hold-out {', '.join(held_out)} leaves nothing of {', '.join(given)} to the filter"
+        )
+    return left
 
 
 # --- all seeds at once ---------------------------------------------------------------------------
 
 
 def _all_seeds(
-    bench: Bench, cell: FilterCell, stepper: DisplacementStepper, first: Ready
+    bench: Bench, cell: FilterCell, stepper: FilterStepper, first: Ready, fold: Fold
 ) -> FilterScores | None:
-    """None where the seeds miss different samples, damping couples the modes, or what the filter
-    was given cannot be told from outside."""
-    z = _measured(bench, cell, stepper, first)
-    shared = sharing(stepper) if z is not None else None
-    if z is None or shared is None or shared.gains is None:
+    """None where the filter cannot take all seeds in one walk."""
+    offered, inputs, t = stepper.offered, first.seen.inputs, first.seen.t
+    every = [bench.ready(cell, seed)[0].with_markers(fold.given) for seed in cell.seeds]
+    z = [_by_step(r.method.offered(r.system, r.seen), offered, t) for r in every]
+    if any(own is None for own in z):
         return None
-    scene, inputs = first.system.scene, first.seen.inputs
-    points = probe_rows(scene.mesh, scene.probes)
-    rows = np.kron(points.weights.toarray(), np.eye(scene.mesh.dimension))
-    found = shared_gain_run(
-        shared, inputs, z, rows["xyz".index(bench.experiment.axis) :: scene.mesh.dimension]
-    )
+    rows, places = _rows(bench, first, fold)
+    found = stepper.batch(inputs, np.array(z), rows)
+    if found is None:
+        return None
     if not (np.isfinite(found.values).all() and np.isfinite(found.nis).all()):
         raise ComparisonError("diverged: the estimate is not finite")
-    names, dof = [p.name for p in scene.probes], int(found.dof.sum())
+    dof = int(found.dof.sum())
     if not dof:
-        raise ComparisonError(f"invalid: {stepper.sensor.table.unheard(len(inputs), ())}")
-    scores = [
-        _scores(bench, first, dict(zip(names, values.T, strict=True)), float(nis.sum()), dof)
-        for values, nis in zip(found.values, found.nis, strict=True)
-    ]
-    return FilterScores(
-        *_columns(scores),
-        nis=float(found.nis.sum()),
-        nis_dof=dof * len(z),
-        steps=len(inputs),
-        frozen=shared.gains.frozen,
-        shared=True,
+        raise ComparisonError(f"invalid: {_unheard(stepper, len(inputs))}")
+    measured, segments = np.isfinite(np.array(z)), first.segments
+    names = [p.name for p in first.scene.probes]
+    scored = []
+    for i, ready in enumerate(every):
+        probes = dict(zip(names, found.values[i, :, : len(names)].T, strict=True))
+        u = found.values[i, :, len(names) :].reshape(len(t), len(places), -1)
+        y = found.y[i]
+        own = (
+            *_held_out(ready, fold, t, u, segments),
+            *ahead_errors(t, offered.names, y, measured[i], segments),
+        )
+        scaled = _scaled(y, measured[i], offered)
+        told = innovations_of(t, scaled, found.log_likelihood[i], found.dof, segments)
+        truth = _against_truth(bench, first, probes)
+        scored.append(Scored(truth, own, told, float(found.nis[i].sum()), dof))
+    return replace(
+        _put_together(scored, segments), steps=len(inputs), frozen=found.frozen, shared=True
     )
 
 
-def _measured(
-    bench: Bench, cell: FilterCell, stepper: DisplacementStepper, first: Ready
-) -> Floats | None:
-    """Measurements z (seeds, nt, m) m by step, NaN = none, of the components the filter was given.
-
-    The filter's own table shows which those are: from the first seed's recording it must come out.
-    """
-    sensor = stepper.sensor
-    own = bench.looks(first, sensor.names)
-    if own is None or not _equal(own.table, sensor.table):
+def _by_step(own: Measurements, offered: Measurements, t: Floats) -> Floats | None:
+    """Measurements (nt, m) m by step, NaN = none; None for other components."""
+    if own.names != offered.names:
         return None
-    others = [bench.looks(bench.ready(cell, seed), sensor.names) for seed in cell.seeds[1:]]
-    all_ = [own, *(o for o in others if o is not None)]
-    if any(o.when != stepper.when for o in all_):
-        return None
-    return np.array([o.z for o in all_])
-
-
-def _looks(ready: Ready, names: tuple[str, ...]) -> Looks | None:
-    if not ready.seen.of(MarkerObservation):
-        return None
-    seen = measurements(ready.seen, ready.system.scene.mesh)
-    if any(name not in seen.names for name in names):
-        return None
-    pick = [seen.names.index(name) for name in names]
-    given = replace(seen, H=seen.H[pick], z=seen.z[:, pick], sd=seen.sd[pick], names=names)
-    table = timetable(given, float(ready.seen.t[0]))
-    z = np.full((len(ready.seen.t), len(names)), np.nan)
-    for step, row in table.z.items():
+    z = np.full((len(t), len(own.names)), np.nan)
+    for step, row in timetable(own, float(t[0])).z.items():
         if step <= len(z):
             z[step - 1] = row
-    return Looks(table, schedule(table), z)
+    return z
 
 
-def _equal(one: Timetable, other: Timetable) -> bool:
-    mine, others = (np.array(list(table.z.values())) for table in (one, other))
-    return one.z.keys() == other.z.keys() and np.array_equal(mine, others, equal_nan=True)
+def _scaled(y: Floats, measured: Floats, offered: Measurements) -> Floats:
+    """Innovations over the noise of their components (nt, m), NaN = none."""
+    return np.where(measured, y / offered.sd, np.nan)
 
 
-def _step_time(stepper: Stepper, inputs: Floats) -> float:
-    """Median s of the first steps, run as they are alone; the very first only warms up."""
+def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ...]]:
+    """Rows (p, N) of the probes along the experiment's axis and of the markers that score, and
+    the names of these."""
+    mesh = first.scene.mesh
+    d, axis = mesh.dimension, "xyz".index(first.experiment.axis)
+    probes = np.zeros((0, mesh.nodes.size))
+    if first.scene.probes:
+        weights = probe_rows(mesh, first.scene.probes).weights.toarray()
+        probes = np.kron(weights, np.eye(d))[axis::d]
+    tracks = _scoring(first, fold)
+    if tracks is None:
+        return probes, ()
+    markers = np.kron(tracks.rows.weights.toarray(), np.eye(d))
+    return np.vstack([probes, markers]), tracks.names
+
+
+def _unheard(stepper: FilterStepper, steps: int) -> str:
+    return cast(str, stepper.unheard([{"nis.dof": 0.0}] * steps))  # type: ignore[attr-defined]
+
+
+def _step_times(stepper: Stepper, inputs: Floats) -> tuple[float, float]:
+    """Median and 99 % quantile (s) of the first steps, run as they are alone; the very first only
+    warms up."""
     state, seconds = stepper.rest(), list[float]()
     for row in inputs[: _TIMED + 1]:
         start = perf_counter()
@@ -220,68 +214,191 @@ def _step_time(stepper: Stepper, inputs: Floats) -> float:
         seconds.append(perf_counter() - start)
         if sum(seconds) > _TIMED_S and len(seconds) > 5:
             break
-    return float(np.median(seconds[1:] or seconds))
+    p50, p99 = np.quantile(seconds[1:] or seconds, [0.5, 0.99])
+    return float(p50), float(p99)
 
 
 # --- seed by seed --------------------------------------------------------------------------------
 
 
-def _one_by_one(
-    bench: Bench, cell: FilterCell, stepper: Stepper, first: Ready, setup: float
-) -> FilterScores:
-    rows, times, nis, dof, steps = [], [], 0.0, 0, 0
-    for i, seed in enumerate(cell.seeds):
-        ready = first if i == 0 else bench.ready(cell, seed)
-        run = _march(cell, stepper if i == 0 else bench.stepper(ready), ready)
-        if not run.finished:
-            end = run.outcome
-            raise ComparisonError(f"seed {seed}: {end.state} at step {end.step}: {end.why}")
-        own, degrees = _nis(run)
-        names = [p.name for p in ready.system.scene.probes]
-        traces = {n: run.traces[f"{n}.{bench.experiment.axis}"].y for n in names}
-        rows.append(_scores(bench, first, traces, own, degrees))
-        nis, dof, steps = nis + own, dof + degrees, len(run.t)
-        times += [run.step_s.p50] if run.step_s else []
-    return FilterScores(
-        *_columns(rows),
-        nis=nis if dof else None,
-        nis_dof=dof,
-        step_s=float(np.median(times)) if times else None,
-        setup_s=setup,
+def _one_by_one(bench: Bench, cell: FilterCell, folds: Sequence[Fold]) -> FilterScores:
+    scored, timing, steps = list[Scored](), Timing(), 0
+    segments: Segments | None = None
+    for seed in cell.seeds:
+        on_each = []
+        for ready in bench.ready(cell, seed):
+            segments = segments or ready.segments
+            runs = [_run(cell, ready, fold, seed) for fold in folds]
+            timing.add(runs[0].step_s)
+            steps = len(runs[0].t)
+            on_each.append(_scored(bench, cell, ready, folds, runs))
+        scored.append(_in_a_row(on_each))
+    assert segments is not None
+    return replace(
+        _put_together(scored, segments),
+        step_s=float(np.median(timing.p50)) if timing.p50 else None,
+        step_p99_s=float(np.median(timing.p99)) if timing.p99 else None,
+        setup_s=runs[0].setup_s,
         steps=steps,
     )
 
 
-def _march(cell: FilterCell, stepper: Stepper, ready: Ready) -> Run:
-    t, inputs = ready.seen.t, ready.seen.inputs
-    return march(cell.method, stepper, t, inputs, np.array([len(t) - 1]), 0.0)
+def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:
+    one = ready.with_markers(fold.given)
+    one = one.given_nothing() if cell.baseline == "alone" else one
+    tracks = ready.tracks
+    points = None if tracks is None else tracks.rows
+    run = one.run(cell.method, KeptFields(other_times(ready.seen), points))
+    state = run.outcome.state
+    if state == "finished" or (state == "invalid" and cell.baseline == "alone"):
+        return run
+    where = f"seed {seed}: " if cell.seed_path else ""
+    raise ComparisonError(f"{where}{state} at step {run.outcome.step}: {run.outcome.why}")
 
 
-def _nis(run: Run) -> tuple[float, int]:
+def _scored(
+    bench: Bench, cell: FilterCell, ready: Ready, folds: Sequence[Fold], runs: Sequence[Run]
+) -> Scored:
+    """One recording: held-out errors of every fold, all else of the first."""
+    segments, run = ready.segments, runs[0]
+    tracks = ready.tracks
+    held = list[Withheld]()
+    for fold, own in zip(folds, runs, strict=True):
+        if tracks is not None and own.points is not None and fold.scores:
+            at = [tracks.names.index(n) for n in fold.scores]
+            held += tracks.of(fold.scores).errors(own.t, own.points[:, at], segments, ahead=False)
+    held += other_errors(run, ready.seen, segments)
+    axis = ready.experiment.axis
+    probes = {p.name: run.traces[f"{p.name}.{axis}"].y for p in ready.scene.probes}
+    truth = _against_truth(bench, ready, probes) if bench.experiment.repeats else {}
     nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
-    return (0.0, 0) if nis is None or dof is None else (float(nis.y.sum()), int(dof.y.sum()))
+    if nis is None or dof is None or cell.baseline:
+        ahead = _at_given(cell, tracks, run.t, run.points, segments)
+        return Scored(truth, (*held, *ahead))
+    names = [n for n in run.traces if n.startswith("innovation.") and not n.endswith(".sd")]
+    names = [n.removeprefix("innovation.") for n in names]
+    y, sd = read_innovations(run, names)
+    measured = (sd > 0) | (y != 0)
+    scaled = np.where(sd > 0, y / np.where(sd > 0, sd, 1.0), np.nan)
+    told = innovations_of(run.t, scaled, run.traces["log_likelihood"].y, dof.y, segments)
+    ahead = ahead_errors(run.t, names, y, measured, segments)
+    return Scored(truth, (*held, *ahead), told, float(nis.y.sum()), int(dof.y.sum()))
+
+
+def _at_given(
+    cell: FilterCell,
+    tracks: MarkerTracks | None,
+    t: Floats,
+    u: Floats | None,
+    segments: Segments,
+) -> tuple[Withheld, ...]:
+    """Errors at the markers that filters are given, of a method that is given none."""
+    if tracks is None or u is None:
+        return ()
+    given = tracks.of(cell.given)
+    at = [tracks.names.index(n) for n in given.names]
+    return given.errors(t, u[:, at], segments, ahead=True)
+
+
+# --- persistence ----------------------------------------------------------------------------------
+
+
+def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
+    """The last measurement, held: a marker is where it, or the nearest given one, was last seen."""
+    scored, seconds, segments = list[Scored](), list[float](), first.segments
+    for seed in cell.seeds:
+        on_each = []
+        for ready in bench.ready(cell, seed):
+            tracks = ready.tracks
+            given = None if tracks is None else tracks.of(cell.given)
+            if tracks is None or given is None or not given.names:
+                raise ComparisonError("no marker is given to any filter: nothing to hold")
+            start = perf_counter()
+            now, before = tracks.held(given)
+            seconds.append((perf_counter() - start) / len(tracks.t))
+            on_each.append(
+                Scored(
+                    _held_at_probes(bench, ready, given),
+                    (
+                        *_squares(tracks, now, cell.scored(tracks.names), segments, ahead=False),
+                        *_squares(tracks, before, given.names, segments, ahead=True),
+                    ),
+                )
+            )
+        scored.append(_in_a_row(on_each))
+    found = _put_together(scored, segments)
+    step = float(np.median(seconds))
+    return replace(found, step_s=step, step_p99_s=float(np.max(seconds)), steps=len(first.seen.t))
+
+
+def _squares(
+    tracks: MarkerTracks, u: Floats, names: Sequence[str], segments: Segments, *, ahead: bool
+) -> tuple[Withheld, ...]:
+    """Of displacements u (nt, k, d) m at the samples' own times."""
+    at = [tracks.names.index(n) for n in names]
+    own = tracks.of(names)
+    return own.errors(tracks.t[1:], u[1:, at], segments, ahead=ahead)
+
+
+def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[str, float]:
+    truth = bench.truth(ready)
+    if not truth:
+        return {}
+    probes = [p for p in ready.scene.probes if p.name in truth]
+    rest = np.array([p.point for p in probes])
+    at = replace(given, names=tuple(p.name for p in probes), rest=rest)
+    now, _ = at.held(given)
+    c, t = "xyz".index(ready.experiment.axis), np.concatenate([[0.0], ready.seen.t])
+    last = np.searchsorted(given.t, t[1:] + 1e-9) - 1
+    estimates = {p.name: now[last, j, c] for j, p in enumerate(probes)}
+    return error_scores(estimates, truth, ready.experiment.axis)
 
 
 # --- scores --------------------------------------------------------------------------------------
 
 
-def _scores(
-    bench: Bench, first: Ready, traces: Mapping[str, Floats], nis: float, dof: int
-) -> dict[str, float]:
-    truth = bench.truth(first)
-    if not truth:
-        raise ComparisonError("the twin tells no probe's truth: 0 compared")
-    scores = error_scores(traces, truth, bench.experiment.axis)
-    return scores | ({NIS: nis / dof} if dof else {})
+def _scoring(ready: Ready, fold: Fold) -> MarkerTracks | None:
+    tracks = ready.tracks
+    return None if tracks is None or not fold.scores else tracks.of(fold.scores)
 
 
-def _columns(
-    rows: list[dict[str, float]],
-) -> tuple[dict[str, tuple[float, ...]], dict[str, str]]:
-    names = tuple(rows[0])
-    units = {name: "1" if name == NIS else "m" for name in names}
-    return {name: tuple(row[name] for row in rows) for name in names}, units
+def _held_out(
+    ready: Ready, fold: Fold, t: Floats, u: Floats, segments: Segments
+) -> tuple[Withheld, ...]:
+    tracks = _scoring(ready, fold)
+    return () if tracks is None else tracks.errors(t, u, segments, ahead=False)
 
 
-def _text(parameters: Any) -> str:
-    return repr([(p.path, p.default) for p in describe(parameters)])
+def _against_truth(bench: Bench, ready: Ready, traces: Mapping[str, Floats]) -> Mapping[str, float]:
+    truth = bench.truth(ready)
+    return error_scores(traces, truth, bench.experiment.axis) if truth else {}
+
+
+def _in_a_row(scored: Sequence[Scored]) -> Scored:
+    """Several measured recordings as one."""
+    if len(scored) == 1:
+        return scored[0]
+    return Scored(
+        {}, in_a_row([s.withheld for s in scored]),
+        joined_innovations([s.innovations for s in scored], 1),
+        sum(s.nis for s in scored), sum(s.dof for s in scored),
+    )  # fmt: skip
+
+
+def _put_together(scored: Sequence[Scored], segments: Segments) -> FilterScores:
+    """All seeds; steps and times are the caller's."""
+    withheld = by_seed([s.withheld for s in scored])
+    innovations = joined_innovations([s.innovations for s in scored], 0)
+    scores, units = withheld_scores(withheld, innovations)
+    truth = {name: tuple(s.truth[name] for s in scored) for name in scored[0].truth}
+    dof = sum(s.dof for s in scored)
+    nis = {NIS: tuple(s.nis / s.dof for s in scored)} if all(s.dof for s in scored) else {}
+    return FilterScores(
+        {**truth, **scores, **nis},
+        {**dict.fromkeys(truth, "m"), **units, **dict.fromkeys(nis, "1")},
+        nis=sum(s.nis for s in scored) if dof else None,
+        nis_dof=dof,
+        withheld=withheld,
+        innovations=innovations,
+        segment_s=segments.length,
+    )

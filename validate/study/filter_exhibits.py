@@ -5,12 +5,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.study.chosen_exhibits import chosen_exhibits
 from validate.study.filter_maps import over_axes
 from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
+from validate.study.score import WORDS
+from validate.study.shown import shown_unit
 from validate.study.sweep import named
 
-_MM = 1e3
+_MS = 1e3
 _SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
 _SHOWN_OF_MANY = 8  # places of each where there are many conditions
 _FULL = 12  # conditions whose rankings and charts are shown
@@ -24,50 +27,74 @@ _PAIRS = (
     "that overlap may still differ in pairs. Nothing is corrected for the number of cells: the "
     "winner of many is a little better here than it is."
 )
+_BLOCKS = (
+    "± is half of Student's 95 % interval over blocks of time; differences from the first place "
+    "are taken block by block. A setting whose innovations stay correlated longer than a block has "
+    "no interval. What was measured has noise of its own: it is in every score alike."
+)
+_NIS = (
+    "A filter whose NIS lies outside its 95 % band does not know how wrong it is: its own interval "
+    "is not used."
+)
 _NAMED = 3  # overlapping places that are named
 
 
 def study_exhibits(study: FilterStudy) -> tuple[Exhibit, ...]:
     """In the order of a reader's questions: which, how sure, at what cost, is it honest."""
-    found = [best_exhibit(study), _ranking_exhibit(study), _pareto_exhibit(study)]
-    found += list(over_axes(study))
+    found = [best_exhibit(study), _ranking_exhibit(study), *chosen_exhibits(study)]
+    found += [_pareto_exhibit(study), *over_axes(study)]
     failed = _failed_exhibit(study)
     return (*found, *((failed,) if failed else ()))
 
 
-def ranking_row(r: Ranked) -> tuple[Entry, ...]:
+def ranking_row(r: Ranked, by: str) -> tuple[Entry, ...]:
     """One place: what it is, its score with interval, ties, honesty and cost."""
-    seen = r.result.consistency
+    result, (factor, _) = r.result, shown_unit(r.result.units[by])
+    seen, told = result.consistency, result.innovations
     half, apart = r.score.half, r.from_best
     return (
         r.place,
-        r.cell.method,
+        r.cell.name,
         named(r.cell.settings),
-        _MM * r.score.mean,
-        None if half is None else _MM * half,
+        factor * r.score.mean,
+        None if half is None else factor * half,
         _overlapping(r),
-        _MM * apart.mean if r.place > 1 else None,
-        _MM * apart.half if r.place > 1 and apart.half is not None else None,
+        factor * apart.mean if r.place > 1 else None,
+        factor * apart.half if r.place > 1 and apart.half is not None else None,
         _tied(r),
         seen.mean if seen else None,
-        seen.verdict if seen else None,
-        None if r.result.step_s is None else _MM * r.result.step_s,
-        r.result.frozen,
+        _consistent(r),
+        told.lag_1 if told else None,
+        None if result.step_s is None else _MS * result.step_s,
+        None if result.step_p99_s is None else _MS * result.step_p99_s,
+        result.frozen,
         _front(r),
     )
 
 
+def _consistent(r: Ranked) -> str | None:
+    """What NIS says of a filter, and of the interval that it claims."""
+    seen = r.result.consistency
+    if seen is None:
+        return None
+    return "consistent" if seen.band_95.holds(seen.mean) else f"{seen.verdict}: interval not used"
+
+
 def _front(r: Ranked) -> str:
     if r.result.step_s is None:
-        return "sees the future"
+        return "not timed"
     return "front" if r.dominated_by is None else f"#{r.dominated_by} beats"
 
 
-RANKING = (
-    "place", "method", "settings", "error / mm", "± 95 % / mm", "interval overlaps",
-    "less #1's, paired / mm", "± 95 % / mm (paired)", "against #1", "NIS per dof / 1", "filter is",
-    "step / ms", "gains repeat from step", "Pareto",
-)  # fmt: skip
+def ranking_head(unit: str) -> tuple[str, ...]:
+    """Columns of a ranking by a score in `unit` (SI)."""
+    shown = shown_unit(unit)[1]
+    return (
+        "place", "method", "settings", f"error / {shown}", f"± 95 % / {shown}",
+        "interval overlaps", f"less #1's, paired / {shown}", f"± 95 % / {shown} (paired)",
+        "against #1", "NIS per dof / 1", "filter is", "innovation lag 1 / 1", "step p50 / ms",
+        "step p99 / ms", "gains repeat from step", "Pareto",
+    )  # fmt: skip
 
 
 def best_exhibit(study: FilterStudy) -> Exhibit:
@@ -75,16 +102,16 @@ def best_exhibit(study: FilterStudy) -> Exhibit:
     words, rows = [], []
     for best in study.best:
         r = best.ranked
-        half = f" ± {_MM * r.score.half:.3g}" if r.score.half is not None else ""
+        factor, unit = shown_unit(study.unit)
+        half = f" ± {factor * r.score.half:.3g}" if r.score.half is not None else ""
         when = f" with {named(r.cell.condition)}" if r.cell.condition else ""
         doubts = f"; {best.doubts}" if best.doubts else ""
         words.append(
             f"Best{when}: {r.cell.method} ({named(r.cell.settings)}), "
-            f"{study.by} {_MM * r.score.mean:.4g}{half} mm over "
-            f"{seeds_text(r.score.count)}{doubts}."
+            f"{study.by} {factor * r.score.mean:.4g}{half} {unit} over {over(study)}{doubts}."
         )
         rows.append((named(r.cell.condition), best.line))
-    head = ("condition of the twin", "command")
+    head = ("condition", "command")
     table = NumberTable("best", "The best settings as commands", head, tuple(rows))
     return Exhibit("best", "Best settings", tuple(words), tables=(table,))
 
@@ -95,8 +122,8 @@ def _ranking_exhibit(study: FilterStudy) -> Exhibit:
         NumberTable(
             f"ranking_{i}",
             f"Ranking{_under(r)}: the first {min(most, len(r.rows))} of {len(r.rows)} places",
-            RANKING,
-            tuple(ranking_row(row) for row in r.rows[:most]),
+            ranking_head(study.unit),
+            tuple(ranking_row(row, study.by) for row in r.rows[:most]),
         )
         for i, r in enumerate(study.rankings[:_FULL], start=1)
     )
@@ -105,14 +132,38 @@ def _ranking_exhibit(study: FilterStudy) -> Exhibit:
 
 def _ranking_words(study: FilterStudy) -> Iterator[str]:
     seeds = len(study.plan.seeds)
+    meaning = WORDS.get(study.by, "root mean square")
+    if seeds > 1:
+        yield (
+            f"Ranked by the mean of {study.by} over {seeds_text(seeds)} of the noise; ± is half of "
+            f"Student's 95 % interval of that mean, taken over the seeds. {study.by}: {meaning}."
+        )
+        yield _PAIRS
+    else:
+        yield f"Ranked by {study.by}: {meaning}."
+        for ranking in study.rankings[:_FULL]:
+            if ranking.blocks is not None:
+                yield f"{_under(ranking).strip() or 'The recording'}: {ranking.blocks.words}."
+        yield _BLOCKS
+    yield _NIS
     yield (
-        f"Ranked by the mean of {study.by} over {seeds_text(seeds)} of the noise; ± is half of "
-        "Student's 95 % interval of that mean, taken over the seeds."
+        "Times are the median and the 99 % quantile of one step in this study's workers, one "
+        "thread each, side by side."
     )
-    yield _PAIRS if seeds > 1 else "One seed: no interval, so no two places can be told apart."
-    yield "Time is the median of one step in this study's workers, one thread each, side by side."
     if study.plan.experiment.same_model:
         yield _SAME_MODEL
+
+
+def over(study: FilterStudy) -> str:
+    """What a score is taken over."""
+    seeds, blocks = len(study.plan.seeds), study.rankings[0].blocks
+    if seeds > 1:
+        return seeds_text(seeds)
+    if blocks is None:
+        return "one recording"
+    return (
+        f"one recording in {blocks.count} blocks" if blocks.sure else "one recording, no interval"
+    )
 
 
 def seeds_text(count: int) -> str:
@@ -121,7 +172,7 @@ def seeds_text(count: int) -> str:
 
 def _overlapping(r: Ranked) -> str:
     if r.score.half is None:
-        return "one seed"
+        return "no interval"
     if not r.overlaps:
         return "none"
     shown = ", ".join(f"#{p}" for p in r.overlaps[:_NAMED])
@@ -143,14 +194,22 @@ def _under(ranking: Ranking) -> str:
 
 
 def _pareto_exhibit(study: FilterStudy) -> Exhibit:
-    shown = study.rankings[:_FULL]
+    shown, (factor, unit) = study.rankings[:_FULL], shown_unit(study.unit)
     charts = tuple(_pareto_chart(study, r, i) for i, r in enumerate(shown, start=1) if r.rows)
     tables = tuple(
         NumberTable(
             f"pareto_{i}",
             f"Pareto front{_under(r)}, fastest first: nothing here is both less wrong and faster",
-            ("place", "method", "settings", "step / ms", "error / mm", "± 95 % / mm"),
-            tuple(_front_row(row) for row in r.front),
+            (
+                "place",
+                "method",
+                "settings",
+                "step p50 / ms",
+                "step p99 / ms",
+                f"error / {unit}",
+                f"± 95 % / {unit}",
+            ),
+            tuple(_front_row(row, factor) for row in r.front),
         )
         for i, r in enumerate(shown, start=1)
     )
@@ -158,16 +217,17 @@ def _pareto_exhibit(study: FilterStudy) -> Exhibit:
     return Exhibit("pareto", "Error against time per step", words, tables=tables, charts=charts)
 
 
-def _front_row(r: Ranked) -> tuple[Entry, ...]:
-    half = None if r.score.half is None else _MM * r.score.half
-    step = None if r.result.step_s is None else _MM * r.result.step_s
-    return (r.place, r.cell.method, named(r.cell.settings), step, _MM * r.score.mean, half)
+def _front_row(r: Ranked, factor: float) -> tuple[Entry, ...]:
+    half = None if r.score.half is None else factor * r.score.half
+    times = (r.result.step_s, r.result.step_p99_s)
+    steps = (None if s is None else _MS * s for s in times)
+    return (r.place, r.cell.name, named(r.cell.settings), *steps, factor * r.score.mean, half)
 
 
 def _dominated(ranking: Ranking) -> Iterator[str]:
     """One sentence naming the methods that are nowhere on the front."""
-    methods = dict.fromkeys(r.cell.method for r in ranking.rows)
-    front = {r.cell.method for r in ranking.front}
+    methods = dict.fromkeys(r.cell.name for r in ranking.rows)
+    front = {r.cell.name for r in ranking.front}
     beaten = [m for m in methods if m not in front]
     if beaten:
         yield (
@@ -181,28 +241,29 @@ def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
     exact = sum(r.score.mean <= 0 for r in ranking.rows)
     none = f" Not drawn: {exact} without any error." if exact else ""
     future = sum(r.result.step_s is None for r in ranking.rows)
-    none += f" Not drawn: {future} smoothed, which see the future." if future else ""
+    none += f" Not drawn: {future} without times (smoothed, or solved whole)." if future else ""
+    factor, unit = shown_unit(study.unit)
     series = []
-    for method in dict.fromkeys(r.cell.method for r in rows):
-        mine = [r for r in rows if r.cell.method == method]
-        x, y = _points(mine)
+    for method in dict.fromkeys(r.cell.name for r in rows):
+        mine = [r for r in rows if r.cell.name == method]
+        x, y = _points(mine, factor)
         series.append(Series(method, x, y, "points"))
-    x, y = _points([r for r in ranking.front if r in rows])
+    x, y = _points([r for r in ranking.front if r in rows], factor)
     series.append(Series("Pareto front", x, y))
     return Chart(
         f"pareto_{i}",
         f"Error against time per step{_under(ranking)}",
         "time of one step / ms",
-        f"{study.by} / mm",
+        f"{study.by} / {unit}",
         tuple(series),
         log="xy",
-        caption=f"A point is one cell: a method with one set of values, mean over the seeds.{none}",
+        caption=f"A point is one cell: a method with one set of values.{none}",
     )
 
 
-def _points(rows: Sequence[Ranked]) -> tuple[np.ndarray, np.ndarray]:
-    x = np.array([_MM * (r.result.step_s or 0.0) for r in rows])
-    return x, np.array([_MM * r.score.mean for r in rows])
+def _points(rows: Sequence[Ranked], factor: float) -> tuple[np.ndarray, np.ndarray]:
+    x = np.array([_MS * (r.result.step_s or 0.0) for r in rows])
+    return x, np.array([factor * r.score.mean for r in rows])
 
 
 # --- failures ------------------------------------------------------------------------------------
@@ -210,13 +271,13 @@ def _points(rows: Sequence[Ranked]) -> tuple[np.ndarray, np.ndarray]:
 
 def _failed_exhibit(study: FilterStudy) -> Exhibit | None:
     rows = [
-        (c.method, named(c.settings), named(c.condition), why)
+        (c.name, named(c.settings), named(c.condition), why)
         for ranking in study.rankings
         for c, why in ranking.failed
     ]
     if not rows:
         return None
-    head = ("method", "settings", "condition of the twin", "why")
+    head = ("method", "settings", "condition", "why")
     title = f"{len(rows)} of {len(study.plan.cells)} cells failed"
     table = NumberTable("failed", title, head, tuple(rows[:200]))
     return Exhibit("failed", "Cells that failed", tables=(table,))

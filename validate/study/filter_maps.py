@@ -8,9 +8,8 @@ from validate.compare.exhibit import Chart, Exhibit, Heat, Series
 from validate.study.filter_plan import METHODS, FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.score import NIS
+from validate.study.shown import shown_unit
 from validate.study.sweep import Axis, named, short
-
-_MM = 1e3
 
 
 def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
@@ -46,11 +45,20 @@ def _axes_of(study: FilterStudy, method: str) -> list[Axis]:
 
 
 def _cells_of(study: FilterStudy, method: str) -> list[FilterCell]:
-    return [c for c in study.plan.cells if c.method == method]
+    return [c for c in study.plan.cells if c.method == method and not c.baseline]
+
+
+def _unit(study: FilterStudy) -> str:
+    return shown_unit(study.unit)[1]
 
 
 def _fixed(study: FilterStudy, method: str, axes: Sequence[Axis]) -> dict[str, str]:
-    rows = [r for ranking in study.rankings for r in ranking.rows if r.cell.method == method]
+    rows = [
+        r
+        for ranking in study.rankings
+        for r in ranking.rows
+        if r.cell.method == method and not r.cell.baseline
+    ]
     if not rows or not axes:
         return {}
     best = min(rows, key=lambda r: r.score.mean).cell.values
@@ -63,13 +71,18 @@ def _value(study: FilterStudy, cell: FilterCell, what: str) -> float | None:
         return None
     if what == NIS:
         return value.consistency.mean if value.consistency else None
-    return _MM * float(np.mean(value.scores[what]))
+    if what not in value.scores:
+        return None
+    return shown_unit(value.units[what])[0] * float(np.mean(value.scores[what]))
 
 
 def _heats(
     study: FilterStudy, method: str, x: Axis, y: Axis, cells: Sequence[FilterCell]
 ) -> Iterator[Heat]:
-    for what, label, centre in ((NIS, "NIS per dof / 1", 1.0), (study.by, "error / mm", None)):
+    for what, label, centre in (
+        (NIS, "NIS per dof / 1", 1.0),
+        (study.by, f"error / {_unit(study)}", None),
+    ):
         at = {(c.values[x.path], c.values[y.path]): _value(study, c, what) for c in cells}
         values = np.array([[_nan(at.get((i, j))) for i in x.values] for j in y.values])
         if np.isfinite(values).any():
@@ -94,7 +107,7 @@ def _curves(
         return
     at = dict(zip(axis.values, numbers, strict=True))
     log = "x" if min(numbers) > 0 and max(numbers) >= 20 * min(numbers) else ""
-    for what, label in ((NIS, "NIS per dof / 1"), (study.by, f"{study.by} / mm")):
+    for what, label in ((NIS, "NIS per dof / 1"), (study.by, f"{study.by} / {_unit(study)}")):
         pairs = sorted(
             (at[c.values[axis.path]], value)
             for c in cells

@@ -4,11 +4,12 @@ from typing import Any
 
 from validate.parameters import describe
 from validate.replay.options import Options, configure
-from validate.study.filter_exhibits import seeds_text, study_exhibits
+from validate.study.filter_exhibits import over, study_exhibits
 from validate.study.filter_plan import FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.interval import interval
 from validate.study.score import FilterScores
+from validate.study.shown import shown_unit
 from validate.study.store import Record
 from validate.study.study_page import CellsTable, Findings, Row
 
@@ -31,12 +32,19 @@ def sentence(study: FilterStudy) -> str:
     doubts = f" ({best.doubts})" if best.doubts else ""
     more = f" (first of {len(study.rankings)} conditions)" if len(study.rankings) > 1 else ""
     failed = f", {study.failed} failed" if study.failed else ""
-    half = best.ranked.score.half
-    spread = "" if half is None else f" ± {1e3 * half:.2g}"
-    seeds = seeds_text(len(study.plan.seeds))
+    half, (factor, unit) = best.ranked.score.half, shown_unit(study.unit)
+    spread = "" if half is None else f" ± {factor * half:.2g}"
+    near = sum(p.near for p in study.picks)
+    truth = (
+        f" Without truth the pick is within 10 % of the best in {near} of {len(study.picks)} "
+        "recordings."
+        if study.picks
+        else ""
+    )
     return (
-        f"{cells} cells over {seeds}{failed}; best by {study.by}{more}: "
-        f"{best.ranked.cell.method}, {1e3 * best.ranked.score.mean:.4g}{spread} mm{doubts}."
+        f"{cells} cells over {over(study)}{failed}; best by {study.by}{more}: "
+        f"{best.ranked.cell.method}, {factor * best.ranked.score.mean:.4g}{spread} {unit}{doubts}."
+        f"{truth}"
     )
 
 
@@ -60,6 +68,40 @@ def document(study: FilterStudy) -> dict[str, Any]:
             }
             for b in study.best
         ],
+        "blocks": [
+            None
+            if r.blocks is None
+            else {
+                "count": r.blocks.count,
+                "length_s": r.blocks.length_s,
+                "correlation_s": r.blocks.correlation_s,
+                "interval": r.blocks.sure,
+            }
+            for r in study.rankings
+        ],
+        "nested": [
+            None
+            if r.nested is None
+            else {
+                "error": r.nested.error.mean,
+                "half_95": r.nested.error.half,
+                "chosen": dict(r.nested.chosen),
+                "beside": dict(r.nested.beside),
+                "other_markers": r.nested.split,
+            }
+            for r in study.rankings
+        ],
+        "without_truth": [
+            {
+                "condition": dict(p.condition),
+                "seed": p.seed,
+                "picked": p.cell.label,
+                "true_error_m": p.error,
+                "least_true_error_m": p.least,
+                "within_10_percent": p.near,
+            }
+            for p in study.picks
+        ],
         "cells": [_cell(c, done.records[c.key]) for c in study.plan.cells],
     }
 
@@ -68,6 +110,7 @@ def _cell(cell: FilterCell, record: Record[FilterScores]) -> dict[str, Any]:
     value = record.value
     return {
         "method": cell.method,
+        "baseline": cell.baseline or None,
         "values": cell.values,
         "failed": record.why or None,
         "seconds": record.seconds,
@@ -85,6 +128,7 @@ def _numbers(value: FilterScores) -> dict[str, Any]:
     return {
         "scores": scores,
         "step_s": value.step_s,
+        "step_p99_s": value.step_p99_s,
         "setup_s": value.setup_s,
         "steps": value.steps,
         "gains_repeat_from_step": value.frozen,
@@ -95,19 +139,21 @@ def _numbers(value: FilterScores) -> dict[str, Any]:
 def cells_table(study: FilterStudy) -> CellsTable:
     """Every cell, SI; place is by condition."""
     axes = [a.path for a in study.plan.axes]
-    head = ("method", *axes, "place", f"{study.by}_m", "half_95_m", "seeds", "tied_with_first",
-            "nis_per_dof", "verdict", "step_s", "gains_repeat_from_step", "failed")  # fmt: skip
+    unit = study.unit
+    head = ("method", *axes, "place", f"{study.by}_{unit}", f"half_95_{unit}", "samples",
+            "tied_with_first", "nis_per_dof", "verdict", "step_p50_s", "step_p99_s",
+            "gains_repeat_from_step", "failed")  # fmt: skip
     place = {r.cell.key: r for ranking in study.rankings for r in ranking.rows}
     rows: list[Row] = []
     for cell in study.plan.cells:
-        what = (cell.method, *(cell.values.get(path) for path in axes))
+        what = (cell.name, *(cell.values.get(path) for path in axes))
         if (r := place.get(cell.key)) is None:
-            rows.append((*what, *(None,) * 9, study.done.records[cell.key].why))
+            rows.append((*what, *(None,) * 10, study.done.records[cell.key].why))
             continue
         score, seen = r.score, r.result.consistency
         rows.append(
             (*what, r.place, score.mean, score.half, score.count, r.tied,
              seen.mean if seen else None, seen.verdict if seen else None, r.result.step_s,
-             r.result.frozen, None)
+             r.result.step_p99_s, r.result.frozen, None)
         )  # fmt: skip
     return head, tuple(rows)

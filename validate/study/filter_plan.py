@@ -1,8 +1,8 @@
 """What a filter study will run: every method with every set of values, over common seeds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 from validate.errors import UsageError
 from validate.parameters import describe, nearest_names, with_values
@@ -13,6 +13,10 @@ from validate.study.store import key_of
 from validate.study.sweep import Axis, grid, named
 
 METHODS = "methods."
+CASE = "case"  # a condition: the truth is a case of the experiment, by its name
+RECORDED = "recorded"  # the case that the experiment's own recording is
+SEEDS = 10  # common samples of the noise: a t interval of them is 2.3 standard errors wide
+EACH = ("each",)  # of hold_out: every marker in turn
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,10 @@ class FilterCell:
     """One method, its `settings` and the twin's `condition` as texts by path, over all `seeds`.
 
     `seed_path` is the seed's parameter; "" where there is none. `key` names all that makes its
-    numbers.
+    numbers. `given` are the markers that any filter of the study is given, `hold_out` those that
+    are kept from all of them. `baseline` compares filters with the method's model, given "nothing"
+    ("alone"), or with the last measurement ("persistence"). Markers are registered as for the
+    method `tracker`, a filter.
     """
 
     method: str
@@ -30,11 +37,33 @@ class FilterCell:
     seeds: tuple[int, ...] = (0,)
     key: str = ""
     timed: bool = False
+    given: tuple[str, ...] = ()
+    hold_out: tuple[str, ...] = ()
+    baseline: Literal["", "alone", "persistence"] = ""
+    tracker: str = ""
+
+    @property
+    def name(self) -> str:
+        """What a ranking calls it."""
+        if self.baseline == "persistence":
+            return "last measurement, held"
+        return f"{self.method}, given nothing" if self.baseline else self.method
 
     @property
     def label(self) -> str:
         given = f" ({named(self.values)})" if self.values else ""
-        return f"{self.method}{given}, {len(self.seeds)} seeds"
+        return f"{self.name}{given}, {len(self.seeds)} seeds"
+
+    def in_turn(self, moving: Sequence[str]) -> bool:
+        """Whether every marker is held out in turn: where that is asked for, or none is free."""
+        return self.hold_out == EACH or set(moving) <= set(self.given)
+
+    def scored(self, moving: Sequence[str]) -> tuple[str, ...]:
+        """The markers at which a method that is given none is scored as held out."""
+        if self.hold_out and self.hold_out != EACH:
+            return self.hold_out
+        free = tuple(n for n in moving if n not in self.given)
+        return tuple(moving) if self.in_turn(moving) else free
 
     @property
     def values(self) -> dict[str, str]:
@@ -54,33 +83,57 @@ class FilterPlan:
 
 
 def plan(
-    experiment: Experiment, options: Options, axes: Sequence[Axis], seeds: int | tuple[int, ...]
+    experiment: Experiment,
+    options: Options,
+    axes: Sequence[Axis],
+    seeds: int | tuple[int, ...] | None = None,
+    hold_out: tuple[str, ...] = (),
 ) -> FilterPlan:
     """Checks every path and value before anything runs.
 
-    `seeds`: so many from the twin's own seed on, or these. An axis of one method multiplies that
-    method's cells only. Raises `UsageError` for another kind of experiment, unknown paths (naming
-    the nearest), values of another type, methods without a sweep's name, and fewer than one seed.
+    `seeds`: so many from the twin's own seed on, or these (None: `SEEDS`; a measured recording has
+    one). An axis of one method multiplies that method's cells only. Raises `UsageError` for an
+    experiment without filters, unknown paths (naming the nearest), values of another type, methods
+    without a sweep's name, and fewer than one seed.
     """
-    if experiment.twin is None or experiment.twin.truth is None:
+    filters = [n for n, m in experiment.methods.items() if m.markers]
+    if not filters:
         raise UsageError(
-            f"'{experiment.name}' has no twin whose truth is known: filters are ranked against "
-            f"one; declare it (`Twin(..., truth=...)`), or `validate run {experiment.name}` judges "
-            "what its filters predict"
+            f"'{experiment.name}' has no filter: none of {', '.join(experiment.methods)} is given "
+            'markers; declare one, as Method("...", KfFem(), markers=("A",)), in its file'
         )
     parameters, _ = configure(experiment, Options(options.values, (), options.quick))
     methods = _methods(experiment, options.methods, axes)
-    seed_path = _seed_path(parameters)
-    _require(axes, parameters, experiment.methods, methods, seed_path)
+    seed_path = _seed_path(parameters) if experiment.repeats else ""
+    _require(axes, experiment, parameters, methods, seed_path)
     job = job_of(experiment, options.values, options.quick)
-    own = FilterCell("", (), (), seed_path, _seeds(seeds, parameters, seed_path))
-    cells = tuple(c for m in methods for c in _cells(experiment, job, replace(own, method=m), axes))
-    return FilterPlan(experiment, job, tuple(axes), methods, own.seeds, cells)
+    mine = [m for m in methods if m in filters] or filters
+    given = tuple(dict.fromkeys(n for m in mine for n in experiment.methods[m].markers))
+    if seeds is None:
+        seeds = SEEDS if experiment.repeats and seed_path else 1
+    own = FilterCell(
+        "",
+        (),
+        (),
+        seed_path,
+        _seeds(seeds, parameters, seed_path),
+        given=given,
+        hold_out=hold_out,
+        tracker=mine[0],
+    )
+    of_methods = [replace(own, method=m) for m in methods]
+    cells = [c for one in of_methods for c in _cells(experiment, job, one, axes)]
+    beside = [replace(own, method=mine[0], baseline="persistence")]
+    if all(m in filters for m in methods):  # no plain solver stands beside them
+        beside.insert(0, replace(own, method=mine[0], baseline="alone"))
+    conditions = [a for a in axes if not a.path.startswith(METHODS)]
+    cells += [c for one in beside for c in _cells(experiment, job, one, conditions)]
+    return FilterPlan(experiment, job, tuple(axes), methods, own.seeds, tuple(cells))
 
 
 def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tuple[Any, Any]:
     """Parameters with that seed, and the method's settings, of a cell."""
-    values = {**dict(job.values), **cell.values}
+    values = {k: v for k, v in {**dict(job.values), **cell.values}.items() if k != CASE}
     if cell.seed_path:
         values[cell.seed_path] = str(seed)
     parameters, methods = configure(experiment, Options(values, (cell.method,), job.quick))
@@ -116,12 +169,14 @@ def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
 def _methods(
     experiment: Experiment, chosen: tuple[str, ...], axes: Sequence[Axis]
 ) -> tuple[str, ...]:
-    """Those named, else those whose settings are swept, else all that run the whole time."""
+    """Those named, else those whose settings are swept, else all that run the whole time; on a
+    measured recording filters, with what the experiment accepts and varies its inputs by."""
     known = experiment.methods
     for name in chosen:
         if name not in known:
             raise UsageError(f"unknown method '{name}'; {nearest_names(name, set(known))}")
     whole = tuple(n for n, m in known.items() if getattr(m, "steps", None) is None)
+    usual = whole if experiment.repeats else tuple(n for n in whole if n in _usual(experiment))
     short = [n for n in chosen if n not in whole]
     if short:
         raise UsageError(
@@ -129,7 +184,14 @@ def _methods(
             "error; leave it out"
         )
     swept = [a.path.split(".")[1] for a in axes if a.path.startswith(METHODS)]
-    return chosen or tuple(n for n in whole if n in swept) or whole
+    return chosen or tuple(n for n in whole if n in swept) or usual
+
+
+def _usual(experiment: Experiment) -> set[str]:
+    """Filters, and the plain solvers that stand beside them: other ones may take minutes."""
+    by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    filters = {n for n, m in experiment.methods.items() if m.markers}
+    return {*filters, *experiment.accepted, experiment.reference, by}
 
 
 def _seed_path(parameters: Any) -> str:
@@ -158,12 +220,16 @@ def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tup
 
 def _require(
     axes: Sequence[Axis],
+    experiment: Experiment,
     parameters: Any,
-    known: Mapping[str, Any],
     methods: tuple[str, ...],
     seed_path: str,
 ) -> None:
+    known = experiment.methods
     for a in axes:
+        if a.path == CASE:
+            _require_cases(experiment, a)
+            continue
         if a.path == seed_path:
             raise UsageError(f"'{a.path}' is not swept: --seeds N repeats every cell N times")
         if not a.path.startswith(METHODS):
@@ -176,6 +242,14 @@ def _require(
                 f"'{a.path}' is swept, but the method is not among {', '.join(methods)}; add it to "
                 "--methods"
             )
+
+
+def _require_cases(experiment: Experiment, axis: Axis) -> None:
+    names = {c.name for c in experiment.cases} if experiment.repeats else set()
+    for value in axis.values:
+        if value not in names | {RECORDED}:
+            hint = nearest_names(value, names) if names else "the experiment has none"
+            raise UsageError(f"no case '{value}' of {experiment.name}; {hint}")
 
 
 def _require_values(settings: Any, path: str, axis: Axis) -> None:

@@ -15,16 +15,18 @@ from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.options import Options, Report
+from validate.study.agreement import Pick, picks
+from validate.study.blocks import score_difference
 from validate.study.engine import CELLS, Finished, finish, study_folder
-from validate.study.filter_cell import open_bench, run_cell
-from validate.study.filter_plan import METHODS, FilterCell, FilterPlan, plan
+from validate.study.filter_bench import open_bench
+from validate.study.filter_cell import run_cell
+from validate.study.filter_plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
 from validate.study.job import Plan, Where
 from validate.study.ranking import Ranked, Ranking, rankings, tied
-from validate.study.score import POOLED, FilterScores
+from validate.study.score import AHEAD, HELD_OUT, POOLED, WITHHELD, FilterScores
 from validate.study.sweep import axes
 
 KIND = "filters"
-SEEDS = 10  # common samples of the noise: a t interval of them is 2.3 standard errors wide
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,16 @@ class Best:
         """What speaks against taking it as it is; "" for nothing."""
         found = []
         if self.ranked.score.half is None:
-            found.append("one seed tells no two cells apart")
+            found.append("one sample tells no two settings apart")
         elif self.ties:
             found.append(f"{self.ties} others cannot be told from it")
         if self.edges:
             found.append(f"at the end of the sweep of {', '.join(self.edges)}: widen it")
+        seen = self.ranked.result.consistency
+        if seen is not None and not seen.band_95.holds(seen.mean):
+            found.append(
+                f"NIS {seen.mean:.3g} is outside its 95 % band: its own interval is not used"
+            )
         return "; ".join(found)
 
 
@@ -60,8 +67,20 @@ class FilterStudy:
     rankings: tuple[Ranking, ...]
 
     @property
+    def unit(self) -> str:
+        """Of the score that ranks."""
+        return self.rankings[0].rows[0].result.units[self.by]
+
+    @property
+    def picks(self) -> tuple[Pick, ...]:
+        """What a ranking without truth picks where the truth is known."""
+        records = self.done.records
+        values = {c: v for c in self.plan.cells if (v := records[c.key].value) is not None}
+        return picks(values)
+
+    @property
     def best(self) -> tuple[Best, ...]:
-        return tuple(_best(self.plan, r) for r in self.rankings if r.rows)
+        return tuple(_best(self.plan, r, self.by) for r in self.rankings if r.rows)
 
     @property
     def failed(self) -> int:
@@ -74,8 +93,9 @@ def study(
     *,
     methods: tuple[str, ...] = (),
     values: Mapping[str, str] | None = None,
-    seeds: int | tuple[int, ...] = SEEDS,
-    by: str = POOLED,
+    seeds: int | tuple[int, ...] | None = None,
+    by: str = "",
+    hold_out: tuple[str, ...] = (),
     quick: bool = False,
     out: Path | None = None,
     where: Where | None = None,
@@ -83,16 +103,28 @@ def study(
 ) -> FilterStudy:
     """Runs what is not finished yet in `out`/<name>/study-filters/cells, and ranks everything.
 
-    `sweeps` as for `--sweep`, `values` as for `--set`; `out` is the folder of the reports. Raises
-    `UsageError` for bad names and values before anything runs, `ComparisonError` when no cell has
-    a score.
+    `sweeps` as for `--sweep`, `values` as for `--set`; `out` is the folder of the reports. `by` is
+    a score of `validate.study.score` (empty: the truth's, where it is known, else that of what was
+    withheld); `hold_out` as for `--hold-out`. Raises `UsageError` for bad names and values before
+    anything runs, `ComparisonError` when no cell has a score.
     """
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
-    planned = plan(found, Options(dict(values or {}), methods, quick), axes(sweeps), seeds)
+    options = Options(dict(values or {}), methods, quick)
+    planned = plan(found, options, axes(sweeps), seeds, hold_out)
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
     done = finish(work, study_folder(found, KIND, out) / CELLS, where, report)
+    by = by or usual_score(done, in_turn=hold_out == EACH)
     _require_score(done, by)
     return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
+
+
+def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
+    """The first of the usual scores that every filter has; the first of its own otherwise."""
+    filters = [v for r in done.records.values() if (v := r.value) is not None and v.nis is not None]
+    usual = (POOLED, HELD_OUT if in_turn else WITHHELD, AHEAD)
+    own = tuple(filters[0].scores) if filters else ()
+    names = (*usual, *own)
+    return next((n for n in names if all(n in v.scores for v in filters)), POOLED)
 
 
 def _require_score(done: Finished[FilterScores], by: str) -> None:
@@ -102,18 +134,17 @@ def _require_score(done: Finished[FilterScores], by: str) -> None:
         raise ComparisonError(
             f"all {len(done.records)} cells failed, 0 compared; the first: {first.why}"
         )
-    for value in good:
-        if by not in value.scores:
-            hint = nearest_names(by, set(value.scores))
-            raise UsageError(f"no score '{by}' to rank by; {hint}")
+    names = {name for value in good for name in value.scores}
+    if by not in names:
+        raise UsageError(f"no score '{by}' to rank by; {nearest_names(by, names)}")
 
 
-def _best(planned: FilterPlan, ranking: Ranking) -> Best:
+def _best(planned: FilterPlan, ranking: Ranking, by: str) -> Best:
     """The first filter (what has innovations); the first of all where there is none."""
-    filters = [r for r in ranking.rows if r.result.nis is not None]
+    filters = [r for r in ranking.rows if r.result.nis is not None and not r.cell.baseline]
     rows = filters or list(ranking.rows)
-    ties = sum(tied(r.scores, rows[0].scores)[1] for r in rows[1:])
-    cell = rows[0].cell
+    apart = [score_difference(r.result, rows[0].result, by, ranking.blocks) for r in rows[1:]]
+    ties, cell = sum(tied(a) for a in apart), rows[0].cell
     return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell))
 
 
@@ -136,6 +167,7 @@ def run_line(planned: FilterPlan, cell: FilterCell) -> str:
     beside = [m for m in experiment.methods if m in (*experiment.accepted, experiment.reference)]
     methods = tuple(dict.fromkeys((*beside, cell.method)))
     values = {**dict(planned.job.values), **cell.values}
+    values.pop(CASE, None)  # a run shows all cases
     kept = {k: v for k, v in values.items() if _concerns(k, methods)}
     parts = ["validate", "run", experiment.name]
     for path, value in kept.items():

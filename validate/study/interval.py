@@ -37,8 +37,3 @@ def interval(values: Sequence[float]) -> SeedInterval:
         return SeedInterval(mean, None, n)
     spread = float(np.std(values, ddof=1)) / np.sqrt(n)
     return SeedInterval(mean, float(student.ppf((1 + LEVEL) / 2, n - 1) * spread), n)
-
-
-def paired(one: Sequence[float], other: Sequence[float]) -> SeedInterval:
-    """Of one less other over common seeds (n,): what both share of the noise cancels."""
-    return interval(np.subtract(one, other).tolist())

@@ -4,10 +4,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from validate.study.blocks import (
+    Blocks,
+    Nested,
+    blocks_of,
+    nested,
+    score_difference,
+    score_interval,
+)
 from validate.study.filter_plan import FilterCell
-from validate.study.interval import SeedInterval, interval, paired
-from validate.study.score import FilterScores
+from validate.study.interval import SeedInterval, interval
+from validate.study.score import LOG_LOSS, WITHHELD, FilterScores, of_score
 from validate.study.store import Record
+from validate.study.sweep import named
 
 # Medians of one step on a machine that does other things too: closer than this is the same time.
 SAME_TIME = 1.25
@@ -20,9 +29,9 @@ Condition = tuple[tuple[str, str], ...]
 class Ranked:
     """A cell's place by one score; `overlaps` are the places whose intervals overlap its own.
 
-    `from_best` is its score less the best one's over common seeds; `tied` when that interval holds
-    zero, or there are too few seeds to say. `dominated_by` is the place of a cell with less error
-    and less time a step (see `SAME_TIME`); None on the Pareto front.
+    `from_best` is its score less the best one's over common seeds, or blocks of one recording;
+    `tied` when that interval holds zero, or there are too few to say. `dominated_by` is the place
+    of a cell with less error and less time a step (see `SAME_TIME`); None on the Pareto front.
     """
 
     place: int
@@ -33,16 +42,18 @@ class Ranked:
     from_best: SeedInterval
     tied: bool
     dominated_by: int | None
-    scores: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """All cells of one condition, best first, and those that failed."""
+    """All cells of one condition, best first, and those that failed; `blocks` of one recording,
+    and what a choice on some of its data is worth on the rest."""
 
     condition: Condition
     rows: tuple[Ranked, ...]
     failed: tuple[tuple[FilterCell, str], ...]
+    blocks: Blocks | None = None
+    nested: Nested | None = None
 
     @property
     def front(self) -> tuple[Ranked, ...]:
@@ -75,21 +86,55 @@ def _ranking(
     by: str,
 ) -> Ranking:
     found = [(c, value) for c in cells if (value := records[c.key].value) is not None]
-    failed = tuple((c, records[c.key].why) for c in cells if records[c.key].value is None)
+    failed = [(c, records[c.key].why) for c in cells if records[c.key].value is None]
+    found, other = _comparable(found, by)
     order = sorted(found, key=lambda one: interval(one[1].scores[by]).mean)
-    scores = [value.scores[by] for _, value in order]
-    means = [interval(s) for s in scores]
+    values = {c.key: value for c, value in order}
+    names = {c.key: f"{c.name} ({named(c.settings)})" if c.settings else c.name for c, _ in order}
+    blocks = blocks_of({names[key]: v for key, v in values.items()})
+    means = [score_interval(value, by, blocks) for _, value in order]
     times = [_time(value) for _, value in order]
     rows = []
     for i, (cell, value) in enumerate(order):
         better = dominator(i, [m.mean for m in means], times)
+        apart = score_difference(value, order[0][1], by, blocks)
         rows.append(
             Ranked(
-                i + 1, cell, value, means[i], _overlaps(i, means), *tied(scores[i], scores[0]),
-                None if better is None else better + 1, scores[i],
+                i + 1, cell, value, means[i], _overlaps(i, means), apart, tied(apart),
+                None if better is None else better + 1,
             )
         )  # fmt: skip
-    return Ranking(condition, tuple(rows), failed)
+    of_filters = {names[c.key]: v for c, v in order if v.nis is not None and not c.baseline}
+    others = {names[c.key]: v for c, v in order if v.nis is None or c.baseline}
+    chosen = nested(
+        of_filters, others, by if values and _segmented(order, by) else WITHHELD, blocks
+    )
+    return Ranking(condition, tuple(rows), (*failed, *other), blocks, chosen)
+
+
+Found = list[tuple[FilterCell, FilterScores]]
+
+
+def _segmented(order: Found, by: str) -> bool:
+    return any(v.sums(by) is not None for _, v in order)
+
+
+def _comparable(found: Found, by: str) -> tuple[Found, list[tuple[FilterCell, str]]]:
+    """Those scored on the most markers, and the others with the reason: fewer are another score."""
+    on = {c.key: frozenset(w.name for w in of_score(v.withheld, by)) for c, v in found}
+    most = max(on.values(), key=len, default=frozenset())
+    kept = [(c, v) for c, v in found if by in v.scores and (on[c.key] == most or by == LOG_LOSS)]
+    left = [(c, v) for c, v in found if c.key not in {k.key for k, _ in kept}]
+    return kept, [(c, _why_not(v, by, on[c.key], most)) for c, v in left]
+
+
+def _why_not(value: FilterScores, by: str, mine: frozenset[str], most: frozenset[str]) -> str:
+    if by not in value.scores and not most:
+        return f"it has no {by}"
+    return (
+        f"scored on {', '.join(sorted(mine)) or 'nothing'}, the others on "
+        f"{', '.join(sorted(most))}: give it two markers or more, or name --hold-out"
+    )
 
 
 def _overlaps(i: int, scores: Sequence[SeedInterval]) -> tuple[int, ...]:
@@ -97,11 +142,10 @@ def _overlaps(i: int, scores: Sequence[SeedInterval]) -> tuple[int, ...]:
     return tuple(j + 1 for j, s in enumerate(scores) if j != i and mine.overlaps(s))
 
 
-def tied(mine: Sequence[float], best: Sequence[float]) -> tuple[SeedInterval, bool]:
-    """`mine` less `best` over common seeds, and whether that interval holds zero (or there is none:
-    one seed tells nothing)."""
-    apart = paired(mine, best)
-    return apart, apart.half is None or abs(apart.mean) <= apart.half
+def tied(apart: SeedInterval) -> bool:
+    """Whether the interval of a difference holds zero, or there is none: one sample tells
+    nothing."""
+    return apart.half is None or abs(apart.mean) <= apart.half
 
 
 def dominator(i: int, errors: Sequence[float], times: Sequence[float]) -> int | None:

@@ -1,6 +1,7 @@
-"""Scores of a filter study: errors along the experiment's axis at every probe, and NIS."""
+"""Scores of a filter study: errors against a twin's truth, errors at what was withheld, likelihood
+of the innovations, and NIS."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,19 +9,33 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.track import rmse, track_error
 from validate.estimate.consistency import Consistency, nis_consistency
+from validate.study.withheld import Innovations, Withheld
 
 POOLED = "all.rmse"
 NIS = "nis.per_dof"
+WITHHELD = "withheld.rmse"  # of all markers: those held out, and the next samples of the others
+HELD_OUT = "held_out.rmse"  # of markers that no filter was given, or that were held out in turn
+AHEAD = "ahead.rmse"  # of markers that were given: each sample from those before it
+LOG_LOSS = "log_loss"  # minus log-likelihood of a measured component, its density in metres
+WORDS = {
+    POOLED: "rms error against the truth of the twin along one axis, over its probes and all steps",
+    WITHHELD: "rms distance from what was measured and not given: markers that were held out, and "
+    "the next sample of those that were given (noise included)",
+    HELD_OUT: "rms distance from what was measured of markers that were held out (noise included)",
+    AHEAD: "rms distance of a given marker's next sample from its prediction (noise included)",
+    LOG_LOSS: "minus log-likelihood of the innovations per measured component, densities in metres",
+}
 
 
 @dataclass(frozen=True)
 class FilterScores:
-    """Scores by name, one number per seed (SI, `units` by name); step_s s is the median step,
-    None for runs that are smoothed: they are none for real time.
+    """Scores by name, one number per seed (SI, `units` by name); step_s s is the median step and
+    step_p99_s its 99 % quantile, None for runs that are smoothed: they are none for real time.
 
     `nis` is that of all seeds with `nis_dof` degrees of freedom, None without innovations.
     `frozen` is the step from which a linear filter's gains repeat. `shared`: all seeds were run at
-    once with one set of gains.
+    once with one set of gains. `withheld` are the squared errors at what the method was not given,
+    in segments of `segment_s` s.
     """
 
     scores: Mapping[str, tuple[float, ...]]
@@ -28,10 +43,14 @@ class FilterScores:
     nis: float | None = None
     nis_dof: int = 0
     step_s: float | None = None
+    step_p99_s: float | None = None
     setup_s: float | None = None
     steps: int = 0
     frozen: int | None = None
     shared: bool = False
+    withheld: tuple[Withheld, ...] = ()
+    innovations: Innovations | None = None
+    segment_s: float = 0.0
 
     @property
     def consistency(self) -> Consistency | None:
@@ -39,6 +58,54 @@ class FilterScores:
         if self.nis is None or not self.nis_dof:
             return None
         return nis_consistency([self.nis], [self.nis_dof])
+
+    def sums(self, by: str) -> tuple[Floats, Floats] | None:
+        """What a score is the mean of: sums and counts (seeds, segments); None for one against the
+        truth, whose segments are not kept."""
+        if by == LOG_LOSS:
+            i = self.innovations
+            return None if i is None else (-i.log_likelihood, i.dof)
+        return summed(of_score(self.withheld, by))
+
+
+def of_score(withheld: Sequence[Withheld], by: str) -> list[Withheld]:
+    """The quantities that a score is made of."""
+    if by == WITHHELD:
+        return [w for w in withheld if w.marker]
+    if by in (HELD_OUT, AHEAD):
+        return [w for w in withheld if w.marker and w.ahead == (by == AHEAD)]
+    return [w for w in withheld if name_of(w) == by]
+
+
+def summed(withheld: Sequence[Withheld]) -> tuple[Floats, Floats] | None:
+    """Sums of squares and counts (seeds, segments) of some quantities; None for none."""
+    if not withheld:
+        return None
+    return sum(w.squares for w in withheld), sum(w.counts for w in withheld)  # type: ignore[return-value]
+
+
+def name_of(w: Withheld) -> str:
+    """The name of one quantity's own score."""
+    return f"{w.name}.{AHEAD if w.ahead else HELD_OUT}"
+
+
+def withheld_scores(
+    withheld: Sequence[Withheld], innovations: Innovations | None
+) -> tuple[dict[str, tuple[float, ...]], dict[str, str]]:
+    """Scores by name, one number per seed, and their units."""
+    scores: dict[str, tuple[float, ...]] = {}
+    units: dict[str, str] = {}
+    named = {n: of_score(withheld, n) for n in (WITHHELD, HELD_OUT, AHEAD)}
+    for name, parts in (named | {name_of(w): [w] for w in withheld}).items():
+        found = summed(parts)
+        if found is None or not (found[1].sum(axis=1) > 0).all():
+            continue
+        squares, counts = (x.sum(axis=1) for x in found)
+        scores[name], units[name] = tuple(np.sqrt(squares / counts).tolist()), parts[0].unit
+    if innovations is not None and (dof := innovations.dof.sum(axis=1)).all():
+        loss = -innovations.log_likelihood.sum(axis=1) / dof
+        scores[LOG_LOSS], units[LOG_LOSS] = tuple(loss.tolist()), "1"
+    return scores, units
 
 
 def error_scores(

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.estimate.batch import shared_gain_run
 from validate.estimate.displacement_filter import DisplacementStepper
 from validate.estimate.filterpy_oracle import oracle_table
 from validate.estimate.measurements import measurements
@@ -56,7 +55,8 @@ def _nrmse(
     system = build_system(followed.body)
     stepper = _printed(parameters, followed, system, Q, recursion)
     row = _z_row(system, followed)
-    batch = shared_gain_run(stepper, followed.seen.inputs, _noisy(followed), row)
+    batch = stepper.batch(followed.seen.inputs, _noisy(followed), row)
+    assert batch is not None
     reference = followed.truth.probes["node_A"][:, 2]
     off = batch.values[..., 0] - reference
     return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))
@@ -72,7 +72,7 @@ def _printed(
     )  # fmt: skip
     given = measurements(followed.seen, system.scene.mesh).of("node_A")
     every = replace(given, t=followed.seen.t, z=np.zeros((len(followed.run.t), 3)))
-    return cast(DisplacementStepper, settings.prepare(system, every))
+    return settings.prepare(system, every)
 
 
 def _uncertain_steps(parameters: Any, followed: Followed) -> float:

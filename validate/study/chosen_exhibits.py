@@ -1,0 +1,101 @@
+"""What a choice without truth is worth: on other data of the recording, and against the truth."""
+
+from collections.abc import Iterator, Mapping
+
+from validate.compare.exhibit import Entry, Exhibit, NumberTable
+from validate.study.agreement import NEAR, Pick
+from validate.study.blocks import Nested
+from validate.study.filters import FilterStudy
+from validate.study.ranking import Ranking
+from validate.study.score import WITHHELD
+from validate.study.shown import shown_unit
+from validate.study.sweep import named
+
+_MM = 1e3
+_MOST = 60  # picks shown; cells.csv and results.json have all
+
+
+def chosen_exhibits(study: FilterStudy) -> Iterator[Exhibit]:
+    """Nested choices, and the ranking without truth beside the one with it."""
+    rows = [row for r in study.rankings if r.nested for row in _nested_rows(r, study)]
+    if rows:
+        unit = shown_unit(_unit(study))[1]
+        table = NumberTable(
+            "nested",
+            "Chosen on some blocks and markers, reported on the others",
+            ("condition", "what", f"error / {unit}", f"± 95 % / {unit}", "times chosen"),
+            tuple(rows),
+        )
+        yield Exhibit("nested", "What the choice is worth", tuple(_nested_words(study)), (table,))
+    if picks := study.picks:
+        yield _agreement(picks)
+
+
+def _unit(study: FilterStudy) -> str:
+    first = next(r for ranking in study.rankings for r in ranking.rows)
+    return study.unit if first.result.sums(study.by) is not None else "m"
+
+
+def _nested_rows(ranking: Ranking, study: FilterStudy) -> list[tuple[Entry, ...]]:
+    found, condition = ranking.nested, named(ranking.condition)
+    assert found is not None
+    factor, _ = shown_unit(_unit(study))
+    half = None if found.error.half is None else factor * found.error.half
+    total = sum(found.chosen.values())
+    often = ", ".join(f"{n} {k} of {total}" for n, k in _by_count(found.chosen))
+    rows: list[tuple[Entry, ...]] = [
+        (condition, "the chosen setting", factor * found.error.mean, half, often)
+    ]
+    return rows + [(condition, name, factor * e, None, None) for name, e in found.beside.items()]
+
+
+def _by_count(chosen: Mapping[str, int]) -> list[tuple[str, int]]:
+    return sorted(chosen.items(), key=lambda one: -one[1])[:3]
+
+
+def chosen_line(found: Nested, study: FilterStudy) -> str:
+    """What a choice on other blocks and markers is worth, in one line."""
+    factor, unit = shown_unit(_unit(study))
+    half = "" if found.error.half is None else f" ± {factor * found.error.half:.2g}"
+    others = "other blocks and markers" if found.split else "other blocks"
+    beside = ", ".join(f"{name} {factor * e:.3g}" for name, e in found.beside.items())
+    return (
+        f"chosen on {others}, reported on the rest: {factor * found.error.mean:.4g}{half} {unit}"
+        f"{f' ({beside})' if beside else ''}"
+    )
+
+
+def _nested_words(study: FilterStudy) -> Iterator[str]:
+    yield (
+        "The best of many settings looks better on the data that chose it than it is. Here each "
+        "block of time is left out in turn: the setting of least error on the other blocks is "
+        "chosen, and its error on the block that was left out is reported."
+    )
+    found = next(r.nested for r in study.rankings if r.nested)
+    yield (
+        "Half of the markers choose, the other half reports, and the other way round."
+        if found.split
+        else "There is one marker to score: the same one chooses and reports, in other blocks."
+    )
+    for ranking in study.rankings:
+        if ranking.nested and ranking.blocks and not ranking.blocks.sure:
+            yield f"{ranking.blocks.words}."
+
+
+def _agreement(picks: tuple[Pick, ...]) -> Exhibit:
+    near = sum(p.near for p in picks)
+    rows = tuple(
+        (
+            named(p.condition) or "recorded", p.seed, p.cell.name, named(p.cell.settings),
+            _MM * p.error, p.best.name, named(p.best.settings), _MM * p.least, p.ratio,
+        )
+        for p in picks[:_MOST]
+    )  # fmt: skip
+    head = ("condition", "seed", "picked without truth", "settings", "its true error / mm",
+            "best by truth", "settings of it", "least true error / mm", "ratio / 1")  # fmt: skip
+    words = (
+        f"Where the truth is known: the filter setting of least {WITHHELD} has a true error within "
+        f"{100 * (NEAR - 1):.0f} % of the least in {near} of {len(picks)} recordings.",
+    )
+    table = NumberTable("agreement", "The two rankings, recording by recording", head, rows)
+    return Exhibit("agreement", "With and without truth", words, (table,))

@@ -1,0 +1,309 @@
+"""Errors of an estimate at what it was not given: markers held out, samples still to come, outlines
+and forces.
+
+Squared errors are summed over short segments of time, so that a ranking can put them together in
+blocks as long as its innovations stay correlated.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.fem.locate import Rows, barycentric_rows
+from validate.fem.system import System
+from validate.register.markers import MarkerObservation
+from validate.register.observation import Observation, Selection
+from validate.register.outlines import OutlineObservation
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
+from validate.scene.mesh import Mesh
+from validate.solve.types import Run
+
+SEGMENTS = 120  # of a recording, at most
+_DECAYED = float(np.exp(-1))
+_LONGEST = 4  # an autocorrelation is taken over this part of the samples
+
+
+@dataclass(frozen=True)
+class Withheld:
+    """Sums of squared errors of one quantity over the segments, (seeds, segments) in `unit`^2, and
+    how many samples each holds. `ahead`: the quantity was given, and each sample is predicted from
+    those before it. `marker`: it is the place of a marker."""
+
+    name: str
+    unit: str
+    squares: Floats
+    counts: Floats
+    ahead: bool = False
+    marker: bool = False
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """What the innovations of a filter say, by (seeds, segments): summed log-likelihood and degrees
+    of freedom. `correlation_s` is how long they stay correlated, `lag_1` the largest
+    autocorrelation of neighbouring samples; medians over the seeds, None for too few samples."""
+
+    log_likelihood: Floats
+    dof: Floats
+    correlation_s: float | None
+    lag_1: float | None
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Equal parts of the time from 0 to the end of a recording; a sample at t = 0 is in none."""
+
+    edges: Floats
+
+    @property
+    def count(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def length(self) -> float:
+        """Of one segment, in seconds."""
+        return float(self.edges[1] - self.edges[0])
+
+    def number(self, t: Floats) -> Ints:
+        """Of the segment that every time (n,) s lies in, -1 for none."""
+        found = np.searchsorted(self.edges, t - 1e-9 * self.edges[-1], side="right") - 1
+        inside = (t > 1e-9 * self.edges[-1]) & (found < self.count)
+        return np.asarray(np.where(inside, found, -1), dtype=np.int64)
+
+    def sums(self, t: Floats, values: Floats) -> Floats:
+        """Sums (segments,) of values (n,) at times (n,) s."""
+        at = self.number(t)
+        return np.asarray(np.bincount(at[at >= 0], values[at >= 0], self.count), dtype=float)
+
+
+def segments_of(seen: Registered) -> Segments:
+    """As many as there are samples of what is compared, `SEGMENTS` at most."""
+    samples = max((len(o.t) - 1 for o in seen.compared), default=1)
+    return Segments(np.linspace(0.0, float(seen.t[-1]), max(1, min(SEGMENTS, samples)) + 1))
+
+
+# --- markers --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MarkerTracks:
+    """Measured displacements z (nt, k, d) m, NaN = not seen, at times t (nt,) s of markers that are
+    free to move; `rows` read them from a field, `rest` (k, d) m are their places."""
+
+    names: tuple[str, ...]
+    t: Floats
+    z: Floats
+    rest: Floats
+    rows: Rows
+
+    def of(self, names: Sequence[str]) -> "MarkerTracks":
+        """Those of the names that are tracked."""
+        at = [self.names.index(n) for n in names if n in self.names]
+        rows = Rows(self.rows.weights[at], self.rows.outside[at])
+        picked = tuple(self.names[i] for i in at)
+        return MarkerTracks(picked, self.t, self.z[:, at], self.rest[at], rows)
+
+    def errors(
+        self, t: Floats, u: Floats, segments: Segments, *, ahead: bool
+    ) -> tuple[Withheld, ...]:
+        """Of displacements u (nt, k, d) m at times t (nt,) s, zero at rest."""
+        squared = ((self.estimated(t, u) - self.z) ** 2).sum(axis=2)
+        return errors_of(self.names, self.t, squared, segments, ahead=ahead)
+
+    def on(self, mesh: Mesh) -> "MarkerTracks":
+        """The same markers, read from fields of another mesh of the body."""
+        return replace(self, rows=barycentric_rows(mesh, self.rest))
+
+    def estimated(self, t: Floats, u: Floats) -> Floats:
+        """u (nt, k, d) m at the times of the samples."""
+        known, rest = np.append(0.0, t), np.zeros((1, *u.shape[1:]))
+        flat = np.concatenate([rest, u]).reshape(len(known), -1)
+        found = np.stack([np.interp(self.t, known, y) for y in flat.T], axis=1)
+        return found.reshape(len(self.t), *u.shape[1:])
+
+    def held(self, given: "MarkerTracks") -> tuple[Floats, Floats]:
+        """Persistence: at every sample the last displacement seen of the nearest of the markers
+        `given`, up to that sample and before it, (nt, k, d) m each."""
+        last = np.zeros_like(given.z)
+        for i, z in enumerate(given.z):
+            last[i] = np.where(np.isfinite(z), z, last[i - 1] if i else 0.0)
+        before = np.concatenate([np.zeros_like(last[:1]), last[:-1]])
+        away = np.linalg.norm(self.rest[:, None] - given.rest, axis=2)
+        nearest = away.argmin(axis=1)
+        return last[:, nearest], before[:, nearest]
+
+
+def marker_tracks(seen: Registered, system: System) -> MarkerTracks | None:
+    """The markers that are free to move; None where there is none."""
+    found = seen.of(MarkerObservation)
+    if not found:
+        return None
+    markers, d = found[0], system.scene.mesh.dimension
+    free = np.zeros(system.scene.mesh.nodes.size)
+    free[system.free] = 1.0
+    reach = abs(markers.positions.weights) @ free.reshape(-1, d).max(axis=1)
+    moving = np.flatnonzero(reach > 0)
+    if not len(moving):
+        return None
+    names = tuple(markers.names[i] for i in moving)
+    rows = Rows(markers.positions.weights[moving], markers.positions.outside[moving])
+    z = (markers.x - markers.rest)[:, moving]
+    return MarkerTracks(names, markers.t, z, markers.rest[moving], rows)
+
+
+def errors_of(
+    names: Sequence[str], t: Floats, squared: Floats, segments: Segments, *, ahead: bool
+) -> tuple[Withheld, ...]:
+    """Squared errors (n, k) m^2 at times (n,) s, NaN = no sample, by segment."""
+    found = []
+    for name, own in zip(names, squared.T, strict=True):
+        seen = np.isfinite(own)
+        squares = segments.sums(t[seen], own[seen])
+        counts = segments.sums(t[seen], np.ones(int(seen.sum())))
+        found.append(Withheld(name, "m", squares[None], counts[None], ahead, True))
+    return tuple(found)
+
+
+# --- innovations ----------------------------------------------------------------------------------
+
+
+def ahead_errors(
+    t: Floats, names: Sequence[str], y: Floats, measured: Floats, segments: Segments
+) -> tuple[Withheld, ...]:
+    """Innovations y (nt, m) m of components such as "top.z", where `measured` (nt, m) says that
+    there is one, by marker."""
+    owners = [name.rpartition(".")[0] for name in names]
+    markers = tuple(dict.fromkeys(owners))
+    squared = np.full((len(t), len(markers)), np.nan)
+    for j, marker in enumerate(markers):
+        mine = np.array([owner == marker for owner in owners])
+        seen = measured[:, mine].any(axis=1)
+        squared[seen, j] = (y[seen][:, mine] ** 2).sum(axis=1)
+    return errors_of(markers, t, squared, segments, ahead=True)
+
+
+def innovations_of(
+    t: Floats, scaled: Floats, log_likelihood: Floats, dof: Floats, segments: Segments
+) -> Innovations:
+    """Of innovations over their standard deviations (nt, m), NaN = none."""
+    lag, lag_1 = _correlation(scaled)
+    measured = t[np.isfinite(scaled).any(axis=1)]
+    every = float(np.median(np.diff(measured))) if len(measured) > 1 else 0.0
+    return Innovations(
+        segments.sums(t, log_likelihood)[None],
+        segments.sums(t, dof)[None],
+        None if lag is None else lag * every,
+        lag_1,
+    )
+
+
+def _correlation(scaled: Floats) -> tuple[int | None, float | None]:
+    """The lag in samples from which the autocorrelation of every component stays within 1/e, and
+    the largest of neighbours; None for fewer than 8 samples."""
+    lags, firsts = [], []
+    for e in scaled.T:
+        e = e[np.isfinite(e)]
+        if len(e) < 8 or not e.any():
+            continue
+        most = max(2, len(e) // _LONGEST)
+        r = np.array([e[k:] @ e[:-k] for k in range(1, most + 1)]) / (e @ e)
+        beyond = np.flatnonzero(np.abs(r) > _DECAYED)
+        lags.append(int(beyond[-1]) + 2 if len(beyond) else 1)
+        firsts.append(float(r[0]))
+    return (max(lags), max(firsts, key=abs)) if lags else (None, None)
+
+
+def read_innovations(run: Run, names: Sequence[str]) -> tuple[Floats, Floats]:
+    """Innovations (nt, m) m of a run and their standard deviations (nt, m) m, zero for none."""
+    y = np.stack([run.traces[f"innovation.{n}"].y for n in names], axis=1)
+    sd = np.stack([run.traces[f"innovation.{n}.sd"].y for n in names], axis=1)
+    return y, sd
+
+
+# --- other sensors --------------------------------------------------------------------------------
+
+
+def other_errors(run: Run, seen: Registered, segments: Segments) -> tuple[Withheld, ...]:
+    """Of outlines (distance to the simulated wall) and signals that are compared, at their own
+    samples."""
+    return tuple(w for o in _others(seen) for w in _of_sensor(o, run, segments))
+
+
+def _others(seen: Registered) -> list[Observation]:
+    """Those that were sampled over time: a sensor of one experiment's own says less."""
+    return [o for o in seen.compared if isinstance(o, OutlineObservation | SignalObservation)]
+
+
+def other_times(seen: Registered) -> Floats | None:
+    """Times (n,) s at which fields are needed to compare sensors other than markers."""
+    if not (others := _others(seen)):
+        return None
+    t = np.unique(np.concatenate([o.t for o in others]))
+    return np.asarray(t[(t >= seen.t[0] / 2) & (t <= seen.t[-1])])
+
+
+def _of_sensor(sensor: Observation, run: Run, segments: Segments) -> list[Withheld]:
+    found: dict[str, Withheld] = {}
+    at = np.where(sensor.t <= run.t[-1], segments.number(sensor.t), -1)
+    for i in range(segments.count):
+        t = sensor.t[(at == i) & (sensor.t >= run.t[0] / 2)]
+        if not len(t):
+            continue
+        for d in sensor.deviations(run, Selection(f"part {i + 1}", t)):
+            one = found.setdefault(d.quantity, _none(d.quantity, d.unit, segments))
+            one.squares[0, i] = float((d.values**2).sum())
+            one.counts[0, i] = len(d.values)
+    return [w for w in found.values() if w.counts.any()]
+
+
+def _none(name: str, unit: str, segments: Segments) -> Withheld:
+    return Withheld(name, unit, np.zeros((1, segments.count)), np.zeros((1, segments.count)))
+
+
+# --- several recordings ---------------------------------------------------------------------------
+
+
+def by_seed(every: Sequence[tuple[Withheld, ...]]) -> tuple[Withheld, ...]:
+    """The errors of all seeds, one row each."""
+    return _joined(every, 0)
+
+
+def in_a_row(every: Sequence[tuple[Withheld, ...]]) -> tuple[Withheld, ...]:
+    """The errors on several recordings, one after the other."""
+    return _joined(every, 1)
+
+
+def _joined(every: Sequence[tuple[Withheld, ...]], axis: int) -> tuple[Withheld, ...]:
+    keyed: list[Mapping[tuple[str, bool], Withheld]] = [
+        {(w.name, w.ahead): w for w in one} for one in every
+    ]
+    common = [key for key in keyed[0] if all(key in one for one in keyed)]
+    return tuple(
+        replace(
+            keyed[0][key],
+            squares=np.concatenate([one[key].squares for one in keyed], axis=axis),
+            counts=np.concatenate([one[key].counts for one in keyed], axis=axis),
+        )
+        for key in common
+    )
+
+
+def joined_innovations(every: Sequence[Innovations | None], axis: int) -> Innovations | None:
+    """Of all seeds (axis 0) or recordings (axis 1); None where any has none."""
+    found = [i for i in every if i is not None]
+    if not found or len(found) < len(every):
+        return None
+
+    def median(values: list[float | None]) -> float | None:
+        known = [v for v in values if v is not None]
+        return float(np.median(known)) if known else None
+
+    return Innovations(
+        np.concatenate([i.log_likelihood for i in found], axis=axis),
+        np.concatenate([i.dof for i in found], axis=axis),
+        median([i.correlation_s for i in found]),
+        median([i.lag_1 for i in found]),
+    )
