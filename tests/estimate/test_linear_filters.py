@@ -9,7 +9,6 @@ from filterpy.kalman import KalmanFilter
 from scipy.linalg import expm, solve_discrete_are
 
 from validate.errors import ComparisonError, SceneError
-from validate.estimate.batch import shared_gain_run
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
 from validate.estimate.covariance import Decoupled
 from validate.estimate.displacement_filter import DisplacementStepper, Estimate, Structure
@@ -31,7 +30,6 @@ from validate.solve.march import march
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import propagation, rule_of
 from validate.solve.types import Run, Stepper
-from validate.study.shared import sharing
 
 
 @pytest.fixture(scope="module")
@@ -120,10 +118,8 @@ def test_drives_are_inputs_of_the_filter_too() -> None:
     z_innovation = dense.traces["innovation.z"].y  # the drive is known: noise alone is left
     assert z_innovation == pytest.approx(z[:, 2] + inputs[:, 0], abs=1e-15)
     stepper = ModalKf(settled=0.0).prepare(system, seen)
-    assert isinstance(stepper, DisplacementStepper)
-    shared = sharing(stepper)
-    assert shared is not None
-    batch = shared_gain_run(shared, inputs, z[None], H.toarray())
+    batch = stepper.batch(inputs, z[None], H.toarray())
+    assert batch is not None
     assert batch.nis[0] == pytest.approx(modal.traces["nis"].y, rel=1e-8)
     assert batch.values[0, -1] == pytest.approx(H @ modal.u[0].ravel(), rel=1e-8)
 
@@ -233,13 +229,11 @@ def test_a_batch_is_the_filter_one_by_one(settings: KfFem | ModalKf, pulled: Cas
     settings = replace(settings, settled=0.0)
     seeds = [replace(with_gaps(pulled, 2), z=with_gaps(pulled, 2).z * k) for k in (1.0, -2.0)]
     stepper = settings.prepare(pulled.system, seeds[0])
-    assert isinstance(stepper, DisplacementStepper)
-    shared = sharing(stepper)
-    assert shared is not None
     z = np.full((2, len(pulled.t), 3), np.nan)
     z[:, 1::2] = [seen.z for seen in seeds]
     rows = np.vstack([pulled.rows(p).toarray() for p in (TOP, CORNER)])
-    batch = shared_gain_run(shared, pulled.inputs, z, rows)
+    batch = stepper.batch(pulled.inputs, z, rows)
+    assert batch is not None
     for i, seen in enumerate(seeds):
         run = pulled.march(settings.prepare(pulled.system, seen))
         for j, name in enumerate(("top.x", "top.y", "top.z", "corner.x", "corner.y", "corner.z")):
@@ -247,15 +241,17 @@ def test_a_batch_is_the_filter_one_by_one(settings: KfFem | ModalKf, pulled: Cas
             assert np.abs(batch.values[i, :, j] - y).max() < 1e-10 * np.abs(y).max(), name
         assert batch.nis[i] == pytest.approx(run.traces["nis"].y, rel=1e-7, abs=1e-9)
         assert batch.dof.tolist() == run.traces["nis.dof"].y.tolist()
+        density = run.traces["log_likelihood"].y
+        assert batch.log_likelihood[i] == pytest.approx(density, rel=1e-7, abs=1e-9)
 
 
 def test_seeds_share_one_walk(pulled: Case) -> None:
     """A batch equals the runs one by one, and refuses another schedule."""
     stepper = ModalKf(gains="shared").prepare(pulled.system, pulled.measured(1))
-    assert isinstance(stepper, DisplacementStepper)
     z = np.array([pulled.measured(seed).z for seed in (1, 2, 3)])
     rows = np.vstack([pulled.rows(p).toarray() for p in (TOP, CORNER)])
-    batch = shared_gain_run(stepper, pulled.inputs, z, rows)
+    batch = stepper.batch(pulled.inputs, z, rows)
+    assert batch is not None
     for i, seed in enumerate((1, 2, 3)):
         run = pulled.march(ModalKf().prepare(pulled.system, pulled.measured(seed)))
         assert batch.values[i, :, 2] == pytest.approx(run.traces["top.z"].y, rel=1e-8)
@@ -263,11 +259,7 @@ def test_seeds_share_one_walk(pulled: Case) -> None:
         assert batch.nis[i] == pytest.approx(run.traces["nis"].y, rel=1e-5)
     assert batch.dof.tolist() == [3.0] * 60
     z[1, 5] = np.nan
-    with pytest.raises(ComparisonError, match="1 of 3 seeds miss other samples"):
-        shared_gain_run(stepper, pulled.inputs, z, rows)
-    other = KfFem().prepare(pulled.system, pulled.measured(1))
-    with pytest.raises(ComparisonError, match="prepare that"):
-        shared_gain_run(other, pulled.inputs, z, rows)  # type: ignore[arg-type]
+    assert stepper.batch(pulled.inputs, z, rows) is None
 
 
 @pytest.mark.parametrize(
@@ -286,7 +278,6 @@ def test_truth_of_the_filters_own_model_is_consistent(
     """
     pulled = case(steps, shape)
     stepper = KfFem(gains="every_step").prepare(pulled.system, pulled.measured(1))
-    assert isinstance(stepper, DisplacementStepper)
     A = propagation(pulled.system, rule_of("average", DT)).transition()
     H, n = pulled.measured(1).free(pulled.system.free), len(A)
     rng = np.random.default_rng(0)
@@ -309,7 +300,6 @@ def test_tiny_noise_keeps_the_claim_positive_and_nis_flags_it(pulled: Case) -> N
     seen = pulled.measured(1)
     for settings in (KfFem(gains="every_step", R=1e-18), ModalKf(R=1e-18, Q=1e-13)):
         stepper = settings.prepare(pulled.system, seen)
-        assert isinstance(stepper, DisplacementStepper)
         state = stepper.rest()
         for row in pulled.inputs:
             state = stepper.step(state, row)
@@ -474,9 +464,10 @@ PAPER_TABLE = (  # Q mm^2, NRMSE of an earlier study (v, a from the prior)
 def seeds_nrmse(pulled: Case, Q: float, recursion: str = "prior") -> np.ndarray:  # type: ignore[type-arg]
     settings = ModalKf(Q=Q, gains="shared", recursion=recursion)  # type: ignore[arg-type]
     stepper = settings.prepare(pulled.system, pulled.measured(0))
-    assert isinstance(stepper, DisplacementStepper)
     z = np.array([pulled.measured(seed).z for seed in range(50)])
-    found = shared_gain_run(stepper, pulled.inputs, z, pulled.rows().toarray()).values[:, :, 2]
+    batch = stepper.batch(pulled.inputs, z, pulled.rows().toarray())
+    assert batch is not None
+    found = batch.values[:, :, 2]
     truth = pulled.probe()[:, 2]
     return np.sqrt(((found - truth) ** 2).mean(axis=1)) / np.ptp(truth)
 

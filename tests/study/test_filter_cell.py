@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,15 +11,19 @@ from study_samples import experiment_file
 
 from validate.compare.track import rmse, track_error
 from validate.errors import ComparisonError, UsageError
+from validate.estimate.batch import Batch
+from validate.estimate.displacement_filter import DisplacementStepper
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
+from validate.replay.followed import Truth
 from validate.replay.options import Options
 from validate.replay.road import compare
-from validate.study import filter_cell
 from validate.study.engine import finish
-from validate.study.filter_cell import Bench, open_bench, run_cell
+from validate.study.filter_bench import Bench, Ready, open_bench
+from validate.study.filter_cell import run_cell
 from validate.study.filter_plan import FilterPlan, plan
 from validate.study.job import Plan, Where
+from validate.study.kept import fingerprint
 from validate.study.score import FilterScores
 from validate.study.store import Record, read_records
 from validate.study.sweep import axes
@@ -52,7 +57,7 @@ def test_shared_gains_give_the_scores_of_single_runs(
     assert together.shared
     dense = first(pulled, methods__kf__gains="every_step")
     assert dense.shared
-    monkeypatch.setattr("validate.study.filter_cell.sharing", lambda stepper: None)
+    monkeypatch.setattr(DisplacementStepper, "batch", lambda *_: None)
     alone = first(pulled)
     assert not alone.shared
     assert alone.scores.keys() == together.scores.keys()
@@ -127,7 +132,7 @@ def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
     assert found.value.scores == first(pulled).scores
     key = made.cells[0].key
     stored = read_records(tmp_path, [key], FilterScores, found.code)
-    assert (stored.records, stored.doubts) == ({key: found}, ())
+    assert (fingerprint(stored.records), stored.doubts) == (fingerprint({key: found}), ())
     file = tmp_path / f"{key}.json"
     file.write_text(file.read_text("utf-8")[:-20], encoding="utf-8")
     stored = read_records(tmp_path, [key], FilterScores, found.code)
@@ -137,48 +142,48 @@ def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
 def test_a_worker_keeps_few_systems_and_many_recordings(pulled: Experiment) -> None:
     """Its memory is bounded: factors of four meshes, seeds of one study."""
     bench = Bench(pulled, planned(pulled).job)
-    kept = (bench._systems, bench._truths, bench._seen, bench._recordings)
-    assert [k._most for k in kept] == [4, 4, 40, 40]
+    kept = (bench._systems, bench._truths, bench._loaded, bench._seen, bench._recordings)
+    assert [k._most for k in kept] == [4, 4, 4, 40, 40]
 
 
-def shared_run(monkeypatch: pytest.MonkeyPatch, **found: object) -> None:
-    """Replace the filter of all seeds by its result `found`."""
-    probes = SimpleNamespace(weights=SimpleNamespace(toarray=lambda: np.ones((1, 1))))
-    monkeypatch.setattr(filter_cell, "probe_rows", lambda *_: probes)
-    monkeypatch.setattr(filter_cell, "sharing", lambda stepper: stepper, raising=False)
-    monkeypatch.setattr(filter_cell, "shared_gain_run", lambda *_: SimpleNamespace(**found))
-
-
-def test_a_march_that_ends_early_names_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_march_that_ends_early_names_its_seed(
+    pulled: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
     end = SimpleNamespace(state="diverged", step=7, why="not finite")
-    run = SimpleNamespace(finished=False, outcome=end)
-    monkeypatch.setattr(filter_cell, "_march", lambda *_: run)
-    cell = SimpleNamespace(seeds=(11, 12))
-    with pytest.raises(ComparisonError, match="seed 11: diverged at step 7: not finite"):
-        filter_cell._one_by_one(None, cell, None, None, 0.0)  # type: ignore[arg-type]
+    run = SimpleNamespace(outcome=end)
+    monkeypatch.setattr(Ready, "run", lambda *_: run)
+    made = planned(pulled, methods__kf__gate="0.9")
+    with pytest.raises(ComparisonError, match="seed 5: diverged at step 7: not finite"):
+        run_cell(Bench(pulled, made.job), made.cells[0])
 
 
-def test_a_twin_that_tells_no_truth_is_no_benchmark() -> None:
-    bench = SimpleNamespace(truth=lambda first: {})
+def test_a_twin_that_tells_no_truth_is_no_benchmark(
+    pulled: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = planned(pulled)
+    bench = Bench(pulled, made.job)
+    monkeypatch.setattr(bench, "_repeated", lambda ready: Truth({}))
     with pytest.raises(ComparisonError, match="the twin tells no probe's truth: 0 compared"):
-        filter_cell._scores(bench, None, {}, 1.0, 1)  # type: ignore[arg-type]
+        run_cell(bench, made.cells[0])
 
 
 @pytest.mark.parametrize(
-    ("value", "dof", "says"),
-    [(np.nan, 3, "diverged: the estimate is not finite"), (1.0, 0, "invalid: no sample heard")],
+    ("values", "says"),
+    [
+        ({"values": np.nan}, "diverged: the estimate is not finite"),
+        ({"dof": 0.0}, "invalid: 0 of 41 measurements reached the filter"),
+    ],
 )
 def test_seeds_at_once_that_diverge_or_hear_nothing_are_refused(
-    value: float, dof: int, says: str, monkeypatch: pytest.MonkeyPatch
+    pulled: Experiment, values: dict[str, float], says: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shared_run(monkeypatch, values=np.full((1, 2), value), nis=np.ones(1), dof=np.array([dof]))
-    table = SimpleNamespace(unheard=lambda count, names: "no sample heard")
-    stepper = SimpleNamespace(gains=True, sensor=SimpleNamespace(table=table))
-    monkeypatch.setattr(filter_cell, "_measured", lambda *_: np.zeros(1))
-    scene = SimpleNamespace(mesh=SimpleNamespace(dimension=3), probes=(SimpleNamespace(name="a"),))
-    first = SimpleNamespace(
-        system=SimpleNamespace(scene=scene), seen=SimpleNamespace(inputs=np.zeros((2, 1)))
-    )
-    bench = SimpleNamespace(experiment=SimpleNamespace(axis="z"))
+    whole = DisplacementStepper.batch
+
+    def broken(*given: Any) -> Batch:
+        found = whole(*given)
+        assert found is not None
+        return replace(found, **{k: 0 * getattr(found, k) + v for k, v in values.items()})
+
+    monkeypatch.setattr(DisplacementStepper, "batch", broken)
     with pytest.raises(ComparisonError, match=says):
-        filter_cell._all_seeds(bench, None, stepper, first)  # type: ignore[arg-type]
+        first(pulled)

@@ -29,8 +29,9 @@ def planned(pulled: Experiment, *sweeps: str, **options: object) -> FilterPlan:
 def test_an_axis_of_one_method_multiplies_its_cells_only(pulled: Experiment) -> None:
     sweeps = ("methods.kf.Q=1e-12,1e-11,1e-10", "twin.noise=1e-11,1e-10")
     found = planned(pulled, *sweeps, methods=("kf", "plain"))
-    assert [c.method for c in found.cells].count("kf") == 6
-    assert [c.method for c in found.cells].count("plain") == 2
+    assert [c.name for c in found.cells].count("kf") == 6
+    assert [c.name for c in found.cells].count("plain") == 2
+    assert [c.name for c in found.cells].count("last measurement, held") == 2
     assert found.seeds == (5, 6, 7)
 
 
@@ -91,7 +92,7 @@ def test_what_cannot_run_is_refused_at_once(
 
 
 def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
-    with pytest.raises(UsageError, match="no twin whose truth is known"):
+    with pytest.raises(UsageError, match=r"has no filter: none of .* is given markers"):
         plan(phantom, Options({}), (), 2)
 
 
@@ -123,7 +124,7 @@ def test_a_combination_that_settings_refuse_has_a_key_of_its_refusal(
 
 def test_a_method_that_is_only_timed_has_no_error() -> None:
     methods = {"whole": SimpleNamespace(steps=None), "timed": SimpleNamespace(steps=20)}
-    experiment = SimpleNamespace(methods=methods)
+    experiment = SimpleNamespace(methods=methods, repeats=True)
     with pytest.raises(
         UsageError, match="method 'timed' runs 20 steps only, to be timed: it has no"
     ):

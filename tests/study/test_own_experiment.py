@@ -92,5 +92,5 @@ def test_its_stability_map_says_that_nothing_is_stepped(
 def test_filters_are_refused_in_one_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["study", "filters", "my_gel"]) == 2
     error = capsys.readouterr().err
-    assert "no twin whose truth is known" in error
+    assert "'my_gel' has no filter: none of slip, bonded is given markers" in error
     assert error.count("\n") == 1

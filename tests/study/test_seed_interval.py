@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from validate.study.interval import SeedInterval, interval, paired
+from validate.study.blocks import score_difference
+from validate.study.interval import SeedInterval, interval
+from validate.study.score import FilterScores
 
 
 def test_the_95_percent_interval_of_five_numbers() -> None:
@@ -27,5 +29,7 @@ def test_pairs_see_what_common_noise_hides() -> None:
     noise = np.random.default_rng(4).standard_normal(20)
     one, other = (noise + 0.1).tolist(), noise.tolist()
     assert interval(one).overlaps(interval(other))
-    assert paired(one, other).mean == pytest.approx(0.1)
-    assert paired(one, other).low > 0.09
+    scores = [FilterScores({"e": tuple(v)}, {"e": "m"}) for v in (one, other)]
+    apart = score_difference(scores[0], scores[1], "e", None)
+    assert apart.mean == pytest.approx(0.1)
+    assert apart.low > 0.09

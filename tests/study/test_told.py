@@ -8,10 +8,10 @@ import pytest
 from validate.replay.ladder import PaperSetting, Turned
 from validate.study import stability_exhibits
 from validate.study.filter_exhibits import (
-    RANKING,
     _pareto_chart,
     _pareto_exhibit,
     _ranking_exhibit,
+    ranking_head,
 )
 from validate.study.stability import points
 from validate.study.stability_exhibits import _cost, _map, _marks
@@ -32,7 +32,7 @@ def test_tables_of_a_front_are_numbered_from_one() -> None:
     empty = Made(rows=(), front=(), condition=())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("validate.study.filter_exhibits._under", lambda ranking: "")
-        made = _pareto_exhibit(Made(rankings=[empty, empty]))
+        made = _pareto_exhibit(Made(rankings=[empty, empty], unit="m"))
     assert [t.name for t in made.tables] == ["pareto_1", "pareto_2"]
 
 
@@ -43,20 +43,21 @@ def test_a_lone_ranking_shows_more_places(
     module = "validate.study.filter_exhibits."
     monkeypatch.setattr(module + "_under", lambda ranking: "")
     monkeypatch.setattr(module + "_ranking_words", lambda study: ())
-    monkeypatch.setattr(module + "ranking_row", lambda row: (row,) * len(RANKING))
-    made = _ranking_exhibit(Made(rankings=[Made(rows=tuple(range(30)))] * conditions))
+    monkeypatch.setattr(module + "ranking_row", lambda row, by: (row,) * len(ranking_head("m")))
+    rankings = [Made(rows=tuple(range(30)))] * conditions
+    made = _ranking_exhibit(Made(rankings=rankings, unit="m", by="all.rmse"))
     assert [len(t.rows) for t in made.tables] == [shown] * conditions
     assert made.tables[0].title == f"Ranking: the first {shown} of 30 places"
 
 
 def test_a_point_of_the_front_is_drawn_under_its_method(monkeypatch: pytest.MonkeyPatch) -> None:
     def row(method: str, time: float | None, mean: float) -> Made:
-        return Made(cell=Made(method=method), result=Made(step_s=time), score=Made(mean=mean))
+        return Made(cell=Made(name=method), result=Made(step_s=time), score=Made(mean=mean))
 
     rows = (row("kf", 1e-3, 2e-3), row("ekf", 2e-3, 1e-3), row("kf", 4e-3, 3e-3),
             row("exact", 1e-3, 0.0), row("untimed", None, 1.0))  # fmt: skip
     monkeypatch.setattr("validate.study.filter_exhibits._under", lambda ranking: "")
-    chart = _pareto_chart(Made(by="rmse"), Made(rows=rows, front=rows[:2]), 1)
+    chart = _pareto_chart(Made(by="rmse", unit="m"), Made(rows=rows, front=rows[:2]), 1)
     drawn = {s.label: (s.x.tolist(), s.y.tolist()) for s in chart.series}
     assert drawn == {
         "kf": ([1.0, 4.0], [2.0, 3.0]),
@@ -64,7 +65,7 @@ def test_a_point_of_the_front_is_drawn_under_its_method(monkeypatch: pytest.Monk
         "Pareto front": ([1.0, 2.0], [2.0, 1.0]),
     }
     assert "1 without any error" in chart.caption
-    assert "1 smoothed, which see the future" in chart.caption
+    assert "1 without times" in chart.caption
 
 
 # --- stability maps -------------------------------------------------------------------------------

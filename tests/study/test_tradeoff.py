@@ -14,6 +14,7 @@ from scipy import sparse
 from validate.cli import studying
 from validate.cli.main import run
 from validate.errors import ComparisonError, SceneError, UsageError
+from validate.estimate import displacement_filter
 from validate.fem.factor import factorise
 from validate.fem.system import build
 from validate.replay.experiment import Experiment
@@ -33,7 +34,6 @@ from validate.study import (
     coverage_plan,
     gain,
     precision,
-    shared,
     stability_cell,
     trade,
     trade_cell,
@@ -530,9 +530,10 @@ def test_studies_of_what_cannot_be_are_reported(monkeypatch: pytest.MonkeyPatch)
     def coupled(*_: object) -> None:
         raise SceneError("damping couples the modes")
 
-    monkeypatch.setattr(shared, "in_modes", coupled)
+    monkeypatch.setattr(displacement_filter, "in_modes", coupled)
     filters = SimpleNamespace(
         care=None, smooth=False, claimed=None, covariance=None, system=None,
         excitation=SimpleNamespace(rule=None),
     )  # fmt: skip
-    assert shared.sharing(filters) is None  # type: ignore[arg-type]
+    alone = displacement_filter.DisplacementStepper._sharing(filters)  # type: ignore[arg-type]
+    assert alone is None

@@ -11,11 +11,13 @@ from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
 from validate.register.clock import interpolated
 from validate.register.markers import MarkerObservation
+from validate.register.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.scene.mesh import Mesh
 
 OFF_STEP = 0.01  # of a step: clock jitter that moves no estimate; more would be a wrong time
 _FINEST = 1000  # parts of a sampling interval tried as a step when one is looked for
+NORMALS = 24  # places of an outline that a filter is given, evenly in polar angle
 _AXES = "xyz"
 
 
@@ -53,9 +55,9 @@ class Measurements:
             raise ComparisonError(f"measurement sd {self.sd.min():g} m: it must be positive")
 
     def of(self, *markers: str) -> "Measurements":
-        """What these markers measured: all that a filter is given of a recording.
+        """What these markers or outlines measured: all that a filter is given of a recording.
 
-        Raises `ComparisonError` naming a marker that was not measured.
+        Raises `ComparisonError` naming one that was not measured.
         """
         owners = [name.rpartition(".")[0] for name in self.names]
         absent = [marker for marker in markers if marker not in owners]
@@ -174,15 +176,46 @@ def _landed(t: Floats, dt: float) -> float | None:
 
 
 def measurements(registered: Registered, mesh: Mesh) -> Measurements:
-    """Displacements of the registered markers from their rest layout.
+    """Displacements of the registered markers from their rest layout, and of outlines along their
+    normals, from rest: `<outline>.<number>`.
 
-    Looks of a jittering camera, which no step meets, are interpolated onto the steps; see
-    `on_steps`. Raises `ComparisonError` without markers and for rows of another mesh.
+    Samples of a jittering camera, which no step meets, are interpolated onto the steps; see
+    `on_steps`. Raises `ComparisonError` without either and for rows of another mesh.
     """
-    found = registered.of(MarkerObservation)
+    markers, outlines = registered.of(MarkerObservation), registered.of(OutlineObservation)
+    found = [_of_markers(m, registered, mesh) for m in markers[:1]]
+    found += [_of_outline(o, registered) for o in outlines]
     if not found:
-        raise ComparisonError("the recording has no markers: a filter has nothing to measure")
-    seen = found[0]
+        raise ComparisonError(
+            "the recording has no markers and no outlines: a filter has nothing to measure"
+        )
+    return together(found)
+
+
+def together(every: Sequence[Measurements]) -> Measurements:
+    """Measurements of several sensors as one, NaN where a sensor was not read at an instant."""
+    if len(every) == 1:
+        return every[0]
+    t = np.unique(np.concatenate([m.t for m in every]))
+    z = np.full((len(t), sum(len(m.names) for m in every)), np.nan)
+    first = 0
+    for m in every:
+        z[np.searchsorted(t, m.t), first : first + len(m.names)] = m.z
+        first += len(m.names)
+    H = sparse.csr_array(sparse.vstack([m.H for m in every]))
+    sd = np.concatenate([m.sd for m in every])
+    names = tuple(name for m in every for name in m.names)
+    return Measurements(t, H, z, sd, names, max(m.sd_t for m in every))
+
+
+def _of_outline(outline: OutlineObservation, registered: Registered) -> Measurements:
+    found = outline.along_normals(NORMALS)
+    names = tuple(f"{outline.name}.{i}" for i in range(NORMALS))
+    t, z, sd = on_steps(outline.t, found.z, np.full(NORMALS, found.sd), registered.t)
+    return Measurements(t, found.H, z, sd, names, outline.sd_t)
+
+
+def _of_markers(seen: MarkerObservation, registered: Registered, mesh: Mesh) -> Measurements:
     n, d = mesh.nodes.shape
     weights = seen.positions.weights
     if weights.shape[1] != n:

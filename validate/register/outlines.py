@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
+from scipy.spatial.distance import cdist
 
 from validate.arrays import Floats, rms
 from validate.fem.locate import Rows
@@ -28,7 +30,7 @@ from validate.register.outline_geometry import (
     polar_angles,
     ray_points,
 )
-from validate.register.plane import SurfaceSampler, require_rigid, section
+from validate.register.plane import SurfaceSampler, from_image, require_rigid, section
 
 _TINY = np.finfo(float).tiny
 _ANGLES = np.deg2rad(np.arange(0.0, 360.0, 10.0))
@@ -80,6 +82,20 @@ class OutlineObservation:
 
     def rows(self) -> Rows | None:
         return None
+
+    def along_normals(self, count: int) -> "NormalDistances":
+        """How far the outline moved along the wall's normals at `count` places of the rest section,
+        evenly in polar angle; to first order what the wall's own displacement along them is."""
+        still = self.simulated(np.zeros((self.wall.rows.weights.shape[1], 3)))
+        places = ray_points(still, np.linspace(0, 2 * np.pi, count, endpoint=False))
+        places, across = _at_normals(still, places)
+        rows = self.wall.rows_at(from_image(self.pose, places))
+        directions = across @ self.pose[:3, :2].T
+        away = np.array([normal_distances(o, places) for o in self.outlines])
+        moved = away - normal_distances(self.measured(self.rest), places)
+        sds = np.full(len(self.t), self.sd) if self.sds is None else self.sds
+        sd = float(np.hypot(rms(sds), self._sd_at(self.rest)))
+        return NormalDistances(Rows(rows, np.zeros(count)), directions, moved, sd)
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -194,6 +210,34 @@ class OutlineObservation:
         share = min((float(ways[1][0] @ ray) / max(measured, _TINY)) ** 2, 1.0)
         sd = self.sd * float(np.sqrt(share * along[0, 0] + (1 - share) * across))
         return Deviation(corner.quantity, off, "m", sd, 0.0, corner.words, simulated, measured)
+
+
+@dataclass(frozen=True)
+class NormalDistances:
+    """Displacements z (nt, m) m of an outline along unit `normals` (m, 3), of standard deviation
+    sd m; `rows` read the places from nodal values."""
+
+    rows: Rows
+    normals: Floats
+    z: Floats
+    sd: float
+
+    @property
+    def H(self) -> sparse.csr_array:
+        """What reads z from nodal displacements (3 n,), node by node: (m, 3 n)."""
+        each = [
+            sparse.kron(self.rows.weights[[i]], self.normals[[i]]) for i in range(len(self.normals))
+        ]
+        return sparse.csr_array(sparse.vstack(each))
+
+
+def _at_normals(outline: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """The outline's vertices nearest to points (m, 2) m, and the outward normals there."""
+    nearest = cdist(points, outline).argmin(axis=1)
+    across = normals(outline)
+    middle = enclosed(outline)[1]
+    outward = np.sign(((outline - middle) * across).sum(axis=1, keepdims=True))
+    return outline[nearest], (outward * across)[nearest]
 
 
 def _moved(start: Floats, end: Floats, angles: Floats) -> Floats:

@@ -4,12 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from scipy import sparse
+from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
 from validate.fem.locate import Rows, facet_samples, nearest_node_rows
 from validate.scene.inclusion_shape import InclusionShape
 from validate.scene.mesh import Mesh
+
+_CANDIDATES = 12  # nearest triangles that may hold a point
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,33 @@ class SurfaceSampler:
     def deformed(self, u: Floats) -> Floats:
         """Positions (v, 3) m under nodal displacements u (n, 3) m."""
         return self.rest + self.rows.apply(u)
+
+    def rows_at(self, points: Floats) -> sparse.csr_array:
+        """Rows (m, n) of the places on the wall that are nearest to points (m, 3) m."""
+        middles = self.rest[self.triangles].mean(axis=1)
+        near = cKDTree(middles).query(points, k=min(_CANDIDATES, len(middles)))[1]
+        corners = self.triangles[near.reshape(len(points), -1)]
+        shares = _shares(self.rest[corners], points)
+        feet = np.einsum("pkc,pkcd->pkd", shares, self.rest[corners])
+        best = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
+        each = np.arange(len(points))
+        shape = (len(points), len(self.rest))
+        entries = (shares[each, best].ravel(), (np.repeat(each, 3), corners[each, best].ravel()))
+        return sparse.csr_array(sparse.csr_array(entries, shape=shape) @ self.rows.weights)
+
+
+def _shares(corners: Floats, points: Floats) -> Floats:
+    """Barycentric coordinates (p, k, 3) of points (p, 3) m in triangles (p, k, 3, 3) m, within
+    them."""
+    start = corners[..., 0, :]
+    u, v = corners[..., 1, :] - start, corners[..., 2, :] - start
+    w = points[:, None] - start
+    uu, uv, vv = (u * u).sum(-1), (u * v).sum(-1), (v * v).sum(-1)
+    wu, wv = (w * u).sum(-1), (w * v).sum(-1)
+    area = np.maximum(uu * vv - uv**2, np.finfo(float).tiny)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    inside = np.clip(np.stack([1 - s - t, s, t], axis=-1), 0, None)
+    return np.asarray(inside / inside.sum(axis=-1, keepdims=True))
 
 
 def cavity_sampler(

@@ -38,7 +38,7 @@ class Method:
     label: str = quantity("", "1", "what reports call it")
     settings: Any = part(None, "of the scheme or filter")
     scene: Any = part(None, "what the scene is built with")
-    markers: tuple[str, ...] = quantity((), "1", "markers that a filter is given")
+    markers: tuple[str, ...] = quantity((), "1", "markers and outlines that a filter is given")
     steps: int | None = quantity(None, "1", "steps to run; none: all")
     stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
     chosen: str = quantity("", "1", "what was chosen on the twin that judges it; empty: nothing")

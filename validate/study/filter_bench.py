@@ -13,6 +13,8 @@ from validate.fem.system import build as build_system
 from validate.parameters import describe
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
+from validate.register.observation import Observation
+from validate.register.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
 from validate.replay.followed import Truth
@@ -57,11 +59,8 @@ class Ready:
         return replace(self, method=replace(self.method, markers=tuple(names)))
 
     def given_nothing(self) -> "Ready":
-        """The same, where every marker was missed at every sample."""
-        blank = tuple(
-            replace(o, x=np.full_like(o.x, np.nan)) if isinstance(o, MarkerObservation) else o
-            for o in self.seen.observations
-        )
+        """The same, where every marker and outline was missed at every sample after rest."""
+        blank = tuple(_missed(o) for o in self.seen.observations)
         return replace(self, seen=replace(self.seen, observations=blank))
 
     def stepper(self) -> Stepper:
@@ -75,6 +74,15 @@ class Ready:
             self.experiment, name, self.method, self.parameters, self.scene, (self.seen,), kept
         )
         return found
+
+
+def _missed(sensor: Observation) -> Observation:
+    if isinstance(sensor, MarkerObservation):
+        return replace(sensor, x=np.full_like(sensor.x, np.nan))
+    if isinstance(sensor, OutlineObservation):
+        sds = None if sensor.sds is None else sensor.sds[:1]
+        return replace(sensor, t=np.zeros(1), outlines=sensor.outlines[:1], sds=sds)
+    return sensor
 
 
 @dataclass(frozen=True)

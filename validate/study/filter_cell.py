@@ -10,12 +10,13 @@ from time import perf_counter
 from typing import cast
 
 import numpy as np
+from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.filters import FilterStepper
 from validate.estimate.measurements import Measurements, timetable
-from validate.fem.locate import probe_rows
+from validate.fem.locate import Rows, probe_rows
 from validate.replay.solved import Kept as KeptFields
 from validate.solve.types import Run, Stepper, StepTimes
 from validate.study.filter_bench import Bench, Ready
@@ -33,6 +34,7 @@ from validate.study.withheld import (
     joined_innovations,
     other_errors,
     other_times,
+    outline_tracks,
     read_innovations,
 )
 
@@ -246,14 +248,23 @@ def _one_by_one(bench: Bench, cell: FilterCell, folds: Sequence[Fold]) -> Filter
 def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:
     one = ready.with_markers(fold.given)
     one = one.given_nothing() if cell.baseline == "alone" else one
-    tracks = ready.tracks
-    points = None if tracks is None else tracks.rows
+    points = _watched(ready, cell)
     run = one.run(cell.method, KeptFields(other_times(ready.seen), points))
     state = run.outcome.state
     if state == "finished" or (state == "invalid" and cell.baseline == "alone"):
         return run
     where = f"seed {seed}: " if cell.seed_path else ""
     raise ComparisonError(f"{where}{state} at step {run.outcome.step}: {run.outcome.why}")
+
+
+def _watched(ready: Ready, cell: FilterCell) -> Rows | None:
+    """Rows of the markers, then of the outlines that filters are given."""
+    every = [] if ready.tracks is None else [ready.tracks.rows]
+    every += [o.distances.rows for o in outline_tracks(ready.seen, cell.given)]
+    if not every:
+        return None
+    weights = sparse.csr_array(sparse.vstack([r.weights for r in every]))
+    return Rows(weights, np.concatenate([r.outside for r in every]))
 
 
 def _scored(
@@ -267,13 +278,13 @@ def _scored(
         if tracks is not None and own.points is not None and fold.scores:
             at = [tracks.names.index(n) for n in fold.scores]
             held += tracks.of(fold.scores).errors(own.t, own.points[:, at], segments, ahead=False)
-    held += other_errors(run, ready.seen, segments)
+    held += other_errors(run, ready.seen, segments, cell.given)
     axis = ready.experiment.axis
     probes = {p.name: run.traces[f"{p.name}.{axis}"].y for p in ready.scene.probes}
     truth = _against_truth(bench, ready, probes) if bench.experiment.repeats else {}
     nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
     if nis is None or dof is None or cell.baseline:
-        ahead = _at_given(cell, tracks, run.t, run.points, segments)
+        ahead = _at_given(cell, ready, run, segments)
         return Scored(truth, (*held, *ahead))
     names = [n for n in run.traces if n.startswith("innovation.") and not n.endswith(".sd")]
     names = [n.removeprefix("innovation.") for n in names]
@@ -285,59 +296,62 @@ def _scored(
     return Scored(truth, (*held, *ahead), told, float(nis.y.sum()), int(dof.y.sum()))
 
 
-def _at_given(
-    cell: FilterCell,
-    tracks: MarkerTracks | None,
-    t: Floats,
-    u: Floats | None,
-    segments: Segments,
-) -> tuple[Withheld, ...]:
-    """Errors at the markers that filters are given, of a method that is given none."""
-    if tracks is None or u is None:
+def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> tuple[Withheld, ...]:
+    """Errors at what filters are given, of a method that is given nothing."""
+    u, tracks = run.points, ready.tracks
+    if u is None:
         return ()
-    given = tracks.of(cell.given)
-    at = [tracks.names.index(n) for n in given.names]
-    return given.errors(t, u[:, at], segments, ahead=True)
+    found, first = list[Withheld](), 0
+    if tracks is not None:
+        given, first = tracks.of(cell.given), len(tracks.names)
+        at = [tracks.names.index(n) for n in given.names]
+        found += given.errors(run.t, u[:, at], segments, ahead=True)
+    for outline in outline_tracks(ready.seen, cell.given):
+        last = first + len(outline.distances.normals)
+        found += outline.errors(run.t, u[:, first:last], segments)
+        first = last
+    return tuple(found)
 
 
 # --- persistence ----------------------------------------------------------------------------------
 
 
 def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
-    """The last measurement, held: a marker is where it, or the nearest given one, was last seen."""
+    """The last measurement, held: what was given stays as it was last measured, another marker is
+    where the nearest given one was."""
     scored, seconds, segments = list[Scored](), list[float](), first.segments
     for seed in cell.seeds:
         on_each = []
         for ready in bench.ready(cell, seed):
-            tracks = ready.tracks
-            given = None if tracks is None else tracks.of(cell.given)
-            if tracks is None or given is None or not given.names:
-                raise ComparisonError("no marker is given to any filter: nothing to hold")
+            one = ready.with_markers(cell.given)
+            offered = one.method.offered(one.system, one.seen)
             start = perf_counter()
-            now, before = tracks.held(given)
-            seconds.append((perf_counter() - start) / len(tracks.t))
-            on_each.append(
-                Scored(
-                    _held_at_probes(bench, ready, given),
-                    (
-                        *_squares(tracks, now, cell.scored(tracks.names), segments, ahead=False),
-                        *_squares(tracks, before, given.names, segments, ahead=True),
-                    ),
-                )
-            )
+            last = _last_seen(offered.z)
+            seconds.append((perf_counter() - start) / len(offered.t))
+            y, measured = offered.z - last, np.isfinite(offered.z)
+            ahead = ahead_errors(offered.t, offered.names, np.nan_to_num(y), measured, segments)
+            tracks, held = ready.tracks, tuple[Withheld, ...]()
+            given = None if tracks is None else tracks.of(cell.given)
+            truth: Mapping[str, float] = {}
+            if tracks is not None and given is not None and given.names:
+                scoring = tracks.of(cell.scored(tracks.names))
+                u = scoring.held(given)
+                held = scoring.errors(tracks.t[1:], u[1:], segments, ahead=False)
+                truth = _held_at_probes(bench, ready, given)
+            on_each.append(Scored(truth, (*held, *ahead)))
         scored.append(_in_a_row(on_each))
     found = _put_together(scored, segments)
     step = float(np.median(seconds))
     return replace(found, step_s=step, step_p99_s=float(np.max(seconds)), steps=len(first.seen.t))
 
 
-def _squares(
-    tracks: MarkerTracks, u: Floats, names: Sequence[str], segments: Segments, *, ahead: bool
-) -> tuple[Withheld, ...]:
-    """Of displacements u (nt, k, d) m at the samples' own times."""
-    at = [tracks.names.index(n) for n in names]
-    own = tracks.of(names)
-    return own.errors(tracks.t[1:], u[1:, at], segments, ahead=ahead)
+def _last_seen(z: Floats) -> Floats:
+    """The last value of every component before each row (nt, m), zero at first."""
+    last, found = np.zeros(z.shape[1]), np.zeros_like(z)
+    for i, row in enumerate(z):
+        found[i] = last
+        last = np.where(np.isfinite(row), row, last)
+    return found
 
 
 def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[str, float]:
@@ -347,7 +361,7 @@ def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[
     probes = [p for p in ready.scene.probes if p.name in truth]
     rest = np.array([p.point for p in probes])
     at = replace(given, names=tuple(p.name for p in probes), rest=rest)
-    now, _ = at.held(given)
+    now = at.held(given)
     c, t = "xyz".index(ready.experiment.axis), np.concatenate([[0.0], ready.seen.t])
     last = np.searchsorted(given.t, t[1:] + 1e-9) - 1
     estimates = {p.name: now[last, j, c] for j, p in enumerate(probes)}

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.arrays import Floats, Ints
+from validate.estimate.measurements import NORMALS
 from validate.fem.locate import Rows, barycentric_rows
 from validate.fem.system import System
 from validate.register.markers import MarkerObservation
 from validate.register.observation import Observation, Selection
-from validate.register.outlines import OutlineObservation
+from validate.register.outlines import NormalDistances, OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.mesh import Mesh
@@ -124,16 +125,14 @@ class MarkerTracks:
         found = np.stack([np.interp(self.t, known, y) for y in flat.T], axis=1)
         return found.reshape(len(self.t), *u.shape[1:])
 
-    def held(self, given: "MarkerTracks") -> tuple[Floats, Floats]:
-        """Persistence: at every sample the last displacement seen of the nearest of the markers
-        `given`, up to that sample and before it, (nt, k, d) m each."""
+    def held(self, given: "MarkerTracks") -> Floats:
+        """Persistence: at every sample the last displacement of the nearest of the markers `given`,
+        (nt, k, d) m."""
         last = np.zeros_like(given.z)
         for i, z in enumerate(given.z):
             last[i] = np.where(np.isfinite(z), z, last[i - 1] if i else 0.0)
-        before = np.concatenate([np.zeros_like(last[:1]), last[:-1]])
         away = np.linalg.norm(self.rest[:, None] - given.rest, axis=2)
-        nearest = away.argmin(axis=1)
-        return last[:, nearest], before[:, nearest]
+        return np.asarray(last[:, away.argmin(axis=1)])
 
 
 def marker_tracks(seen: Registered, system: System) -> MarkerTracks | None:
@@ -226,10 +225,39 @@ def read_innovations(run: Run, names: Sequence[str]) -> tuple[Floats, Floats]:
 # --- other sensors --------------------------------------------------------------------------------
 
 
-def other_errors(run: Run, seen: Registered, segments: Segments) -> tuple[Withheld, ...]:
-    """Of outlines (distance to the simulated wall) and signals that are compared, at their own
-    samples."""
-    return tuple(w for o in _others(seen) for w in _of_sensor(o, run, segments))
+@dataclass(frozen=True)
+class OutlineTracks:
+    """An outline's displacements along its normals, at times t (nt,) s, that filters are given."""
+
+    name: str
+    t: Floats
+    distances: NormalDistances
+
+    def errors(self, t: Floats, u: Floats, segments: Segments) -> tuple[Withheld, ...]:
+        """Of displacements u (nt, m, 3) m of its places at times t (nt,) s."""
+        along = (u * self.distances.normals).sum(axis=2)
+        known = np.append(0.0, t)
+        found = np.stack([np.interp(self.t, known, np.append(0.0, y)) for y in along.T], axis=1)
+        squared = ((found - self.distances.z) ** 2).sum(axis=1, keepdims=True)
+        return errors_of((self.name,), self.t, squared, segments, ahead=True)
+
+
+def outline_tracks(seen: Registered, given: Sequence[str]) -> tuple[OutlineTracks, ...]:
+    """The outlines among what filters are given."""
+    return tuple(
+        OutlineTracks(o.name, o.t, o.along_normals(NORMALS))
+        for o in seen.of(OutlineObservation)
+        if o.name in given
+    )
+
+
+def other_errors(
+    run: Run, seen: Registered, segments: Segments, given: Sequence[str]
+) -> tuple[Withheld, ...]:
+    """Of outlines (distance to the simulated wall) and signals that are compared and not `given`,
+    at their own samples."""
+    others = [o for o in _others(seen) if o.name not in given]
+    return tuple(w for o in others for w in _of_sensor(o, run, segments))
 
 
 def _others(seen: Registered) -> list[Observation]:
