@@ -8,10 +8,10 @@ from cubes import BELOW, CORNER, DT, PAPER, SD, SMALL, TOP, Case, case, cube
 from filterpy.kalman import KalmanFilter
 from scipy.linalg import expm, solve_discrete_are
 
-from validate.errors import ComparisonError, SceneError
+from validate.errors import SceneError
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
 from validate.estimate.covariance import Decoupled
-from validate.estimate.displacement_filter import DisplacementStepper, Estimate, Structure
+from validate.estimate.displacement_filter import Estimate, Structure
 from validate.estimate.gains import Claims, gain_sequence, schedule
 from validate.estimate.kalman import Gaussian, best_gain, kf_predict, kf_update
 from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
