@@ -1,6 +1,10 @@
 """Errors at what was withheld, blocks of time and nested choices, against numbers made by hand."""
 
+import importlib.util
+import sys
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +16,16 @@ from validate.fem.locate import barycentric_rows
 from validate.recording.types import Contours
 from validate.register.outlines import observe_outlines
 from validate.register.plane import cavity_sampler
-from validate.replay.find import load_file
+from validate.replay.find import find, load_file
 from validate.replay.options import Options
+from validate.replay.road import compare
 from validate.scene.box import box
 from validate.study.blocks import cut, nested, score_interval
 from validate.study.filter_bench import Bench
 from validate.study.filter_cell import folds_of, run_cell
 from validate.study.filter_plan import FilterCell, plan
+from validate.study.filters import study
+from validate.study.job import Where
 from validate.study.score import AHEAD, HELD_OUT, WITHHELD, FilterScores
 from validate.study.withheld import (
     Innovations,
@@ -216,3 +223,55 @@ def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: obj
     assert (fold.given, fold.scores) == (("top",), ("side",))
     found = run_cell(bench, named)
     assert {(w.name, w.ahead) for w in found.withheld} == {("side", False), ("top", True)}
+
+
+@pytest.mark.parametrize(("R", "used"), [("none", True), ("1e-9", False), ("1e-11", False)])
+def test_a_filter_that_does_not_know_its_error_gives_no_interval(
+    tmp_path: object, R: str, used: bool
+) -> None:
+    """NIS 0.80 with the declared noise (in the band), 0.09 and 5.0 with a wrong one."""
+    pulled = load_file(experiment_file(tmp_path))  # type: ignore[arg-type]
+    values = {"methods.kf.Q": "1e-11"} | ({} if R == "none" else {"methods.kf.R": R})
+    check = compare(pulled, Options(values, ("kf",))).checks[0]
+    assert (check.u_input > 0) == used
+
+
+def test_a_measured_recording_is_ranked_on_blocks_and_other_markers(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    """The silicone beam: the filter that doubts its model most is best at the tips it never saw;
+    its innovations stay correlated, so there is no interval."""
+    root = Path(__file__).parents[2]
+    found = study(
+        find("silicone_beam", root), ["methods.filter_doubt.R=4e-8,1e-6"],
+        methods=("filter_doubt", "roukf"), out=tmp_path, where=Where(workers=0),
+    )  # fmt: skip
+    (ranking,) = found.rankings
+    assert found.by == WITHHELD
+    assert [r.cell.name for r in ranking.rows] == [
+        "filter_doubt", "roukf", "filter_doubt", "filter_doubt, given nothing",
+        "last measurement, held",
+    ]  # fmt: skip
+    assert ranking.rows[0].score.mean == pytest.approx(2.72e-4, rel=0.02)
+    assert ranking.blocks is not None
+    assert (ranking.blocks.count, ranking.rows[0].score.half) == (3, None)
+    assert ranking.nested is not None
+    assert ranking.nested.split
+    assert dict(ranking.nested.chosen) == {"filter_doubt (R=4e-8)": 6}
+    assert not found.picks
+
+
+@pytest.mark.slow
+def test_a_ranking_without_truth_picks_a_good_filter() -> None:
+    """Two of the three twins, one of the seeds that were named before the first run."""
+    file = Path(__file__).parents[2] / "benchmarks" / "filter_rankings.py"
+    spec = importlib.util.spec_from_file_location("filter_rankings", file)
+    assert spec is not None
+    assert spec.loader is not None
+    ranked = importlib.util.module_from_spec(spec)
+    sys.modules["filter_rankings"] = ranked
+    spec.loader.exec_module(ranked)
+    with tempfile.TemporaryDirectory() as folder:
+        found = ranked.picks("ekf_cube", (301,), Path(folder))
+    assert len(found) == 4
+    assert sum(p.near for p in found) >= 3

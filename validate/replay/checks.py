@@ -25,6 +25,7 @@ from validate.compare.verdict import (
 )
 from validate.errors import ComparisonError
 from validate.fem.locate import probe_rows
+from validate.replay.consistency import claims_hold
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
 from validate.replay.followed import Followed
 from validate.replay.refined import Refined, mesh_errors, variants
@@ -198,8 +199,9 @@ def _together(inputs: Sequence[Input], draw: Floats) -> Change:
 
 
 def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
-    """What a filter itself claims of its error at every probe, as one more input of u_val."""
-    if mine.run.sd is None or not mine.whole:
+    """What a filter itself claims of its error at every probe, as one more input of u_val; nothing
+    where its NIS is outside the 95 % band: such a claim does not hold."""
+    if mine.run.sd is None or not mine.whole or not claims_hold(mine):
         return {}
     found = {}
     for probe in mine.scene.probes:

@@ -60,12 +60,20 @@ def consistency_exhibit(
         ("filter", "component", "p / 1", "lag-1 correlation / 1", "samples", "white"),
         tuple(row for f in filters.values() for row in _white_rows(f)),
     )
-    words = (
+    words = [
         "NIS sees measured components only: a filter can look consistent while unmeasured nodes "
-        "are wrong, so read it beside the errors at the other nodes.",
-    )
+        "are wrong, so read it beside the errors at the other nodes."
+    ]
+    doubted = [f.label for f in filters.values() if not claims_hold(f)]
+    if doubted:
+        words.append(
+            "NIS outside its 95 % band, so the filter's own interval is not used in any verdict: "
+            f"{'; '.join(doubted)}."
+        )
     charts = tuple(_chart(f) for f in list(filters.values())[:4])
-    return Exhibit("consistency", "Does the filter know its error?", words, (table, white), charts)
+    return Exhibit(
+        "consistency", "Does the filter know its error?", tuple(words), (table, white), charts
+    )
 
 
 def nis_of(followed: Followed) -> Consistency | None:
@@ -74,6 +82,12 @@ def nis_of(followed: Followed) -> Consistency | None:
     if nis is None or dof is None or not dof.y.any():
         return None
     return nis_consistency(nis.y, dof.y)
+
+
+def claims_hold(followed: Followed) -> bool:
+    """Whether NIS lies within its 95 % band; True for a method without innovations."""
+    nis = nis_of(followed)
+    return nis is None or nis.band_95.holds(nis.mean)
 
 
 def nees_of(followed: Followed) -> dict[str, Consistency]:

@@ -52,7 +52,8 @@ class FilterCell:
     @property
     def label(self) -> str:
         given = f" ({named(self.values)})" if self.values else ""
-        return f"{self.name}{given}, {len(self.seeds)} seeds"
+        seeds = f", {len(self.seeds)} seeds" if self.seed_path else ""
+        return f"{self.name}{given}{seeds}"
 
     def in_turn(self, moving: Sequence[str]) -> bool:
         """Whether every marker is held out in turn: where that is asked for, or none is free."""
