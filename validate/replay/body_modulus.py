@@ -218,6 +218,11 @@ class _Bench:
         for declared in self.experiment.uncertainty.inputs:
             if declared.name == "Poisson ratio":
                 add(declared.name, declared.move(p, 1.0))
+            if declared.name == "machine compliance":
+                changed = declared.move(p, 1.0)
+                add(declared.name, p, self.experiment.place(
+                    self.recording, changed, self.scene(name, changed)
+                ))  # fmt: skip
         add("load", p, self._driven(1 + p.ranges.load, 0.0))
         zero = hypot(p.ranges.contact, self._rest_sd(p.moved.by))
         if zero > 0:
