@@ -26,7 +26,8 @@ class Indenter:
     gap: float = quantity(
         0.0, "m", "from the first instant to the first touch; below 0: it already presses"
     )
-    friction: float = quantity(0.0, "1", "Coulomb's coefficient; inf: bonded while it presses")
+    friction: float = quantity(0.0, "1", "Coulomb's coefficient")
+    bonded: bool = quantity(False, "1", "whether what touches sticks while it is pressed")
     reach: float = quantity(
         0.0, "m", "radius of contact at the largest load, for which a block's mesh is graded"
     )
@@ -37,9 +38,10 @@ class Indenter:
                 f"indenter.radius = {self.radius:g} m: a {self.shape} needs a radius above 0, as "
                 "--set indenter.radius=5mm"
             )
-        if not self.friction >= 0:
+        if not (np.isfinite(self.friction) and self.friction >= 0):
             raise UsageError(
-                f"indenter.friction = {self.friction:g}: 0 (frictionless), a coefficient, or inf"
+                f"indenter.friction = {self.friction:g}: 0 (frictionless), or a coefficient; what "
+                "sticks is indenter.bonded=true"
             )
         if len(self.tip) not in (0, 3) or not self.reach >= 0:
             raise UsageError(

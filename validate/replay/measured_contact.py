@@ -60,7 +60,7 @@ def contact_of(p: MeasuredBody, mesh: Mesh, where: Place) -> RigidContact:
         )
     reach = np.sqrt(card.radius**2 - aside[under] ** 2) if card.shape != "plate" else 0.0
     start = tip + along * (float((depth[under] - reach).min()) - max(card.gap, 0.0))
-    friction = min(card.friction, _BONDED)
+    friction = _BONDED if card.bonded else card.friction
     direction = tuple(along.tolist())
     return RigidContact(PRESSED, where, _shape(card, start, direction), direction, friction)
 
