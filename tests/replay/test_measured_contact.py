@@ -10,6 +10,7 @@ import pytest
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
+from validate.fem.system import build
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import compare
@@ -26,10 +27,18 @@ from validate.replay.measured_cards import (
     Solid,
     Tissue,
 )
-from validate.replay.measured_contact import contact_of, is_quarter, pressed_mesh, touching
+from validate.replay.measured_contact import (
+    contact_of,
+    is_quarter,
+    pressed_mesh,
+    symmetry,
+    touching,
+)
 from validate.scene.contact import RigidCylinder, RigidPlane, RigidSphere
+from validate.scene.material import Material
 from validate.scene.mesh import cell_volumes
 from validate.scene.named_place import place_of
+from validate.scene.scene import Scene, Support
 
 SIZE, E, C = (0.04, 0.03, 0.02), 20e3, 4e-3
 STIFFNESS = E * SIZE[0] * SIZE[1] / SIZE[2]  # N/m between slippery plates, nu 0
@@ -222,3 +231,34 @@ def test_a_force_that_pulls_moves_no_indenter(tmp_path: Path) -> None:
     p = replace(BLOCK, moved=replace(BLOCK.moved, by="force"), seen=SeenOf(states=6))
     with pytest.raises(UsageError, match=r"set moved\.by to a signal in m"):
         compare(experiment(tmp_path, p))
+
+
+def test_hertz_on_a_large_block() -> None:
+    """F = 4/3 E* sqrt(R) d^(3/2) on the mesh that an indenter gets: three cells a radius."""
+    R, a, nu = 1.0, 0.01, 0.3
+    p = MeasuredBody(
+        body=Solid(block=(1.2, 1.2, 0.6), cells=12), material=Tissue(E, nu),
+        held=HeldAt(all="zmin"), moved=MovedBy("displacement", "zmax", "-z"),
+        indenter=Indenter("sphere", R, reach=4 / 3 * a),
+    )  # fmt: skip
+    mesh = pressed_mesh(gridded(p))
+    scene = Scene(
+        mesh, Material(E, nu), (Support(place_of("zmin", mesh), (0, 1, 2)), *symmetry(p)),
+        copies=4, contacts=(contact_of(p, mesh, place_of("zmax", mesh)),), dilatation="mixed",
+    )  # fmt: skip
+    stepper = touching("linear", "linear").settings.prepare(build(scene))
+    state = stepper.step(stepper.rest(), np.array([a**2 / R]))
+    hertz = 4 / 3 * E / (1 - nu**2) * a**3 / R
+    assert state.numbers["moved.force"] == pytest.approx(hertz, rel=0.02)
+
+
+def test_a_bonded_plate_is_stiffer_than_a_slippery_one(tmp_path: Path) -> None:
+    """Between slippery plates the force is E A d / h; a bonded one holds the block's end."""
+    p = replace(BLOCK, material=Tissue(E, 0.45), machine=Machine(0.0), held=HeldAt(z="zmin"))
+    forces = []
+    for bonded in (False, True):
+        card = replace(p.indenter, bonded=bonded)
+        result = compare(experiment(tmp_path, replace(p, indenter=card), 0.0), quick=True)
+        forces.append(result.methods[0].runs[0].traces["moved.force"].y[-1])
+    assert forces[0] == pytest.approx(STIFFNESS * DEPTH, rel=1e-3)
+    assert forces[1] > 1.1 * forces[0]
