@@ -135,6 +135,18 @@ def test_a_rigid_block_tells_the_compliance(tmp_path: Path) -> None:
         yielding(replace(BLOCK, machine=Machine(measured="empty.mcap")), tmp_path)
 
 
+def test_a_measured_compliance_is_taken_off(tmp_path: Path) -> None:
+    """Set by a user, on an experiment that declares no compliance; its sd enters u_input."""
+    force = T * 0.5 + np.random.default_rng(2).normal(0, NOISE, len(T))
+    write_recording(recorded(C * T * 0.5, force), tmp_path / "rigid.mcap")
+    made = experiment(tmp_path, replace(BLOCK, machine=Machine()))
+    result = compare(made, {"machine.measured": "rigid.mcap"})
+    assert verdicts(result) == {("not distinguishable", "good enough")}
+    used = {q.path: q.default for q in result.parameters}
+    assert used["machine.compliance"] == pytest.approx(C, rel=1e-3)
+    assert "machine compliance" in {i.name for i in result.inputs}
+
+
 def test_an_open_modulus_is_identified_through_contact(tmp_path: Path) -> None:
     p = replace(BLOCK, material=replace(BLOCK.material, E=None))
     result = compare(experiment(tmp_path, p))

@@ -224,7 +224,7 @@ class _Bench:
                     self.recording, changed, self.scene(name, changed)
                 ))  # fmt: skip
         add("load", p, self._driven(1 + p.ranges.load, 0.0))
-        zero = hypot(p.ranges.contact, self._rest_sd(p.moved.by))
+        zero = hypot(p.ranges.contact, *(d.sd for d in self.seen.drives))
         if zero > 0:
             add("contact point", p, self._driven(1.0, zero))
         for what, changed in _sizes(p).items():

@@ -32,7 +32,7 @@ from validate.replay.experiment import (
     Uncertainty,
 )
 from validate.replay.fitted_moduli import modulus_in
-from validate.replay.machine_compliance import doubt
+from validate.replay.machine_compliance import doubt, yielding
 from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_contact import (
     contact_of,
@@ -97,7 +97,21 @@ def measured_body(
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
-    return replace(bare, identify=partial(_identified, experiment=bare))
+    return _as_set(bare, (), parameters, folder=folder)
+
+
+def _as_set(
+    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
+) -> Experiment:
+    """The experiment with the inputs that these parameters make uncertain."""
+    assert experiment.uncertainty is not None
+    inputs = _inputs_of(p)
+    made = replace(experiment, uncertainty=replace(experiment.uncertainty, inputs=inputs))
+    return replace(
+        made,
+        identify=partial(_identified, experiment=made, folder=folder),
+        follows=partial(_as_set, folder=folder),
+    )
 
 
 def _identified(
@@ -106,10 +120,13 @@ def _identified(
     methods: Mapping[str, Method],
     *,
     experiment: Experiment,
+    folder: Path,
 ) -> Identified:
-    """An open modulus, and the doubt of a machine whose compliance nobody stated."""
+    """The compliance that a rigid block shows, an open modulus, and the doubt of a machine whose
+    compliance nobody stated."""
+    p = yielding(p, folder)
     found = identify_body(recordings, p, methods, experiment=experiment)
-    if drive_kind(recordings[0], p) != "moves" or p.moved.by == NOTED or p.machine.measured:
+    if drive_kind(recordings[0], p) != "moves" or p.moved.by == NOTED:
         return found
     limits = [a.required for a in experiment.accept if a.quantity == "force" and a.required]
     why = doubt(p, recordings[0], min(limits, default=None))

@@ -18,7 +18,6 @@ from validate.solve.needle import NeedleLoop
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
 from validate.solve.pressure_loop import PressureLoop
-from validate.solve.propagated import Propagated
 from validate.solve.proportional import Proportional
 from validate.solve.pulse import PulsePressure
 from validate.solve.quasi_static import QuasiStatic
@@ -55,7 +54,6 @@ SCHEMES: tuple[type[Scheme], ...] = (
 SOLVERS: tuple[type[SceneSolver], ...] = (
     StretchTest,
     RigidMotion,
-    Propagated,
     Proportional,
     ViscousModes,
     LetGo,
