@@ -5,20 +5,20 @@ import pytest
 from validate.replay.ladder_solvers import (
     exact_in_ramps,
     exact_in_time,
-    still,
     still_best,
-    swinging,
     swinging_pair,
 )
+from validate.solve.candidates import StillBody, SwingingBody
 from validate.solve.fluid import ExactPressure
 from validate.solve.quasi_static import QuasiStatic
+from validate.solve.schemes import candidates
 
 STEPS = (0.02, 0.01)
 EXACT = {"quasi-static", "10 modes", "40 modes"}  # none of these has an error of the step
 
 
 def test_only_what_depends_on_the_step_takes_several() -> None:
-    rivals = swinging(STEPS, small=3, medium=5, law="svk")
+    rivals = candidates(SwingingBody(STEPS, small=3, medium=5, law="svk"))
     taken = dict.fromkeys((r.name for r in rivals), STEPS)
     taken |= dict.fromkeys(EXACT, STEPS[1:]) | {"large strain, implicit": STEPS[:1]}
     assert {r.name: r.steps("P1", 1, STEPS) for r in rivals} == taken
@@ -36,7 +36,7 @@ def test_only_what_depends_on_the_step_takes_several() -> None:
 
 def test_statics_are_stepped_by_newton_alone() -> None:
     for cavities, count in ((True, 5), (False, 3)):
-        rivals = still(cavities, 0.02, 0.01, medium=5, coarse=3)
+        rivals = candidates(StillBody(cavities, 0.02, 0.01, medium=5, coarse=3))
         assert len(rivals) == count
         stepped = {r.name for r in rivals if r.steps("P1", 1, STEPS) == STEPS[:1]}
         assert stepped == {"large strain, Newton every step"}

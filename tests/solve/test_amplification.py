@@ -12,16 +12,12 @@ from validate.fem.system import System, build
 from validate.papers.accuracy.needle import needle_block
 from validate.papers.accuracy.rod import bending_rod
 from validate.scene.material import Region
-from validate.solve.amplification import (
-    amplification,
-    explicit_maps,
-    newmark_maps,
-    spectral_radii,
-)
+from validate.solve.amplification import amplification
 from validate.solve.dynamic import Moving
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
 from validate.solve.newmark import Newmark
 from validate.solve.newmark_rule import rule_of
+from validate.solve.step_maps import explicit_maps, newmark_maps, spectral_radii
 from validate.solve.types import Stepper
 
 SCHEMES = [

@@ -14,9 +14,7 @@ from validate.scene.scene import Load, Probe, Scene
 from validate.scene.select import InBox, OnPlane
 from validate.scene.tracked import Prescribed
 from validate.solve.march import run_scheme
-from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
-from validate.solve.propagated import Propagated
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.types import Run, SceneSolver, Scheme
 
@@ -123,21 +121,16 @@ def covariance() -> Floats:
     return np.asarray(P + np.outer(shared, shared))
 
 
-def test_covariance_is_carried_as_J_P_J() -> None:
-    """Field and probe by the columns of the system; draws agree within their own scatter."""
+def test_deviations_carry_the_covariance_into_the_field() -> None:
+    """Sum of (J d)^2 over the deviations d is the diagonal of J P J^T; a rigid set has six."""
     body, P = scene(covariance=covariance()), covariance()
-    told = run(Propagated(), body, np.zeros(9), 0.01)
-    plain = run(QuasiStatic(), body, np.zeros(9), 0.01)
-    assert told.u == pytest.approx(plain.u)
     stepper = QuasiStatic().prepare(build(body))
     J = stepper.columns[:, :9]  # type: ignore[attr-defined]
-    assert told.sd is not None
-    assert told.sd[0].ravel() ** 2 == pytest.approx(np.diag(J @ P @ J.T), rel=1e-9)
+    off = body.tracked[0].deviations()
+    assert off.shape == (6, 9)
+    assert ((J @ off.T) ** 2).sum(axis=1) == pytest.approx(np.diag(J @ P @ J.T), rel=1e-9)
     draws = np.random.default_rng(0).multivariate_normal(np.zeros(9), P, 4000) @ J.T
-    assert told.sd[0].ravel() == pytest.approx(draws.std(axis=0), rel=0.06)
-    (tip,) = np.flatnonzero((body.mesh.nodes == [0.03, 0.01, 0.01]).all(axis=1))
-    assert told.traces["tip.x.sd"].y[0] == pytest.approx(told.sd[0, tip, 0])
-    assert told.traces["base.a.x.displacement.sd"].y[0] == pytest.approx(np.sqrt(P[0, 0]))
+    assert np.sqrt(((J @ off.T) ** 2).sum(axis=1)) == pytest.approx(draws.std(axis=0), rel=0.06)
 
 
 def test_forces_have_it_too() -> None:
@@ -155,36 +148,15 @@ def test_forces_have_it_too() -> None:
             Prescribed("end", end, far, "rigid", noise),
         ),
     )
-    told = run_scheme("r", Propagated(), body, np.zeros(1), np.zeros((1, len(body.inputs))), LAST)
+    off = body.tracked[1].deviations()
+    inputs = np.zeros((len(off), len(body.inputs)))
+    inputs[:, 9:21] = off  # of the far end's points
+    runs = [run_scheme("r", QuasiStatic(), body, np.zeros(1), row[None], LAST) for row in inputs]
     stiffness = 1e4 * 4e-4 / 0.03
     # The mean of four corners' x: turns of the end pull on one side and push on the other.
-    assert told.traces["end.force.x.sd"].y[0] == pytest.approx(stiffness * 1e-5 / 2, rel=1e-6)
-    assert told.traces["base.force.x.sd"].y[0] == pytest.approx(stiffness * 1e-5 / 2, rel=1e-6)
-
-
-def test_at_large_strain_it_is_the_tangents() -> None:
-    """Small noise about a small load: what a linear body shows, to the strain."""
-    P = covariance()
-    told = run(Propagated(StaticNewton()), scene("neo_hooke", P), np.zeros(9), 1e-4)
-    linear = run(Propagated(), scene(covariance=P), np.zeros(9), 1e-4)
-    assert told.sd is not None
-    assert linear.sd is not None
-    assert told.sd == pytest.approx(linear.sd, rel=0.02, abs=1e-7)
-
-
-def test_a_deviation_that_fails_says_so() -> None:
-    huge = np.eye(9) * 0.05**2
-    told = run(Propagated(StaticNewton(max_cuts=0)), scene("neo_hooke", huge), np.zeros(9), 0.0)
-    assert told.outcome.state in ("not_converged", "invalid")
-    assert told.outcome.why.startswith("with deviation")
-    assert len(told.t) == len(told.u) == 0
-
-
-def test_what_cannot_be_carried_is_refused() -> None:
-    with pytest.raises(SceneError, match="1 sets follow tracked points, none with a covariance"):
-        run(Propagated(), scene(), np.zeros(9))
-    with pytest.raises(SceneError, match="Newmark marches in time"):
-        run(Propagated(Newmark()), scene(covariance=covariance()), np.zeros(9))
+    for name in ("end.force.x", "base.force.x"):
+        sd = np.sqrt(sum(one.traces[name].y[0] ** 2 for one in runs))
+        assert sd == pytest.approx(stiffness * 1e-5 / 2, rel=1e-6)
 
 
 def test_points_that_say_too_little_are_refused() -> None:

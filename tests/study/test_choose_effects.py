@@ -8,7 +8,8 @@ import pytest
 
 from validate.replay.experiment import Experiment
 from validate.replay.ladder import Rival
-from validate.replay.ladder_solvers import still
+from validate.solve.candidates import StillBody
+from validate.solve.schemes import candidates
 from validate.study.choose_effects import ShownEffects, effect_words, stored_effects, with_effects
 
 
@@ -31,7 +32,7 @@ def stored(folder: Path, experiment: Experiment, shown: dict[str, float]) -> Non
 class Candidates:
     """Of a ladder what effects read."""
 
-    solvers: tuple[Rival, ...] = still(True, 1.0, 1.0, 1, 1)
+    solvers: tuple[Rival, ...] = candidates(StillBody(True, 1.0, 1.0, 1, 1))
     steps: tuple[float, ...] = (1.0,)
 
 

@@ -25,13 +25,14 @@ from validate.report.store import schema
 from validate.solve.amplification import amplification
 from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
+from validate.solve.misprint import misprint_limit
 from validate.solve.newmark import Newmark
 from validate.study import precision, stability_page
 from validate.study import stability as stability_module
 from validate.study.engine import Finished, finish
 from validate.study.job import Job, Plan, Where
 from validate.study.precision import drift
-from validate.study.stability import SCHEMES, Stability, points, stability
+from validate.study.stability import Stability, declared, points, stability
 from validate.study.stability_cell import (
     StabilityBench,
     Stepped,
@@ -47,7 +48,6 @@ from validate.study.stability_plan import (
     stability_cells,
     step_grid,
 )
-from validate.study.stepping import misprint_limit
 from validate.study.store import Record
 from validate.study.study_page import write_study
 
@@ -70,7 +70,7 @@ def body(name: str) -> StabilityBody:
 
 
 def crossing(scheme: str, w: float, alpha: float, beta: float, near: float) -> float | None:
-    own = SCHEMES[scheme]
+    own = declared()[scheme]
     return measured_limit(
         lambda h: own.radius(h, np.array([w / 9, w]), alpha, beta), near, 1 + own.rounding
     )
@@ -100,7 +100,7 @@ def test_the_misprints_cubic_is_where_its_radius_crosses_one(xi: float, x: float
     limit = misprint_limit(W, 2 * xi * W)
     assert limit * W == pytest.approx(x, abs=0.005)
     # One mode only: alpha damps a second one otherwise.
-    own = SCHEMES["newmark_misprinted"]
+    own = declared()["newmark_misprinted"]
     found = measured_limit(
         lambda h: own.radius(h, np.array([W]), 2 * xi * W, 0.0), 1.3 * limit, 1 + own.rounding
     )
@@ -112,7 +112,7 @@ def test_the_misprints_cubic_is_where_its_radius_crosses_one(xi: float, x: float
 def test_unconditional_schemes_stay_at_one_over_twelve_decades(
     scheme: str, damping: tuple[float, float]
 ) -> None:
-    own = SCHEMES[scheme]
+    own = declared()[scheme]
     radii = [own.radius(h, np.array([W]), *damping) for h in np.geomspace(1e-6, 1e6, 25)]
     assert max(radii) <= 1 + own.rounding
     assert measured_limit(lambda h: own.radius(h, np.array([W]), *damping), 1.0, 1.001) is None
@@ -122,7 +122,7 @@ def test_a_mode_walked_exactly_has_the_radius_of_its_decay() -> None:
     under, over = 0.5, 200.0
     for c in (under, over):
         slow = max((-c + s * np.emath.sqrt(c * c - 4 * W * W)).real / 2 for s in (1, -1))
-        assert SCHEMES["modal"].radius(0.1, np.array([W]), c, 0.0) == pytest.approx(
+        assert declared()["modal"].radius(0.1, np.array([W]), c, 0.0) == pytest.approx(
             math.exp(slow * 0.1), rel=1e-12
         )
 
@@ -171,7 +171,7 @@ def test_central_difference_itself_turns_at_the_maps_limit() -> None:
     scene = base.build(replace(base.base, mesh=2))
     large = replace(scene, material=replace(scene.material, law="svk"))
     system = build(large)
-    own = SCHEMES["central"]
+    own = declared()["central"]
     omegas = frequencies(build(scene), "lumped")
     limit = measured_limit(lambda h: own.radius(h, omegas, 0.0, 0.0), 1e-3, 1 + own.rounding)
     assert limit == pytest.approx(2 / omegas[-1], rel=1e-6)
@@ -230,15 +230,15 @@ def test_explicit_steps_of_one_mass_are_the_cosine(positions: bool) -> None:
 def test_energy_over_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("validate.study.precision.DRIFT_STEPS", 2000)
     omegas = np.array([1.0, 7.0, 30.0])
-    for scheme in SCHEMES.values():
+    for scheme in declared().values():
         if scheme.conserves:
             found = drift(scheme, 0.03, omegas)
             assert found.double == pytest.approx(1.0, abs=1e-11), scheme.name
             assert found.single == pytest.approx(1.0, abs=1e-2), scheme.name
-    lost = drift(SCHEMES["backward_euler"], 0.03, omegas).double
+    lost = drift(declared()["backward_euler"], 0.03, omegas).double
     assert lost is not None
     assert lost < 0.1
-    grown = drift(SCHEMES["explicit_lumped"], 0.07, omegas)
+    grown = drift(declared()["explicit_lumped"], 0.07, omegas)
     assert grown.single is None  # beyond the limit: not finite, so no number
 
 

@@ -1,5 +1,6 @@
 """Any body under what a recording says moved it: questions by the paths of its parameters."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
@@ -26,6 +27,7 @@ from validate.cli.new_body_questions import (
     three_of,
     unit_of,
 )
+from validate.cli.new_contact import contact_values, of_the_indenter
 from validate.cli.new_kind import (
     FEW_CELLS,
     NewKind,
@@ -49,6 +51,10 @@ _LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "lin
 _SHAPES = ("file", "block", "cylinder")
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
              "contour": ("m", "distance of the outlines, as 0.5mm")}  # fmt: skip
+_MOVED = "from validate.replay.measured_body import measured_body, solid"
+_PRESSED = """from validate.replay.measured_body import measured_body
+from validate.replay.measured_contact import touching"""
+_MANY = 8  # classes whose lines would make the file longer than 60
 _PATHS = {p.path for p in describe(MeasuredBody())}
 
 
@@ -130,6 +136,9 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
         if by == NOTED:
             asked.append(by_path("moved.noted", "its motion as it was noted, evenly from the first "
                                "instant to the last, straight between, as 0,2mm,5mm"))  # fmt: skip
+        asked += of_the_indenter(recording, found)
+        if found.get("indenter.shape", "none") != "none":
+            return asked
         asked.append(Question("moved.sideways", "whether the moved place is held across its "
                               "direction (glued, gripped), or slides", open=True,
                               choices=("true", "false")))  # fmt: skip
@@ -256,11 +265,17 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     order = (
         2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= FEW_CELLS else 1
     )
-    parameters = _card(source, folder, found)
+    parameters = _card(source, folder, found, contact_values(recording, found))
+    pressed = found.get("indenter.shape", "none") != "none"
+    maker = "touching" if pressed else "solid"
+    cells = "mixed hexahedra" if pressed and found["body.shape"] != "file" else ""
     return {
-        "cards": ",\n    ".join(sorted(_classes(parameters))) + ",",
+        "cards": _names(sorted(_classes(parameters))),
         "parameters": rendered(parameters),
-        "methods": "\n        ".join(_methods(found["law"], mesh, order)),
+        "imports": _PRESSED if pressed else _MOVED,
+        "methods": "\n        ".join(
+            _methods(found["law"], mesh, 1 if pressed else order, maker, cells)
+        ),
         "accepted": "solid" if found["law"] != "linear" else "linear",
         "accept": "\n        ".join(
             accept_line(name, _ACCEPTED[name][0], found)
@@ -269,25 +284,25 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     }  # fmt: skip
 
 
-def _card(source: str, folder: Path, found: Answers) -> MeasuredBody:
+def _card(source: str, folder: Path, found: Answers, more: Mapping[str, str]) -> MeasuredBody:
     skipped = ("", UNKNOWN)
     values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
     for key in ("body.file", "seen.layout"):
         if values.get(key, AS_SEEN) not in (AS_SEEN, RECORDED):
             values[key] = beside(Path(values[key]), folder / "x.py")
-    values |= {"recording": source}
+    values |= {**more, "recording": source}
     card: MeasuredBody = with_values(MeasuredBody(), values)
     return card
 
 
-def _methods(law: str, mesh: Mesh | None, order: int) -> list[str]:
-    cells = "quadratic cells" if order == 2 else "linear cells"
+def _methods(law: str, mesh: Mesh | None, order: int, maker: str, cells: str) -> list[str]:
+    cells = cells or ("quadratic cells" if order == 2 else "linear cells")
     if mesh is not None and mesh.bricks:  # which are taken as they are, mixed
         cells, order = "mixed hexahedra", 1
-    lines = [f'"linear": solid("linear law, {cells}", "linear", {order}),']
+    lines = [f'"linear": {maker}("linear law, {cells}", "linear", {order}),']
     if law != "linear":
         words = f"{_LAWS[law]}, {cells}"
-        lines.insert(0, f'"solid": solid("{words}", "{law}", {order}),')
+        lines.insert(0, f'"solid": {maker}("{words}", "{law}", {order}),')
     if order == 2:
         lines.append('"quick": solid("linear law, linear cells", "linear", 1),')
     return lines
@@ -298,6 +313,13 @@ def _classes(card: Any) -> set[str]:
     inner = (getattr(card, f.name) for f in fields(card) if getattr(card, f.name) != f.default)
     found = {type(card).__name__}
     return found.union(*(_classes(value) for value in inner if is_dataclass(value)))
+
+
+def _names(classes: Sequence[str]) -> str:
+    """The imported names, one a line; several a line where they are many."""
+    if len(classes) <= _MANY:
+        return ",\n    ".join(classes) + ","
+    return "\n    ".join(textwrap.wrap(", ".join(classes) + ",", 90))
 
 
 def _used(recording: Recording, found: Answers) -> set[str]:

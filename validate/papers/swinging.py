@@ -7,12 +7,14 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.replay.ladder import Trial
-from validate.replay.ladder_solvers import ORDERS, exact_in_time, swinging, swinging_pair
+from validate.replay.ladder_solvers import ORDERS, exact_in_time, swinging_pair
 from validate.replay.own_body import with_law
 from validate.scene.box import box, grid
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene
+from validate.solve.candidates import SwingingBody
+from validate.solve.schemes import candidates
 
 _SMALL, _MEDIUM = 2, 4  # finest meshes of baselines that solve anew every step
 
@@ -47,7 +49,7 @@ def swinging_trial(
         points=_spread_points(size, int(np.argmax(per))),
         reference=("P2", 4 if quick else 6),
         best=exact_in_time,
-        solvers=swinging(steps, _SMALL, _MEDIUM),
+        solvers=candidates(SwingingBody(steps, _SMALL, _MEDIUM)),
         pair=swinging_pair("P2", 2, steps[0]),
         dynamic=True,
         rise_s=0.0,

@@ -61,6 +61,22 @@ class Registered:
         """What every step is given (nt, k): drives in m, then loads in N, as the scene has them."""
         return np.hstack([d.y for d in self.drives])
 
+    def shifted(self, off: tuple[float, ...]) -> "Registered":
+        """With every drive off by a constant (k,), one number an input, but at rest, from where
+        drives are counted."""
+        at = 0
+        new: dict[int, SignalObservation] = {}
+        still = np.zeros(len(self.t), bool)
+        if self.rest is not None and self.rest.t is not None:
+            still = np.isin(self.t, self.rest.t)
+        for drive in self.drives:
+            wide = drive.y.shape[1]
+            error = np.where(still[:, None], 0.0, np.array(off[at : at + wide]))
+            new[id(drive)] = replace(drive, y=drive.y + error)
+            at += wide
+        observed = tuple(new.get(id(o), o) for o in self.observations)
+        return replace(self, observations=observed)
+
     @property
     def compared(self) -> tuple[Observation, ...]:
         return tuple(o for o in self.observations if o.role != "drives")

@@ -218,8 +218,13 @@ class _Bench:
         for declared in self.experiment.uncertainty.inputs:
             if declared.name == "Poisson ratio":
                 add(declared.name, declared.move(p, 1.0))
+            if declared.name == "machine compliance":
+                changed = declared.move(p, 1.0)
+                add(declared.name, p, self.experiment.place(
+                    self.recording, changed, self.scene(name, changed)
+                ))  # fmt: skip
         add("load", p, self._driven(1 + p.ranges.load, 0.0))
-        zero = hypot(p.ranges.contact, self._rest_sd(p.moved.by))
+        zero = hypot(p.ranges.contact, *(d.sd for d in self.seen.drives))
         if zero > 0:
             add("contact point", p, self._driven(1.0, zero))
         for what, changed in _sizes(p).items():

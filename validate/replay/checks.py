@@ -46,7 +46,7 @@ def variants_of(road: Road) -> list[Variant]:
         ]
         wanted += [Variant(uncertainty.surrogate)] if uncertainty.inputs else []
         wanted += [
-            Variant(by, i.by(1.0))
+            i.at(by, 1.0)
             for i in uncertainty.inputs
             for by in dict.fromkeys(_moved_by(road, uncertainty, i, n) for n in accepted)
         ]
@@ -153,7 +153,7 @@ def _sensitivities(road: Road, judged: str = "") -> dict[str, list[Sensitivity]]
     for source in uncertainty.inputs:
         by = _moved_by(road, uncertainty, source, judged)
         base = road.main(Variant(by)).residuals
-        moved = road.main(Variant(by, source.by(1.0))).residuals
+        moved = road.main(source.at(by, 1.0)).residuals
         for key in base.keys() & moved.keys():
             step = replace(base[key], values=moved[key].values - base[key].values, sd=0.0)
             found.setdefault(key, []).append(Sensitivity(source.name, step))
@@ -186,7 +186,17 @@ def _joint_variants(road: Road) -> list[Variant]:
     if road.quick or uncertainty is None or not uncertainty.inputs:
         return []
     table = joint_draws(_DRAWS, len(uncertainty.inputs))
-    return [Variant(uncertainty.surrogate, _together(uncertainty.inputs, row)) for row in table]
+    return [_drawn(uncertainty, row) for row in table]
+
+
+def _drawn(uncertainty: Uncertainty, row: Floats) -> Variant:
+    """The surrogate with every input off by its number (inputs,) of standard uncertainties."""
+    off = [z * np.array(i.off) for i, z in zip(uncertainty.inputs, row, strict=True) if i.off]
+    return Variant(
+        uncertainty.surrogate,
+        _together(uncertainty.inputs, row),
+        off=tuple(np.sum(off, axis=0).tolist()) if off else (),
+    )
 
 
 def _together(inputs: Sequence[Input], draw: Floats) -> Change:

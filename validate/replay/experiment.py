@@ -33,16 +33,21 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Variant:
-    """A method with changed parameters, and `split` of its steps in one of its own."""
+    """A method with changed parameters, `split` of its steps in one of its own, and drives that are
+    `off` by these amounts, one an input of the scene (none: as recorded)."""
 
     method: str
     change: Change = unchanged
     split: int = 1
+    off: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Input:
     """An uncertain input: `move` takes parameters to where it is off by z standard uncertainties.
+
+    `off` is instead one standard uncertainty of what drives, one number an input of the scene: it
+    is off by a constant after rest.
 
     z lies within +-sqrt(3), the half-width of a uniform range. `source` says where the range comes
     from, or "assumed". `identified`: it is a share of the covariance of what was identified;
@@ -55,6 +60,7 @@ class Input:
     source: str
     identified: bool = False
     each: bool = False
+    off: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.source.strip():
@@ -64,6 +70,10 @@ class Input:
 
     def by(self, z: float) -> Change:
         return lambda parameters: self.move(parameters, z)
+
+    def at(self, method: str, z: float) -> Variant:
+        """The method with this input off by z standard uncertainties."""
+        return Variant(method, self.by(z), off=tuple(z * x for x in self.off))
 
 
 @dataclass(frozen=True)

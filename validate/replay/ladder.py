@@ -6,7 +6,7 @@ An experiment may declare its ladder; `replay.ladder_default` derives one from i
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -16,54 +16,17 @@ from validate.recording.types import Recording
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene
-from validate.solve.types import SceneSolver, Scheme
+from validate.solve.candidates import RUNGS as RUNGS
+from validate.solve.candidates import SHOWN as SHOWN
+from validate.solve.candidates import Rival as Rival
+from validate.solve.candidates import Rung as Rung
+from validate.solve.types import Scheme
 
 LARGEST = 1000  # unknowns of a body whose stability is mapped: all its modes are taken many times
 # Worst altitude ratios of its cells.
 QUALITY = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 
-Rung = Literal[
-    "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
-    "large strain", "guests",
-]  # fmt: skip
-RUNGS: tuple[Rung, ...] = (  # that are climbed to choose a method of ours
-    "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
-    "large strain",
-)  # fmt: skip
-SHOWN: tuple[Rung, ...] = (*RUNGS, "guests")
-
 # --- error against time ---------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A scheme on the ladder: `make(dt)` s. `stepped`: whether its answer depends on dt.
-
-    It runs on `elements` (none: all) at meshes up to `finest` (0: all) and down to `shortest`
-    steps (0: all): slow baselines need no fine ones. `law` is what its scenes are made of; `order`
-    that of its error in dt. `lacks`: what the scene has and it leaves out; it is run as evidence
-    and never chosen. `uneven`: some of its steps are much longer than the median by design, so that
-    a rate is held by the slow ones alone.
-    """
-
-    name: str
-    rung: Rung
-    make: Callable[[float], Scheme | SceneSolver]
-    stepped: bool = True
-    law: LawName = "linear"
-    elements: tuple[str, ...] = ()
-    finest: int = 0
-    shortest: float = 0.0
-    order: float = 2.0
-    lacks: str = ""
-    uneven: bool = False
-
-    def steps(self, element: str, level: int, steps: tuple[float, ...]) -> tuple[float, ...]:
-        """Those of the ladder's steps s that it takes on that mesh."""
-        if (self.elements and element not in self.elements) or 0 < self.finest < level:
-            return ()
-        own = steps if self.stepped else steps[-1:]
-        return tuple(dt for dt in own if dt >= self.shortest * (1 - 1e-9))
 
 
 @dataclass(frozen=True)

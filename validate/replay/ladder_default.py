@@ -29,10 +29,8 @@ from validate.replay.ladder import (
 from validate.replay.ladder_solvers import (
     ORDERS,
     exact_in_ramps,
-    still,
     still_best,
     still_pair,
-    swinging,
     swinging_pair,
 )
 from validate.replay.ladder_touched import touched_ladder
@@ -43,7 +41,9 @@ from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.refine import linear, of_element
 from validate.scene.scene import Load, Scene
+from validate.solve.candidates import StillBody, SwingingBody
 from validate.solve.central import CentralDifference
+from validate.solve.schemes import candidates
 
 _LEVELS = (400, 300, 200, 150, 125, 100, 75, 50, 35, 25, 18, 12)  # of a hundred: own mesh
 _COARSER = (0.5, 0.7, 1.0)  # of the reference's level
@@ -251,11 +251,11 @@ def _solvers(
     law: LawName = "neo_hooke" if own_law == "linear" else own_law
     if loading.dynamic:
         pair = swinging_pair(element, coarse, steps[0], law)
-        every = swinging(steps, coarse, medium, law)
+        every = candidates(SwingingBody(steps, coarse, medium, law))
     else:
         cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
         pair = still_pair(element, coarse, steps[0], cavities, law)
-        every = still(cavities, steps[0], table, medium, coarse, law)
+        every = candidates(StillBody(cavities, steps[0], table, medium, coarse, law))
     return tuple(s for s in every if _handles(s, steps[0], own.scene)), pair
 
 

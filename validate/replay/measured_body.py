@@ -6,7 +6,7 @@ markers and outlines counts from there. An open modulus is identified up to a sh
 and only what lies beyond is a prediction.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from math import prod
@@ -26,13 +26,23 @@ from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
     Experiment,
+    Identified,
     Input,
     MeshLadder,
     Uncertainty,
 )
 from validate.replay.fitted_moduli import modulus_in
+from validate.replay.machine_compliance import doubt, yielding
 from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
-from validate.replay.measured_drive import drive_kind, prescribed
+from validate.replay.measured_contact import (
+    contact_of,
+    is_quarter,
+    pressed_mesh,
+    require_touching,
+    spans_of,
+    symmetry,
+)
+from validate.replay.measured_drive import NOTED, drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.similar_grids import divided, fitting, member
@@ -83,11 +93,49 @@ def measured_body(
         uncertainty=Uncertainty(
             mesh=MeshLadder(_LEVELS if parameters.body.file is None else _HALVINGS,
                             partial(_cell, body=body), CORNER_ORDER),
-            inputs=_INPUTS,
+            inputs=_inputs_of(parameters),
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
-    return replace(bare, identify=partial(identify_body, experiment=bare))
+    return _as_set(bare, (), parameters, folder=folder)
+
+
+def _as_set(
+    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
+) -> Experiment:
+    """The experiment with the inputs that these parameters make uncertain."""
+    assert experiment.uncertainty is not None
+    inputs = _inputs_of(p)
+    made = replace(experiment, uncertainty=replace(experiment.uncertainty, inputs=inputs))
+    return replace(
+        made,
+        identify=partial(_identified, experiment=made, folder=folder),
+        follows=partial(_as_set, folder=folder),
+    )
+
+
+def _identified(
+    recordings: Sequence[Recording],
+    p: MeasuredBody,
+    methods: Mapping[str, Method],
+    *,
+    experiment: Experiment,
+    folder: Path,
+) -> Identified:
+    """The compliance that a rigid block shows, an open modulus, and the doubt of a machine whose
+    compliance nobody stated."""
+    p = yielding(p, folder)
+    found = identify_body(recordings, p, methods, experiment=experiment)
+    if drive_kind(recordings[0], p) != "moves" or p.moved.by == NOTED:
+        return found
+    limits = [a.required for a in experiment.accept if a.quantity == "force" and a.required]
+    why = doubt(p, recordings[0], min(limits, default=None))
+    if not why:
+        return found
+    headline = f"{found.headline}; largest doubt: " if found.headline else "largest doubt: "
+    return replace(
+        found, doubts=(why, *found.doubts), headline=headline + "the machine's compliance"
+    )
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -96,7 +144,7 @@ def measured_body(
 def _build(
     recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
 ) -> Scene:
-    mesh = body(gridded(p).body, places=_places(p))
+    mesh = _mesh(p, body)
     E = modulus_in(p.material.by_method, model_name(model)) or p.material.E
     scene = Scene(
         mesh,
@@ -104,6 +152,7 @@ def _build(
                  coefficients=p.material.coefficients.known_to(model.law)),
         _supports(p, mesh, recording),
         _pins(p, mesh),
+        copies=4 if is_quarter(p) else 1,
         **_load(p, recording, (mesh, folder)),
     )  # fmt: skip
     if mesh.bricks:
@@ -116,7 +165,8 @@ def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Suppor
     held = [Support(place_of(text, mesh), axes) for text, axes in said if text]
     if p.held.slides:
         held.append(Support(place_of(p.held.slides, mesh), (_across(p.held.slides, mesh),)))
-    if drive_kind(recording, p) == "moves" and p.moved.sideways:
+    held += symmetry(p)
+    if drive_kind(recording, p) == "moves" and p.moved.sideways and not p.indenter.there:
         along = int(np.abs(axis_of(p.moved.along)).argmax())
         across = tuple(c for c in range(3) if c != along)
         held.append(Support(place_of(known_place(p), mesh), across))
@@ -150,6 +200,9 @@ def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[
     if kind == "weighs":
         return {"loads": (Weight("gravity", along),)}
     where = place_of(known_place(p), at[0])
+    if p.indenter.there:
+        require_touching(p, "m" if kind == "moves" else "N")
+        return {"contacts": (contact_of(p, at[0], where),)}
     if kind == "follows":
         return {"tracked": (prescribed(recording, p, where, at),)}
     if kind == "pulls":
@@ -157,6 +210,13 @@ def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[
     if sorted(np.abs(along)) != [0.0, 0.0, 1.0]:
         raise SceneError(f"moved.along = {p.moved.along}: a place is moved along an axis, as -z")
     return {"drives": (Drive("moved", where, along),)}
+
+
+def _mesh(p: MeasuredBody, body: Any) -> Mesh:
+    if p.indenter.there and p.body.file is None:
+        return pressed_mesh(gridded(p))
+    mesh: Mesh = body(gridded(p).body, places=_places(p))
+    return mesh
 
 
 def known_place(p: MeasuredBody) -> str:
@@ -208,7 +268,12 @@ def gridded(p: MeasuredBody) -> MeasuredBody:
     which has a node in the middle of a plate that the body slides on."""
     if p.body.file is not None or p.body.divisions or not (p.body.block or p.body.cylinder):
         return p
-    cells = divided(_ideal(p.body), _even(p))
+    if p.indenter.there:
+        spans = spans_of(p)
+        ideal = tuple(p.body.cells * s / max(spans) for s in spans)
+    else:
+        ideal = _ideal(p.body)
+    cells = divided(ideal, _even(p))
     return replace(p, body=replace(p.body, divisions=cells))
 
 
@@ -267,7 +332,7 @@ _HALVINGS = (_level(None, 1), _level(None, 2))
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:
     """The edge m of a cube as large as a mean cell."""
-    return float(np.cbrt(cell_volumes(body(gridded(p).body, places=_places(p))).mean()))
+    return float(np.cbrt(cell_volumes(_mesh(p, body)).mean()))
 
 
 def _stiffer(p: MeasuredBody, z: float) -> float | None:
@@ -282,6 +347,31 @@ def _of_poisson(p: MeasuredBody, z: float) -> float:
 
 def _more(p: MeasuredBody, z: float) -> float:
     return p.moved.scale * (1 + z * p.ranges.load)
+
+
+def _deeper(p: MeasuredBody, z: float) -> float:
+    return p.indenter.gap - z * p.ranges.contact
+
+
+def _yields(p: MeasuredBody, z: float) -> float | None:
+    C = p.machine.compliance
+    return C if C is None else max(0.0, C + z * p.machine.sd)
+
+
+_CONTACT = Input(
+    "contact point", moved("indenter", gap=_deeper), "where the indenter touches", "assumed"
+)
+_MACHINE = Input(
+    "machine compliance", moved("machine", compliance=_yields),
+    "compliance of the machine within its standard uncertainty", "declared",
+)  # fmt: skip
+
+
+def _inputs_of(p: MeasuredBody) -> tuple[Input, ...]:
+    """Those that this body has: an indenter its contact point, a known machine its compliance."""
+    own = (_CONTACT,) if p.indenter.there else ()
+    known_machine = p.machine.compliance is not None or p.machine.measured is not None
+    return (*_INPUTS, *own, *((_MACHINE,) if known_machine else ()))
 
 
 _INPUTS = (

@@ -7,6 +7,8 @@ from typing import Literal
 from validate.errors import UsageError
 from validate.parameters import Ranges, part, quantity
 from validate.register.fitting import MarkerFit
+from validate.replay.contact_cards import Indenter as Indenter
+from validate.replay.contact_cards import Machine as Machine
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName
 
@@ -123,7 +125,9 @@ class BodyRanges(Ranges):
     nu: float = quantity(0.01, "1", "of the Poisson ratio")
     load: float = quantity(0.01, "1", "relative, of what moves or pulls the body")
     size: float = quantity(0.005, "1", "relative, of each size of the body; of an identified E")
-    contact: float = quantity(0.0, "m", "of where the load begins; of an identified E")
+    contact: float = quantity(
+        0.0, "m", "of where the load begins: of an indenter's gap, of an identified E"
+    )
     friction: float = quantity(
         0.05, "1", "of an identified E: share of the way from sliding places to held ones"
     )
@@ -140,6 +144,8 @@ class MeasuredBody:
     moved: MovedBy = MovedBy()
     seen: SeenOf = SeenOf()
     ranges: BodyRanges = BodyRanges()
+    indenter: Indenter = Indenter()
+    machine: Machine = Machine()
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from validate.identify.modulus import MIN_SAMPLES, load_noise
 from validate.recording.types import Recording, Signal
 from validate.register.clock import clock_sd, interpolated
 from validate.register.signals import SignalObservation
+from validate.replay.machine_compliance import taken_off
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_markers import BodyAt, markers_topic, registered
 from validate.scene.select import Place
@@ -55,10 +56,17 @@ def driven(
     topic, unit = p.moved.by, "m" if kind == "moves" else "N"
     signal = zeroed(recording, topic, unit, rest + p.seen.still)
     y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
+    if kind == "moves":
+        y = y - min(p.indenter.gap, 0.0)  # it pressed already
     y[0] = 0.0
-    return SignalObservation(
+    drive = SignalObservation(
         topic, "drives", t, y, unit, signal.sd, sd_t=clock_sd(recording, topic)
     )
+    if kind != "moves" or not p.machine.compliance:
+        return drive
+    felt = p.seen.force and zeroed(recording, p.seen.force, "N", rest + p.seen.still)
+    force = felt and SignalObservation(str(p.seen.force), "validates", felt.t, felt.y, "N", felt.sd)
+    return taken_off(drive, p, force or None)
 
 
 def _noted(p: MeasuredBody, t: Floats) -> SignalObservation:

@@ -44,6 +44,7 @@ from validate.replay.room import coarser, require_room
 from validate.replay.runs import Road
 from validate.replay.sentence import figures_sentence, verdict_sentence
 from validate.replay.standard_exhibits import error_at, standard_exhibits
+from validate.replay.uncertain_drives import with_uncertain_drives
 from validate.solve.guests.guest import Guest
 
 _AGAINST: Mapping[Kind, str] = {
@@ -120,6 +121,8 @@ def set_out(
     identified = identified_by(experiment, shipped, parameters, every, fitted)
     used = identified.parameters if identified else parameters
     experiment = identified.of(experiment) if identified else experiment
+    if identified is None or identified.inputs is None:  # else the identification counts them
+        experiment = with_uncertain_drives(experiment, methods, shipped, used)
     road = Road(
         experiment, methods, used, report,
         quick=options.quick, calibrated=identified.calibrated if identified else (),

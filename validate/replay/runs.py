@@ -160,7 +160,7 @@ class Road:
                 parameters = middle(self.experiment, parameters)
             found = solve(
                 self.experiment, recordings, as_.method, method, parameters, case,
-                lambda doing: self.tell(f"{what}: {doing}"), why,
+                lambda doing: self.tell(f"{what}: {doing}"), why, as_.off,
             )  # fmt: skip
             self._done[key] = self._with_truth(found, true)
             self._pace.took(key, perf_counter() - start)
@@ -176,7 +176,8 @@ class Road:
 
     def _key(self, case: str, variant: Variant, parameters: Any) -> tuple[Any, ...]:
         settings = self.settings[variant.method]
-        return case, variant.method, settings, variant.split, variant.change(parameters)
+        changed = variant.change(parameters)
+        return case, variant.method, settings, variant.split, variant.off, changed
 
 
 def _cases(experiment: Experiment, methods: Mapping[str, Method]) -> tuple[Case, ...]:

@@ -34,11 +34,12 @@ def solve(
     case: str = MAIN,
     tell: Tell = lambda _: None,
     refused: str = "",
+    off: tuple[float, ...] = (),
 ) -> Followed:
     """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input.
 
     `tell` is given what is being done, in words. A method that is `refused`, for that reason, has
-    its scene built and is not run.
+    its scene built and is not run. Drives are `off` by these amounts, one an input of the scene.
     """
     start = perf_counter()
     tell("mesh")
@@ -46,6 +47,8 @@ def solve(
     built, scene = perf_counter() - start, scenes[0]
     pairs = zip(recordings, scenes, strict=True)
     seen = tuple(experiment.place(r, parameters, s) for r, s in pairs)
+    if off:
+        seen = tuple(one.shifted(off) for one in seen)
     runs = _Runs(experiment, name, method, parameters, scene, built, tell)
     done = tuple(
         _refused(refused) if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True)

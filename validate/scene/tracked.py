@@ -22,8 +22,8 @@ class Prescribed:
     `interpolation`: "rigid" is the small rigid motion nearest to what was tracked (3 points, 2 in
     2-D), "affine" the nearest affine one (4, 3 in 2-D), "radial" goes through every point (linear
     radial functions). All are linear in what was tracked: `covariance` (p d, p d) m^2 of the
-    inputs, point by point, x y z, is carried by `solve.Propagated`. Raises `SceneError` for points
-    that do not determine the motion, and for what is no covariance.
+    inputs, point by point, x y z, enters u_input (`replay.uncertain_drives`). Raises `SceneError`
+    for points that do not determine the motion, and for what is no covariance.
     """
 
     name: str
@@ -96,14 +96,34 @@ class Prescribed:
             )
         return np.asarray(np.linalg.pinv(at))
 
-    def deviations(self) -> Floats:
-        """Deviations (r, p d) m of one standard deviation each, whose outer products add up to the
-        covariance."""
-        if self.covariance is None:
-            return np.zeros((0, self.places.size))
-        sizes, vectors = np.linalg.eigh(np.array(self.covariance))
+    def deviations(self, sd: float = 0.0) -> Floats:
+        """Deviations (r, p d) m of one standard deviation each, whose outer products add up to what
+        of the covariance the set follows; `sd` m of every coordinate where none is given.
+
+        A rigid set follows six motions (3 in 2-D), an affine one twelve (6): what the points' noise
+        has beyond them moves nothing.
+        """
+        P = sd**2 * np.eye(self.places.size)
+        if self.covariance is not None:
+            P = np.array(self.covariance)
+        at = self._motions()
+        if at is not None:
+            back = np.linalg.pinv(at)
+            P = back @ P @ back.T
+        sizes, vectors = np.linalg.eigh(P)
         kept = sizes > 1e-12 * max(float(sizes.max()), 1e-300)
-        return np.asarray((np.sqrt(sizes[kept]) * vectors[:, kept]).T)
+        own = np.asarray((np.sqrt(sizes[kept]) * vectors[:, kept]).T)
+        return own if at is None else np.asarray(own @ at.T)
+
+    def _motions(self) -> Floats | None:
+        """Displacements (p d, m) m of the points in every motion that the set can follow; None
+        where it goes through every point."""
+        if self.interpolation == "radial":
+            return None
+        if self.interpolation == "rigid":
+            return _rigid(self.places, self.places)
+        shares = _affine(self.places, self.places)
+        return np.asarray(np.kron(shares, np.eye(self.places.shape[1])), dtype=np.float64)
 
 
 def _affine(x: Floats, around: Floats) -> Floats:

@@ -15,9 +15,9 @@ from validate.errors import SceneError
 from validate.fem.matrices import damping_of, mass_of
 from validate.fem.system import System
 from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.explicit_linear import UpdateName as ExplicitUpdate
 from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import Rule, per_mode, rule_of
+from validate.solve.newmark_rule import rule_of
+from validate.solve.step_maps import explicit_maps, newmark_maps, spectral_radii
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
 _COUPLED = 1e-8  # of the damping, as in `fem.modes`
@@ -67,31 +67,3 @@ def modes_with(system: System, scheme: Newmark | ExplicitLinear) -> tuple[Floats
     if np.abs(modal - np.diag(c)).max() > _COUPLED * max(float(np.abs(c).max()), 1e-300):
         raise SceneError("the damping couples the modes; use Rayleigh damping of one material")
     return np.sqrt(np.maximum(squares, 0.0)), c
-
-
-def newmark_maps(rule: Rule, c: Floats, k: Floats, *, misprinted: bool = False) -> Floats:
-    """Maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2 (r,)."""
-    h, one, zero = rule.h, np.ones_like(c), np.zeros_like(c)
-    q = np.stack(per_mode(rule, c, k)[:3], axis=-1)
-    v_old = np.stack([zero, one, zero], axis=-1)
-    a_old = np.stack([zero, zero, one], axis=-1)
-    q_old = np.stack([one, zero, zero], axis=-1)
-    v, a = rule.rates(q, q_old, v_old, a_old)
-    if misprinted:
-        q = q + h * (v - v_old)
-    return np.stack([q, v, a], axis=1)
-
-
-def explicit_maps(h: float, c: Floats, k: Floats, update: ExplicitUpdate) -> Floats:
-    """As `newmark_maps`, for the explicit schemes."""
-    one, zero = np.ones_like(c), np.zeros_like(c)
-    half = np.stack([zero, one, h / 2 * one], axis=-1)
-    q = np.stack([one, zero, zero], axis=-1) + h * half
-    J = one if update == "lagged" else 1 + h / 2 * c
-    a = -(k[:, None] * q + c[:, None] * half) / J[:, None]
-    return np.stack([q, half + h / 2 * a, a], axis=1)
-
-
-def spectral_radii(maps: Floats) -> Floats:
-    """Largest magnitude of the eigenvalues of every map (r, m, m)."""
-    return np.asarray(np.abs(np.linalg.eigvals(maps)).max(axis=-1))

@@ -9,7 +9,7 @@ is taken at the last half step ("lagged"), which costs no solve and lowers the l
 body's strain energy is that of its relaxed law, and what its branches take is in no trace.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import ClassVar, Literal
@@ -25,10 +25,12 @@ from validate.fem.system import System
 from validate.fem.threads import Team, idle_cores, pilot
 from validate.parameters import quantity
 from validate.scene.scene import Scene
+from validate.solve.candidates import Asked, Rival, SwingingBody
 from validate.solve.central_contact import ExplicitContact, Struck, explicit_contact
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
+from validate.solve.stepping import TETS, Radii, Rates, Stepping
 from validate.solve.touching_traces import contact_units
-from validate.solve.types import Ending, State, Stepper
+from validate.solve.types import Ending, Scheme, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
 _DEFORMED = 0.02  # of the body's size: the critical step is taken anew after such a motion
@@ -37,6 +39,8 @@ _SEEN = dict.fromkeys(
 ) | {"det_F.min": "1", "inverted": "1", "critical_step": "s"}
 
 Damping = Literal["none", "mass", "lagged"]
+
+_PARTS = 16  # explicit steps within one of a ladder's
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,31 @@ class CentralDifference:
     watch: int = quantity(20, "1", "steps between looks at energy, det F, critical step")
     threads: int = quantity(1, "1", "most cores to share the cells of a step, where it pays")
     precision: Precision = quantity("double", "1", "of the element loops: double or single")
+
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        """At rest, with damping of the mass alone and with lagged damping."""
+        return tuple(
+            Stepping(
+                name, f"central difference at rest, {damping}", "lumped", _maps_at_rest(lagged),
+                _step_at_rest(lagged), TETS, explicit=True, conserves=True,
+                order=1.0 if lagged else 2.0,
+            )
+            for name, damping, lagged in (
+                ("central", "C = alpha M", False), ("central_lagged", "lagged C", True)
+            )
+        )  # fmt: skip
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        """In single precision for the laws whose loops know it."""
+        if not isinstance(asked, SwingingBody):
+            return ()
+        law, name = asked.law, "large strain, explicit"
+        double = Rival(name, "large strain", _in_parts("double"), elements=("P1",), law=law)
+        if law not in ("svk", "neo_hooke"):
+            return (double,)
+        return (double, replace(double, name=f"{name}, single precision", make=_in_parts("single")))
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1 and self.watch >= 1):
@@ -355,3 +384,33 @@ def lumped_damping(system: System) -> Floats:
     if not scene.regions:
         return scene.material.mass_damping * system.masses
     return lumped(scene, mass(scene, damping=True))
+
+
+def _in_parts(precision: Precision) -> Callable[[float], Scheme]:
+    return lambda dt: CentralDifference(dt, _PARTS, "lagged", precision=precision)
+
+
+def _maps_at_rest(lagged: bool) -> Radii:
+    """Of (u, d), d the last increment: d' = keep d - gain (K u + lag K d), paper 003, eq 18."""
+
+    def maps(r: Rates) -> Floats:
+        keep, gain = (1 - r.alpha / 2) / (1 + r.alpha / 2), 1 / (1 + r.alpha / 2)
+        k = gain * r.x**2
+        d = keep - (r.beta * k if lagged else 0 * k)
+        return np.stack([np.stack([1 - k, d], axis=-1), np.stack([-k, d], axis=-1)], axis=1)
+
+    return maps
+
+
+def _step_at_rest(lagged: bool) -> Callable[[System], float]:
+    """As the scheme takes it: by Lanczos, with sqrt(h^2 + beta^2) - beta for lagged damping."""
+
+    def limit(system: System) -> float:
+        free = system.free
+        K = system.K[free][:, free]
+        h = lanczos_step(lambda x: K @ x, system.masses[free]).limit
+        beta = system.scene.material.stiffness_damping if lagged else 0.0
+        # The same as hypot(h, beta) - beta, without its cancellation.
+        return float(h * h / (np.hypot(h, beta) + beta))
+
+    return limit

@@ -22,14 +22,16 @@ from validate.fem.factor import factorise
 from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.solve.candidates import Asked, Rival, SwingingBody
 from validate.solve.dynamic import Moving, MovingStepper, reactions
 from validate.solve.excitation import DriveRates, StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.linear_solvers import Diagonal, Solver
 from validate.solve.newmark_rule import rule_of
+from validate.solve.step_maps import UpdateName, explicit_maps
+from validate.solve.stepping import Stepping
 from validate.solve.types import Ending, State, Stepper
 
-UpdateName = Literal["printed", "lagged"]
 # Displacements of so many times the body's size say that a linear run has left all bounds.
 _RUNAWAY = 100.0
 _ROUNDING = 1e-12  # of the critical step
@@ -54,6 +56,26 @@ class ExplicitLinear:
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
     drive_rates: DriveRates = quantity("difference", "1", "v and a of prescribed unknowns")
     beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        """Both masses, damping in full or of the mass alone, as printed or lagged."""
+        return (
+            _stepping("explicit_consistent", "consistent", "full", "printed"),
+            _stepping("explicit_consistent_lagged", "consistent", "full", "lagged"),
+            _stepping("explicit_lumped", "lumped", "mass", "printed"),
+            _stepping("explicit_lumped_lagged", "lumped", "full", "lagged"),
+        )
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, SwingingBody):
+            return ()
+        return (
+            Rival("explicit, consistent mass", "explicit",
+                   lambda dt: ExplicitLinear(dt, mass="consistent", damping_terms="full")),
+            Rival("explicit, lumped, C = alpha M", "explicit", ExplicitLinear),
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         rule_of("average", self.dt)
@@ -159,3 +181,17 @@ class ExplicitStepper(MovingStepper):
         if not float(np.abs(u).max()) <= _RUNAWAY * self.size:
             return "diverged", f"step {k}: displacements over {_RUNAWAY:g} body sizes; {over}"
         return None
+
+
+def _stepping(name: str, mass: MassName, terms: DampingTerms, update: UpdateName) -> Stepping:
+    settings = ExplicitLinear(1.0, mass, terms, update)
+    return Stepping(
+        name,
+        settings.treatment,
+        mass,
+        lambda r: explicit_maps(1.0, r.c(terms), r.x**2, update),
+        lambda system: stable_step(system, settings),
+        explicit=True,
+        conserves=True,
+        order=1.0 if update == "lagged" else 2.0,  # of a damped mode
+    )

@@ -16,6 +16,7 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
+from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.linear import LinearStepper, condensed
 from validate.solve.pressure_curve import NEWTON_STEPS, ROUNDING, cubic, least_slope, root_of
@@ -29,6 +30,15 @@ class NoFluid:
     """The cavity is empty: gauge pressure zero, its volume changes freely."""
 
     handles: ClassVar[Handles] = FLUID
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not (isinstance(asked, StillBody) and asked.cavities):
+            return ()
+        return (
+            Rival("superposition, cavity empty", "static superposition", lambda dt: NoFluid(),
+                   stepped=False, lacks="the fluid and its pressure"),
+        )  # fmt: skip
 
     def prepare(self, system: System) -> Stepper:
         require_handled(system.scene, self)
@@ -50,6 +60,13 @@ class ExactPressure:
 
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
     bulk_modulus: float | None = quantity(None, "Pa", "of the fluid; none: incompressible")
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not (isinstance(asked, StillBody) and asked.cavities):
+            return ()
+        name = "condensed, exact pressure"
+        return (Rival(name, "condensed", lambda dt: ExactPressure(), stepped=False),)
 
     def __post_init__(self) -> None:
         if not self.volume_ratio > 0:

@@ -27,8 +27,10 @@ from validate.fem.system import System
 from validate.fem.viscous import Branches, Remembered, cell_branches, relaxed
 from validate.parameters import quantity
 from validate.scene.scene import Scene
+from validate.solve.candidates import Asked, Rival, SwingingBody
 from validate.solve.central import lumped_damping
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
+from validate.solve.stepping import LOOSE, TETS, Stepping, implicit_maps
 from validate.solve.types import State
 
 RateRule = Literal["average", "backward_euler"]
@@ -47,6 +49,24 @@ class NewtonDynamics:
     mass: Literal["lumped", "consistent"] = quantity("lumped", "1", "mass matrix")
     tolerance: float = quantity(1e-9, "1", "residual, of the forces that act")
     max_iterations: int = quantity(20, "1", "of Newton in a step")
+
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        words = "Newton's average acceleration at rest, lumped mass"
+        maps = implicit_maps("average")
+        return (
+            Stepping("newton_dynamics", words, "lumped", maps, None, TETS, LOOSE, conserves=True),
+        )
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, SwingingBody):
+            return ()
+        return (
+            Rival("large strain, implicit", "large strain",
+                   lambda dt: NewtonDynamics(dt, mass="consistent"), elements=("P1", "P2"),
+                   finest=asked.medium, shortest=asked.steps[0], law=asked.law),
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.tolerance > 0 and self.max_iterations >= 1):

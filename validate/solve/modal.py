@@ -9,7 +9,7 @@ Departures: a cut-off cluster of equal frequencies is taken whole, so there may 
 asked for. The static correction has no rates: it gives no share of damping and inertia forces.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -20,12 +20,14 @@ from validate.errors import SceneError
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.solve.candidates import Asked, Rival, SwingingBody
 from validate.solve.dynamic import InertialStepper, Reactions, reactions
 from validate.solve.excitation import Excitation, Inputs, StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.modal_walk import Walk, exact_walk, walk_by_rule
 from validate.solve.newmark_rule import RuleName, require_start, rule_of
-from validate.solve.types import State, Stepper
+from validate.solve.stepping import Rates, Stepping
+from validate.solve.types import Scheme, State, Stepper
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,19 @@ class Modal:
     static_correction: bool = quantity(True, "1", "modes left out answer at once")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
     rho_inf: float = quantity(0.8, "1", "spectral radius at infinity; generalised alpha alone")
+
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        """Every mode by its own solution: there is no error in the step."""
+        return (Stepping("modal", "all modes, each exactly", "consistent", _exact, order=0.0),)
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, SwingingBody):
+            return ()
+        return tuple(
+            Rival(f"{count} modes", "modal", _of_modes(count), stepped=False) for count in (10, 40)
+        )
 
     def __post_init__(self) -> None:
         rule_of("average", self.dt, self.rho_inf)
@@ -171,3 +186,15 @@ class ModalStepper(InertialStepper):
 
 def _signal(inputs: Inputs) -> Floats:
     return np.concatenate([inputs.loads, inputs.q, inputs.rate, inputs.acceleration])
+
+
+def _of_modes(count: int) -> Callable[[float], Scheme]:
+    return lambda dt: Modal(dt, modes=count, propagate="constant")
+
+
+def _exact(r: Rates) -> Floats:
+    """Larger |e^(lambda h)| of every mode (r, 1, 1), its real root without cancellation."""
+    c, k = r.c("full"), r.x**2
+    root = np.sqrt(np.maximum(c * c - 4 * k, 0.0))
+    real = np.where(root > 0, -2 * k / (c + root + (root == 0)), -c / 2)
+    return np.asarray(np.exp(real))[:, None, None]

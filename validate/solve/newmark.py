@@ -10,8 +10,9 @@ Departures: average acceleration is not L-stable: with a0 = M^-1 f velocities an
 ring for ever. Show none of them; take backward Euler or generalised alpha, or ramp the load.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from validate.errors import SceneError
 from validate.fem.matrices import DampingTerms, MassName
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.solve.candidates import Asked, Rival, Rung, SwingingBody
 from validate.solve.dynamic import Moving, MovingStepper, reactions
 from validate.solve.excitation import DriveRates, StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
+from validate.solve.misprint import misprint_step, misprinted_maps
 from validate.solve.newmark_rule import (
     Propagation,
     RuleName,
@@ -31,7 +34,8 @@ from validate.solve.newmark_rule import (
     require_start,
     rule_of,
 )
-from validate.solve.types import Ending, State, Stepper
+from validate.solve.stepping import LOOSE, Stepping, implicit_maps
+from validate.solve.types import Ending, Scheme, State, Stepper
 
 UpdateName = Literal["newmark", "misprinted"]
 
@@ -59,6 +63,55 @@ class Newmark:
     damping_terms: DampingTerms = quantity("full", "1", "alpha M + beta K, or alpha M alone")
     update: UpdateName = quantity("newmark", "1", "of u: Newmark's, or as paper 002 prints it")
     tolerance: float = quantity(TOLERANCE, "1", "iterative solvers: residual, of the right side")
+
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        """The rules, average acceleration with lumped masses, too, and paper 002's printed one."""
+        average = "average acceleration, {} mass"
+        return (
+            Stepping(
+                "newmark_average", average.format("consistent"), "consistent",
+                implicit_maps("average"), conserves=True, rounding=LOOSE,
+            ),
+            Stepping(
+                "newmark_lumped", average.format("lumped"), "lumped", implicit_maps("average"),
+                conserves=True, rounding=LOOSE,
+            ),
+            Stepping(
+                "backward_euler", "backward Euler", "consistent", implicit_maps("backward_euler"),
+                rounding=LOOSE, order=1.0,
+            ),
+            Stepping(
+                "generalised_alpha", "generalised alpha, rho_inf .8", "consistent",
+                implicit_maps("generalised_alpha"), rounding=LOOSE,
+            ),
+            Stepping(
+                "newmark_misprinted", "paper 002's update as printed", "consistent",
+                misprinted_maps, misprint_step, order=1.0,
+            ),
+        )  # fmt: skip
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, SwingingBody):
+            return ()
+        prefactored: Rung = "prefactored"
+        return (
+            Rival("implicit, prefactored", prefactored, _with()),
+            Rival("backward Euler, prefactored", prefactored, _with(rule="backward_euler"),
+                   order=1.0),
+            Rival("generalised alpha, prefactored", prefactored,
+                   _with(rule="generalised_alpha", a0="zero")),
+            Rival("implicit, dense inverse", prefactored, _with(solver="dense_inverse"),
+                   finest=asked.medium),
+            Rival("implicit, lumped mass", prefactored, _with(mass="lumped")),
+            Rival("implicit, conjugate gradients", prefactored, _with(solver="cg")),
+            Rival("implicit, Gauss-Seidel", prefactored, _with(solver="gauss_seidel")),
+            Rival("implicit, sparse LU every step", prefactored, _with(solver="sparse_lu"),
+                   finest=asked.small),
+            Rival("implicit, Gaussian elimination every step", prefactored,
+                   _with(solver="gaussian_elimination"), finest=asked.small),
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt, self.rho_inf)
@@ -116,3 +169,7 @@ def _failure(k: int, new: Moving, solved: Solved) -> tuple[Ending, str] | None:
         why = f"{solved.iterations} iterations leave the residual above the tolerance"
         return "not_converged", f"step {k}: {why}"
     return None
+
+
+def _with(**settings: Any) -> Callable[[float], Scheme]:
+    return lambda dt: Newmark(dt, **settings)

@@ -24,6 +24,7 @@ from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene, Weight
+from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
 from validate.solve.handles import LARGE_STATICS, Handles, require_handled
 from validate.solve.types import Ending, State, Stepper
@@ -52,6 +53,15 @@ class StaticNewton:
     max_cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
     contraction: float = quantity(0.2, "1", "of the error, that keeps a factorisation")
     watch: float = quantity(0.01, "1", "motion between looks at the inertia, of the body's size")
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, StillBody):
+            return ()
+        return (
+            Rival("large strain, Newton every step", "large strain", lambda dt: StaticNewton(),
+                   law=asked.law, finest=asked.coarse, shortest=asked.increment),
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         if not self.volume_ratio > 0:

@@ -23,6 +23,7 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
+from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.fluid import FLUID, Settling
 from validate.solve.handles import Handles, require_handled
 from validate.solve.linear import condensed
@@ -60,6 +61,13 @@ class PressureLoop:
     gains: Literal["own", "common", "matrix"] = quantity(
         "own", "1", "of several cavities: each its own, their mean, or coupled"
     )
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not (isinstance(asked, StillBody) and asked.cavities):
+            return ()
+        name = "condensed, paper's loop at 1 %"
+        return (Rival(name, "condensed", lambda dt: PressureLoop(), stepped=False),)
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a line search on several cavities."""

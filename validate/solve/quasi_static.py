@@ -8,8 +8,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.incompressible import keep_volumes
 from validate.fem.system import System
+from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.dynamic import InertialStepper, reactions
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
+from validate.solve.stepping import Rates, Stepping
 from validate.solve.types import State, Stepper
 
 
@@ -18,6 +20,19 @@ class QuasiStatic:
     """Linear statics of drives and loads, by superposition of one solved column per input."""
 
     handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False, incompressible=True)
+
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        """One map that remembers nothing."""
+        words = "statics: no memory of the last step"
+        return (Stepping("quasi_static", words, "consistent", _still, order=0.0),)
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if isinstance(asked, StillBody) and asked.cavities:
+            return ()
+        name = "superposition" if isinstance(asked, StillBody) else "quasi-static"
+        return (Rival(name, "static superposition", lambda dt: QuasiStatic(), stepped=False),)
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""
@@ -54,3 +69,7 @@ class QuasiStaticStepper(InertialStepper):
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
         return np.reshape(state.inner, self.scene.mesh.nodes.shape)
+
+
+def _still(r: Rates) -> Floats:
+    return np.zeros((len(r.x), 1, 1))

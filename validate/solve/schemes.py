@@ -1,7 +1,13 @@
-"""Every scheme there is. A new one is one file beside this and its name here."""
+"""Every scheme there is. A new one is one file beside this and its name here.
+
+What a scheme declares in its class (`handles`, `steppings`, `candidates`) is all that the stability
+study, the ladders and `choose` know of it.
+"""
 
 from collections.abc import Callable
 
+from validate.scene.mesh import Kind
+from validate.solve.candidates import RUNGS, Asked, Rival
 from validate.solve.central import CentralDifference
 from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
@@ -18,12 +24,12 @@ from validate.solve.needle import NeedleLoop
 from validate.solve.newmark import Newmark
 from validate.solve.newton import StaticNewton
 from validate.solve.pressure_loop import PressureLoop
-from validate.solve.propagated import Propagated
 from validate.solve.proportional import Proportional
 from validate.solve.pulse import PulsePressure
 from validate.solve.quasi_static import QuasiStatic
 from validate.solve.regions import AsyncRegions
 from validate.solve.rigid_motion import RigidMotion
+from validate.solve.stepping import Stepping
 from validate.solve.stretch_test import StretchTest
 from validate.solve.tabulated import Tabulated
 from validate.solve.touched_krylov import TouchedKrylov
@@ -36,14 +42,14 @@ SCHEMES: tuple[type[Scheme], ...] = (
     PressureLoop,
     ElasticPressure,
     PulsePressure,
-    StaticNewton,
     Tabulated,
-    QuasiStatic,
+    StaticNewton,
     Newmark,
-    Modal,
     ExplicitLinear,
     CentralDifference,
     NewtonDynamics,
+    Modal,
+    QuasiStatic,
     ContactNewton,
     NeedleLoop,
     AsyncRegions,
@@ -55,7 +61,6 @@ SCHEMES: tuple[type[Scheme], ...] = (
 SOLVERS: tuple[type[SceneSolver], ...] = (
     StretchTest,
     RigidMotion,
-    Propagated,
     Proportional,
     ViscousModes,
     LetGo,
@@ -68,6 +73,27 @@ SOLVERS: tuple[type[SceneSolver], ...] = (
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
     """The schemes whose `handles` pass, in order."""
     return tuple(scheme for scheme in SCHEMES if handle(scheme.handles))
+
+
+def steppings() -> tuple[Stepping, ...]:
+    """The step maps that schemes declare, in order: what stability studies map."""
+    return tuple(s for scheme in SCHEMES for s in getattr(scheme, "steppings", tuple)())
+
+
+def steppings_for(kind: Kind) -> tuple[Stepping, ...]:
+    """Those that know such meshes."""
+    return tuple(s for s in steppings() if not s.kinds or kind in s.kinds)
+
+
+def candidates(asked: Asked) -> tuple[Rival, ...]:
+    """The candidates that schemes declare for such a body, by their rung: what ladders climb."""
+    none = _no_candidates
+    found = [c for scheme in SCHEMES for c in getattr(scheme, "candidates", none)(asked)]
+    return tuple(sorted(found, key=lambda c: RUNGS.index(c.rung)))
+
+
+def _no_candidates(asked: Asked) -> tuple[Rival, ...]:
+    return ()
 
 
 # Linear schemes of drives and cavities, and those of drives and loads.

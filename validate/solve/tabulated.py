@@ -17,7 +17,9 @@ from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
+from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.handles import LARGE_STATICS, Handles
+from validate.solve.newton import StaticNewton
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _NODES = 4  # of the interpolation
@@ -32,6 +34,18 @@ class Tabulated:
 
     inner: Scheme
     step: float = quantity(1e-3, "m", "between the loads that are solved")
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        """A table of Newton's solutions over the load."""
+        if not isinstance(asked, StillBody):
+            return ()
+        spacing = asked.table
+        return (
+            Rival("large strain, table", "large strain",
+                   lambda dt: Tabulated(StaticNewton(), spacing), stepped=False, law=asked.law,
+                   finest=asked.medium),
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         if not self.step > 0:

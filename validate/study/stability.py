@@ -15,11 +15,12 @@ from validate.replay.find import find
 from validate.replay.ladder import StabilityBody
 from validate.replay.ladder_default import body_of
 from validate.replay.options import Report
+from validate.solve.schemes import steppings
+from validate.solve.stepping import Stepping
 from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.job import Plan, Where, job_of
 from validate.study.stability_cell import SchemeResult, Stepped, open_bench, run_cell
 from validate.study.stability_plan import StabilityCell, stability_cells
-from validate.study.stepping import STEPPINGS, Stepping
 from validate.study.store import Record
 
 KIND = "stability"
@@ -27,9 +28,13 @@ FEWEST = 500  # points of a map
 TOLERANCE = 0.02  # of the predicted limit
 DRIFT_TOLERANCE = 1e-6  # of the energy, over 1e5 steps in float64
 RESOLVED = 6.283 / 10  # rad of the slowest mode in a step: ten steps a period
-SCHEMES: Mapping[str, Stepping] = {s.name: s for s in STEPPINGS}
 
 Regime = Literal["stable", "unresolved", "unstable", "refused"]
+
+
+def declared() -> Mapping[str, Stepping]:
+    """The step maps of all schemes by name."""
+    return {s.name: s for s in steppings()}
 
 
 @dataclass(frozen=True)
@@ -136,7 +141,7 @@ def points(
 def _regime(
     found: SchemeResult, result: Stepped, dt: float, radius: float
 ) -> tuple[Regime, float, str]:
-    scheme = SCHEMES[found.scheme]
+    scheme = declared()[found.scheme]
     if radius > 1 + scheme.rounding:
         times = "" if found.predicted is None else f"{dt / found.predicted:.4g} times the limit"
         return "unstable", radius, times
@@ -152,7 +157,7 @@ def _regime(
 def _predictions(study: Stability) -> Iterator[Prediction]:
     for name in study.schemes:
         own = [s for r in study.ran for s in r.schemes if s.scheme == name]
-        yield (_limit if SCHEMES[name].limit else _no_limit)(name, own)
+        yield (_limit if declared()[name].limit else _no_limit)(name, own)
     yield _drift(study.ran)
     yield _refusals(study)
     failed = [r.failed for r in study.done.records.values() if r.failed]
@@ -180,13 +185,13 @@ def _limit(name: str, own: list[SchemeResult]) -> Prediction:
 
 def _no_limit(name: str, own: list[SchemeResult]) -> Prediction:
     over = [r - 1 for s in own for r in s.radii]
-    worst, border = max(over, default=None), SCHEMES[name].rounding
+    worst, border = max(over, default=None), declared()[name].rounding
     holds = worst is not None and worst <= border
     return Prediction(f"no_limit.{name}", worst, border, len(over), holds, "radius less 1")
 
 
 def _drift(ran: tuple[Stepped, ...]) -> Prediction:
-    kept = [d for r in ran for d in r.drifts if SCHEMES[d.scheme].conserves]
+    kept = [d for r in ran for d in r.drifts if declared()[d.scheme].conserves]
     changes = [abs(d.double - 1) for d in kept if d.double is not None]
     worst = max(changes, default=None)
     holds = worst is not None and len(changes) == len(kept) and worst <= DRIFT_TOLERANCE

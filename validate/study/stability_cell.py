@@ -21,11 +21,12 @@ from validate.replay.ladder import StabilityBody, Turned
 from validate.replay.ladder_default import body_of
 from validate.scene.scene import Scene
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
+from validate.solve.schemes import steppings_for
+from validate.solve.stepping import Stepping
 from validate.study.job import Job
 from validate.study.kept import Kept
 from validate.study.precision import Drift, Rounding, drift, rounding
 from validate.study.stability_plan import StabilityCell
-from validate.study.stepping import Stepping, steppings_for
 
 _REACH = 8.0  # times the predicted limit, on both sides, that the measured one is sought in
 _HALVINGS = 30  # of that interval's logarithm: 4e-9 of the limit

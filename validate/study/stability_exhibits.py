@@ -9,9 +9,9 @@ from validate.compare.exhibit import Entry, Exhibit, Mark, NumberTable, Panel, R
 from validate.replay.ladder import PaperSetting, Turned
 from validate.study.precision import DRIFT_STEPS, STEPS
 from validate.study.stability import (
-    SCHEMES,
     Point,
     Stability,
+    declared,
     limit_error,
     points,
 )
@@ -248,8 +248,15 @@ def _cost(r: Stepped) -> tuple[Entry, ...]:
 
 
 def _drifts(study: Stability) -> Exhibit:
+    known = declared()
     rows = [
-        (d.scheme, _MM * d.dt, "yes" if SCHEMES[d.scheme].conserves else "no", d.double, d.single)
+        (
+            d.scheme,
+            _MM * d.dt,
+            "yes" if known[d.scheme].conserves else "no",
+            d.double,
+            d.single,
+        )
         for r in study.ran
         for d in r.drifts
     ]

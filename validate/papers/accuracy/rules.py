@@ -11,9 +11,10 @@ from validate.fem.system import build as build_system
 from validate.papers.accuracy.benchmark import IMPLICIT
 from validate.papers.accuracy.needle import MP1, MP2, needle_block
 from validate.papers.accuracy.rod import bending_rod, gravity_inputs
-from validate.solve.amplification import amplification, newmark_maps, spectral_radii
+from validate.solve.amplification import amplification
 from validate.solve.march import march
 from validate.solve.newmark_rule import Rule, rule_of
+from validate.solve.step_maps import newmark_maps, spectral_radii
 
 _AVERAGE = rule_of("average", 1.0)
 #: beta = .25, gamma = .5 in the paper's notation, where beta is twice the usual one.

@@ -10,10 +10,12 @@ from validate.arrays import Floats
 from validate.papers.fluid_inclusion.phantom import PhantomModel, build
 from validate.recording.types import Recording
 from validate.replay.ladder import Ladder, Trial, marker_noise
-from validate.replay.ladder_solvers import ORDERS, still, still_best, still_pair
+from validate.replay.ladder_solvers import ORDERS, still_best, still_pair
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
+from validate.solve.candidates import StillBody
+from validate.solve.schemes import candidates
 
 GRIDS = {7: (7, 8, 11), 9: (9, 10, 15), 11: (11, 13, 19)}  # nodes along x, y, z by level
 _DEEPEST = 0.009  # m, the last load of the experiment
@@ -48,7 +50,7 @@ def phantom_trial(
         points=_points(scene("P1", 7, "linear").mesh),
         reference=("P2", 9 if quick else 11),
         best=still_best(cavities=True),
-        solvers=still(True, rise / 6, _TABLE, medium=9, coarse=7),
+        solvers=candidates(StillBody(True, rise / 6, _TABLE, medium=9, coarse=7)),
         pair=still_pair("P2", 7, rise / 6, cavities=True),
         dynamic=False,
         rise_s=rise,

@@ -1,0 +1,69 @@
+"""A time-stepping scheme as its step map per mode, and its predicted stability limit.
+
+A mode is q'' + c q' + w^2 q = 0. Maps are taken in units of the step (w h, c h), which keeps their
+entries of order 1 whatever the step. Linear solvers (direct, CG, Gauss-Seidel) share one map. Every
+scheme declares its own in `steppings`; `solve.schemes.steppings` has them all.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.fem.matrices import DampingTerms, MassName
+from validate.fem.system import System
+from validate.scene.mesh import Kind
+from validate.solve.newmark_rule import RuleName, rule_of
+from validate.solve.step_maps import newmark_maps, spectral_radii
+
+Radii = Callable[["Rates"], Floats]
+LOOSE = 1e-6  # rounding of double eigenvalues, squared and some more
+TETS: tuple[Kind, ...] = ("tet4",)
+
+
+@dataclass(frozen=True)
+class Rates:
+    """All modes in units of a step: `x` = w h (r,), `alpha` h, and `beta`/h of the damping."""
+
+    x: Floats
+    alpha: float
+    beta: float
+
+    def c(self, terms: DampingTerms) -> Floats:
+        """Dampings c h (r,)."""
+        full = terms == "full"
+        return self.alpha + (self.beta * self.x**2 if full else np.zeros_like(self.x))
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """A scheme: its `maps` (r, m, m) per mode with the masses `mass`, and its predicted `limit` s.
+
+    Without `limit` it is predicted to be stable at every step. `kinds`: the meshes it is for (none:
+    all). `conserves`: undamped it keeps an energy exactly, that of half steps where it is explicit.
+    `rounding`: how far above 1 a radius may lie by rounding alone; defective double
+    eigenvalues, as undamped implicit rules have at large steps, cost half of the digits. `order`
+    is that of its error in the step; 0: it has none.
+    """
+
+    name: str
+    words: str
+    mass: MassName
+    maps: Radii
+    limit: Callable[[System], float] | None = None
+    kinds: tuple[Kind, ...] = ()
+    rounding: float = 1e-9
+    explicit: bool = False
+    conserves: bool = False
+    order: float = 2.0
+
+    def radius(self, h: float, omegas: Floats, alpha: float, beta: float) -> float:
+        """Spectral radius of a step of h s over all modes (r,) 1/s."""
+        return float(spectral_radii(self.maps(Rates(omegas * h, alpha * h, beta / h))).max())
+
+
+def implicit_maps(rule: RuleName) -> Radii:
+    """Return the step map of a rule of Newmark's family."""
+    unit = rule_of(rule, 1.0)
+    return lambda r: newmark_maps(unit, r.c("full"), r.x**2)
