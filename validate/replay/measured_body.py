@@ -1,9 +1,9 @@
 """Any body under what a recording says moved it: a mesh file, block or cylinder, held and moved
 where the user says, judged by force, markers and outlines; and the experiment that follows.
 
-Statics at evenly spaced instants. The body is unloaded at the first one: what is compared of
-markers and outlines counts from there. An open modulus is identified up to a share of the load,
-and only what lies beyond is a prediction.
+Statics at evenly spaced instants, or the motion in time (`moving_body`). In statics the body is
+unloaded at the first one: what is compared of markers and outlines counts from there. An open
+modulus is identified up to a share of the load, and only what lies beyond is a prediction.
 """
 
 from collections.abc import Mapping
@@ -35,6 +35,7 @@ from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_drive import drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
+from validate.replay.moving_body import in_motion
 from validate.replay.similar_grids import divided, fitting, member
 from validate.scene.box import box
 from validate.scene.cylinder import whole_cylinder
@@ -43,7 +44,7 @@ from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import linear, of_element, refined
-from validate.scene.scene import Drive, Load, Pin, Scene, Support, Weight
+from validate.scene.scene import Drive, Load, Pin, Pressure, Scene, Support, Weight
 from validate.scene.select import facets_of, nodes_of
 from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
@@ -78,24 +79,28 @@ def measured_body(
     body = partial(body_of, folder=folder)
     bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
-        partial(_build, body=body, folder=folder), partial(place, folder=folder),
+        partial(static_scene, body=body, folder=folder), partial(place, folder=folder),
         frames=parameters.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
             mesh=MeshLadder(_LEVELS if parameters.body.file is None else _HALVINGS,
-                            partial(_cell, body=body), CORNER_ORDER),
+                            partial(_cell, body=body), _order(parameters, methods, accepted)),
             inputs=_INPUTS,
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
+    if parameters.motion.how == "dynamic":
+        return in_motion(bare, bare.build, folder)
     return replace(bare, identify=partial(identify_body, experiment=bare))
 
 
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def _build(
-    recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
+def static_scene(
+    recording: Recording, p: MeasuredBody, model: SolidModel, folder: Path, body: Any = None
 ) -> Scene:
+    """The body as it is held and loaded; a mesh file is found from the `folder`."""
+    body = body or partial(body_of, folder=folder)
     mesh = body(gridded(p).body, places=_places(p))
     E = modulus_in(p.material.by_method, model_name(model)) or p.material.E
     scene = Scene(
@@ -149,11 +154,23 @@ def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[
     kind, along = drive_kind(recording, p), axis_of(p.moved.along)
     if kind == "weighs":
         return {"loads": (Weight("gravity", along),)}
+    if not p.motion.gravity:
+        return _without_weight(p, recording, at, kind, along)
+    weight = Weight("gravity", axis_of(p.motion.gravity))
+    found = _without_weight(p, recording, at, kind, along)
+    return found | {"loads": (*found.get("loads", ()), weight)}
+
+
+def _without_weight(
+    p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path], kind: Any, along: Any
+) -> dict[str, Any]:
     where = place_of(known_place(p), at[0])
     if kind == "follows":
         return {"tracked": (prescribed(recording, p, where, at),)}
-    if kind == "pulls":
+    if kind in ("pulls", "releases"):
         return {"loads": (Load("load", where, along),)}
+    if kind == "presses":
+        return {"loads": (Pressure("load", where),)}
     if sorted(np.abs(along)) != [0.0, 0.0, 1.0]:
         raise SceneError(f"moved.along = {p.moved.along}: a place is moved along an axis, as -z")
     return {"drives": (Drive("moved", where, along),)}
@@ -263,6 +280,15 @@ def _level(share: float | None, halvings: int | None) -> Change:
 
 _LEVELS = (_level(0.5, 1), _level(0.75, 2), _level(None, None))
 _HALVINGS = (_level(None, 1), _level(None, 2))
+
+
+def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:
+    """The formal order: of a static force or displacement that of the corners of a held place; of
+    a motion in time that of its cells, since frequencies rule it, of which corners are a small
+    part."""
+    if p.motion.how == "static":
+        return CORNER_ORDER
+    return max(3.0 if methods[n].scene.order == 2 else 2.0 for n in accepted if n in methods)
 
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:
