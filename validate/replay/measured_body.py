@@ -35,7 +35,8 @@ from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
 from validate.replay.measured_drive import drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
-from validate.replay.moving_body import in_motion
+from validate.replay.motion_exhibit import motion_exhibit
+from validate.replay.moving_body import doubting, following, in_motion
 from validate.replay.similar_grids import divided, fitting, member
 from validate.scene.box import box
 from validate.scene.cylinder import whole_cylinder
@@ -90,7 +91,11 @@ def measured_body(
     )  # fmt: skip
     if parameters.motion.how == "dynamic":
         return in_motion(bare, bare.build, folder)
-    return replace(bare, identify=partial(identify_body, experiment=bare))
+    by_statics = partial(identify_body, experiment=bare)
+    return replace(
+        bare, identify=partial(doubting, identify=by_statics, build=bare.build),
+        follows=following, exhibits=motion_exhibit,
+    )  # fmt: skip
 
 
 # --- the scene ------------------------------------------------------------------------------------

@@ -25,6 +25,7 @@ from validate.replay.experiment import Experiment, Identified, Input, StepLadder
 from validate.replay.first_modes import first_frequencies
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.method import Method
+from validate.replay.motion_exhibit import motion_exhibit
 from validate.replay.moving_seen import (
     FIRST,
     motion_of,
@@ -108,17 +109,22 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
         place=partial(place_moving, folder=folder),
         sets=_sets,
         identify=partial(_identify, build=build, folder=folder),
-        follows=_following,
+        follows=following,
+        exhibits=motion_exhibit,
         uncertainty=uncertainty,
         frames=200,
     )
 
 
-def _following(
+def following(
     experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody
 ) -> Experiment:
-    """Charts follow the axis of the largest recorded motion."""
-    return replace(experiment, axis=motion_of(recordings[0], p.seen.markers).axis)
+    """Charts follow the axis of the largest recorded motion, where something moved."""
+    try:
+        axis = motion_of(recordings[0], p.seen.markers).axis
+    except ValidateError:
+        return experiment
+    return replace(experiment, axis=axis)
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -261,3 +267,37 @@ _INPUTS = (
     Input("damping", moved("motion", stiffness_damping=_beta),
           "damping within its declared uncertainty", "assumed"),
 )  # fmt: skip
+
+
+# --- statics of what moves ------------------------------------------------------------------------
+
+
+def doubting(
+    recordings: Sequence[Recording],
+    p: MeasuredBody,
+    methods: Mapping[str, Method],
+    *,
+    identify: Any,
+    build: Any,
+) -> Identified:
+    """What statics identifies; where the recording shows inertia, headline and warnings doubt it.
+
+    Slow recordings, and those that show no motion in time, are as they were.
+    """
+    found: Identified = identify(recordings, p, methods)
+    try:
+        shown = motion_of(recordings[0], p.seen.markers)
+    except ValidateError:
+        return found
+    first = _first_of(recordings[0], found.parameters, methods, build) if p.material.E else None
+    if not shown.inertia_matters(first):
+        return found
+    why = (
+        f"statics, although inertia matters: {against_mode(shown, first)}; answer motion.how = "
+        "dynamic in `validate new`"
+    )
+    headline = f"{why}; {found.headline}" if found.headline else why
+    seen = f"Recorded motion: {shown.words()}."
+    return replace(
+        found, headline=headline, doubts=(*found.doubts, why), notes=(*found.notes, seen)
+    )
