@@ -43,10 +43,8 @@ def test_statics_of_a_swing_is_inertia() -> None:
 
 def test_a_lag_is_the_clock() -> None:
     found = replace(motions(swing(T)), measured=motions(swing(T - 0.02)).measured)
-    assert first(found) == (
-        "clock",
-        "the recorded motion comes +19.6 ms later than the simulated one",
-    )
+    words = "the recorded motion comes +19.6 ms later than the simulated one"
+    assert first(found) == ("clock", words)
 
 
 @pytest.mark.parametrize(("factor", "name"), [(1000.0, "wrong unit"), (1.2, "load or modulus")])

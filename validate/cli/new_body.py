@@ -284,6 +284,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         parameters, here = (
             replace(p, body=replace(p.body, cells=cells_for(p))) for p in (parameters, here)
         )
+        order = 1 if mesh is not None and mesh.bricks else order  # taken as they are, mixed
         methods = moving_methods(recording, here, found["law"], order)
         names = judged_markers(recording, here)
         accepted = "large" if found["law"] != "linear" else "implicit"

@@ -35,10 +35,8 @@ def motion_exhibit(p: MeasuredBody, cases: Cases, tell: Progress) -> Told:
     scene = next(iter(main.values())).scene
     facts = _facts(shown, _modes(scene) if isinstance(scene, Scene) else ())
     charts = (_over_time(shown, found, main), *_spectrum(shown))
-    words = (
-        f"The marker that moves most, '{shown.marker}', along the direction in which it moves most.",
-    )
-    return Told((Exhibit("recorded-motion", "The recorded motion", words, (facts,), charts),))
+    words = f"The marker that moves most, '{shown.marker}', along where it moves most."
+    return Told((Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),))
 
 
 def _modes(scene: Scene) -> tuple[float, ...]:
@@ -52,7 +50,8 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...]) -> NumberTable:
     along = ", ".join(f"{x:+.3f}" for x in shown.direction)
     rings = shown.ringing
     rows: list[tuple[Entry, ...]] = [
-        ("largest motion, peak to peak", _MM * shown.size, "mm", f"'{shown.marker}' along ({along})"),
+        ("largest motion, peak to peak", _MM * shown.size, "mm",
+         f"'{shown.marker}' along ({along})"),
         ("from first to last sample", _MM * shown.drift, "mm", "drift, or another rest"),
         ("samples a second", shown.rate, "Hz", ""),
         ("gaps", shown.gaps, "1", f"longest interval {shown.gap:.4g} s, "
@@ -61,7 +60,7 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...]) -> NumberTable:
         ("largest peak of the spectrum", shown.frequency, "Hz",
          f"resolved to {shown.resolution:.2g} Hz"),
         ("ring-down, frequency", rings.frequency if rings else None, "Hz",
-         f"damping ratio {rings.damping:.3g} (sd {rings.damping_sd:.1g})" if rings else "none seen"),
+         f"damping {rings.damping:.3g} (sd {rings.damping_sd:.1g})" if rings else "none seen"),
         *((f"natural frequency {i}", f, "Hz", "of the body as it is held, undamped")
           for i, f in enumerate(modes, 1)),
     ]  # fmt: skip

@@ -84,7 +84,8 @@ def moving(
     that are given `markers`. `split` steps in one of the recording's, for the explicit one;
     `settings` are those of the scheme or filter."""
     scheme, words = _SCHEMES[name]
-    label = words.format(law=f"{law} law", modes=_MODES)
+    cells = "quadratic cells" if order == 2 else "linear cells"
+    label = words.format(law=f"{law} law, {cells}", modes=_MODES)
     if markers:
         label += f", given {', '.join(markers)}"
     return Method(
