@@ -67,11 +67,9 @@ def test_edges_and_faces_within_the_body_are_refused() -> None:
     edges = OnPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).edges
     with pytest.raises(SceneError, match="a foundation, membrane or pressure on edges"):
         Scene(mesh, SOFT, loads=(Pressure("p", edges),))
-    cut = replace(mesh, facets={"cut": mesh.cells[:1, :3]})
+    outside = {frozenset(face) for face in mesh.surface.tolist()}
+    inside = next(c[:3] for c in mesh.cells.tolist() if frozenset(c[:3]) not in outside)
+    cut = replace(mesh, facets={"cut": np.array([inside])})
     scene = Scene(cut, SOFT, loads=(Pressure("p", "cut"),))
-    if {tuple(sorted(f)) for f in mesh.surface.tolist()} & {
-        tuple(sorted(mesh.cells[0, :3].tolist()))
-    }:
-        pytest.skip("the first face lies on the surface")
     with pytest.raises(SceneError, match="1 of 1 faces lie within the body"):
         load_columns(scene)

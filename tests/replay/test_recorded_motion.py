@@ -1,4 +1,4 @@
-"""What a recording's motion is: frequency, direction, start, rest, gaps, and whether inertia counts."""
+"""What a recording's motion is: frequency, direction, start, rest, gaps, class of method."""
 
 import numpy as np
 import pytest
