@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -293,7 +294,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         accepted = "solid" if found["law"] != "linear" else "linear"
     return {
         "imports": _MOVING if _dynamic(found) else _STATIC,
-        "cards": ",\n    ".join(sorted(_classes(parameters))) + ",",
+        "cards": fill(", ".join(sorted(_classes(parameters))) + ",", 96).replace("\n", "\n    "),
         "parameters": rendered(parameters),
         "methods": "\n        ".join(methods),
         "accepted": accepted,
