@@ -191,7 +191,7 @@ def test_true_constants_are_good_enough(here: Path, name: str) -> None:
     result = compare(experiment(here))
     assert judged(result) == {("not distinguishable", "good enough")}
     assert result.sentence.startswith("dynamic: recorded motion mostly at")
-    assert not [e for e in result.exhibits if e.id == "likely-causes"]
+    assert not [e for e in result.exhibits if e.anchor == "likely-causes"]
 
 
 @pytest.mark.slow
@@ -209,7 +209,7 @@ def test_a_wrong_modulus_is_named_by_its_frequency(here: Path) -> None:
     new(here, "swinging", ("E = 165000", "E = 250000"))
     result = compare(experiment(here))
     assert "Likely causes, in order: " in result.sentence
-    causes = next(e for e in result.exhibits if e.id == "likely-causes").tables[0].rows
+    causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0].rows
     assert {str(row[2]) for row in causes} >= {"modulus or density"}
 
 
