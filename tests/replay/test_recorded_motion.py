@@ -6,6 +6,7 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.replay.recorded_motion import RecordedMotion, recorded_motion
+from validate.replay.solved import between
 
 T = np.arange(401) / 200.0
 ALONG = np.array([0.6, 0.0, 0.8])
@@ -71,3 +72,12 @@ def test_noise_alone_is_no_inertia_and_stillness_no_motion() -> None:
 def test_few_samples_have_no_spectrum() -> None:
     found = recorded_motion(np.arange(4.0), {"a": np.arange(4.0)[:, None] * ALONG}, 1e-5)
     assert (found.frequency, found.above(0.1)) == (0.0, 0.0)
+
+
+def test_loads_that_act_at_once_do_not_rise_in_shorter_steps() -> None:
+    t, inputs = np.array([0.1, 0.2]), np.array([[4.0], [4.0]])
+    at, rising = between(t, inputs, 2)
+    _, sudden = between(t, inputs, 2, sudden=True)
+    np.testing.assert_allclose(at, [0.05, 0.1, 0.15, 0.2])
+    assert rising[:, 0].tolist() == [2.0, 4.0, 4.0, 4.0]
+    assert sudden[:, 0].tolist() == [4.0, 4.0, 4.0, 4.0]

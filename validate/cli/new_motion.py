@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from math import ceil
 from pathlib import Path
 
@@ -160,19 +159,19 @@ def motion_values(found: Answers) -> dict[str, str]:
     return {name: text for name, text in asked if name}
 
 
-@lru_cache(maxsize=4)
-def _known(recording_id: int, values: tuple[tuple[str, str], ...]) -> Proposal:
-    return proposal(_RECORDINGS[recording_id], with_values(MeasuredBody(), dict(values)), Path())
+class _Remembered:
+    """The last proposal with its recording and answers: questions are listed again and again."""
 
-
-_RECORDINGS: dict[int, Recording] = {}
+    last: tuple[Recording, tuple[tuple[str, str], ...], Proposal] | None = None
 
 
 def _proposed(recording: Recording, values: tuple[tuple[str, str], ...]) -> Proposal:
-    """Once for one recording and one set of answers: questions are listed again and again."""
-    _RECORDINGS.clear()
-    _RECORDINGS[id(recording)] = recording
-    return _known(id(recording), values)
+    last = _Remembered.last
+    if last and last[0] is recording and last[1] == values:
+        return last[2]
+    found = proposal(recording, with_values(MeasuredBody(), dict(values)), Path())
+    _Remembered.last = (recording, values, found)
+    return found
 
 
 # --- what is written ------------------------------------------------------------------------------

@@ -283,7 +283,7 @@ def doubting(
 ) -> Identified:
     """What statics identifies; where the recording shows inertia, headline and warnings doubt it.
 
-    Slow recordings, and those that show no motion in time, are as they were.
+    Of slow recordings a note says that they are quasi-static.
     """
     found: Identified = identify(recordings, p, methods)
     try:
@@ -292,7 +292,8 @@ def doubting(
         return found
     first = _first_of(recordings[0], found.parameters, methods, build) if p.material.E else None
     if not shown.inertia_matters(first):
-        return found
+        slow = f"Quasi-static: {against_mode(shown, first)}; inertia is small."
+        return replace(found, notes=(*found.notes, slow)) if first else found
     why = (
         f"statics, although inertia matters: {against_mode(shown, first)}; answer motion.how = "
         "dynamic in `validate new`"
