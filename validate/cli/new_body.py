@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -35,13 +35,22 @@ from validate.cli.new_kind import (
     limit_question,
     reason_question,
 )
+from validate.cli.new_motion import (
+    DYNAMIC,
+    cells_for,
+    judged_markers,
+    motion_questions,
+    motion_values,
+    moving_methods,
+    require_dynamic,
+)
 from validate.cli.rendered import rendered
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.measured_body import body_of
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_drive import NOTED
+from validate.replay.measured_drive import NOTED, RELEASE
 from validate.replay.measured_markers import AS_SEEN
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.mesh import Mesh
@@ -54,6 +63,8 @@ _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker,
 _MOVED = "from validate.replay.measured_body import measured_body, solid"
 _PRESSED = """from validate.replay.measured_body import measured_body
 from validate.replay.measured_contact import touching"""
+_MOVING = """from validate.replay.measured_body import measured_body
+from validate.replay.moving_body import moving"""
 _MANY = 8  # classes whose lines would make the file longer than 60
 _PATHS = {p.path for p in describe(MeasuredBody())}
 
@@ -61,6 +72,10 @@ _PATHS = {p.path for p in describe(MeasuredBody())}
 def _fits(recording: Recording) -> bool:
     units = {s.unit for s in recording.signals.values()}
     return bool(recording.markers or recording.contours or {"m", "N"} <= units)
+
+
+def _dynamic(found: Answers) -> bool:
+    return found.get("motion.how") == DYNAMIC
 
 
 # --- the questions --------------------------------------------------------------------------------
@@ -75,7 +90,8 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
     if forces and unit_of(recording, found.get("moved.by", "")) == "m":
         asked.append(by_topic("seen.force", "force on the moved place that is judged", forces))
-    asked += _of_the_material(found)
+    asked += _of_the_material(recording, found)
+    asked += motion_questions(recording, found, mesh, _values(found))
     return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
 
 
@@ -97,14 +113,17 @@ def _of_the_body(found: Answers) -> list[Question]:
     return asked
 
 
-def _of_the_material(found: Answers) -> list[Question]:
+def _of_the_material(recording: Recording, found: Answers) -> list[Question]:
     """The modulus is open only under a displacement with a force that is judged."""
     sought = found.get("seen.force", NONE) != NONE
     way = f"; {UNKNOWN}: identified on the lower part of the load" if sought else ""
+    pressed = unit_of(recording, found.get("moved.by", "")) == "Pa"
     return [
         Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
                  check=parsed("material.E", UNKNOWN) if sought else a_known_modulus),
         by_path("material.nu", "Poisson ratio"),
+        Question("law", "law of the material", "linear", "a pressure acts on the undeformed "
+                 "surface", choices=("linear",)) if pressed else
         Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
                  "beside it", choices=tuple(_LAWS)),
     ]  # fmt: skip
@@ -115,14 +134,15 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
     asked = [
         Question(
             "moved.by",
-            f"what loads the body; {NOTED}: a place was moved, by what was written down alone",
+            f"what loads the body; {NOTED}: a place was moved, by what was written down alone; "
+            f"{RELEASE}: a place was held and let go",
             open=True,
             choices=_movers(recording),
         )
     ]
     if by is None:
         return asked
-    if by != "markers":
+    if by != "markers" and unit_of(recording, by) != "Pa":
         asked.append(Question("moved.along", "direction of it, as -z (force and displacement are "
                               "positive along it)", open=True, check=axis_of))  # fmt: skip
     if by == "gravity":
@@ -146,8 +166,9 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
 
 
 def _movers(recording: Recording) -> tuple[str, ...]:
-    signals = [t for t, s in recording.signals.items() if s.unit in ("m", "N")]
-    return (*signals, *(("markers",) if recording.markers else ()), "gravity", NOTED)
+    signals = [t for t, s in recording.signals.items() if s.unit in ("m", "N", "Pa")]
+    moving = ("markers",) if recording.markers else ()
+    return (*signals, *moving, "gravity", NOTED, *((RELEASE,) if recording.markers else ()))
 
 
 def _of_the_supports(mesh: Mesh | None) -> list[Question]:
@@ -262,37 +283,55 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         raise UsageError("held.all, .x, .y, .z and .slides are all empty: the body is not held")
     if not _judged(found):
         raise UsageError("nothing is judged: seen.force, seen.markers and seen.outline are none")
+    require_dynamic(found)
     order = (
         2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= FEW_CELLS else 1
     )
     parameters = _card(source, folder, found, contact_values(recording, found))
     pressed = found.get("indenter.shape", "none") != "none"
-    maker = "touching" if pressed else "solid"
-    cells = "mixed hexahedra" if pressed and found["body.shape"] != "file" else ""
+    if _dynamic(found):
+        here = with_values(MeasuredBody(), _values(found))
+        parameters, here = (
+            replace(p, body=replace(p.body, cells=cells_for(p))) for p in (parameters, here)
+        )
+        order = 1 if mesh is not None and mesh.bricks else order  # taken as they are, mixed
+        methods = moving_methods(recording, here, found["law"], order)
+        names = judged_markers(recording, here)
+        accepted = "large" if found["law"] != "linear" else "implicit"
+    else:
+        maker = "touching" if pressed else "solid"
+        cells = "mixed hexahedra" if pressed and found["body.shape"] != "file" else ""
+        methods = _methods(found["law"], mesh, 1 if pressed else order, maker, cells)
+        names, accepted = (), "solid" if found["law"] != "linear" else "linear"
     return {
+        "imports": _MOVING if _dynamic(found) else _PRESSED if pressed else _MOVED,
         "cards": _names(sorted(_classes(parameters))),
         "parameters": rendered(parameters),
-        "imports": _PRESSED if pressed else _MOVED,
-        "methods": "\n        ".join(
-            _methods(found["law"], mesh, 1 if pressed else order, maker, cells)
-        ),
-        "accepted": "solid" if found["law"] != "linear" else "linear",
+        "methods": "\n        ".join(methods),
+        "accepted": accepted,
         "accept": "\n        ".join(
-            accept_line(name, _ACCEPTED[name][0], found)
+            accept_line(name, _ACCEPTED[name][0], found, names)
             for name in _ACCEPTED if name in _judged(found)
         ),
     }  # fmt: skip
 
 
 def _card(source: str, folder: Path, found: Answers, more: Mapping[str, str]) -> MeasuredBody:
-    skipped = ("", UNKNOWN)
-    values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
+    values = _values(found)
     for key in ("body.file", "seen.layout"):
         if values.get(key, AS_SEEN) not in (AS_SEEN, RECORDED):
             values[key] = beside(Path(values[key]), folder / "x.py")
     values |= {**more, "recording": source}
     card: MeasuredBody = with_values(MeasuredBody(), values)
     return card
+
+
+def _values(found: Answers) -> dict[str, str]:
+    """The answers that are parameters, by path."""
+    skipped = ("", UNKNOWN)
+    values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
+    return {k: v for k, v in values.items() if k not in ("seen.markers", "seen.force",
+            "seen.outline") or v != NONE} | motion_values(found)  # fmt: skip
 
 
 def _methods(law: str, mesh: Mesh | None, order: int, maker: str, cells: str) -> list[str]:

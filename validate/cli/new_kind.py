@@ -53,15 +53,19 @@ def reason_question(name: str, default: str = "") -> Question:
     )  # fmt: skip
 
 
-def accept_line(name: str, unit: str, found: Answers) -> str:
-    """The requirement as an experiment's file declares it."""
-    answer = found[f"accept.{name}"]
-    whole = ', statistic="rms"' if name in _NOISY else ""
+def accept_line(name: str, unit: str, found: Answers, each: tuple[str, ...] = ()) -> str:
+    """The requirement as an experiment's file declares it; of a motion in time one for `each`
+    marker, as the rms over its samples."""
+    answer, many = found[f"accept.{name}"], name == "marker" and bool(each)
+    what = "name" if many else f'"{name}"'
+    whole = ', statistic="rms"' if many or name in _NOISY else ""
     if answer == NOTHING:
-        return f'Accept("{name}"{whole}),  # nothing is required'
-    reason = found.get(f"why.{name}", "")
-    told = "" if reason else "; write why, or it is no requirement"
-    return f'Accept("{name}", {quantity_in(unit)(answer):.6g}, {reason!r}{whole}),  # {unit}{told}'
+        call, note = f"Accept({what}{whole})", "nothing is required"
+    else:
+        reason = found.get(f"why.{name}", "")
+        call = f"Accept({what}, {quantity_in(unit)(answer):.6g}, {reason!r}{whole})"
+        note = unit + ("" if reason else "; write why, or it is no requirement")
+    return f"{f'*({call} for name in {each!r})' if many else call},  # {note}"
 
 
 def quantity_in(unit: str) -> Callable[[str], float]:

@@ -1,27 +1,31 @@
-"""Nodal forces of the scene's loads, per newton of their inputs, per m/s^2 of a weight; masses
-that hang at the body."""
+"""Nodal forces of the scene's loads, per newton of their inputs, per m/s^2 of a weight, per Pa of a
+pressure; masses that hang at the body."""
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
+from validate.errors import SceneError
 from validate.fem.assemble import mass
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Load, Scene, Weight
+from validate.scene.scene import Load, Pressure, Scene, Weight
 from validate.scene.select import Place, facets_of, kind_of, nodes_of
 from validate.scene.shape_functions import facet_rule
 
 
 def load_columns(scene: Scene) -> Floats:
-    """Forces (N, l) on all unknowns for one newton or m/s^2 of each load, node-major.
+    """Forces (N, l) on all unknowns for one newton, m/s^2 or Pa of each load, node-major.
 
     What moves a rigid body is an input after the loads and no force: its column is zero.
-    Raises `SceneError` for a weight without densities.
+    Raises `SceneError` for a weight without densities, a pressure inside the body.
     """
     columns = np.zeros((scene.mesh.nodes.size, len(scene.loads) + len(scene.movers)))
     for j, load in enumerate(scene.loads):
         if isinstance(load, Weight):
             pull = np.tile(load.direction, len(scene.mesh.nodes))
             columns[:, j] = mass(scene) @ pull + hung_masses(scene) * pull
+            continue
+        if isinstance(load, Pressure):
+            columns[:, j] = _pushed(scene.mesh, load).ravel()
             continue
         columns[:, j] = np.outer(_nodal(scene.mesh, load), load.direction).ravel()
     return columns
@@ -33,6 +37,33 @@ def hung_masses(scene: Scene) -> Floats:
     for part in scene.masses:
         nodal += part.mass * uniform_shares(scene.mesh, part.facets)
     return np.repeat(nodal, scene.mesh.dimension)
+
+
+def _pushed(mesh: Mesh, load: Pressure) -> Floats:
+    """Forces (n, 3) N of one Pa: -integral of N_a n dA over the undeformed faces, n outward."""
+    facets = _outward(mesh, load)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    normal = np.cross(J[..., 0], J[..., 1])
+    found = np.zeros_like(mesh.nodes)
+    np.add.at(found, facets, -np.einsum("q,fqi,qa->fai", rule.weights, normal, rule.N))
+    return found
+
+
+def _outward(mesh: Mesh, load: Pressure) -> Ints:
+    """The faces (f, m) as the surface of the body has them, oriented outward: a mesh file's own
+    facet set may be oriented either way. Raises `SceneError` for 2-D, and faces within the body."""
+    if mesh.dimension != 3:
+        raise SceneError(f"pressure '{load.name}': for 3-D meshes, not {mesh.kind}")
+    outside = {tuple(row): i for i, row in enumerate(np.sort(mesh.surface, axis=1).tolist())}
+    wanted = np.sort(facets_of(mesh, load.facets), axis=1).tolist()
+    at = [outside.get(tuple(row), -1) for row in wanted]
+    if -1 in at:
+        raise SceneError(
+            f"pressure '{load.name}': {at.count(-1)} of {len(at)} faces lie within the body; "
+            "choose faces of its surface"
+        )
+    return np.asarray(mesh.surface[at])
 
 
 def _nodal(mesh: Mesh, load: Load) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import AnyScene, Meshless
-from validate.scene.scene import Scene
+from validate.scene.scene import Pressure, Scene
 
 # P1 / P2 displacement of a held cube that is pulled, 4 boxes an edge: .98 at nu .3, .96 at .4, .92
 # at .45, .82 at .49, .67 at .4999.
@@ -113,5 +113,8 @@ def _bends(scene: Scene, along: int) -> bool:
     """Whether anything acts across the long axis; drives and loads along it only stretch."""
     if scene.contacts or scene.tracked or scene.tools or scene.cavities:
         return True
-    acting = [np.asarray(one.direction) for one in (*scene.drives, *scene.loads)]
+    if any(isinstance(load, Pressure) for load in scene.loads):
+        return True
+    acting = [np.asarray(one.direction) for one in (*scene.drives, *scene.loads)
+              if not isinstance(one, Pressure)]  # fmt: skip
     return not acting or any(np.abs(np.delete(d, along)).max(initial=0.0) > 1e-9 for d in acting)

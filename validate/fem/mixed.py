@@ -32,7 +32,7 @@ from skfem.helpers import ddot, div, sym_grad
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assemble import lame_constants, library_mesh
-from validate.scene.scene import Load, Scene, Weight
+from validate.scene.scene import Load, Pressure, Scene, Weight
 from validate.scene.select import Place, facets_of, kind_of
 
 _PAIRS = {
@@ -105,7 +105,8 @@ def _require_plain(scene: Scene) -> None:
         )
     if scene.foundations or scene.membranes or scene.cavities:
         raise SceneError("mixed elements know supports, pins, drives and loads alone")
-    spread = [x.name for x in scene.loads if isinstance(x, Load) and x.spread != "consistent"]
+    spread = [x.name for x in scene.loads if not isinstance(x, Weight)
+              and (isinstance(x, Pressure) or x.spread != "consistent")]  # fmt: skip
     if spread or not scene.loads:
         raise SceneError(f"mixed elements need consistent loads or weights, got {spread or 'none'}")
 
@@ -137,8 +138,9 @@ def _facets(scene: Scene, domain: Any, place: Place) -> Ints:
     return np.array([number[tuple(f)] for f in wanted.tolist()])
 
 
-def _force(scene: Scene, load: Load | Weight, domain: Any, basis: Basis) -> Floats:
+def _force(scene: Scene, load: Load | Weight | Pressure, domain: Any, basis: Basis) -> Floats:
     """f (N',) N of one unit of the load."""
+    assert not isinstance(load, Pressure)  # refused before
     direction = np.array(load.direction)
 
     def pushed(v: Any, w: Any) -> Any:

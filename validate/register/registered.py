@@ -21,6 +21,8 @@ class Registered:
     `outside` counts samples left out because they lie beyond the law's validity. `time_scale` are
     the recorded seconds in one second of these times, where a slow recording is walked faster.
     `timed` is False where rows were recorded without times and their numbers stand for them.
+    `sudden`: the loads of the first step act from 0 s on, and a shorter step does not let them
+    rise. `moves`: a motion in time, drawn over it whatever windows are compared.
     Raises `ComparisonError` unless driving signals, on common times, are there.
     """
 
@@ -31,6 +33,8 @@ class Registered:
     findings: tuple[str, ...] = ()
     time_scale: float = 1.0
     timed: bool = True
+    sudden: bool = False
+    moves: bool = False
 
     def __post_init__(self) -> None:
         drives = self.drives

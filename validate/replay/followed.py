@@ -87,7 +87,7 @@ class Followed:
     @property
     def over_time(self) -> bool:
         """Whether every sample is compared, not holds or windows of a load."""
-        return any(s.t is None for s in self.seen.selections)
+        return self.seen.moves or any(s.t is None for s in self.seen.selections)
 
     @property
     def own_time(self) -> Floats:

@@ -1,9 +1,9 @@
 """Any body under what a recording says moved it: a mesh file, block or cylinder, held and moved
 where the user says, judged by force, markers and outlines; and the experiment that follows.
 
-Statics at evenly spaced instants. The body is unloaded at the first one: what is compared of
-markers and outlines counts from there. An open modulus is identified up to a share of the load,
-and only what lies beyond is a prediction.
+Statics at evenly spaced instants, or the motion in time (`moving_body`). In statics the body is
+unloaded at the first one: what is compared of markers and outlines counts from there. An open
+modulus is identified up to a share of the load, and only what lies beyond is a prediction.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,6 +45,8 @@ from validate.replay.measured_contact import (
 from validate.replay.measured_drive import NOTED, drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
+from validate.replay.motion_exhibit import motion_exhibit
+from validate.replay.moving_body import doubting, following, in_motion
 from validate.replay.similar_grids import divided, fitting, member
 from validate.scene.box import box
 from validate.scene.cylinder import whole_cylinder
@@ -53,7 +55,7 @@ from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import linear, of_element, refined
-from validate.scene.scene import Drive, Load, Pin, Scene, Support, Weight
+from validate.scene.scene import Drive, Load, Pin, Pressure, Scene, Support, Weight
 from validate.scene.select import facets_of, nodes_of
 from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
@@ -88,28 +90,33 @@ def measured_body(
     body = partial(body_of, folder=folder)
     bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
-        partial(_build, body=body, folder=folder), partial(place, folder=folder),
+        partial(static_scene, body=body, folder=folder), partial(place, folder=folder),
         frames=parameters.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
             mesh=MeshLadder(_LEVELS if parameters.body.file is None else _HALVINGS,
-                            partial(_cell, body=body), CORNER_ORDER),
+                            partial(_cell, body=body), _order(parameters, methods, accepted)),
             inputs=_inputs_of(parameters),
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
-    return _as_set(bare, (), parameters, folder=folder)
+    if parameters.motion.how == "dynamic":
+        return in_motion(bare, bare.build, folder)
+    return replace(_as_set(bare, (), parameters, folder=folder), exhibits=motion_exhibit)
 
 
 def _as_set(
     experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
 ) -> Experiment:
-    """The experiment with the inputs that these parameters make uncertain."""
+    """The experiment with the inputs that these parameters make uncertain, and charts along the
+    axis of the largest motion."""
     assert experiment.uncertainty is not None
     inputs = _inputs_of(p)
     made = replace(experiment, uncertainty=replace(experiment.uncertainty, inputs=inputs))
+    made = following(made, recordings, p) if recordings else made
+    by_statics = partial(_identified, experiment=made, folder=folder)
     return replace(
         made,
-        identify=partial(_identified, experiment=made, folder=folder),
+        identify=partial(doubting, identify=by_statics, build=made.build),
         follows=partial(_as_set, folder=folder),
     )
 
@@ -141,10 +148,11 @@ def _identified(
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def _build(
-    recording: Recording, p: MeasuredBody, model: SolidModel, *, body: Any, folder: Path
+def static_scene(
+    recording: Recording, p: MeasuredBody, model: SolidModel, folder: Path, body: Any = None
 ) -> Scene:
-    mesh = _mesh(p, body)
+    """The body as it is held and loaded; a mesh file is found from the `folder`."""
+    mesh = _mesh(p, body or partial(body_of, folder=folder))
     E = modulus_in(p.material.by_method, model_name(model)) or p.material.E
     scene = Scene(
         mesh,
@@ -199,14 +207,26 @@ def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[
     kind, along = drive_kind(recording, p), axis_of(p.moved.along)
     if kind == "weighs":
         return {"loads": (Weight("gravity", along),)}
+    if not p.motion.gravity:
+        return _without_weight(p, recording, at, kind, along)
+    weight = Weight("gravity", axis_of(p.motion.gravity))
+    found = _without_weight(p, recording, at, kind, along)
+    return found | {"loads": (*found.get("loads", ()), weight)}
+
+
+def _without_weight(
+    p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path], kind: Any, along: Any
+) -> dict[str, Any]:
     where = place_of(known_place(p), at[0])
     if p.indenter.there:
         require_touching(p, "m" if kind == "moves" else "N")
         return {"contacts": (contact_of(p, at[0], where),)}
     if kind == "follows":
         return {"tracked": (prescribed(recording, p, where, at),)}
-    if kind == "pulls":
+    if kind in ("pulls", "releases"):
         return {"loads": (Load("load", where, along),)}
+    if kind == "presses":
+        return {"loads": (Pressure("load", where),)}
     if sorted(np.abs(along)) != [0.0, 0.0, 1.0]:
         raise SceneError(f"moved.along = {p.moved.along}: a place is moved along an axis, as -z")
     return {"drives": (Drive("moved", where, along),)}
@@ -328,6 +348,15 @@ def _level(share: float | None, halvings: int | None) -> Change:
 
 _LEVELS = (_level(0.5, 1), _level(0.75, 2), _level(None, None))
 _HALVINGS = (_level(None, 1), _level(None, 2))
+
+
+def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:
+    """The formal order: of a static force or displacement that of the corners of a held place; of
+    a motion in time that of its cells, since frequencies rule it, of which corners are a small
+    part."""
+    if p.motion.how == "static":
+        return CORNER_ORDER
+    return max(3.0 if methods[n].scene.order == 2 else 2.0 for n in accepted if n in methods)
 
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:

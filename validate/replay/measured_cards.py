@@ -49,7 +49,7 @@ class Solid:
 class Tissue:
     E: float | None = quantity(None, "Pa", "Young's modulus; none: identified")
     nu: float = quantity(0.45, "1", "Poisson ratio")
-    rho: float = quantity(1000.0, "kg/m3", "density; moves the body under gravity only")
+    rho: float = quantity(1000.0, "kg/m3", "density: its weight, and its inertia in motion")
     by_method: tuple[tuple[str, float, float], ...] = quantity(
         (), "1", "found by the run: of each model, its modulus Pa; the last number is 0"
     )
@@ -71,11 +71,12 @@ class HeldAt:
 
 @dataclass(frozen=True)
 class MovedBy:
-    """What loads the body: a signal in m (moves a place) or N (pulls at it), "markers" that sit on
-    a place, which follows them as a rigid body, "gravity", or a motion of a place that was "noted"
-    by hand where nothing recorded it."""
+    """What loads the body: a signal in m (moves a place), N (pulls at it) or Pa (presses on it),
+    "markers" that sit on a place, which follows them as a rigid body, "gravity", a motion of a
+    place that was "noted" by hand where nothing recorded it, or the "release" of a place that was
+    held (motion.held_force or motion.held_displacement)."""
 
-    by: str = quantity("gravity", "1", "a signal's topic, or: markers, gravity, noted")
+    by: str = quantity("gravity", "1", "a signal's topic, or: markers, gravity, noted, release")
     place: str | None = quantity(None, "1", "where; gravity needs none")
     along: str = quantity("-z", "1", "direction: +x, -z, or three numbers")
     sideways: bool = quantity(True, "1", "whether a moved place is held across its direction")
@@ -120,10 +121,54 @@ class SeenOf:
 
 
 @dataclass(frozen=True)
+class BodyMotion:
+    """Whether the body's motion in time is solved, from when to when, and its damping.
+
+    Until the start the body rests; loads and displacements count from there. Damping is that of
+    the stiffness, C = beta K (Rayleigh): beta itself, or the share of critical damping at the first
+    mode, or what is identified on the ring-down in the first `fit_window`. `gravity` acts before
+    the start, too. A place is released at the start from a force, or a displacement.
+    """
+
+    how: Literal["static", "dynamic"] = quantity("static", "1", "static: no inertia; or dynamic")
+    start: float | None = quantity(None, "s", "of the recording's clock; none: found in it")
+    length: float | None = quantity(None, "s", "solved and compared; none: to the end")
+    dt: float | None = quantity(None, "s", "time step; none: 40 or more in the recorded period")
+    stiffness_damping: float | None = quantity(None, "s", "beta of C = beta K")
+    damping_ratio: float | None = quantity(None, "1", "of critical damping, at the first mode")
+    fit_window: float | None = quantity(
+        None, "s", "from the start, in which damping is identified; only later is evidence"
+    )
+    gravity: str | None = quantity(None, "1", "direction of a weight that acts besides, as -z")
+    held_force: float | None = quantity(
+        None, "N", "that held the released place, along moved.along"
+    )
+    held_displacement: float | None = quantity(
+        None, "m", "at which the released place was held, along moved.along"
+    )
+
+    def __post_init__(self) -> None:
+        damping = (self.stiffness_damping, self.damping_ratio)
+        if any(value is not None and not value >= 0 for value in damping) or None not in damping:
+            raise UsageError(
+                f"motion.stiffness_damping = {damping[0]}, motion.damping_ratio = {damping[1]}: "
+                "one of them, 0 or above"
+            )
+        times = (self.length, self.dt, self.fit_window)
+        if any(value is not None and not value > 0 for value in times):
+            raise UsageError(
+                f"motion.length = {times[0]}, motion.dt = {times[1]}, motion.fit_window = "
+                f"{times[2]} s: each must be above 0"
+            )
+
+
+@dataclass(frozen=True)
 class BodyRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of a modulus that is given")
     nu: float = quantity(0.01, "1", "of the Poisson ratio")
     load: float = quantity(0.01, "1", "relative, of what moves or pulls the body")
+    rho: float = quantity(0.01, "1", "relative, of the density; of a motion in time")
+    damping: float = quantity(0.2, "1", "relative, of the damping; of a motion in time")
     size: float = quantity(0.005, "1", "relative, of each size of the body; of an identified E")
     contact: float = quantity(
         0.0, "m", "of where the load begins: of an indenter's gap, of an identified E"
@@ -143,6 +188,7 @@ class MeasuredBody:
     held: HeldAt = HeldAt()
     moved: MovedBy = MovedBy()
     seen: SeenOf = SeenOf()
+    motion: BodyMotion = BodyMotion()
     ranges: BodyRanges = BodyRanges()
     indenter: Indenter = Indenter()
     machine: Machine = Machine()

@@ -1,5 +1,7 @@
-"""What loads a measured body: a signal, markers on a place, gravity, or a motion that was noted."""
+"""What loads a measured body: a signal, markers on a place, gravity, a motion that was noted, or
+the release of a place that was held."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -7,6 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError, UsageError
+from validate.fem.system import build
 from validate.identify.modulus import MIN_SAMPLES, load_noise
 from validate.recording.types import Recording, Signal
 from validate.register.clock import clock_sd, interpolated
@@ -14,31 +17,36 @@ from validate.register.signals import SignalObservation
 from validate.replay.machine_compliance import taken_off
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_markers import BodyAt, markers_topic, registered
+from validate.scene.scene import Scene
 from validate.scene.select import Place
 from validate.scene.tracked import Prescribed
 
-NOTED = "noted"
-Kind = Literal["weighs", "pulls", "moves", "follows"]
+NOTED, RELEASE = "noted", "release"
+Kind = Literal["weighs", "pulls", "moves", "follows", "presses", "releases"]
+_KINDS: Mapping[str, Kind] = {"m": "moves", "N": "pulls", "Pa": "presses"}  # by a signal's unit
+_UNITS = {kind: unit for unit, kind in _KINDS.items()}
 FEWEST = 3  # markers on a place that follows them
 
 
 def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
-    """What the load is; raises `UsageError` for a topic that is no signal in m or N."""
+    """What the load is; raises `UsageError` for a topic that is no signal in m, N or Pa."""
     if p.moved.by == "gravity":
         return "weighs"
     if p.moved.by == "markers":
         return "follows"
     if p.moved.by == NOTED:
         return "moves"
+    if p.moved.by == RELEASE:
+        return "releases"
     found = recording.signals.get(p.moved.by)
     unit = found.unit if found is not None else ""
-    if unit not in ("m", "N"):
-        known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in ("m", "N")]
+    if unit not in _KINDS:
+        known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in _KINDS]
         raise UsageError(
             f"moved.by = {p.moved.by}: {'in ' + unit if unit else 'no signal of that name'}; one "
-            f"of {', '.join([*known, 'markers', 'gravity', NOTED])}"
+            f"of {', '.join([*known, 'markers', 'gravity', NOTED, RELEASE])}"
         )
-    return "moves" if unit == "m" else "pulls"
+    return _KINDS[unit]
 
 
 def driven(
@@ -53,7 +61,7 @@ def driven(
         return _followed(recording, p, t, at)
     if p.moved.by == NOTED:
         return _noted(p, t)
-    topic, unit = p.moved.by, "m" if kind == "moves" else "N"
+    topic, unit = p.moved.by, _UNITS[kind]
     signal = zeroed(recording, topic, unit, rest + p.seen.still)
     y = p.moved.scale * np.interp(t, signal.t, signal.y[:, 0])[:, None]
     if kind == "moves":
@@ -126,3 +134,28 @@ def _followed(recording: Recording, p: MeasuredBody, t: Floats, at: BodyAt) -> S
     y[0] = 0.0
     sd_t = clock_sd(recording, markers_topic(recording, p))
     return SignalObservation("moved", "drives", t, p.moved.scale * y, "m", seen.sd, sd_t=sd_t)
+
+
+def released_force(p: MeasuredBody, scene: Scene) -> float:
+    """N along `moved.along` that held the released place: as given, or what holds it at the given
+    mean displacement by linear statics. Raises `UsageError` where neither is given, or both."""
+    force, displacement = p.motion.held_force, p.motion.held_displacement
+    if (force is None) == (displacement is None):
+        raise UsageError(
+            "moved.by = release: set motion.held_force (as 0.2N) or motion.held_displacement (as "
+            "5mm), one of them"
+        )
+    if force is not None:
+        return force
+    return float(displacement or 0.0) / _compliance(scene)
+
+
+def _compliance(scene: Scene) -> float:
+    """Mean displacement m of the load's place along it, per newton of it."""
+    loads = tuple(part for part in scene.loads if part.name == "load")
+    linear = replace(scene, material=scene.material.of_law("linear"), loads=loads, probes=())
+    system = build(linear)
+    u = np.zeros(len(system.loads))
+    f = system.loads[:, 0]
+    u[system.free] = system.factor().solve(f[system.free])
+    return float(f @ u)  # the mean over the place: the load is spread over it uniformly

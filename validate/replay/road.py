@@ -35,6 +35,7 @@ from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
 from validate.replay.gated import gate_warnings
 from validate.replay.guest_exhibit import guest_exhibits
+from validate.replay.likely_causes import Motions, explained_by, motions_of
 from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, configure
 from validate.replay.origins import Opened, marked, opened
@@ -144,6 +145,7 @@ def _compared(
     told = _told(road, {MAIN: main, **others})
     results = tuple(_method(road, main[name], others) for name in methods)
     effects = effects_of(road, results)
+    because, causes = explained_by(results, lambda name: _motions(main[name], methods[name]))
     published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
     locking = locking_notes(
@@ -165,6 +167,7 @@ def _compared(
         + _opening(identified)
         + (f"{predicted(results)}. " if out.fitted else "")
         + verdict_sentence(results, road.kind, quick=options.quick)
+        + because
         + figures_sentence(published),
         parameters=parameters_used,
         methods=results,
@@ -185,6 +188,7 @@ def _compared(
         exhibits=tuple(
             captioned(exhibit, experiment.captions)
             for exhibit in (
+                *causes,
                 *guest_exhibits(road, main),
                 *standard_exhibits(experiment, main, others),
                 *told.exhibits,
@@ -195,6 +199,11 @@ def _compared(
         expected=() if options.quick else experiment.expected,
         identified_values=identified.values if identified else (),
     )
+
+
+def _motions(followed: Followed, method: Method) -> Motions | None:
+    handles = getattr(method.settings, "handles", None)
+    return motions_of(followed, inertia=handles is None or handles.inertia)
 
 
 def _specimens(experiment: Experiment, recordings: tuple[Recording, ...]) -> tuple[str, ...]:

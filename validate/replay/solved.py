@@ -136,7 +136,7 @@ class _Runs:
         """The run through the recorded inputs, as many of them as the method takes."""
         method = self._method
         every = slice(method.stride - 1, None, method.stride)
-        t, inputs = between(seen.t[every], seen.inputs[every], method.split)
+        t, inputs = between(seen.t[every], seen.inputs[every], method.split, sudden=seen.sudden)
         steps = method.steps or len(t)
         self._tell("set-up")
         at = seen.frames(t, self._experiment.frames)
@@ -164,13 +164,20 @@ class _Runs:
         return self._prepared
 
 
-def between(t: Floats, inputs: Floats, split: int) -> tuple[Floats, Floats]:
-    """Times (nt,) s and inputs (nt, k) with so many steps in one, straight from rest at 0 s."""
+def between(
+    t: Floats, inputs: Floats, split: int, *, sudden: bool = False
+) -> tuple[Floats, Floats]:
+    """Times (nt,) s and inputs (nt, k) with so many steps in one, straight from rest at 0 s;
+    `sudden` ones have their first value from 0 s on."""
     if split == 1:
         return t, inputs
     at = np.arange(split * len(t) + 1) / split
     known = np.arange(len(t) + 1)
-    finer = [np.interp(at, known, np.append(0.0, y))[1:] for y in (t, *inputs.T)]
+    starts = (0.0, *(inputs[0] if sudden else np.zeros(inputs.shape[1])))
+    finer = [
+        np.interp(at, known, np.append(start, y))[1:]
+        for start, y in zip(starts, (t, *inputs.T), strict=True)
+    ]
     return finer[0], np.stack(finer[1:], axis=1)
 
 

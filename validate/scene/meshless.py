@@ -4,7 +4,7 @@ import numpy as np
 
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Cavity, Drive, Load, Probe, Scene, Support, Weight
+from validate.scene.scene import Cavity, Drive, Load, Pressure, Probe, Scene, Support, Weight
 
 
 class Meshless:
@@ -28,7 +28,7 @@ class Meshless:
         return ()
 
     @property
-    def loads(self) -> tuple[Load | Weight, ...]:
+    def loads(self) -> tuple[Load | Weight | Pressure, ...]:
         return ()
 
     @property

@@ -117,6 +117,18 @@ class Weight:
 
 
 @dataclass(frozen=True)
+class Pressure:
+    """A pressure on faces by a named input in Pa, positive where it pushes into the body.
+
+    It acts along the normals of the undeformed surface and does not follow the wall: a load of
+    small strain. A fluid whose pressure follows the wall is a `Cavity`.
+    """
+
+    name: str
+    facets: Place
+
+
+@dataclass(frozen=True)
 class Mass:
     """A mass kg that hangs at faces, edges or points, spread over them as a uniform load is.
 
@@ -207,7 +219,7 @@ class Scene:
     foundations: tuple[Foundation, ...] = ()
     membranes: tuple[Membrane, ...] = ()
     regions: tuple[Region, ...] = ()
-    loads: tuple[Load | Weight, ...] = ()
+    loads: tuple[Load | Weight | Pressure, ...] = ()
     probes: tuple[Probe, ...] = ()
     plane: PlaneState = "strain"
     thickness: float = 1.0
@@ -250,12 +262,14 @@ class Scene:
         places = [s.facets for s in self.supports] + [d.facets for d in self.drives]
         places += [load.facets for load in self.loads if isinstance(load, Load)]
         sheets = [f.facets for f in self.foundations] + [m.facets for m in self.membranes]
+        sheets += [load.facets for load in self.loads if isinstance(load, Pressure)]
         for place in (*places, *(m.facets for m in self.masses), *sheets):
             nodes_of(self.mesh, place)
         for place in sheets:
             if kind_of(place) != "faces":
                 raise SceneError(
-                    f"a foundation or membrane on {kind_of(place)}: it covers an area; choose faces"
+                    f"a foundation, membrane or pressure on {kind_of(place)}: it covers an area; "
+                    "choose faces"
                 )
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)
@@ -313,7 +327,7 @@ class Scene:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of what a step is given: drives in m, then loads in N and weights in m/s^2, then
+        """Names of what a step is given: drives in m, then loads in N, m/s^2 or Pa, then
         rigid bodies that move and needles' tips in m."""
         parts = (*self.drives, *self.loads, *self.movers)
         return (*(part.name for part in parts), *(i for tool in self.tools for i in tool.inputs))

@@ -11,7 +11,7 @@ from validate.errors import ComparisonError
 from validate.fem.locate import Rows, probe_rows
 from validate.fem.system import build
 from validate.scene.meshless import AnyScene
-from validate.scene.scene import Scene, Weight
+from validate.scene.scene import Load, Pressure, Scene, Weight
 from validate.solve.handles import require_handled
 from validate.solve.types import (
     Listening,
@@ -31,6 +31,7 @@ from validate.solve.types import (
 _UNTIMED = 20  # first steps left out of the step times: caches and allocators settle
 _TOLD = 100  # times in a run that a step is told of: what is told costs time between the steps
 _AXES = "xyz"
+_GIVEN = {Load: ("force", "N"), Weight: ("acceleration", "m/s^2"), Pressure: ("pressure", "Pa")}
 RUNAWAY = 100.0  # body sizes: a displacement beyond has left all bounds
 
 Tell = Callable[[str], None]  # what is being done, in words
@@ -82,9 +83,9 @@ def march(
 
     `tell` is given the step, now and then.
 
-    Inputs are drives in m, then loads in N. Inputs, the numbers of the states and the scene's
-    probes are traced at every step. A filter that smooths is stepped twice and has no times: it is
-    none for real time.
+    Inputs are drives in m, then loads in N, m/s^2 or Pa. Inputs, the numbers of the states and the
+    scene's probes are traced at every step. A filter that smooths is stepped twice and has no
+    times: it is none for real time.
     """
     if len(t) == 0 or len(at) == 0:
         raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
@@ -212,14 +213,14 @@ def _in_unit_of(scene: Scene, trace: Trace) -> Trace:
 
 def given_traces(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     """`<drive>.displacement` m, `<load>.force` N (with `per_node` that at each node, else the
-    total), `<weight>.acceleration` m/s^2, of a rigid body `<contact>.displacement` m,
-    and `<needle>.x`.. m of its tip."""
+    total), `<weight>.acceleration` m/s^2, `<pressure>.pressure` Pa, of a rigid body
+    `<contact>.displacement` m, and `<needle>.x`.. m of its tip."""
     traces = {
         f"{d.name}.displacement": Trace(y, "m")
         for d, y in zip(scene.drives, inputs.T, strict=False)
     }
     for load, y in zip(scene.loads, inputs.T[len(scene.drives) :], strict=False):
-        kind, unit = ("acceleration", "m/s^2") if isinstance(load, Weight) else ("force", "N")
+        kind, unit = _GIVEN[type(load)]
         traces[f"{load.name}.{kind}"] = Trace(y, unit)
     paths = [name for tool in scene.tools for name in tool.inputs]
     columns = inputs.T[: inputs.shape[1] - len(paths)]

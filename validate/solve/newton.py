@@ -23,7 +23,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.scene.scene import Scene, Weight
+from validate.scene.scene import Load, Pressure, Scene, Weight
 from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.equilibrium import Balance, Equilibrium, Tangent, equilibrium
 from validate.solve.handles import LARGE_STATICS, Handles, require_handled
@@ -31,6 +31,7 @@ from validate.solve.types import Ending, State, Stepper
 
 _VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
 _NEGATIVE, _MADE = "tangent.negative_pivots", "newton.factorisations"
+_UNITS = {Load: "N", Weight: "m/s^2", Pressure: "Pa"}
 _FEW = 6  # iterations after which the next load step is twice as large
 _HALVINGS = 6  # of a Newton correction that inverts cells
 
@@ -283,7 +284,7 @@ class NewtonStepper:
     def _load_words(self, inputs: Floats) -> str:
         scene = self.scene
         drives = [f"{1e3 * d:.4g} mm" for d in inputs[: len(scene.drives)]]
-        units = ["m/s^2" if isinstance(x, Weight) else "N" for x in scene.loads]
+        units = [_UNITS[type(x)] for x in scene.loads]
         loads = zip(inputs[len(scene.drives) :], units, strict=True)
         return ", ".join(drives + [f"{x:.4g} {unit}" for x, unit in loads])
 

@@ -12,6 +12,7 @@ from validate.solve.central import CentralDifference
 from validate.solve.contact import ContactNewton
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
+from validate.solve.from_equilibrium import FromEquilibrium
 from validate.solve.guests.guest import Guest
 from validate.solve.guests.let_go import GuestLetGo
 from validate.solve.handles import Handles
@@ -50,6 +51,7 @@ SCHEMES: tuple[type[Scheme], ...] = (
     NewtonDynamics,
     Modal,
     QuasiStatic,
+    FromEquilibrium,
     ContactNewton,
     NeedleLoop,
     AsyncRegions,

@@ -1,0 +1,221 @@
+"""`validate new` of bodies that move in time, on another code's recordings.
+
+The recordings are those of `benchmarks/moving_bodies.py`.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.moving_bodies import written
+from validate.cli.main import cli
+from validate.cli.new_motion import damping, held
+from validate.compare.result import Result
+from validate.errors import UsageError
+from validate.register.markers import MarkerObservation
+from validate.replay import compare
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.followed import Followed
+from validate.replay.options import folder_of
+from validate.replay.solved import solve
+
+
+def called(*arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(cli, list(arguments), standalone_mode=False)
+    if done.exception is not None:
+        return 2, str(done.exception)
+    return int(done.return_value or 0), done.output
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("moving")
+    for name in ("swinging", "pushed", "chamber"):
+        written(name, folder)
+    return folder
+
+
+@pytest.fixture
+def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    for file in made.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def new(here: Path, name: str, *changes: tuple[str, str]) -> tuple[int, str]:
+    """`validate new` with the answers of the benchmark, some texts of them replaced."""
+    text = (here / f"{name}.toml").read_text("utf-8")
+    for old, other in changes:
+        assert old in text
+        text = text.replace(old, other)
+    (here / "a.toml").write_text(text, "utf-8")
+    return called("new", "mine", "--from", f"{name}.mcap", "--answers", "a.toml", "--force")
+
+
+def experiment(here: Path) -> Experiment:
+    return load_file(here / "experiments" / "mine.py")
+
+
+def run(of: Experiment, method: str) -> Followed:
+    recordings = of.load(of.parameters, folder_of(of))
+    return solve(of, recordings, method, of.methods[method], of.parameters)
+
+
+def off(followed: Followed) -> float:
+    """Rms m of the markers' residuals, per axis."""
+    values = [r.values for r in followed.residuals.values()]
+    return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
+
+
+STATIC = ('how = "dynamic", damping = "0.003s"', 'how = "static"')
+
+
+@pytest.mark.parametrize(("name", "within", "still"), [("swinging", 1e-4, 5e-4),
+                                                       ("pushed", 1e-4, 5e-4)])  # fmt: skip
+def test_answers_make_a_motion_that_is_another_codes(
+    here: Path, name: str, within: float, still: float
+) -> None:
+    """Within a tenth of what statics is off by; the file is short and has the methods."""
+    code, said = new(here, name)
+    assert code == 0, said
+    assert len((here / "experiments" / "mine.py").read_text("utf-8").splitlines()) <= 60
+    mine = experiment(here)
+    assert set(mine.methods) >= {"implicit", "modal", "explicit", "static", "reduced_kf", "roukf"}
+    assert off(run(mine, "implicit")) < within
+    assert off(run(mine, "modal")) < within
+    assert off(run(mine, "static")) > still
+    filtered = run(mine, "reduced_kf")
+    assert filtered.run.finished
+    assert off(filtered) < within
+
+
+def test_a_pressure_over_time_moves_the_wall_of_a_chamber(here: Path) -> None:
+    """Within the noise of the markers, 20 um."""
+    assert new(here, "chamber")[0] == 0
+    mine = experiment(here)
+    assert off(run(mine, "implicit")) < 2.5e-5
+    text = (here / "experiments" / "mine.py").read_text("utf-8")
+    assert len(text.splitlines()) <= 60
+    assert "by='pressure', place='inner'" in text
+
+
+def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(here: Path) -> None:
+    new(here, "swinging")
+    mine = experiment(here)
+    recordings = mine.load(mine.parameters, folder_of(mine))
+    assert mine.follows(mine, recordings, mine.parameters).axis == "z"
+    followed = run(mine, "modal")
+    markers = followed.seen.of(MarkerObservation)[0]
+    assert len(markers.t) == 350  # samples after 0.25 s of 2 s, at 200 Hz
+    assert markers.sd_t == pytest.approx(0.005 / np.sqrt(12))
+
+
+def test_what_rings_is_proposed_as_dynamic_and_its_questions_are_open(here: Path) -> None:
+    code, said = new(here, "pushed", ('motion = {how = "dynamic", damping = "0.003s"}\n', ""))
+    assert code == 2
+    assert "motion.damping (damping: of the stiffness as a time" in said
+    listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
+    assert 'motion.how = "dynamic"' in listing[1]
+    assert "first mode of the body at 2.93 Hz: inertia matters" in listing[1]
+
+
+@pytest.mark.parametrize(("change", "why"), [
+    (('held = "0.015N"', 'held = "0.015"'), "a force as 0.2N or a displacement as 5mm"),
+    (('damping = "0.003s"', 'damping = "heavy"'), "motion.damping = heavy"),
+    (STATIC, "motion.how = static: a release is a motion in time"),
+])  # fmt: skip
+def test_wrong_answers_are_named(here: Path, change: tuple[str, str], why: str) -> None:
+    changes = [change]
+    if change is STATIC:
+        changes += [(', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""),
+                    (', held = "0.015N"', "")]  # fmt: skip
+    code, said = new(here, "swinging", *changes)
+    assert (code, why in said) == (2, True), said
+
+
+def test_answers_on_damping_and_release_are_parameters() -> None:
+    assert damping("3ms") == ("motion.stiffness_damping", "3ms")
+    assert damping("0.03") == ("motion.damping_ratio", "0.03")
+    assert held("5mm") == ("motion.held_displacement", "5mm")
+    with pytest.raises(UsageError):
+        held("5")
+
+
+def test_a_release_from_a_displacement_is_one_from_its_force(here: Path) -> None:
+    """The end of the beam hangs by 3.87 mm under the 15 mN of the benchmark."""
+    new(here, "swinging")
+    by_force = run(experiment(here), "modal")
+    sag = -by_force.seen.inputs[0, 0]
+    assert sag == pytest.approx(0.015)
+    new(here, "swinging", ('held = "0.015N"', 'held = "3.87mm"'))
+    found = -run(experiment(here), "modal").seen.inputs[0, 0]
+    assert found == pytest.approx(0.015, rel=0.01)
+
+
+def test_a_damping_ratio_is_that_of_the_first_mode(here: Path) -> None:
+    """beta = 2 zeta / w: the benchmark's 3 ms are 2.64 % of critical at 2.8 Hz."""
+    new(here, "swinging", ('damping = "0.003s"', 'damping = "0.0264"'))
+    mine = experiment(here)
+    assert mine.parameters.motion.damping_ratio == 0.0264
+    scene = run(mine, "modal").body
+    assert scene.material.stiffness_damping == pytest.approx(3e-3, rel=0.01)
+
+
+def test_identified_damping_is_fitted_and_only_later_is_evidence(here: Path) -> None:
+    fitted = ('damping = "0.003s"', 'damping = "identified", fit_window = "1.2s"')
+    assert new(here, "swinging", fitted, (', damping = "2%"', ""))[0] == 0
+    mine = experiment(here)
+    recordings = mine.load(mine.parameters, folder_of(mine))
+    assert mine.identify is not None
+    found = mine.identify(recordings, mine.parameters, mine.methods)
+    assert found.parameters.motion.stiffness_damping == pytest.approx(3e-3, rel=0.05)
+    assert found.calibrated == ("tip@first", "middle@first", "side@first")
+    assert "identified, not predicted" in " ".join(found.notes)
+    labels = {s.label: len(s.t) for s in run(mine, "static").seen.selections if s.t is not None}
+    assert labels == {"first": 240, "later": 110}
+
+
+def judged(result: Result) -> set[tuple[str, str]]:
+    return {(c.validation, c.acceptance) for c in result.checks}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["swinging", "pushed", "chamber"])
+def test_true_constants_are_good_enough(here: Path, name: str) -> None:
+    new(here, name)
+    result = compare(experiment(here))
+    assert judged(result) == {("not distinguishable", "good enough")}
+    assert result.sentence.startswith("dynamic: recorded motion mostly at")
+    assert not [e for e in result.exhibits if e.anchor == "likely-causes"]
+
+
+@pytest.mark.slow
+def test_statics_of_a_pushed_beam_names_inertia_first(here: Path) -> None:
+    new(here, "pushed", STATIC, (', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""))
+    result = compare(experiment(here))
+    assert ("differs", "not good enough") in judged(result)
+    assert "statics, although inertia matters" in result.sentence
+    assert "Likely causes, in order: inertia" in result.sentence
+    assert any("answer motion.how = dynamic" in w for w in result.warnings)
+
+
+@pytest.mark.slow
+def test_a_wrong_modulus_is_named_by_its_frequency(here: Path) -> None:
+    new(here, "swinging", ("E = 165000", "E = 250000"))
+    result = compare(experiment(here))
+    assert "Likely causes, in order: " in result.sentence
+    causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0].rows
+    assert {str(row[2]) for row in causes} >= {"modulus or density"}
+
+
+@pytest.mark.slow
+def test_large_strain_agrees_where_strains_are_small(here: Path) -> None:
+    new(here, "swinging", ('law = "linear"', 'law = "neo_hooke"'))
+    mine = experiment(here)
+    assert mine.accepted == ("large",)
+    assert off(run(mine, "large")) < 1.5e-4

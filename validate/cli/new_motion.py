@@ -1,0 +1,272 @@
+"""Questions about a body that moves in time, and the methods of its experiment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.cli.asking import Answers, Question
+from validate.cli.new_body_questions import NONE, by_path, parsed
+from validate.errors import UsageError, ValidateError
+from validate.fem.system import build
+from validate.parameters import with_values
+from validate.recording.types import Recording
+from validate.replay.first_modes import first_frequencies
+from validate.replay.measured_body import static_scene
+from validate.replay.measured_cards import MeasuredBody, SolidModel
+from validate.replay.measured_drive import RELEASE, drive_kind
+from validate.replay.moving_body import against_mode
+from validate.replay.moving_seen import motion_of, started, steps_of, without_rest
+from validate.replay.recorded_motion import FRACTION
+from validate.scene.mesh import Mesh
+from validate.scene.named_place import axis_of
+from validate.scene.scene import Scene
+from validate.solve.explicit_linear import ExplicitLinear, stable_step
+from validate.units import in_si, split
+
+DYNAMIC, STATIC, IDENTIFIED = "dynamic", "static", "identified"
+_ACROSS = 2  # cells across the shortest side: a bending body with one is too stiff
+_UNKNOWNS = 6000  # of quadratic cells, at most
+_FILTERED = 900  # unknowns of a filter of all nodes: its modes are all taken
+_MARGIN = 0.9  # of the critical step
+_LOAD = 0.1  # of its largest value: how unsure a filter is of the load
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The class of method that the recording asks for, and why."""
+
+    how: str
+    why: str
+
+
+def proposal(recording: Recording, p: MeasuredBody, folder: Path) -> Proposal:
+    """Dynamic where the recorded motion has what statics would miss, against the body's first mode
+    (or rings down, where its modulus is unknown)."""
+    try:
+        shown = motion_of(recording, _topic(recording, p))
+    except ValidateError as none:
+        return Proposal(STATIC, str(none))
+    first = _first(recording, p, folder) if p.material.E else None
+    facts = against_mode(shown, first)
+    if shown.inertia_matters(first):
+        return Proposal(DYNAMIC, f"{facts}: inertia matters from {FRACTION:.2g} of it on")
+    return Proposal(STATIC, f"{facts}: slow enough for statics")
+
+
+def _topic(recording: Recording, p: MeasuredBody) -> str | None:
+    return p.seen.markers if p.seen.markers in recording.markers else None
+
+
+def _first(recording: Recording, p: MeasuredBody, folder: Path) -> float | None:
+    try:
+        return first_frequencies(_scene(recording, p, folder, 2), 1)[0]
+    except (ValidateError, np.linalg.LinAlgError):
+        return None
+
+
+def _scene(recording: Recording, p: MeasuredBody, folder: Path, order: int) -> Scene:
+    model = SolidModel("linear", 2 if order == 2 else 1)
+    return static_scene(recording, p, model, folder)
+
+
+# --- questions ------------------------------------------------------------------------------------
+
+
+def motion_questions(
+    recording: Recording, found: Answers, mesh: Mesh | None, values: Mapping[str, str]
+) -> list[Question]:
+    """Whether the motion in time is solved, and what follows; none until the body, its supports,
+    material and load are known, or where nothing moves in time."""
+    if mesh is None or not all(found.get(k) for k in ("material.E", "material.nu", "moved.by")):
+        return []
+    if "held.slides" not in found:
+        return []
+    if found["moved.by"] == RELEASE:
+        proposed = Proposal(DYNAMIC, "a release is a motion in time")
+    else:
+        proposed = _proposed(recording, tuple(sorted(values.items())))
+    asked = [Question("motion.how", "whether the motion in time is solved (dynamic), or states of "
+                      "rest (static: no inertia)", proposed.how, proposed.why,
+                      choices=(STATIC, DYNAMIC))]  # fmt: skip
+    if found.get("motion.how") != DYNAMIC:
+        return asked
+    if found["moved.by"] != "gravity":
+        asked.append(by_path("material.rho", "density, kg/m3"))
+    asked += _of_the_start(found) + _of_the_damping(found)
+    return [
+        *asked,
+        by_path("ranges.rho", "standard uncertainty, relative, of the density"),
+        *([] if found.get("motion.damping") == IDENTIFIED else
+          [by_path("ranges.damping", "standard uncertainty, relative, of the damping")]),
+    ]  # fmt: skip
+
+
+def _of_the_start(found: Answers) -> list[Question]:
+    asked = [
+        Question("motion.start", "when the motion starts, s of the recording's clock; empty: found "
+                 "in the recording", check=parsed("motion.start")),
+        Question("motion.length", "seconds from then on that are solved; empty: to the end",
+                 check=parsed("motion.length")),
+    ]  # fmt: skip
+    if found["moved.by"] == RELEASE:
+        asked.append(Question("moved.held", "what held the place until then, along moved.along: a "
+                              "force as 0.2N, or the place's displacement as 5mm", open=True,
+                              check=held))  # fmt: skip
+    if found["moved.by"] != "gravity":
+        asked.append(Question("motion.gravity", "direction of a weight that acts all the time, as "
+                              "-z (it changes the motion at large strain alone); empty: none",
+                              check=axis_of))  # fmt: skip
+    return asked
+
+
+def _of_the_damping(found: Answers) -> list[Question]:
+    asked = [Question("motion.damping", "damping: of the stiffness as a time (beta, 3ms), a share "
+                      f"of the critical one at the first mode (0.03), or {IDENTIFIED} on the first "
+                      "part of a ring-down", open=True, check=damping)]  # fmt: skip
+    if found.get("motion.damping") == IDENTIFIED:
+        asked.append(by_path("motion.fit_window", "seconds from the start on which it is "
+                             "identified; only what comes later is evidence"))  # fmt: skip
+    return asked
+
+
+def held(text: str) -> tuple[str, str]:
+    """The parameter that the answer is of, and its value."""
+    parts = split(text)
+    for unit, name in (("N", "motion.held_force"), ("m", "motion.held_displacement")):
+        if parts and parts[1] and in_si(parts[0], parts[1], unit) is not None:
+            return name, text
+    raise UsageError("a force as 0.2N or a displacement as 5mm is expected, with its unit")
+
+
+def damping(text: str) -> tuple[str, str]:
+    """The parameter that the answer is of, and its value."""
+    if text == IDENTIFIED:
+        return "", text
+    parts = split(text)
+    name = "motion.stiffness_damping" if parts and parts[1] else "motion.damping_ratio"
+    parsed(name)(text)
+    return name, text
+
+
+def motion_values(found: Answers) -> dict[str, str]:
+    """Parameters by path that the answers on release and damping set."""
+    asked = [held(found["moved.held"])] if found.get("moved.held") else []
+    asked += [damping(found["motion.damping"])] if found.get("motion.damping") else []
+    return {name: text for name, text in asked if name}
+
+
+class _Remembered:
+    """The last proposal with its recording and answers: questions are listed again and again."""
+
+    last: tuple[Recording, tuple[tuple[str, str], ...], Proposal] | None = None
+
+
+def _proposed(recording: Recording, values: tuple[tuple[str, str], ...]) -> Proposal:
+    last = _Remembered.last
+    if last and last[0] is recording and last[1] == values:
+        return last[2]
+    found = proposal(recording, with_values(MeasuredBody(), dict(values)), Path())
+    _Remembered.last = (recording, values, found)
+    return found
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def cells_for(p: MeasuredBody) -> int:
+    """Cells along the longest edge of a block or cylinder: two across the shortest, as long as the
+    quadratic mesh stays small."""
+    sides = p.body.block or tuple(p.body.cylinder)
+    if not sides:
+        return p.body.cells
+    wanted = ceil(_ACROSS * max(sides) / min(sides) - 1e-9)
+    share = np.prod([s / max(sides) for s in sides]) ** (1 / 3)  # of a cube as large
+    most = int(((_UNKNOWNS / 3) ** (1 / 3) - 1) / 2 / share)
+    return max(p.body.cells, min(wanted, most))
+
+
+def moving_methods(recording: Recording, p: MeasuredBody, law: str, order: int) -> list[str]:
+    """Lines of the methods: schemes with inertia, statics beside them, filters that are given one
+    of the markers, where two are recorded."""
+    lines = [f'"implicit": moving("implicit", order={order}),',
+             f'"explicit": moving("explicit", order=1, split={_parts(recording, p)}),',
+             f'"static": moving("static", order={order}),']  # fmt: skip
+    if law != "linear":
+        lines.insert(0, f'"large": moving("large", "{law}", {order}),')
+    lines += _filters(recording, p, order)
+    return [*lines, f'"modal": moving("modal", order={order}),']
+
+
+def _parts(recording: Recording, p: MeasuredBody) -> int:
+    """Explicit steps in one of the recording's."""
+    system = build(_scene(recording, p, Path(), 1))
+    limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
+    cut = started(recording, p).recording
+    return max(1, ceil(float(steps_of(without_rest(p), cut)[0]) / limit))
+
+
+def _filters(recording: Recording, p: MeasuredBody, order: int) -> list[str]:
+    names = judged_markers(recording, p)
+    if len(names) < 2:
+        return []
+    given = _given(recording, p, names)
+    kind, lines = drive_kind(recording, p), []
+    small = _scene(recording, p, Path(), 1).mesh.nodes.size <= _FILTERED
+    if small:
+        lines.append(f'"kf_fem": moving("kf_fem", order=1, markers=({given!r},)),')
+    if kind in ("moves", "follows"):
+        if small:
+            lines.append(f'"modal_kf": moving("modal_kf", order=1, markers=({given!r},)),')
+        return lines
+    unsure = _LOAD * _largest(recording, p, kind)
+    return [
+        *lines,
+        f'"reduced_kf": moving("reduced_kf", order={order}, markers=({given!r},), '
+        f"load_start={unsure:.3g}, load_walk={unsure:.3g}),",
+        f'"roukf": moving("roukf", order={order}, markers=({given!r},)),',
+    ]  # fmt: skip
+
+
+def _given(recording: Recording, p: MeasuredBody, names: tuple[str, ...]) -> str:
+    """The marker that moves most of all but the one that moves most: that one is predicted."""
+    seen = recording.marker(str(p.seen.markers))
+    x = {n: seen.x[:, seen.names.index(n)] for n in names}
+    sizes = sorted(names, key=lambda n: -float(np.nanmax(np.ptp(_seen(x[n]), axis=0), initial=0.0)))
+    return sizes[1]
+
+
+def _seen(x: Floats) -> Floats:
+    kept = x[np.isfinite(x).all(axis=1)]
+    return kept if len(kept) else np.zeros((1, x.shape[1]))
+
+
+def _largest(recording: Recording, p: MeasuredBody, kind: str) -> float:
+    """Of the load, in its unit."""
+    if kind == "weighs":
+        return p.moved.amount
+    if kind == "releases":
+        return p.motion.held_force or 0.1
+    return float(np.ptp(recording.signals[p.moved.by].y))
+
+
+def judged_markers(recording: Recording, p: MeasuredBody) -> tuple[str, ...]:
+    """Markers that are compared: all of the topic but those that move the body."""
+    if not p.seen.markers:
+        return ()
+    return tuple(n for n in recording.marker(p.seen.markers).names if n not in p.moved.markers)
+
+
+def require_dynamic(found: Answers) -> None:
+    """Raises `UsageError` for a release that is to be solved as statics, and for outlines of a
+    motion in time."""
+    if found.get("moved.by") == RELEASE and found.get("motion.how") != DYNAMIC:
+        raise UsageError("motion.how = static: a release is a motion in time; answer dynamic")
+    if found.get("motion.how") == DYNAMIC and found.get("seen.outline", NONE) != NONE:
+        raise UsageError(
+            "seen.outline: outlines are compared of static states alone; answer none, or "
+            "motion.how = static"
+        )

@@ -1,0 +1,338 @@
+"""Likely causes of a difference between a computed and a measured motion, in order.
+
+Each cause is a correction of the computed motion with one or two numbers: a lag of the clock, a
+factor (unit, or load over modulus), an oscillator in place of statics, another frequency, another
+damping, a cubic stiffening, a loop between loading and unloading, one marker left out. The share of
+the residual's mean square that the best correction removes ranks them. A share says what the
+residual looks like, not what is true: each cause names the measurement or run that would tell.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from scipy.signal import cont2discrete
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Exhibit, NumberTable
+from validate.compare.result import MethodResult
+from validate.errors import ValidateError
+from validate.identify.ringing import Ringing
+from validate.register.markers import MarkerObservation
+from validate.replay.first_modes import first_frequencies
+from validate.replay.followed import Followed
+from validate.replay.recorded_motion import RecordedMotion, recorded_motion
+from validate.scene.scene import Scene
+
+_FEWEST = 16  # samples
+_LEAST = 0.05  # of the residual: a correction that removes less is no cause
+_LAGS = 101  # that are tried
+_REACH = 0.25  # of the recorded period: the longest lag
+_DAMPING = 0.03  # of the oscillator, where no ring-down was recorded
+_UNITS = (1e3, 1e-3, 1e6, 1e-6, 25.4, 1 / 25.4, 10.0, 0.1, 9.80665, 1 / 9.80665)
+_UNIT = 0.03  # how near a factor must come to one of them
+_ODD = 2.0  # times the others' relative error: a marker alone
+
+
+@dataclass(frozen=True)
+class Cause:
+    """It removes a `share` of the residual's mean square; `words` on what is seen, what `tells`."""
+
+    name: str
+    share: float
+    words: str
+    tells: str
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Measured and simulated displacements (nt, k, d) m of named markers at t (nt,) s, NaN = not
+    seen; `inertia` says whether the simulation has any, `first` Hz is the body's first mode,
+    `noise` m that of a measured component."""
+
+    t: Floats
+    names: tuple[str, ...]
+    measured: Floats
+    simulated: Floats
+    inertia: bool
+    first: float | None
+    noise: float = 0.0
+
+    def explained(self, other: Floats) -> float:
+        """Share 0..1 of the residual's mean square that is gone with another simulation."""
+        return 1 - _square(other - self.measured) / _square(self.simulated - self.measured)
+
+
+def likely_causes(found: Motions) -> tuple[Cause, ...]:
+    """Those that remove a twentieth of the residual or more, the best first."""
+    size = float(np.nanmax(np.abs(found.measured), initial=0.0))
+    if len(found.t) < _FEWEST or not size > 0 or not _square(found.simulated - found.measured) > 0:
+        return ()
+    shown = _motion(found.t, found.names, found.measured)
+    tried = (_inertia, _frequency, _damping, _law, _loop, _clock, _marker, _factor)
+    causes = [cause for one in tried if (cause := one(found, shown)) and cause.share >= _LEAST]
+    return tuple(sorted(causes, key=lambda c: -c.share))
+
+
+def _square(x: Floats) -> float:
+    return float(np.nanmean(x**2))
+
+
+def _motion(t: Floats, names: tuple[str, ...], x: Floats) -> RecordedMotion | None:
+    try:
+        return recorded_motion(t, {n: x[:, j] for j, n in enumerate(names)})
+    except ValidateError:
+        return None
+
+
+# --- causes ---------------------------------------------------------------------------------------
+
+
+def _inertia(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """Statics drives one oscillator at the body's first mode."""
+    if found.inertia or found.first is None or shown is None:
+        return None
+    damping = shown.ringing.damping if shown.ringing else _DAMPING
+    moved = _oscillated(found.t, found.simulated, found.first, float(np.clip(damping, 0, 0.9)))
+    share = found.explained(moved)
+    if shown.inertia_matters(found.first):
+        share = max(share, 1.0)  # the model cannot have it, whatever else is wrong
+    return Cause(
+        "inertia", share,
+        f"the recorded motion is mostly at {shown.frequency:.3g} Hz, the body's first mode at "
+        f"{found.first:.3g} Hz, and the method has no inertia",
+        "answer motion.how = dynamic in `validate new`; or record the same load more slowly",
+    )  # fmt: skip
+
+
+def _oscillated(t: Floats, u: Floats, first: float, damping: float) -> Floats:
+    """q'' + 2 z w q' + w^2 q = w^2 u, from rest where u begins."""
+    w, h = 2 * np.pi * first, float(np.median(np.diff(t)))
+    A, B, C, D = np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [w * w]]), np.array(
+        [[1, 0]]
+    ), np.zeros((1, 1))  # fmt: skip
+    A, B, *_ = cont2discrete((A, B, C, D), h, "zoh")
+    known = np.nan_to_num(u).reshape(len(u), -1)
+    x, q = np.zeros((2, known.shape[1])), np.empty_like(known)
+    for i, force in enumerate(known):
+        x = A @ x + B * force
+        q[i] = x[0]
+    return np.asarray(q.reshape(u.shape))
+
+
+def _rung(found: Motions, shown: RecordedMotion | None) -> tuple[Ringing, Ringing] | None:
+    """How the marker that moves most rings, measured and simulated."""
+    if shown is None or not found.inertia:
+        return None
+    j = found.names.index(shown.marker)
+    other = _motion(found.t, (shown.marker,), found.simulated[:, [j]])
+    if other is None or shown.ringing is None or other.ringing is None:
+        return None
+    return shown.ringing, other.ringing
+
+
+def _frequency(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """The simulation on a clock that runs as fast as it rings too slowly."""
+    rung = _rung(found, shown)
+    if rung is None:
+        return None
+    ratio = rung[0].frequency / rung[1].frequency
+    since = found.t[0] + ratio * (found.t - found.t[0])
+    return Cause(
+        "modulus or density", found.explained(_at(found, since)),
+        f"it rings at {rung[0].frequency:.4g} Hz, simulated at {rung[1].frequency:.4g} Hz: as if "
+        f"E / rho were {ratio**2:.3g} times the given one",
+        "weigh the body (rho); identify E on a static log; --set material.E=VALUE",
+    )  # fmt: skip
+
+
+def _damping(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """The simulated swing about its end fades as the recorded one does."""
+    rung = _rung(found, shown)
+    if rung is None:
+        return None
+    faster = 2 * np.pi * (rung[0].frequency * rung[0].damping - rung[1].frequency * rung[1].damping)
+    last = np.nanmean(found.simulated[-max(len(found.t) // 4, 1) :], axis=0)
+    fade = np.exp(-np.clip(faster * (found.t - found.t[0]), -5, 50))[:, None, None]
+    return Cause(
+        "damping", found.explained(last + (found.simulated - last) * fade),
+        f"its ring-down has a ratio of {rung[0].damping:.3g}, simulated {rung[1].damping:.3g}",
+        "identify it on the first part: motion.fit_window=SECONDS",
+    )  # fmt: skip
+
+
+def _law(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """A part that grows as the cube of the motion, beyond one in proportion to it."""
+    u, y = found.simulated, found.measured
+    cube = u * np.linalg.norm(np.nan_to_num(u), axis=2, keepdims=True) ** 2
+    return Cause(
+        "law", found.explained(_fit((u, cube), y)) - found.explained(_fit((u,), y)),
+        "the residual grows faster than the motion: another law at large strain",
+        'run a method of another law beside it: moving("large", "neo_hooke"), or '
+        'solid("...", "neo_hooke")',
+    )  # fmt: skip
+
+
+def _loop(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """Another sign where the motion goes back: friction in a support or contact, or a relaxing
+    material."""
+    u, y = found.simulated, found.measured
+    if found.inertia:
+        return None  # a loop is a lag there, or damping
+    back = np.abs(u) * np.sign(np.nan_to_num(np.gradient(u, found.t, axis=0)))
+    return Cause(
+        "contact or friction", found.explained(_fit((u, back), y)) - found.explained(_fit((u,), y)),
+        "the residual depends on whether the load rises or falls",
+        "load and unload twice, at two speeds: friction does not care, relaxation does; watch the "
+        "support by a marker on it",
+    )  # fmt: skip
+
+
+def _clock(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """One lag for all markers."""
+    if shown is None:
+        return None
+    whole = float(found.t[-1] - found.t[0])
+    reach = _REACH * min(1 / shown.frequency if shown.frequency > 0 else whole, whole)
+    lags = np.linspace(-reach, reach, _LAGS)
+    shares = [found.explained(_at(found, found.t - lag)) for lag in lags]
+    best = int(np.argmax(shares))
+    lag = lags[best]
+    return Cause(
+        "clock", shares[best],
+        f"the recorded motion comes {1e3 * lag:+.3g} ms later than the simulated one",
+        "`validate align` the files, or set motion.start; tap the body once where both see it",
+    )  # fmt: skip
+
+
+def _marker(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """Two markers whose names were exchanged, or one that is far worse than the others."""
+    k = len(found.names)
+    if k < 2:
+        return None
+    swapped = _swapped(found)
+    if swapped:
+        return swapped
+    each = [_square((found.simulated - found.measured)[:, j]) for j in range(k)]
+    off = np.maximum(np.array(each) - found.noise**2, 0.0)
+    size = np.array([max(_square(found.measured[:, j]), 1e-30) for j in range(k)])
+    odd = np.sqrt(off / size)
+    worst = int(odd.argmax())
+    rest = float(np.median(np.delete(odd, worst)))
+    if not odd[worst] > _ODD * rest or not off[worst] > found.noise**2:
+        return None
+    share = float(off[worst] / off.sum())
+    return Cause(
+        "wrong marker", share * (1 - rest / odd[worst]),
+        f"'{found.names[worst]}' is off by {100 * odd[worst]:.3g} % of its own motion, the others "
+        f"by {100 * rest:.3g} %",
+        f"look whether '{found.names[worst]}' is the marker that the layout calls so, and still "
+        "glued on",
+    )  # fmt: skip
+
+
+def _swapped(found: Motions) -> Cause | None:
+    """The best exchange of two names, where it removes most of the residual."""
+    best: tuple[float, int, int] = (0.5, 0, 0)
+    for i, j in permutations(range(len(found.names)), 2):
+        if i < j:
+            order = list(range(len(found.names)))
+            order[i], order[j] = j, i
+            best = max(best, (found.explained(found.simulated[:, order]), i, j))
+    share, i, j = best
+    if i == j:
+        return None
+    return Cause(
+        "wrong marker", share,
+        f"'{found.names[i]}' moves as '{found.names[j]}' should, and the other way round",
+        "exchange the two names in the layout or the recording",
+    )  # fmt: skip
+
+
+def _factor(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+    """One factor for everything: a wrong unit where it is one, else load over modulus."""
+    u, y = found.simulated, found.measured
+    seen = np.isfinite(u) & np.isfinite(y)
+    factor = float((u[seen] @ y[seen]) / max(float(u[seen] @ u[seen]), 1e-300))
+    share = found.explained(factor * u)
+    unit = next((x for x in _UNITS if abs(factor / x - 1) < _UNIT), None)
+    if unit:
+        return Cause(
+            "wrong unit", share, f"measured is {factor:.4g} times simulated: near {unit:.4g}",
+            "compare one length of the body, and one load, with a ruler and a scale",
+        )  # fmt: skip
+    return Cause(
+        "load or modulus", share, f"measured is {factor:.3g} times simulated, everywhere and "
+        "always: as if load over modulus were so many times the given one",
+        "identify E on a static log with a force; calibrate the force",
+    )  # fmt: skip
+
+
+def _fit(basis: Sequence[Floats], y: Floats) -> Floats:
+    """The best combination of the basis."""
+    seen = np.isfinite(y) & np.all([np.isfinite(b) for b in basis], axis=0)
+    A = np.stack([b[seen] for b in basis], axis=1)
+    factors = np.linalg.lstsq(A, y[seen], rcond=None)[0]
+    return np.asarray(sum(c * b for c, b in zip(factors, basis, strict=True)))
+
+
+def _at(found: Motions, t: Floats) -> Floats:
+    """The simulated motion at other times, at rest before the first."""
+    u = np.nan_to_num(found.simulated).reshape(len(found.t), -1)
+    before = np.vstack([np.zeros(u.shape[1]), u])
+    times = np.append(2 * found.t[0] - found.t[1], found.t)
+    moved = np.stack([np.interp(t, times, column) for column in before.T], axis=1)
+    return np.asarray(moved.reshape(found.simulated.shape))
+
+
+# --- of a run -------------------------------------------------------------------------------------
+
+
+def motions_of(followed: Followed, inertia: bool) -> Motions | None:
+    """The motion of the first recording's markers beside the run's; None where there is none in
+    time."""
+    seen = followed.seen.of(MarkerObservation)
+    if not seen or not followed.whole or not isinstance(followed.scene, Scene):
+        return None
+    markers = seen[0]
+    if len(markers.t) < _FEWEST:
+        return None
+    measured = markers.x - markers.rest
+    off = markers.left(followed.run).reshape(measured.shape)
+    try:
+        first = first_frequencies(followed.scene, 1)[0]
+    except (ValidateError, np.linalg.LinAlgError):
+        first = None
+    simulated = measured + off
+    return Motions(markers.t, markers.names, measured, simulated, inertia, first, markers.sd)
+
+
+def explained_by(
+    results: Sequence[MethodResult], motions: Callable[[str], Motions | None]
+) -> tuple[str, tuple[Exhibit, ...]]:
+    """A sentence with the likeliest cause of the first method with a check that fails, and a table
+    of all causes by method; nothing where every check passes or nothing moved in time."""
+    rows, sentence = [], ""
+    for method in results:
+        failed = [c.name for c in method.checks
+                  if "differs" in (c.validation, c.acceptance)
+                  or c.acceptance == "not good enough"]  # fmt: skip
+        found = motions(method.name) if failed else None
+        causes = likely_causes(found) if found else ()
+        if causes and not sentence:
+            names = ", ".join(c.name for c in causes[:3])
+            sentence = f" Likely causes, in order: {names}: {causes[0].words}; {causes[0].tells}."
+        rows += [(method.label, i, c.name, 100 * min(c.share, 1.0), c.words, c.tells)
+                 for i, c in enumerate(causes, 1)]  # fmt: skip
+    if not rows:
+        return "", ()
+    table = NumberTable(
+        "likely_causes",
+        "What the residual looks like, and how much of its mean square would be gone. Shares "
+        "overlap; they rank causes and prove none.",
+        ("method", "order", "cause", "share / %", "what is seen", "what would tell"),
+        tuple(rows), below="what would tell",
+    )  # fmt: skip
+    return sentence, (Exhibit("likely-causes", "Likely causes of the difference", (),
+                              tables=(table,)),)  # fmt: skip

@@ -1,0 +1,305 @@
+"""A measured body in motion: the methods of its dynamics, its damping, and what is uncertain of it.
+
+One scene, one registration and one error budget for everything that moves a body: a release, a
+weight, a force, a pressure or a displacement over time. What differs is the load alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from validate.compare.score import Score
+from validate.errors import ComparisonError, UsageError, ValidateError
+from validate.estimate.kf_fem import KfFem
+from validate.estimate.modal_kf import ModalKf
+from validate.estimate.reduced_kf import ReducedKf
+from validate.estimate.roukf import Roukf
+from validate.recording.types import Recording
+from validate.register.registered import Registered
+from validate.replay.cards import moved
+from validate.replay.experiment import Experiment, Identified, Input, StepLadder
+from validate.replay.first_modes import first_frequencies
+from validate.replay.measured_cards import MeasuredBody, SolidModel
+from validate.replay.method import Method
+from validate.replay.motion_exhibit import motion_exhibit
+from validate.replay.moving_seen import (
+    FIRST,
+    motion_of,
+    moving_markers,
+    place_moving,
+    preload,
+    started,
+    without_rest,
+)
+from validate.replay.recorded_motion import RecordedMotion
+from validate.scene.material import LawName
+from validate.scene.scene import Probe, Scene
+from validate.solve.explicit_linear import ExplicitLinear
+from validate.solve.from_equilibrium import FromEquilibrium
+from validate.solve.modal import Modal
+from validate.solve.newmark import Newmark
+from validate.solve.quasi_static import QuasiStatic
+
+MovingName = Literal[
+    "implicit",
+    "modal",
+    "explicit",
+    "large",
+    "static",
+    "kf_fem",
+    "modal_kf",
+    "reduced_kf",
+    "roukf",
+]
+_MODES = 20
+_SCHEMES: Mapping[str, tuple[Any, str]] = {
+    "implicit": (Newmark(), "dynamic, implicit (Newmark), {law}"),
+    "modal": (Modal(modes=_MODES), "dynamic, {modes} modes and the statics of the rest, {law}"),
+    "explicit": (
+        ExplicitLinear(damping_terms="full"), "dynamic, explicit (central differences), {law}"
+    ),
+    "large": (FromEquilibrium(), "dynamic at large strain, implicit (Newton), {law}"),
+    "static": (QuasiStatic(), "quasi-static: no inertia, {law}"),
+    "kf_fem": (KfFem(gains="shared"), "Kalman filter of all nodes (KF-FEM), {law}"),
+    "reduced_kf": (ReducedKf(modes=_MODES), "Kalman filter of {modes} modes and the load, {law}"),
+    "modal_kf": (ModalKf(), "Kalman filter of all modes (KF-FEM's), {law}"),
+    "roukf": (Roukf(), "unscented filter of the modulus, {law}"),
+}  # fmt: skip
+
+
+def moving(
+    name: MovingName,
+    law: LawName = "linear",
+    order: Any = 2,
+    *,
+    markers: tuple[str, ...] = (),
+    split: int = 1,
+    **settings: Any,
+) -> Method:
+    """A method of a moving body, by name: schemes with inertia, statics beside them, and filters
+    that are given `markers`. `split` steps in one of the recording's, for the explicit one;
+    `settings` are those of the scheme or filter."""
+    scheme, words = _SCHEMES[name]
+    cells = "quadratic cells" if order == 2 else "linear cells"
+    label = words.format(law=f"{law} law, {cells}", modes=_MODES)
+    if markers:
+        label += f", given {', '.join(markers)}"
+    return Method(
+        label, replace(scheme, **settings), SolidModel(law, order), markers=markers, split=split
+    )
+
+
+def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
+    """The experiment with the motion of its body in place of static states."""
+    assert bare.uncertainty is not None
+    cheap = "modal" if "modal" in bare.methods else bare.accepted[0]
+    linear = "implicit" if "implicit" in bare.methods else cheap
+    judged = [name for name in bare.accepted if bare.methods[name].scene.law != "linear"]
+    uncertainty = replace(
+        bare.uncertainty, steps=StepLadder(2.0), surrogate=cheap, inputs=(
+            *bare.uncertainty.inputs, *_INPUTS
+        ), stand_in=dict.fromkeys(judged, linear),
+    )  # fmt: skip
+    return replace(
+        bare,
+        build=partial(_build, build=build, folder=folder),
+        place=partial(place_moving, folder=folder),
+        sets=_sets,
+        identify=partial(_identify, build=build, folder=folder),
+        follows=following,
+        exhibits=motion_exhibit,
+        uncertainty=uncertainty,
+        frames=200,
+    )
+
+
+def following(
+    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody
+) -> Experiment:
+    """Charts follow the axis of the largest recorded motion, where something moved."""
+    try:
+        axis = motion_of(recordings[0], p.seen.markers).axis
+    except ValidateError:
+        return experiment
+    return replace(experiment, axis=axis)
+
+
+# --- the scene ------------------------------------------------------------------------------------
+
+
+def _build(
+    recording: Recording, p: MeasuredBody, model: SolidModel, *, build: Any, folder: Path
+) -> Scene:
+    """The static scene with a density's damping, the weight that also acts, and the markers as
+    probes."""
+    bare: Scene = build(recording, p, model)
+    beta = _stiffness_damping(recording, p, model, build)
+    scene = replace(bare, material=replace(bare.material, stiffness_damping=beta))
+    if not p.seen.markers:
+        return scene
+    begun = started(recording, p)
+    seen = moving_markers(begun, without_rest(p), (scene.mesh, folder))
+    probes = (
+        Probe(name, tuple(at.tolist()), stands=True)
+        for name, at in zip(seen.names, seen.rest, strict=True)
+    )
+    return replace(scene, probes=tuple(probes))
+
+
+def _stiffness_damping(
+    recording: Recording, p: MeasuredBody, model: SolidModel, build: Any
+) -> float:
+    """Beta s: as given, or 2 zeta / w of the first mode (Clough & Penzien 1993, eq. 12-40)."""
+    if p.motion.damping_ratio is None:
+        return p.motion.stiffness_damping or 0.0
+    first = first_frequencies(build(recording, p, model), 1)[0]
+    return p.motion.damping_ratio / (np.pi * first)
+
+
+def _sets(p: MeasuredBody, seen: Registered) -> Mapping[str, Any]:
+    """The step, how loads begin, and what the body rests under before them."""
+    sudden = "equilibrium" if seen.sudden else "zero"
+    found: dict[str, Any] = {"dt": float(seen.t[0]), "a0": sudden}
+    rests = preload(p, seen)
+    return found | ({"preload": rests} if rests else {})
+
+
+# --- damping --------------------------------------------------------------------------------------
+
+
+def _identify(
+    recordings: Sequence[Recording],
+    p: MeasuredBody,
+    methods: Mapping[str, Method],
+    *,
+    build: Any,
+    folder: Path,
+) -> Identified:
+    """Damping, where a window is given, of the ring-down in it; and what the recording shows.
+
+    Raises `UsageError` for a modulus that stands open, `ComparisonError` for what does not ring.
+    """
+    if p.material.E is None:
+        raise UsageError(
+            "material.E is not set: of a motion in time the modulus must be known; set it, or "
+            "identify it on a static log"
+        )
+    shown = motion_of(recordings[0], p.seen.markers)
+    first = _first_of(recordings[0], p, methods, build)
+    headline = f"dynamic: {against_mode(shown, first)}"
+    seen = f"Recorded motion: {shown.words()}."
+    if p.motion.fit_window is not None:
+        p, scores, note, names = _ring_down(recordings[0], p, folder, build, methods)
+        return Identified(p, scores, (seen, note), headline, calibrated=names)
+    if p.motion.damping_ratio is not None:  # once: every mesh and method has the same damping
+        beta = _stiffness_damping(recordings[0], p, next(iter(methods.values())).scene, build)
+        p = replace(p, motion=replace(p.motion, stiffness_damping=beta, damping_ratio=None))
+    return Identified(p, (), (seen,), headline)
+
+
+def against_mode(shown: RecordedMotion, first: float | None) -> str:
+    """The recorded frequency beside the body's first natural one, in words."""
+    recorded = f"recorded motion mostly at {shown.frequency:.3g} Hz"
+    return recorded + (f", first mode of the body at {first:.3g} Hz" if first else "")
+
+
+def _first_of(
+    recording: Recording, p: MeasuredBody, methods: Mapping[str, Method], build: Any
+) -> float | None:
+    model = next(iter(methods.values())).scene
+    try:
+        return first_frequencies(build(recording, p, model), 1)[0]
+    except ValidateError:
+        return None
+
+
+def _ring_down(
+    recording: Recording, p: MeasuredBody, folder: Path, build: Any, methods: Mapping[str, Method]
+) -> tuple[MeasuredBody, tuple[Score, ...], str, tuple[str, ...]]:
+    """Parameters with beta = 2 zeta / w of the recorded ring-down in the window; every residual of
+    that window served for it."""
+    window = float(p.motion.fit_window or 0.0)
+    begun = started(recording, replace(p, motion=replace(p.motion, length=window)))
+    found = motion_of(begun.recording, p.seen.markers).ringing
+    if found is None or found.damping <= 0:
+        raise ComparisonError(
+            f"motion.fit_window = {window:g} s: no ring-down is found in it (three periods or more "
+            "that fade are needed); give motion.stiffness_damping or motion.damping_ratio"
+        )
+    w = 2 * np.pi * found.frequency
+    beta, share = 2 * found.damping / w, found.damping_sd / found.damping
+    mesh = build(recording, p, next(iter(methods.values())).scene).mesh
+    seen = moving_markers(started(recording, p), without_rest(p), (mesh, folder))
+    used = replace(
+        p, motion=replace(p.motion, stiffness_damping=beta, damping_ratio=None),
+        ranges=replace(p.ranges, damping=max(share, 1e-3)),
+    )  # fmt: skip
+    note = (
+        f"Damping was identified, not predicted: ratio {found.damping:.4f} (sd "
+        f"{found.damping_sd:.2g}) at {found.frequency:.4g} Hz, of the ring-down in the first "
+        f"{window:g} s; only what comes later is evidence."
+    )
+    score = Score(
+        "damping.ratio", found.damping, "1", 1, "identified",
+        f"share of critical damping of the ring-down in the first {window:g} s",
+    )  # fmt: skip
+    return used, (score,), note, tuple(f"{name}@{FIRST}" for name in seen.names)
+
+
+# --- what is uncertain ----------------------------------------------------------------------------
+
+
+def _denser(p: MeasuredBody, z: float) -> float:
+    return p.material.rho * (1 + z * p.ranges.rho)
+
+
+def _beta(p: MeasuredBody, z: float) -> float | None:
+    beta = p.motion.stiffness_damping
+    return beta and beta * max(1 + z * p.ranges.damping, 0.0)
+
+
+_INPUTS = (
+    Input("density", moved("material", rho=_denser), "rho within its declared uncertainty",
+          "assumed"),
+    Input("damping", moved("motion", stiffness_damping=_beta),
+          "damping within its declared uncertainty", "assumed"),
+)  # fmt: skip
+
+
+# --- statics of what moves ------------------------------------------------------------------------
+
+
+def doubting(
+    recordings: Sequence[Recording],
+    p: MeasuredBody,
+    methods: Mapping[str, Method],
+    *,
+    identify: Any,
+    build: Any,
+) -> Identified:
+    """What statics identifies; where the recording shows inertia, headline and warnings doubt it.
+
+    Of slow recordings a note says that they are quasi-static.
+    """
+    found: Identified = identify(recordings, p, methods)
+    try:
+        shown = motion_of(recordings[0], p.seen.markers)
+    except ValidateError:
+        return found
+    first = _first_of(recordings[0], found.parameters, methods, build) if p.material.E else None
+    if not shown.inertia_matters(first):
+        slow = f"Quasi-static: {against_mode(shown, first)}; inertia is small."
+        return replace(found, notes=(*found.notes, slow)) if first else found
+    why = (
+        f"statics, although inertia matters: {against_mode(shown, first)}; answer motion.how = "
+        "dynamic in `validate new`"
+    )
+    headline = f"{why}; {found.headline}" if found.headline else why
+    seen = f"Recorded motion: {shown.words()}."
+    return replace(
+        found, headline=headline, doubts=(*found.doubts, why), notes=(*found.notes, seen)
+    )

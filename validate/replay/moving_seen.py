@@ -1,0 +1,284 @@
+"""The recording of a measured body that moves in time, registered: its start, its steps, what loads
+it, and markers and force sample by sample.
+
+The body rests until the start, where the recording's clock is set to 0; loads and displacements
+count from there. The start is a sample: where a release lies between two of them, half the interval
+is the uncertainty of the clock.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError, UsageError
+from validate.recording.scatter import repeats_share
+from validate.recording.types import Markers, Recording, Signal
+from validate.register.clock import clock_sd
+from validate.register.from_rest import since_rest
+from validate.register.markers import MarkerObservation
+from validate.register.observation import EVERYTHING, Observation, Selection
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.measured_drive import (
+    RELEASE,
+    Kind,
+    drive_kind,
+    driven,
+    released_force,
+    zeroed,
+)
+from validate.replay.measured_markers import BodyAt, markers_topic, registered
+from validate.replay.recorded_motion import RecordedMotion, recorded_motion
+from validate.scene.scene import Scene
+
+FIRST, LATER = "first", "later"
+SUDDEN: tuple[Kind, ...] = ("weighs", "releases")
+_PER_PERIOD = 40  # steps in the recorded period: average acceleration is then off by 0.2 % in it
+_MOST = 20_000  # steps
+_FEWEST = 8  # samples of a window
+_SAME = 1e-9  # s
+
+
+@dataclass(frozen=True)
+class Started:
+    """A recording whose clock is 0 at the start, its first sample the mean of the rest before it;
+    `rest` samples, `sd_t` s by which the start is uncertain, `noise` m of the markers per axis."""
+
+    recording: Recording
+    start: float
+    rest: int
+    sd_t: float
+    noise: float
+
+
+def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
+    """The motion of the markers of a topic (none: the only one), or of a signal in m.
+
+    Raises `ComparisonError` where there are none, or nothing moves.
+    """
+    if topic is None and recording.markers:
+        topic = next(iter(recording.markers))
+    if topic in recording.markers:
+        seen = recording.marker(str(topic))
+        named = {name: seen.x[:, j] for j, name in enumerate(seen.names)}
+        return recorded_motion(seen.t, named, seen.sd)
+    lengths = {t: s for t, s in recording.signals.items() if s.unit == "m"}
+    if not lengths:
+        raise ComparisonError(f"{recording.name}: no markers and no signal in m; nothing moves")
+    name, signal = next(iter(lengths.items()))
+    return recorded_motion(signal.t, {name: signal.y[:, :1]}, signal.sd)
+
+
+def started(recording: Recording, p: MeasuredBody) -> Started:
+    """The recording from `motion.start`, or from where its motion is found to begin.
+
+    Raises `UsageError` for a start outside the recording.
+    """
+    sudden = drive_kind(recording, p) in SUDDEN
+    topic = markers_topic(recording, p) if recording.markers else None
+    clock = recording.marker(topic).t if topic else next(iter(recording.signals.values())).t
+    at = p.motion.start
+    if at is None:
+        at = motion_of(recording, topic).starts if sudden else float(clock[0] + p.seen.still)
+    if not clock[0] - _SAME <= at < clock[-1]:
+        raise UsageError(
+            f"motion.start = {at:g} s: the recording goes from {clock[0]:g} to {clock[-1]:g} s"
+        )
+    start = float(clock[int(np.abs(clock - at).argmin())])
+    length = p.motion.length or np.inf
+    cut = replace(
+        recording,
+        markers={n: _markers_from(m, start, length) for n, m in recording.markers.items()},
+        signals={n: _signal_from(s, start, length) for n, s in recording.signals.items()},
+        contours={}, frames={},
+    )  # fmt: skip
+    interval = float(np.median(np.diff(clock)))
+    sd_t = interval / np.sqrt(12) if sudden and p.motion.start is None else 0.0
+    rest = clock <= start + _SAME
+    noise = _noise(recording.marker(topic), rest) if topic else 0.0
+    return Started(cut, start, int(rest.sum()), sd_t, noise)
+
+
+def _noise(m: Markers, rest: Any) -> float:
+    """m per axis: as declared, or more as the markers scatter at rest; with few samples of rest by
+    fourth differences, in which a smooth motion leaves little."""
+    still = m.x[rest]
+    if len(still) >= _FEWEST:
+        scatter = np.nanmedian(np.nanstd(still, axis=0, ddof=1))
+    else:
+        bend = np.abs(np.diff(m.x, n=4, axis=0))
+        bend = bend[np.isfinite(bend)]
+        scatter = 1.4826 * np.median(bend) / np.sqrt(70) if len(bend) else 0.0
+    return max(m.sd, float(np.nan_to_num(scatter)))
+
+
+def without_rest(p: MeasuredBody) -> MeasuredBody:
+    """Of a recording that was cut at the start: its first sample alone is at rest."""
+    return replace(p, seen=replace(p.seen, still=0.0))
+
+
+def _markers_from(m: Markers, start: float, length: float) -> Markers:
+    """From the start on; the first sample is the mean of each marker until then."""
+    before, kept = _parts(m.t, start, length)
+    x = m.x[kept].copy()
+    early = m.x[before]
+    seen = np.isfinite(early).all(axis=2)
+    for j in np.flatnonzero(seen.any(axis=0)):
+        x[0, j] = early[seen[:, j], j].mean(axis=0)
+    return replace(m, t=m.t[kept] - start, x=x)
+
+
+def _signal_from(s: Signal, start: float, length: float) -> Signal:
+    before, kept = _parts(s.t, start, length)
+    y = s.y[kept].copy()
+    y[0] = s.y[before].mean(axis=0)
+    return replace(s, t=s.t[kept] - start, y=y)
+
+
+def _parts(t: Floats, start: float, length: float) -> tuple[Any, Any]:
+    kept = (t >= start - _SAME) & (t <= start + length + _SAME)
+    if kept.sum() < _FEWEST:
+        raise ComparisonError(
+            f"{int(kept.sum())} samples from {start:g} s on: {_FEWEST} are needed; set "
+            "motion.start and motion.length"
+        )
+    before = t <= max(start, float(t[0])) + _SAME
+    return before, kept
+
+
+def steps_of(p: MeasuredBody, cut: Recording) -> Floats:
+    """Times (nt,) s of the steps, from one step after the start: every sample of the markers is
+    met, with 40 steps or more in the recorded period."""
+    topic = markers_topic(cut, p) if cut.markers else None
+    clock = cut.marker(topic).t if topic else next(iter(cut.signals.values())).t
+    interval = float(np.median(np.diff(clock)))
+    if p.motion.dt is None:
+        f = motion_of(cut, topic).frequency
+        parts = max(1, int(np.ceil(interval * _PER_PERIOD * f - 1e-9)))
+    else:
+        parts = max(1, int(np.ceil(interval / p.motion.dt - 1e-9)))
+    ends = [float(s.t[-1]) for name, s in cut.streams.items() if name in _used(p, topic)]
+    count = int(np.floor(min([clock[-1], *ends]) / interval + 1e-6)) * parts
+    if count > _MOST:
+        raise UsageError(
+            f"{count} steps of {interval / parts:.3g} s: at most {_MOST}; set motion.length, or a "
+            "longer motion.dt"
+        )
+    return np.asarray(interval / parts * np.arange(1, count + 1), dtype=np.float64)
+
+
+def _used(p: MeasuredBody, topic: str | None) -> set[str]:
+    return {str(name) for name in (p.moved.by, p.seen.force, topic) if name}
+
+
+# --- registration ---------------------------------------------------------------------------------
+
+
+def place_moving(
+    recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path
+) -> Registered:
+    """Loads at every step, markers and force at every sample.
+
+    Raises `ComparisonError` where nothing is compared, `RegistrationError` as the parts do.
+    """
+    if p.seen.outline:
+        raise ComparisonError(
+            f"seen.outline = {p.seen.outline}: outlines are compared of static bodies; set "
+            "seen.outline=none, or motion.how=static"
+        )
+    begun, p = started(recording, p), without_rest(p)
+    t, kind = steps_of(p, begun.recording), drive_kind(recording, p)
+    at = (scene.mesh, folder)
+    main = _load(begun.recording, p, kind, t, scene, at)
+    drives = [main]
+    if p.motion.gravity and kind != "weighs":
+        drives.append(
+            SignalObservation("gravity", "drives", t, np.zeros((len(t), 1)), "m/s^2", 0.0)
+        )
+    compared: list[Observation] = []
+    if p.seen.force:
+        compared.append(_force(begun.recording, p, kind))
+    if p.seen.markers:
+        compared.append(moving_markers(begun, p, at))
+    if not compared:
+        raise ComparisonError("nothing of the motion is compared: set seen.markers or seen.force")
+    return Registered(
+        (*drives, *compared), _windows(p, t, compared[-1].t), sudden=kind in SUDDEN, moves=True
+    )
+
+
+def _load(
+    cut: Recording, p: MeasuredBody, kind: Kind, t: Floats, scene: Scene, at: BodyAt
+) -> SignalObservation:
+    """What loads the body at t (nt,) s, as it changed since the start."""
+    if kind == "releases":
+        force = p.moved.scale * released_force(p, scene)
+        return SignalObservation(RELEASE, "drives", t, np.full((len(t), 1), -force), "N", 0.0)
+    whole = driven(cut, p, kind, np.append(0.0, t), 0.0, at)
+    return replace(whole, t=t, y=whole.y[1:])
+
+
+def moving_markers(begun: Started, p: MeasuredBody, at: BodyAt) -> MarkerObservation:
+    """Every sample of the markers after the start, in the body's frame, each a quantity of its own;
+    those that move the body are left out. Raises `ComparisonError` where none is left."""
+    whole = registered(begun.recording, p, at)
+    driving = p.moved.markers if drive_kind(begun.recording, p) == "follows" else ()
+    kept = [i for i, name in enumerate(whole.names) if name not in driving]
+    if not kept:
+        raise ComparisonError("every marker moves the body: none is left to be compared")
+    part = replace(
+        whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
+        rest=whole.rest[kept], tre=whole.tre[kept],
+    )  # fmt: skip
+    since = since_rest(part, at[0], begun.noise, begun.rest, p.seen.stands)
+    return replace(
+        since, t=since.t[1:], x=since.x[1:], sd_t=float(np.hypot(since.sd_t, begun.sd_t))
+    )
+
+
+def _force(cut: Recording, p: MeasuredBody, kind: Kind) -> SignalObservation:
+    """The force on the moved place, sample by sample."""
+    topic = str(p.seen.force)
+    if kind != "moves":
+        raise ComparisonError(
+            f"seen.force = {topic}: a force is predicted where a displacement moves a place; set "
+            "seen.force=none"
+        )
+    force = zeroed(cut, topic, "N", 0.0)
+    return SignalObservation(
+        topic, "validates", force.t[1:], force.y[1:], "N", force.sd, "force", "moved.force",
+        clock_sd(cut, topic), repeats_share(cut),
+    )  # fmt: skip
+
+
+def _windows(p: MeasuredBody, t: Floats, samples: Floats) -> tuple[Selection, ...]:
+    """Every sample; with an identified damping those it was identified on, and the later ones."""
+    if p.motion.fit_window is None:
+        return (EVERYTHING,)
+    samples = samples[samples <= t[-1] + _SAME]
+    early = samples <= p.motion.fit_window
+    if early.sum() < _FEWEST or (~early).sum() < _FEWEST:
+        raise ComparisonError(
+            f"motion.fit_window = {p.motion.fit_window:g} s: {int(early.sum())} samples in it and "
+            f"{int((~early).sum())} after it, {_FEWEST} of each are needed"
+        )
+    end = f"{p.motion.fit_window:g} s after the start"
+    return (
+        Selection(FIRST, samples[early], f"samples up to {end}"),
+        Selection(LATER, samples[~early], f"samples later than {end}"),
+    )
+
+
+def preload(p: MeasuredBody, seen: Registered) -> tuple[float, ...]:
+    """Inputs at which the body rests before the start: what held it, and its weight; none: all
+    zero."""
+    found = [0.0] * sum(d.y.shape[1] for d in seen.drives)
+    if p.moved.by == RELEASE:
+        found[0] = -float(seen.drives[0].y[0, 0])
+    if p.motion.gravity and p.moved.by != "gravity":
+        found[-1] = p.moved.amount
+    return tuple(found) if any(found) else ()

@@ -1,0 +1,222 @@
+"""What a recording's motion is: its size, direction and frequencies, where it rests, its gaps.
+
+The motion is that of the marker that moves most, along the direction in which it moves most (the
+first principal axis of its displacements). From it and the first natural frequency of the body
+follows whether inertia matters: statics answers at once, and is off by (f / f_1)^2 of what moves at
+f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first mode.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import ComparisonError
+from validate.identify.ringing import Ringing, ringing, spectrum
+
+FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
+_SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics
+_ABOVE_NOISE = 3.0
+_FEWEST = 16  # samples of a spectrum
+_GAP = 1.5  # median intervals: a longer one is a gap
+_STILL = 0.01  # of the whole motion: within it the body rests
+_RISE = (0.02, 0.3)  # of the first swing: where its start is read off
+_PADDED = 8
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """Displacements `y` (nt,) m at `t` (nt,) s of `marker` along `direction` (d,), since the first
+    sample; `noise` m, `frequency` Hz of the largest peak of its spectrum, `resolution` Hz.
+
+    `rests_from` s is where it rests until the end (None: nowhere), `starts` s its last instant of
+    rest before it moves, `drift` m from the first to the last sample, `gap` s the longest interval
+    and `gaps` how many are longer than 1.5 usual ones, `missing` the share of samples without it.
+    """
+
+    marker: str
+    direction: Floats
+    t: Floats
+    y: Floats
+    noise: float
+    frequency: float
+    resolution: float
+    starts: float
+    rests_from: float | None
+    gap: float
+    gaps: int
+    missing: float
+    ringing: Ringing | None
+
+    @property
+    def axis(self) -> str:
+        """The axis that lies nearest to the direction."""
+        return _AXES[int(np.abs(self.direction).argmax())]
+
+    @property
+    def size(self) -> float:
+        """Peak to peak, m."""
+        return float(np.ptp(self.y))
+
+    @property
+    def drift(self) -> float:
+        return float(self.y[-1] - self.y[0])
+
+    @property
+    def rate(self) -> float:
+        """Samples a second."""
+        return float(1 / np.median(np.diff(self.t)))
+
+    def above(self, frequency: float) -> float:
+        """Rms m of what moves at this frequency Hz or faster, less what noise explains there."""
+        if self.resolution == 0 or frequency >= self.rate / 2:
+            return 0.0
+        t, y = _even(self.t, self.y)
+        z = y - np.interp(t, [t[0], t[-1]], [y[0], y[-1]])  # ends that meet do not leak
+        power = 2 * np.abs(np.fft.rfft(z) / len(z)) ** 2
+        kept = np.fft.rfftfreq(len(z), float(t[1] - t[0])) >= frequency
+        noise = self.noise**2 * kept.sum() / len(kept)
+        return float(np.sqrt(max(power[kept].sum() - _ABOVE_NOISE**2 * noise, 0.0)))
+
+    def inertia_matters(self, first: float | None) -> bool:
+        """Whether statics misses a part of this motion of a body with its first natural frequency
+        at `first` Hz; unknown: whether it rings down."""
+        if first is None:
+            found = self.ringing
+            return found is not None and 0.002 < found.damping < 0.5 and (
+                found.damping > 3 * found.damping_sd
+            )  # fmt: skip
+        return self.above(FRACTION * first) > _SHARE * self.size
+
+    def words(self) -> str:
+        """The facts in one sentence."""
+        along = ", ".join(f"{x:+.2f}" for x in self.direction)
+        f = f"{self.frequency:.3g} Hz (resolved to {self.resolution:.2g} Hz)"
+        rest = (
+            "nowhere at rest"
+            if self.rests_from is None
+            else f"at rest from {self.rests_from:.3g} s"
+        )
+        return (
+            f"'{self.marker}' moves most, {1e3 * self.size:.3g} mm peak to peak along ({along}), "
+            f"mostly at {f}; {rest}, {1e3 * self.drift:+.2g} mm from first to last, "
+            f"{self.rate:.4g} samples a second, {self.gaps} gaps (longest {self.gap:.3g} s), "
+            f"{100 * self.missing:.2g} % missing"
+        )
+
+
+def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) -> RecordedMotion:
+    """Of displacements (nt, d) m by name at t (nt,) s, NaN = not seen; a signal is one of d = 1.
+
+    Raises `ComparisonError` where nothing was seen twice.
+    """
+    sizes = {name: _extent(x) for name, x in moved.items()}
+    name = max(sizes, key=lambda n: sizes[n], default="")
+    if not name or not sizes[name] > 0:
+        raise ComparisonError("nothing moves in the recording: 0 of its markers are seen twice")
+    x = moved[name]
+    seen = np.isfinite(x).all(axis=1)
+    t_all, t, x = t, t[seen], x[seen]
+    direction = _direction(x)
+    y = (x - x[0]) @ direction
+    steps = np.diff(t)
+    usual = float(np.median(np.diff(t_all)))
+    frequency, resolution = _dominant(t, y)
+    found, rings = max(noise, _noise(y)), _ringing(t, y)
+    starts = _starts(t, y, found)
+    return RecordedMotion(
+        name, direction, t, y, found, frequency, resolution,
+        _released(t, y, starts, rings) if rings else starts, _rests(t, y, found),
+        float(steps.max()), int((steps > _GAP * usual).sum()), float(1 - seen.mean()), rings,
+    )  # fmt: skip
+
+
+def _extent(x: Floats) -> float:
+    seen = x[np.isfinite(x).all(axis=1)]
+    return float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) > 1 else 0.0
+
+
+def _direction(x: Floats) -> Floats:
+    """The unit vector (d,) along which x (nt, d) varies most, its largest part positive."""
+    _, _, V = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
+    along = V[0]
+    return np.asarray(along * np.sign(along[np.abs(along).argmax()]))
+
+
+def _even(t: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """On as many evenly spaced times."""
+    at = np.linspace(t[0], t[-1], len(t))
+    return at, np.interp(at, t, y)
+
+
+def _noise(y: Floats) -> float:
+    """m, from fourth differences: a smooth motion has small ones."""
+    if len(y) < _FEWEST:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(np.diff(y, n=4))) / np.sqrt(70))
+
+
+def _dominant(t: Floats, y: Floats) -> tuple[float, float]:
+    """Frequency of the spectrum's largest peak and its resolution, Hz; zeros where none is."""
+    if len(t) < _FEWEST:
+        return 0.0, 0.0
+    f, amplitude = spectrum(*_even(t, y))
+    return float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
+
+
+def _starts(t: Floats, y: Floats, noise: float) -> float:
+    """The last instant of rest: the first swing rises as (t - t_0)^2, and its root is a line."""
+    away = np.abs(y - y[0])
+    size = float(away.max())
+    least = max(5 * noise, _RISE[0] * size)
+    first = int(np.argmax(away > least))
+    peak = first + int(np.argmax(np.diff(away[first:], append=0.0) <= 0))
+    low = max(5 * noise, _RISE[0] * away[peak])
+    rise = np.flatnonzero((away[: peak + 1] > low) & (away[: peak + 1] < _RISE[1] * away[peak]))
+    rise = rise[rise >= first - 1]
+    if len(rise) < 2:
+        return float(t[max(first - 1, 0)])
+    slope, offset = np.polyfit(t[rise], np.sqrt(away[rise]), 1)
+    at = -offset / slope if slope > 0 else t[first]
+    return float(np.clip(at, t[0], t[first]))
+
+
+def _released(t: Floats, y: Floats, starts: float, rings: Ringing) -> float:
+    """The start again, of a body let go: its mode begins at an extreme, without velocity. It is the
+    extreme of the fitted ring-down that is nearest, if within a quarter of a period."""
+    w = 2 * np.pi * rings.frequency
+    d = w * rings.damping / np.sqrt(1 - min(rings.damping, 0.9) ** 2)
+    after = t > starts + 0.5 / rings.frequency
+    if after.sum() < _FEWEST:
+        return starts
+    tau = t[after] - starts
+    fade = np.exp(-d * tau)
+    basis = np.stack(
+        [np.ones_like(tau), tau, fade * np.cos(w * tau), fade * np.sin(w * tau)], axis=1
+    )
+    _, _, p, s = np.linalg.lstsq(basis, y[after], rcond=None)[0]
+    # d/dt of exp(-d t)(p cos w t + s sin w t) vanishes where tan(w t) = (w s - d p) / (w p + d s).
+    at = np.arctan2(w * s - d * p, w * p + d * s) / w
+    at = (at + 0.25 / rings.frequency) % (0.5 / rings.frequency) - 0.25 / rings.frequency
+    return float(max(starts + at, t[0]))
+
+
+def _rests(t: Floats, y: Floats, noise: float) -> float | None:
+    """From when it stays within a hundredth of the motion of where it ends, for a tenth of the
+    time at least."""
+    tail = y[t >= t[-1] - 0.1 * (t[-1] - t[0])]
+    near = np.abs(y - np.median(tail)) <= max(4 * noise, _STILL * np.ptp(y))
+    away = np.flatnonzero(~near)
+    start = t[0] if not len(away) else t[min(away[-1] + 1, len(t) - 1)]
+    return float(start) if start <= t[-1] - 0.1 * (t[-1] - t[0]) else None
+
+
+def _ringing(t: Floats, y: Floats) -> Ringing | None:
+    """How it rings after its largest excursion."""
+    after = int(np.abs(y - np.median(y)).argmax())
+    try:
+        return ringing(*_even(t[after:], y[after:]))
+    except (ComparisonError, ValueError, np.linalg.LinAlgError):
+        return None
