@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from validate.replay.find import find
-from validate.study.agreement import Pick
+from validate.study.agreement import TruthPick
 from validate.study.filters import study
 from validate.study.job import Where
 from validate.study.sweep import named
@@ -57,7 +57,7 @@ CANDIDATES = {
 
 def picks(
     name: str, seeds: tuple[int, ...], out: Path, workers: int | None = 0
-) -> tuple[Pick, ...]:
+) -> tuple[TruthPick, ...]:
     """Of every case and seed of an experiment."""
     of = CANDIDATES[name]
     found = study(
@@ -73,7 +73,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int)
     given = parser.parse_args()
     seeds = tuple(int(s) for s in given.seeds.split(","))
-    found: list[tuple[str, Pick]] = []
+    found: list[tuple[str, TruthPick]] = []
     print("experiment case seed | picked, true error / mm | best, true error / mm | ratio")
     with tempfile.TemporaryDirectory() as folder:
         for name in given.names:

@@ -27,7 +27,7 @@ from validate.cli.new_body_questions import (
     three_of,
     unit_of,
 )
-from validate.cli.new_contact import contact_values, of_the_indenter
+from validate.cli.new_contact import CONTACT_WORDS, contact_values, of_the_indenter
 from validate.cli.new_kind import (
     FEW_CELLS,
     NewKind,
@@ -65,7 +65,7 @@ _PRESSED = """from validate.replay.measured_body import measured_body
 from validate.replay.measured_contact import touching"""
 _MOVING = """from validate.replay.measured_body import measured_body
 from validate.replay.moving_body import moving"""
-_MANY = 8  # classes whose lines would make the file longer than 60
+_MANY = 5  # classes whose lines would make the file longer than 60
 _PATHS = {p.path for p in describe(MeasuredBody())}
 
 
@@ -330,8 +330,11 @@ def _values(found: Answers) -> dict[str, str]:
     """The answers that are parameters, by path."""
     skipped = ("", UNKNOWN)
     values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
-    return {k: v for k, v in values.items() if k not in ("seen.markers", "seen.force",
-            "seen.outline") or v != NONE} | motion_values(found)  # fmt: skip
+    nothing = ("seen.markers", "seen.force", "seen.outline")
+    values = {k: v for k, v in values.items() if k not in nothing or v != NONE}
+    if values.get("indenter.friction") in CONTACT_WORDS:  # a parameter of another path
+        del values["indenter.friction"]
+    return values | motion_values(found)
 
 
 def _methods(law: str, mesh: Mesh | None, order: int, maker: str, cells: str) -> list[str]:

@@ -15,7 +15,7 @@ from validate.scene.named_place import axis_of
 from validate.units import in_si, split
 
 FRICTIONLESS, BONDED = "frictionless", "bonded"
-_WORDS = {FRICTIONLESS: ("friction", "0"), BONDED: ("bonded", "true")}
+CONTACT_WORDS = {FRICTIONLESS: ("friction", "0"), BONDED: ("bonded", "true")}
 _SHAPES = ("none", "plate", *ROUND)
 _CELLS, _FINER, _STATES = "14", "1.25", "12"  # contact is solved some ten times a state
 _POWER = {"sphere": 1.5, "cylinder": 1.0, "plate": 1.0}  # of force over depth
@@ -72,7 +72,7 @@ def contact_values(recording: Recording, found: Answers) -> Mapping[str, str]:
     if shape == "none":
         return {}
     answer = found["indenter.friction"]
-    key, value = _WORDS.get(answer, ("friction", answer))
+    key, value = CONTACT_WORDS.get(answer, ("friction", answer))
     values = {
         "indenter.friction": "0",
         f"indenter.{key}": value,
@@ -140,7 +140,7 @@ def _zero_of(
 
 
 def _friction(text: str) -> None:
-    if text not in _WORDS:
+    if text not in CONTACT_WORDS:
         parsed("indenter.friction")(text)
 
 

@@ -188,10 +188,10 @@ class MeasuredBody:
     held: HeldAt = HeldAt()
     moved: MovedBy = MovedBy()
     seen: SeenOf = SeenOf()
-    motion: BodyMotion = BodyMotion()
     ranges: BodyRanges = BodyRanges()
     indenter: Indenter = Indenter()
     machine: Machine = Machine()
+    motion: BodyMotion = BodyMotion()
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def _scenes(
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptFields:
     """What a run keeps besides its traces: fields at times t (m,) s (None: as the experiment has
     it), and the displacements of `points` at every step. `system`: that of the scene, where it is
     built already."""
@@ -100,7 +100,7 @@ def run_on(
     parameters: Any,
     scene: AnyScene,
     seen: Sequence[Registered],
-    kept: Kept = Kept(),
+    kept: KeptFields = KeptFields(),
 ) -> tuple[Run, ...]:
     """Runs of a method on recordings as they are registered: a filter's on other samples, say."""
     runs = _Runs(experiment, name, method, parameters, scene, 0.0, lambda _: None, kept)
@@ -122,7 +122,7 @@ class _Runs:
         scene: AnyScene,
         built: float,
         tell: Tell,
-        kept: Kept = Kept(),
+        kept: KeptFields = KeptFields(),
     ) -> None:
         unknowns = f"{scene.mesh.nodes.size} unknowns"
         self._tell: Tell = lambda what: tell(f"{unknowns}, {what}")

@@ -10,7 +10,7 @@ NEAR = 1.1  # times the best true error: as good
 
 
 @dataclass(frozen=True)
-class Pick:
+class TruthPick:
     """On one recording: the setting of least error at what was withheld, its true error m, and the
     setting of the least true error."""
 
@@ -32,7 +32,7 @@ class Pick:
         return self.ratio <= NEAR
 
 
-def picks(values: Mapping[FilterCell, FilterScores]) -> tuple[Pick, ...]:
+def picks(values: Mapping[FilterCell, FilterScores]) -> tuple[TruthPick, ...]:
     """One for every condition and seed, among filters; none where no truth is known."""
     filters = {
         c: v for c, v in values.items()
@@ -47,5 +47,5 @@ def picks(values: Mapping[FilterCell, FilterScores]) -> tuple[Pick, ...]:
             true = {c: v.scores[POOLED][i] for c, v in mine.items()}
             pick = min(mine, key=lambda c: mine[c].scores[WITHHELD][i])
             best = min(true, key=lambda c: true[c])
-            found.append(Pick(condition, seed, pick, true[pick], best, true[best]))
+            found.append(TruthPick(condition, seed, pick, true[pick], best, true[best]))
     return tuple(found)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.study.agreement import NEAR, Pick
+from validate.study.agreement import NEAR, TruthPick
 from validate.study.blocks import Nested
 from validate.study.filters import FilterStudy
 from validate.study.ranking import Ranking
@@ -82,7 +82,7 @@ def _nested_words(study: FilterStudy) -> Iterator[str]:
             yield f"{ranking.blocks.words}."
 
 
-def _agreement(picks: tuple[Pick, ...]) -> Exhibit:
+def _agreement(picks: tuple[TruthPick, ...]) -> Exhibit:
     near = sum(p.near for p in picks)
     rows = tuple(
         (

@@ -22,8 +22,7 @@ from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.own_body import meshed
 from validate.replay.road import set_out
-from validate.replay.solved import Kept as KeptFields
-from validate.replay.solved import run_on
+from validate.replay.solved import KeptFields, run_on
 from validate.scene.scene import Scene
 from validate.solve.types import Run, Stepper
 from validate.study.filter_plan import CASE, FilterCell, set_up

@@ -17,7 +17,7 @@ from validate.errors import ComparisonError, UsageError
 from validate.estimate.filters import FilterStepper
 from validate.estimate.measurements import Measurements, timetable
 from validate.fem.locate import Rows, probe_rows
-from validate.replay.solved import Kept as KeptFields
+from validate.replay.solved import KeptFields
 from validate.solve.types import Run, Stepper, StepTimes
 from validate.study.filter_bench import Bench, Ready
 from validate.study.filter_plan import EACH, FilterCell

@@ -15,7 +15,7 @@ from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.options import Options, Report
-from validate.study.agreement import Pick, picks
+from validate.study.agreement import TruthPick, picks
 from validate.study.blocks import score_difference
 from validate.study.engine import CELLS, Finished, finish, study_folder
 from validate.study.filter_bench import open_bench
@@ -72,7 +72,7 @@ class FilterStudy:
         return self.rankings[0].rows[0].result.units[self.by]
 
     @property
-    def picks(self) -> tuple[Pick, ...]:
+    def picks(self) -> tuple[TruthPick, ...]:
         """What a ranking without truth picks where the truth is known."""
         records = self.done.records
         values = {c: v for c in self.plan.cells if (v := records[c.key].value) is not None}
