@@ -7,10 +7,13 @@ import pytest
 from study_samples import experiment_file
 
 from validate.errors import UsageError
-from validate.replay.experiment import Experiment
+from validate.replay.cards import changed
+from validate.replay.experiment import Case, Experiment
 from validate.replay.find import load_file
 from validate.replay.options import Options
 from validate.study import filter_plan
+from validate.study.filter_bench import Bench
+from validate.study.filter_cell import run_cell
 from validate.study.filter_plan import FilterPlan, plan
 from validate.study.filters import run_line
 from validate.study.sweep import axes
@@ -94,6 +97,22 @@ def test_what_cannot_run_is_refused_at_once(
 def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
     with pytest.raises(UsageError, match=r"has no filter: none of .* is given markers"):
         plan(phantom, Options({}), (), 2)
+
+
+def test_a_filter_of_one_marker_cannot_be_kept_from_it(pulled: Experiment) -> None:
+    with pytest.raises(UsageError, match="leaves nothing to 'kf', which is given top alone"):
+        plan(pulled, Options({}), (), 2, ("each",))
+
+
+def test_a_case_is_a_condition_by_its_name(pulled: Experiment) -> None:
+    softer = Case("soft", "made for tests", changed("twin", stiffness=0.5))
+    more = replace(pulled, cases=(softer,))
+    found = plan(more, Options({}, ("kf",)), axes(["case=recorded,soft"]), 2)
+    kf = [c for c in found.cells if c.name == "kf"]
+    errors = [run_cell(Bench(more, found.job), c).scores["all.rmse"][0] for c in kf]
+    assert errors[1] > 5 * errors[0]  # the model is twice as stiff as that truth
+    with pytest.raises(UsageError, match=r"no case 'sof' of pulled; nearest: soft"):
+        plan(more, Options({}, ("kf",)), axes(["case=sof"]), 2)
 
 
 def test_seeds_need_a_parameter_and_stand_once() -> None:

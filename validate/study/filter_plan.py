@@ -110,6 +110,13 @@ def plan(
     job = job_of(experiment, options.values, options.quick)
     mine = [m for m in methods if m in filters] or filters
     given = tuple(dict.fromkeys(n for m in mine for n in experiment.methods[m].markers))
+    alone = [m for m in mine if len(experiment.methods[m].markers) == 1]
+    if hold_out == EACH and alone:
+        raise UsageError(
+            f"--hold-out each leaves nothing to '{alone[0]}', which is given "
+            f"{experiment.methods[alone[0]].markers[0]} alone; name markers, as --hold-out A,B, or "
+            "leave it out: markers given to no filter score anyway"
+        )
     if seeds is None:
         seeds = SEEDS if experiment.repeats and seed_path else 1
     own = FilterCell(
