@@ -34,7 +34,7 @@ from validate.replay.measured_contact import (
     symmetry,
     touching,
 )
-from validate.scene.contact import RigidCylinder, RigidPlane, RigidSphere
+from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere
 from validate.scene.material import Material
 from validate.scene.mesh import cell_volumes
 from validate.scene.named_place import place_of
@@ -171,6 +171,7 @@ def test_a_plate_that_presses_already(tmp_path: Path) -> None:
     [
         (Indenter("plate", gap=1e-3), RigidPlane, SIZE[2] + 1e-3),
         (Indenter("sphere", 5e-3), RigidSphere, SIZE[2] + 5e-3),
+        (Indenter("punch", 5e-3, gap=1e-3), RigidPunch, SIZE[2] + 1e-3),
         (Indenter("cylinder", 4e-3, axis="+x", gap=1e-3), RigidCylinder, SIZE[2] + 5e-3),
     ],
 )

@@ -18,7 +18,7 @@ FRICTIONLESS, BONDED = "frictionless", "bonded"
 CONTACT_WORDS = {FRICTIONLESS: ("friction", "0"), BONDED: ("bonded", "true")}
 _SHAPES = ("none", "plate", *ROUND)
 _CELLS, _FINER, _STATES = "14", "1.25", "12"  # contact is solved some ten times a state
-_POWER = {"sphere": 1.5, "cylinder": 1.0, "plate": 1.0}  # of force over depth
+_POWER = {"sphere": 1.5, "cylinder": 1.0, "plate": 1.0, "punch": 1.0}  # of force over depth
 _RANGES = ((0.02, 0.3), (0.01, 0.1))  # shares of the largest force that find the first touch
 _FEWEST = 8  # samples there
 _ENDS = 3.0  # a parabola is as much less certain at its end than in the mean
@@ -85,12 +85,15 @@ def contact_values(recording: Recording, found: Answers) -> Mapping[str, str]:
 
 
 def _reach(recording: Recording, found: Answers) -> float:
-    """Hertz's radius of contact sqrt(R d) at the largest depth, m; 0 for a plate."""
+    """Hertz's radius of contact sqrt(R d) at the largest depth, m; that of a punch; 0 for a
+    plate."""
     if found.get("indenter.shape") not in ROUND:
         return 0.0
     way = recording.signal(found["moved.by"], "m").y[:, 0]
     depth = float(np.abs(way - way[0]).max()) - _metres(found["indenter.gap"])
     radius = _metres(found["indenter.radius"])
+    if found["indenter.shape"] == "punch":
+        return radius
     return float(np.sqrt(radius * min(max(depth, 0.0), radius)))
 
 

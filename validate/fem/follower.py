@@ -16,10 +16,31 @@ from validate.scene.shape_functions import facet_rule
 
 
 def volume_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_array:
-    """d2V/dx2 (N, N) m for the positions (n, 3) m of all mesh nodes, N = 3 n."""
+    """d2V/dx2 (N, N) m for the positions (n, 3) m of all mesh nodes, N = 3 n.
+
+    In 2-D it is (N, N) without a unit, N = 2 n.
+    """
+    if positions.shape[1] == 2:
+        return _flat_hessian(surface, positions)
     x = positions[surface.facets] - positions[surface.nodes].mean(axis=0)
     blocks = 2 * np.einsum("abc,fcij->faibj", _antisymmetric(x.shape[1]), _cross_matrix(x))
-    unknowns = (3 * surface.facets[..., None] + np.arange(3)).reshape(len(x), -1)
+    return _assembled(surface, blocks, positions)
+
+
+def _flat_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_array:
+    count = surface.facets.shape[1]
+    rule = facet_rule(2, count)
+    M = np.einsum("q,qa,qb->ab", rule.weights, rule.N, rule.dN[..., 0])
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    block = np.einsum("ab,ij->aibj", (M - M.T) / 2, turn)
+    blocks = np.broadcast_to(block, (len(surface.facets), *block.shape))
+    return _assembled(surface, blocks, positions)
+
+
+def _assembled(surface: CavitySurface, blocks: Floats, positions: Floats) -> sparse.csr_array:
+    """Blocks (f, m, d, m, d) of all facets, summed at their unknowns."""
+    d = positions.shape[1]
+    unknowns = (d * surface.facets[..., None] + np.arange(d)).reshape(len(surface.facets), -1)
     m = unknowns.shape[1]
     rows, columns = np.repeat(unknowns, m, axis=1).ravel(), np.tile(unknowns, m).ravel()
     shape = (positions.size, positions.size)

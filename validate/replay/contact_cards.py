@@ -8,8 +8,8 @@ import numpy as np
 from validate.errors import UsageError
 from validate.parameters import quantity
 
-IndenterShape = Literal["none", "plate", "sphere", "cylinder"]
-ROUND = ("sphere", "cylinder")
+IndenterShape = Literal["none", "plate", "sphere", "cylinder", "punch"]
+ROUND = ("sphere", "cylinder", "punch")
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class Indenter:
     """A rigid body that presses on `moved.place` along `moved.along`; none: the place itself is
     moved (glued, gripped)."""
 
-    shape: IndenterShape = quantity("none", "1", "rigid body that presses: plate, sphere, cylinder")
-    radius: float = quantity(0.0, "m", "of a sphere or cylinder")
+    shape: IndenterShape = quantity("none", "1", "rigid body that presses: plate, sphere, ...")
+    radius: float = quantity(0.0, "m", "of a sphere, cylinder, or a punch's flat round end")
     axis: str = quantity("+y", "1", "direction of a cylinder's axis")
     tip: tuple[float, ...] = quantity(
         (), "m", "a point below the indenter's middle; none: the middle of the place"

@@ -12,7 +12,14 @@ from validate.replay.contact_cards import Indenter
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.method import Method
 from validate.scene.clustered import clustered_block
-from validate.scene.contact import RigidContact, RigidCylinder, RigidPlane, RigidSphere, Shape
+from validate.scene.contact import (
+    RigidContact,
+    RigidCylinder,
+    RigidPlane,
+    RigidPunch,
+    RigidSphere,
+    Shape,
+)
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
@@ -58,7 +65,8 @@ def contact_of(p: MeasuredBody, mesh: Mesh, where: Place) -> RigidContact:
             f"indenter.tip = ({at}) mm: no node of moved.place = {p.moved.place} lies before the "
             f"{card.shape} of {1e3 * card.radius:.3g} mm; set indenter.tip or moved.place"
         )
-    reach = np.sqrt(card.radius**2 - aside[under] ** 2) if card.shape != "plate" else 0.0
+    flat = card.shape in ("plate", "punch")
+    reach = 0.0 if flat else np.sqrt(card.radius**2 - aside[under] ** 2)
     start = tip + along * (float((depth[under] - reach).min()) - max(card.gap, 0.0))
     friction = _BONDED if card.bonded else card.friction
     direction = tuple(along.tolist())
@@ -90,6 +98,8 @@ def _shape(card: Indenter, start: Floats, along: tuple[float, ...]) -> Shape:
     at = tuple(start.tolist())
     if card.shape == "plate":
         return RigidPlane(at, along)
+    if card.shape == "punch":
+        return RigidPunch(at, along, card.radius)
     if card.shape == "sphere":
         return RigidSphere(at, card.radius)
     return RigidCylinder(at, tuple(_axis(card, np.array(along)).tolist()), card.radius)
