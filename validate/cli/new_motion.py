@@ -159,18 +159,18 @@ def motion_values(found: Answers) -> dict[str, str]:
     return {name: text for name, text in asked if name}
 
 
-class _Remembered:
+class _LastProposal:
     """The last proposal with its recording and answers: questions are listed again and again."""
 
     last: tuple[Recording, tuple[tuple[str, str], ...], Proposal] | None = None
 
 
 def _proposed(recording: Recording, values: tuple[tuple[str, str], ...]) -> Proposal:
-    last = _Remembered.last
+    last = _LastProposal.last
     if last and last[0] is recording and last[1] == values:
         return last[2]
     found = proposal(recording, with_values(MeasuredBody(), dict(values)), Path())
-    _Remembered.last = (recording, values, found)
+    _LastProposal.last = (recording, values, found)
     return found
 
 
