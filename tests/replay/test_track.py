@@ -137,7 +137,7 @@ def test_a_method_gets_the_models_system_and_its_own_markers_and_no_truth() -> N
         assert card == Card()  # never the truth's own
         assert {f.name for f in fields(seen)} == {
             "observations", "selections", "rest", "outside", "findings", "time_scale",
-            "timed",
+            "timed", "sudden", "moves",
         }  # fmt: skip
     assert all(system.scene.material.E == Card().E for system, _ in given)
     names = [looks.names if looks else None for _, looks in given]
