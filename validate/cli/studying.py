@@ -26,6 +26,8 @@ from validate.study.chosen_exhibits import chosen_line
 from validate.study.climb import Climb
 from validate.study.engine import CELLS, Finished, study_folder
 from validate.study.filter_exhibits import ranking_head, ranking_row
+from validate.study.filter_stability import filter_endings, with_endings
+from validate.study.filter_stability import sentence as ending_words
 from validate.study.filters import FilterStudy, study
 from validate.study.gain import GainMap, gain_map
 from validate.study.job import Where
@@ -102,13 +104,21 @@ def stability_map(name: str, common: StudyOptions) -> int:
         still = None
         if found is None:
             still = gain_map(experiment, out=common.out, where=common.where, report=report)
+        endings = filter_endings(
+            experiment, quick=common.quick, out=common.out, where=common.where, report=report
+        )
     if found is None:
         return _still(experiment, still, place, common)
-    page = written(experiment, stability_page.told(found), place, common)
+    told = stability_page.told(found)
+    if endings is not None:
+        told = with_endings(told, endings)
+    page = written(experiment, told, place, common)
     if not common.as_json:
         _show_stability(found)
+        if endings is not None:
+            say(ending_words(endings))
         end(found.done, page)
-    return OK if found.passed else FAILED
+    return OK if found.passed and not (endings and endings.bugs) else FAILED
 
 
 def _still(experiment: Experiment, still: GainMap | None, place: str, common: StudyOptions) -> int:

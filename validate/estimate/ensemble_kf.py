@@ -18,6 +18,7 @@ from validate.estimate.localisation import along_mesh, gaspari_cohn
 from validate.estimate.measurements import Measurements
 from validate.estimate.member_filter import HANDLES, MemberModel, MemberStepper, sight
 from validate.estimate.members import Members
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.sampled_kalman import Corrected, Reach, ensemble_update
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -30,6 +31,7 @@ class EnsembleKf(MemberModel):
     along the mesh; nothing from twice as far on. It needs coordinates that are nodes."""
 
     handles: ClassVar[Handles] = HANDLES
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("walk", "R", "sd")
 
     runs: int = quantity(10, "1", "members")
     seed: int = quantity(1, "1", "of everything that is drawn")

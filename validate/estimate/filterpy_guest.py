@@ -24,6 +24,7 @@ from validate.estimate.filterpy_names import (
 from validate.estimate.kalman import Innovation, best_gain, innovation, nothing
 from validate.estimate.linear_model import LinearModel, require_symmetric
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.reduced_kf import dense_covariance
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
 from validate.estimate.small_state import CoreStepper
@@ -125,6 +126,7 @@ class FilterpyGuest:
     """
 
     handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, drives=False)
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("load_walk", "R", "load_start")
 
     make: Make | str = quantity("KalmanFilter", "1", "name, or a function of the model")
     dt: float = quantity(0.002, "s", "time step")

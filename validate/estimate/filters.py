@@ -11,6 +11,7 @@ from validate.estimate.load_scale import LoadScale
 from validate.estimate.measurements import Measurements
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.node_ekf import NodeEKF
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
@@ -37,6 +38,7 @@ class Filter(Protocol):
     """Settings of a filter: it sees a system and its measurements, never the truth."""
 
     handles: ClassVar[Handles]
+    noise_settings: ClassVar[NoiseSettings]
 
     def prepare(self, system: System, measurements: Measurements) -> FilterStepper: ...
 

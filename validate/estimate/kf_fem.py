@@ -29,6 +29,7 @@ from validate.estimate.displacement_filter import (
 )
 from validate.estimate.gains import GainSequence, schedule
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.observable import shared_gains
 from validate.estimate.smoother import smooth_setting
 from validate.fem.once import once
@@ -55,6 +56,7 @@ class DisplacementNoise:
     """
 
     handles: ClassVar[Handles] = LINEAR_DYNAMICS
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("Q", "R", "P0")
 
     dt: float = quantity(0.002, "s", "time step")
     Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, read as mm2")

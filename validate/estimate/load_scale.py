@@ -26,6 +26,7 @@ from validate.estimate.kalman import (
     nothing,
 )
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.small_state import CoreStepper
 from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
 from validate.fem.system import System
@@ -41,6 +42,7 @@ class LoadScale:
     `Q` m^2 the variance that a step adds to the amplitude, R m^2 (None: the measurements' own)."""
 
     handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False, drives=False)
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("Q", "R", "scale_sd")
 
     dt: float = quantity(0.002, "s", "time step")
     scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")

@@ -23,6 +23,7 @@ from validate.estimate.explicit_filter import ExplicitFilterStepper
 from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
 from validate.estimate.kalman import Innovation
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.noise_settings import NoiseSettings
 from validate.fem.explicit import Precision
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -47,6 +48,7 @@ class NodeEKF:
     """
 
     handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, viscous=False)
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("Qp", "Qm", "P0")
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")

@@ -27,6 +27,7 @@ from validate.estimate.explicit_step import ExplicitStep, beyond, explicit_step
 from validate.estimate.gains import Event, events, schedule
 from validate.estimate.kalman import Gain, Innovation, innovation
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.reduced_basis import Basis, modes, pod
 from validate.estimate.reduced_kf import steady
 from validate.estimate.smoother import (
@@ -53,6 +54,7 @@ class ReducedEKF:
     """
 
     handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, viscous=False)
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("load_walk", "", "load_sd")
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")

@@ -19,6 +19,7 @@ from validate.estimate.gains import Claims, gain_sequence, schedule
 from validate.estimate.kalman import Gain, Innovation, Seen, innovation, nothing, propagated
 from validate.estimate.linear_model import LinearModel
 from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.reduced_linear import LoadDoubt, ReducedModel, reduced_model
 from validate.estimate.small_state import CoreStepper
 from validate.estimate.smoother import (
@@ -48,6 +49,7 @@ class ReducedKf:
     """
 
     handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, drives=False)
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("load_walk", "R", "load_start")
 
     dt: float = quantity(0.002, "s", "time step")
     modes: int = quantity(20, "1", "lowest modes kept")

@@ -12,6 +12,7 @@ from typing import ClassVar
 from validate.arrays import Floats
 from validate.estimate.measurements import Measurements
 from validate.estimate.member_filter import HANDLES, MemberModel, MemberStepper, sight
+from validate.estimate.noise_settings import NoiseSettings
 from validate.estimate.reduced_unscented import SigmaName, reduced_update, spread, unit_points
 from validate.estimate.sampled_kalman import Corrected
 from validate.fem.system import System
@@ -24,6 +25,7 @@ class Roukf(MemberModel):
     """`points`: p + 1 runs of a simplex, or 2 p runs on the axes."""
 
     handles: ClassVar[Handles] = HANDLES
+    noise_settings: ClassVar[NoiseSettings] = NoiseSettings("", "R", "sd")
 
     points: SigmaName = quantity("simplex", "1", "sigma points of p parameters: p + 1, or 2 p")
 
