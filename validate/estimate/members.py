@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, Ints
-from validate.errors import UsageError
+from validate.errors import SceneError, UsageError
 from validate.estimate.doubtful import Doubts, StiffnessPart, parts
 from validate.estimate.explicit_step import ExplicitStep
 from validate.fem.assemble import stiffness, stiffness_damping
@@ -217,8 +217,17 @@ def _solver(
 
 
 def _outside(v: Floats, basis: Floats, M: sparse.csr_array) -> tuple[Floats, float]:
-    """The share of v outside the basis, of length 1 in M, and how large it was."""
-    whole = float(np.sqrt(v @ (M @ v)))
+    """The share of v outside the basis, of length 1 in M, and how large it was.
+
+    Raises `SceneError` for a v beyond the number range: a member far off the model made it.
+    """
+    with np.errstate(all="ignore"):
+        whole = float(np.sqrt(v @ (M @ v))) if np.isfinite(v).all() else np.inf
+    if not np.isfinite(whole):
+        raise SceneError(
+            "a member lies so far off the model that its shapes leave the number range; take a "
+            "smaller sd of the parameters"
+        )
     for _ in range(2):  # once leaves what rounding leaves
         v = v - basis @ (basis.T @ (M @ v))
     left = float(np.sqrt(v @ (M @ v)))
