@@ -2,6 +2,7 @@
 
     python benchmarks/moving_bodies.py swinging -o DIR    # a cantilever, held bent and let go
     python benchmarks/moving_bodies.py pushed -o DIR      # the same, under a step of force
+    python benchmarks/moving_bodies.py filmed -o DIR      # the pushed one: an outline, one marker
     python benchmarks/moving_bodies.py chamber -o DIR     # a thick-walled tube, a step of pressure
 
 Each writes DIR/NAME.mcap and DIR/NAME.toml, the answers for `validate new`, and for the chamber
@@ -22,12 +23,12 @@ from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
 from validate.arrays import Floats
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Markers, Recording, Signal, Source
+from validate.recording.types import Contours, Markers, Recording, Signal, Source
 from validate.scene.box import grid
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import write_mesh
 
-NAMES = ("swinging", "pushed", "chamber")
+NAMES = ("swinging", "pushed", "filmed", "chamber")
 NOISE = 2e-5  # m
 FINER = 10  # times of the other code in an interval of the recording
 MODES = 40
@@ -133,14 +134,18 @@ def end_force(beam: Beam, basis: Any) -> Floats:
     return np.asarray(pushed.assemble(side))
 
 
-def beam_markers(load: Floats, t: Floats, beam: Beam = BEAM) -> Floats:
-    """Displacements (nt, k, 3) m of the markers under a force (nt,) N at the end, along -z."""
+def beam_markers(
+    load: Floats, t: Floats, beam: Beam = BEAM, places: Floats | None = None
+) -> Floats:
+    """Displacements (nt, k, 3) m of the markers, or of other places (k, 3) m, under a force (nt,) N
+    at the end, along -z."""
+    if places is None:
+        places = np.array(list(MARKERS.values()))
     basis, K, M, free = bricks(beam)
     f = end_force(beam, basis)[free]
-    points = np.array(list(MARKERS.values())).T
-    rows = basis.probes(points).tocsr()[:, free].toarray()
+    rows = basis.probes(places.T).tocsr()[:, free].toarray()
     moved = modal(K, M, f, load, t, beam.damping, rows)
-    return moved.reshape(len(t), 3, len(MARKERS)).transpose(0, 2, 1)
+    return moved.reshape(len(t), 3, len(places)).transpose(0, 2, 1)
 
 
 def tube_wall(pressure: Floats, t: Floats, at: Floats, tube: Tube = TUBE) -> Floats:
@@ -213,11 +218,30 @@ def recorded(name: str) -> Recording:
     t = BEAM_CLOCK.fine
     force = BEAM.force * np.clip(t / 0.02, 0, 1)
     # Let go, the force that bent it is away from the start on.
-    moved = beam_markers(force if name == "pushed" else np.full(len(t), -BEAM.force), t)
-    given = {"force": _signal(BEAM_CLOCK, force, "N", 1e-5)} if name == "pushed" else {}
-    return _recording(
-        name, BEAM_CLOCK, tuple(MARKERS), np.array(list(MARKERS.values())), moved, given
-    )
+    if name == "swinging":
+        force = np.full(len(t), -BEAM.force)
+    moved = beam_markers(force, t)
+    given = {} if name == "swinging" else {"force": _signal(BEAM_CLOCK, force, "N", 1e-5)}
+    places = np.array(list(MARKERS.values()))
+    if name != "filmed":
+        return _recording(name, BEAM_CLOCK, tuple(MARKERS), places, moved, given)
+    side = list(MARKERS).index("side")
+    film = _recording(name, BEAM_CLOCK, ("side",), places[[side]], moved[:, [side]], given)
+    return replace(film, contours={"outline": _outlines(force, t)})
+
+
+def _outlines(force: Floats, t: Floats) -> Contours:
+    """The beam's outline from the side, in the plane y = 10 mm, at every tenth sample."""
+    length, _, height = BEAM.size
+    x, z = np.linspace(0, length, 49), np.linspace(0, height, 9)
+    edge = [*((a, 0.0) for a in x), *((length, a) for a in z[1:]),
+            *((a, height) for a in x[-2::-1]), *((0.0, a) for a in z[-2:0:-1])]  # fmt: skip
+    places = np.array([(a, 0.01, b) for a, b in edge])
+    moved = BEAM_CLOCK.sampled(beam_markers(force, t, places=places))[::10]
+    noise = np.random.default_rng(9).normal(0, 2 * NOISE, (len(moved), len(places), 2))
+    outlines = tuple((places + u)[:, [0, 2]] + n for u, n in zip(moved, noise, strict=True))
+    pose = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0.01], [0, 1, 0, 0], [0, 0, 0, 1]])
+    return Contours(BEAM_CLOCK.t[::10], outlines, 2 * NOISE, pose, "body")
 
 
 def _on_tube() -> tuple[Floats, Floats]:
@@ -269,6 +293,10 @@ ANSWERS = {
     "swinging": BEAM_ANSWERS
     + f"""moved = {{by = "release", place = "xmax", along = "-z", held = "{BEAM.force:g}N"}}\n""",
     "pushed": BEAM_ANSWERS + """moved = {by = "force", place = "xmax", along = "-z"}\n""",
+    "filmed": BEAM_ANSWERS.replace("accept = {", 'accept = {contour = "0.5mm", ').replace(
+        "why = {", 'why = {contour = "a fifteenth of the swing, peak to peak", '
+    )
+    + """moved = {by = "force", place = "xmax", along = "-z"}\n""",
     "chamber": f"""\
 body = {{shape = "file", file = "chamber.npz"}}
 material = {{E = {TUBE.E:g}, nu = {TUBE.nu:g}, rho = {TUBE.rho:g}}}

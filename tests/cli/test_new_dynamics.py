@@ -22,6 +22,8 @@ from validate.replay.find import load_file
 from validate.replay.followed import Followed
 from validate.replay.options import folder_of
 from validate.replay.solved import solve
+from validate.study.filters import study
+from validate.study.job import Where
 
 
 def called(*arguments: str) -> tuple[int, str]:
@@ -34,7 +36,7 @@ def called(*arguments: str) -> tuple[int, str]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("moving")
-    for name in ("swinging", "pushed", "chamber"):
+    for name in ("swinging", "pushed", "filmed", "chamber"):
         written(name, folder)
     return folder
 
@@ -102,6 +104,37 @@ def test_a_pressure_over_time_moves_the_wall_of_a_chamber(here: Path) -> None:
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert len(text.splitlines()) <= 60
     assert "by='pressure', place='inner'" in text
+
+
+def test_a_film_of_a_motion_is_compared_and_given_to_filters(here: Path) -> None:
+    """Outlines at 20 Hz with 40 um of noise, one marker: the outline is within its noise, and the
+    marker, which no filter is given, is where a filter of the outline says; statics is off."""
+    code, said = new(here, "filmed")
+    assert code == 0, said
+    assert len((here / "experiments" / "mine.py").read_text("utf-8").splitlines()) <= 60
+    mine = experiment(here)
+    assert mine.methods["reduced_kf"].markers == ("outline",)
+    found = run(mine, "implicit").residuals
+    assert set(found) >= {"contour@film", "side@all"}
+    assert np.sqrt(np.mean(found["contour@film"].values ** 2)) < 6e-5
+    assert np.sqrt(np.mean(run(mine, "static").residuals["contour@film"].values ** 2)) > 5e-4
+    filtered = run(mine, "reduced_kf")
+    assert filtered.run.finished
+    assert {"innovation.outline.0", "innovation.outline.23"} <= set(filtered.run.traces)
+    assert np.sqrt(np.mean(filtered.residuals["side@all"].values ** 2)) < 1e-4
+
+
+def test_filters_of_an_outline_are_ranked_at_the_marker(here: Path) -> None:
+    """Beside plain FEM and the outline's last places held."""
+    new(here, "filmed")
+    found = study(
+        experiment(here), methods=("reduced_kf", "modal"), out=here, where=Where(workers=0)
+    )
+    (ranking,) = found.rankings
+    names = [r.cell.name for r in ranking.rows]
+    assert names == ["reduced_kf", "modal", "last measurement, held"]
+    assert {w.name for w in ranking.rows[0].result.withheld} == {"outline", "side"}
+    assert not ranking.failed
 
 
 def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(here: Path) -> None:

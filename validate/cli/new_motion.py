@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.cli.asking import Answers, Question
-from validate.cli.new_body_questions import NONE, by_path, parsed
+from validate.cli.new_body_questions import by_path, parsed
 from validate.errors import UsageError, ValidateError
 from validate.fem.system import build
 from validate.parameters import with_values
@@ -191,7 +191,7 @@ def cells_for(p: MeasuredBody) -> int:
 
 def moving_methods(recording: Recording, p: MeasuredBody, law: str, order: int) -> list[str]:
     """Lines of the methods: schemes with inertia, statics beside them, filters that are given one
-    of the markers, where two are recorded."""
+    of the markers, where two are recorded, or the outline."""
     lines = [f'"implicit": moving("implicit", order={order}),',
              f'"explicit": moving("explicit", order=1, split={_parts(recording, p)}),',
              f'"static": moving("static", order={order}),']  # fmt: skip
@@ -211,9 +211,9 @@ def _parts(recording: Recording, p: MeasuredBody) -> int:
 
 def _filters(recording: Recording, p: MeasuredBody, order: int) -> list[str]:
     names = judged_markers(recording, p)
-    if len(names) < 2:
+    if len(names) < 2 and not p.seen.outline:
         return []
-    given = _given(recording, p, names)
+    given = _given(recording, p, names) if len(names) > 1 else str(p.seen.outline)
     kind, lines = drive_kind(recording, p), []
     small = _scene(recording, p, Path(), 1).mesh.nodes.size <= _FILTERED
     if small:
@@ -261,12 +261,6 @@ def judged_markers(recording: Recording, p: MeasuredBody) -> tuple[str, ...]:
 
 
 def require_dynamic(found: Answers) -> None:
-    """Raises `UsageError` for a release that is to be solved as statics, and for outlines of a
-    motion in time."""
+    """Raises `UsageError` for a release that is to be solved as statics."""
     if found.get("moved.by") == RELEASE and found.get("motion.how") != DYNAMIC:
         raise UsageError("motion.how = static: a release is a motion in time; answer dynamic")
-    if found.get("motion.how") == DYNAMIC and found.get("seen.outline", NONE) != NONE:
-        raise UsageError(
-            "seen.outline: outlines are compared of static states alone; answer none, or "
-            "motion.how = static"
-        )

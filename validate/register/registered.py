@@ -8,6 +8,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.register.observation import EVERYTHING, Observation, Selection, nearest_sample
+from validate.register.outlines import OutlineObservation
 from validate.register.signals import SignalObservation
 
 O = TypeVar("O")
@@ -91,11 +92,13 @@ class Registered:
 
     def frames(self, t: Floats, most: int) -> Ints:
         """Which of a run's steps at t (nt,) s keep their fields: rest and single instants, where
-        there are none of these rest and `most` evenly."""
+        there are none of these rest and `most` evenly; and those at which outlines are compared."""
         single = [s.steps(t) for s in self.selections if s.t is not None and len(s.t) == 1]
         rest = [self.rest.steps(t)] if self.rest is not None else []
         even = np.linspace(0, len(t) - 1, min(most, len(t))).round().astype(np.int64)
-        return np.unique(np.concatenate([*rest, *(single or [even])]))
+        outlines = {o.name for o in self.of(OutlineObservation)}
+        film = [s.steps(t) for s in self.selections if s.t is not None and outlines & set(s.of)]
+        return np.unique(np.concatenate([*rest, *(single or [even]), *film]))
 
     def stage(self, t: float) -> float:
         """The first input at the step nearest to t s, in its own unit."""

@@ -25,6 +25,7 @@ from validate.compare.verdict import (
 )
 from validate.errors import ComparisonError
 from validate.fem.locate import probe_rows
+from validate.register.outlines import OutlineObservation
 from validate.replay.consistency import claims_hold
 from validate.replay.experiment import Change, EffectSpec, Input, Uncertainty, Variant
 from validate.replay.followed import Followed
@@ -107,8 +108,12 @@ def _served(road: Road, mine: Followed, residual: Residual) -> str:
     """What the data of a residual served for, so that they are no evidence; else ""."""
     if residual.role == "calibrates" or {residual.name, residual.quantity} & set(road.calibrated):
         return "these data served to identify"
-    if residual.quantity in road.settings[mine.method].markers:
+    given = road.settings[mine.method].markers
+    if residual.quantity in given:
         return "this marker was given to the filter"
+    outlines = [o for o in mine.seen.of(OutlineObservation) if o.name in given]
+    if any(residual.quantity in o.units for o in outlines):
+        return "this outline was given to the filter"
     return ""
 
 

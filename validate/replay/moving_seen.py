@@ -15,7 +15,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.recording.scatter import repeats_share
-from validate.recording.types import Markers, Recording, Signal
+from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.register.clock import clock_sd
 from validate.register.from_rest import since_rest
 from validate.register.markers import MarkerObservation
@@ -32,9 +32,11 @@ from validate.replay.measured_drive import (
     zeroed,
 )
 from validate.replay.measured_markers import BodyAt, markers_topic, registered
+from validate.replay.measured_outline import observed_outline
 from validate.replay.recorded_motion import RecordedMotion, recorded_motion
 from validate.scene.scene import Scene
 
+FILM = "film"  # the label of outlines
 FIRST, LATER = "first", "later"
 SUDDEN: tuple[Kind, ...] = ("weighs", "releases")
 _PER_PERIOD = 40  # steps in the recorded period: average acceleration is then off by 0.2 % in it
@@ -94,7 +96,8 @@ def started(recording: Recording, p: MeasuredBody) -> Started:
         recording,
         markers={n: _markers_from(m, start, length) for n, m in recording.markers.items()},
         signals={n: _signal_from(s, start, length) for n, s in recording.signals.items()},
-        contours={}, frames={},
+        contours={n: _outlines_from(c, start, length) for n, c in recording.contours.items()},
+        frames={},
     )  # fmt: skip
     interval = float(np.median(np.diff(clock)))
     sd_t = interval / np.sqrt(12) if sudden and p.motion.start is None else 0.0
@@ -130,6 +133,15 @@ def _markers_from(m: Markers, start: float, length: float) -> Markers:
     for j in np.flatnonzero(seen.any(axis=0)):
         x[0, j] = early[seen[:, j], j].mean(axis=0)
     return replace(m, t=m.t[kept] - start, x=x)
+
+
+def _outlines_from(c: Contours, start: float, length: float) -> Contours:
+    """From the last one before the start on, which is taken as that at the start."""
+    _, kept = _parts(c.t, start, length)
+    kept[max(0, int(np.searchsorted(c.t, start + _SAME)) - 1)] = True
+    t = np.maximum(c.t[kept] - start, 0.0)
+    outlines = tuple(o for o, of in zip(c.outlines, kept, strict=True) if of)
+    return replace(c, t=t, outlines=outlines, each=None if c.each is None else c.each[kept])
 
 
 def _signal_from(s: Signal, start: float, length: float) -> Signal:
@@ -172,7 +184,7 @@ def steps_of(p: MeasuredBody, cut: Recording) -> Floats:
 
 
 def _used(p: MeasuredBody, topic: str | None) -> set[str]:
-    return {str(name) for name in (p.moved.by, p.seen.force, topic) if name}
+    return {str(name) for name in (p.moved.by, p.seen.force, p.seen.outline, topic) if name}
 
 
 # --- registration ---------------------------------------------------------------------------------
@@ -181,15 +193,10 @@ def _used(p: MeasuredBody, topic: str | None) -> set[str]:
 def place_moving(
     recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path
 ) -> Registered:
-    """Loads at every step, markers and force at every sample.
+    """Loads at every step, markers, force and outlines at every sample.
 
     Raises `ComparisonError` where nothing is compared, `RegistrationError` as the parts do.
     """
-    if p.seen.outline:
-        raise ComparisonError(
-            f"seen.outline = {p.seen.outline}: outlines are compared of static bodies; set "
-            "seen.outline=none, or motion.how=static"
-        )
     begun, p = started(recording, p), without_rest(p)
     t, kind = steps_of(p, begun.recording), drive_kind(recording, p)
     at = (scene.mesh, folder)
@@ -204,11 +211,21 @@ def place_moving(
         compared.append(_force(begun.recording, p, kind))
     if p.seen.markers:
         compared.append(moving_markers(begun, p, at))
+    said, film = tuple[str, ...](), tuple[Selection, ...]()
+    others = tuple(o.name for o in compared)
+    if p.seen.outline:
+        outline, said = observed_outline(begun.recording, p, scene.mesh, 0.0)
+        compared.append(outline)
+        taken = outline.t[(outline.t > _SAME) & (outline.t <= t[-1] + _SAME)]
+        film = (Selection(FILM, taken, "every outline after the start", of=(outline.name,)),)
     if not compared:
-        raise ComparisonError("nothing of the motion is compared: set seen.markers or seen.force")
+        raise ComparisonError(
+            "nothing of the motion is compared: set seen.markers, seen.force or seen.outline"
+        )
     return Registered(
-        (*drives, *compared), _windows(p, t, compared[-1].t), sudden=kind in SUDDEN, moves=True
-    )
+        (*drives, *compared), (*_windows(p, t, compared[0], others), *film), findings=said,
+        sudden=kind in SUDDEN, moves=True,
+    )  # fmt: skip
 
 
 def _load(
@@ -255,11 +272,16 @@ def _force(cut: Recording, p: MeasuredBody, kind: Kind) -> SignalObservation:
     )  # fmt: skip
 
 
-def _windows(p: MeasuredBody, t: Floats, samples: Floats) -> tuple[Selection, ...]:
-    """Every sample; with an identified damping those it was identified on, and the later ones."""
+def _windows(
+    p: MeasuredBody, t: Floats, first: Observation, names: tuple[str, ...]
+) -> tuple[Selection, ...]:
+    """Every sample of the sensors of these names; with an identified damping those it was
+    identified on, and the later ones."""
+    if not names:
+        return ()
     if p.motion.fit_window is None:
-        return (EVERYTHING,)
-    samples = samples[samples <= t[-1] + _SAME]
+        return (replace(EVERYTHING, of=names),)
+    samples = first.t[first.t <= t[-1] + _SAME]
     early = samples <= p.motion.fit_window
     if early.sum() < _FEWEST or (~early).sum() < _FEWEST:
         raise ComparisonError(
@@ -268,8 +290,8 @@ def _windows(p: MeasuredBody, t: Floats, samples: Floats) -> tuple[Selection, ..
         )
     end = f"{p.motion.fit_window:g} s after the start"
     return (
-        Selection(FIRST, samples[early], f"samples up to {end}"),
-        Selection(LATER, samples[~early], f"samples later than {end}"),
+        Selection(FIRST, samples[early], f"samples up to {end}", of=names),
+        Selection(LATER, samples[~early], f"samples later than {end}", of=names),
     )
 
 

@@ -305,7 +305,7 @@ def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> t
     if tracks is not None:
         given, first = tracks.of(cell.given), len(tracks.names)
         at = [tracks.names.index(n) for n in given.names]
-        found += given.errors(run.t, u[:, at], segments, ahead=True)
+        found += given.errors(run.t, u[:, at], segments, ahead=True) if at else ()
     for outline in outline_tracks(ready.seen, cell.given):
         last = first + len(outline.distances.normals)
         found += outline.errors(run.t, u[:, first:last], segments)
@@ -331,13 +331,16 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
             y, measured = offered.z - last, np.isfinite(offered.z)
             ahead = ahead_errors(offered.t, offered.names, np.nan_to_num(y), measured, segments)
             tracks, held = ready.tracks, tuple[Withheld, ...]()
-            given = None if tracks is None else tracks.of(cell.given)
             truth: Mapping[str, float] = {}
-            if tracks is not None and given is not None and given.names:
+            if tracks is not None:
+                given = tracks.of(cell.given).and_outlines(
+                    outline_tracks(ready.seen, cell.given), ready.scene.mesh
+                )
                 scoring = tracks.of(cell.scored(tracks.names))
-                u = scoring.held(given)
-                held = scoring.errors(tracks.t[1:], u[1:], segments, ahead=False)
-                truth = _held_at_probes(bench, ready, given)
+                if given.names and scoring.names:
+                    u = scoring.held(given)
+                    held = scoring.errors(tracks.t[1:], u[1:], segments, ahead=False)
+                    truth = _held_at_probes(bench, ready, given)
             on_each.append(Scored(truth, (*held, *ahead)))
         scored.append(_in_a_row(on_each))
     found = _put_together(scored, segments)

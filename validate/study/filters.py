@@ -46,7 +46,8 @@ class Best:
         if self.ranked.score.half is None:
             found.append("one sample tells no two settings apart")
         elif self.ties:
-            found.append(f"{self.ties} others cannot be told from it")
+            others = "1 other" if self.ties == 1 else f"{self.ties} others"
+            found.append(f"{others} cannot be told from it")
         if self.edges:
             found.append(f"at the end of the sweep of {', '.join(self.edges)}: widen it")
         seen = self.ranked.result.consistency

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.estimate.measurements import NORMALS
@@ -117,6 +118,23 @@ class MarkerTracks:
     def on(self, mesh: Mesh) -> "MarkerTracks":
         """The same markers, read from fields of another mesh of the body."""
         return replace(self, rows=barycentric_rows(mesh, self.rest))
+
+    def and_outlines(self, outlines: "Sequence[OutlineTracks]", mesh: Mesh) -> "MarkerTracks":
+        """With the places of outlines as markers that move along their normals, as last seen."""
+        found = self
+        for one in outlines:
+            last = np.searchsorted(one.t, self.t + 1e-9) - 1
+            along = np.where(last[:, None] >= 0, one.distances.z[last], np.nan)
+            names = tuple(f"{one.name}.{i}" for i in range(along.shape[1]))
+            places = one.distances.rows
+            weights = sparse.csr_array(sparse.vstack([found.rows.weights, places.weights]))
+            found = MarkerTracks(
+                (*found.names, *names), self.t,
+                np.concatenate([found.z, along[:, :, None] * one.distances.normals], axis=1),
+                np.concatenate([found.rest, places.apply(mesh.nodes)]),
+                Rows(weights, np.concatenate([found.rows.outside, places.outside])),
+            )  # fmt: skip
+        return found
 
     def estimated(self, t: Floats, u: Floats) -> Floats:
         """u (nt, k, d) m at the times of the samples."""
