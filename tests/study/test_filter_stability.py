@@ -36,7 +36,7 @@ def test_every_run_of_a_filter_finishes_or_has_a_reason(endings: FilterEndings) 
     assert not endings.bugs
     for change, ending in endings.rows:
         assert ending.state == "finished" or ending.why, change.label
-    assert {c.what for c, _ in endings.rows} == {"as declared", "step", "dropped"}
+    assert {c.what for c, _ in endings.rows} == {"as declared", "step", "dropped samples"}
 
 
 def test_what_did_not_finish_comes_first(endings: FilterEndings) -> None:
@@ -75,5 +75,5 @@ def test_extremes_of_shipped_filters_end_with_a_reason(tmp_path: Path) -> None:
     assert states.count("diverged") >= 3
     by = {(c.cell.method, c.what, c.factor): e for c, e in found.rows}
     assert "lies 0.5 steps" in by["kf_load", "step", 2.0].why
-    assert "leave the number range" in by["roukf", "start", 1000.0].why
+    assert "leave the number range" in by["roukf", "start noise", 1000.0].why
     assert all(e.why for _, e in found.rows if e.state != "finished")

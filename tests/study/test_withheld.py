@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import multivariate_normal
 from study_samples import experiment_file
 
+from validate.errors import ComparisonError
 from validate.estimate.kalman import Gaussian, kf_update
 from validate.fem.locate import barycentric_rows
 from validate.recording.types import Contours
@@ -23,6 +24,7 @@ from validate.scene.box import box
 from validate.study.blocks import cut, nested, score_interval
 from validate.study.filter_bench import Bench
 from validate.study.filter_cell import folds_of, run_cell
+from validate.study.filter_exhibits import ranking_row
 from validate.study.filter_plan import FilterCell, plan
 from validate.study.filters import study
 from validate.study.job import Where
@@ -259,6 +261,27 @@ def test_a_measured_recording_is_ranked_on_blocks_and_other_markers(
     assert ranking.nested.split
     assert dict(ranking.nested.chosen) == {"filter_doubt (R=4e-8)": 6}
     assert not found.picks
+
+
+def test_where_every_setting_of_a_filter_fails_the_reason_is_said(tmp_path: Path) -> None:
+    pulled = load_file(experiment_file(tmp_path))
+    with pytest.raises(ComparisonError, match=r"all 1 settings of filters failed; .*Q = -1 m2"):
+        study(
+            pulled, ["methods.kf.Q=-1"], methods=("kf", "plain"), seeds=1, out=tmp_path,
+            where=Where(workers=0),
+        )  # fmt: skip
+
+
+def test_without_an_interval_a_place_is_neither_worse_nor_a_tie(tmp_path: Path) -> None:
+    pulled = load_file(experiment_file(tmp_path))
+    found = study(
+        pulled, methods=("kf", "plain"), seeds=1, out=tmp_path, where=Where(workers=0)
+    )  # fmt: skip
+    (ranking,) = found.rankings
+    words = [ranking_row(r, found.by)[8] for r in ranking.rows]
+    assert words == ["best", "no interval", "no interval"]
+    assert (found.best[0].ties, found.best[0].better) == (0, "plain")  # its twin's own model
+    assert "place 2: plain is first" in found.best[0].doubts
 
 
 @pytest.mark.slow

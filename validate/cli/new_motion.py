@@ -191,7 +191,7 @@ def cells_for(p: MeasuredBody) -> int:
 
 def moving_methods(recording: Recording, p: MeasuredBody, law: str, order: int) -> list[str]:
     """Lines of the methods: schemes with inertia, statics beside them, filters that are given one
-    of the markers, where two are recorded, or the outline."""
+    of the markers, or the outline where one marker alone is judged."""
     lines = [f'"implicit": moving("implicit", order={order}),',
              f'"explicit": moving("explicit", order=1, split={_parts(recording, p)}),',
              f'"static": moving("static", order={order}),']  # fmt: skip
@@ -211,9 +211,9 @@ def _parts(recording: Recording, p: MeasuredBody) -> int:
 
 def _filters(recording: Recording, p: MeasuredBody, order: int) -> list[str]:
     names = judged_markers(recording, p)
-    if len(names) < 2 and not p.seen.outline:
+    if not names and not p.seen.outline:
         return []
-    given = _given(recording, p, names) if len(names) > 1 else str(p.seen.outline)
+    given = _given(recording, p, names) if len(names) > 1 else p.seen.outline or names[0]
     kind, lines = drive_kind(recording, p), []
     small = _scene(recording, p, Path(), 1).mesh.nodes.size <= _FILTERED
     if small:

@@ -38,8 +38,10 @@ from validate.study.sweep import named
 from validate.study.trade import Trade, again, trade
 
 _PLACES = 10  # of every ranking on the terminal
-_COLUMNS = (0, 1, 2, 3, 4, 8, 9, 10, 12, 13)  # of a ranking, and where those have no room
-_FEW = (0, 1, 2, 3, 4, 8)
+# Columns of a ranking, and of one where those have no room: the report has all.
+_COLUMNS = (0, 1, 2, 3, 4, 8, 9, 10, 11, 12, 13, 15)
+_FEWER = (0, 1, 2, 3, 4, 8, 12, 13)
+_FEW = (0, 1, 2, 3, 8, 12, 13)
 
 
 @dataclass(frozen=True)
@@ -234,7 +236,7 @@ def _show_filters(found: FilterStudy) -> None:
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
         head = ranking_head(found.unit)
-        for pick in (_COLUMNS, _FEW):
+        for pick in (_COLUMNS, _FEWER, _FEW):
             columns = tuple(head[i] for i in pick)
             rows = _places(ranking, pick, found.by)
             if fits(columns, rows):

@@ -111,7 +111,10 @@ def _noise(m: Markers, rest: Any) -> float:
     fourth differences, in which a smooth motion leaves little."""
     still = m.x[rest]
     if len(still) >= _FEWEST:
-        scatter = np.nanmedian(np.nanstd(still, axis=0, ddof=1))
+        often = np.isfinite(still).all(axis=2).sum(axis=0) >= 2
+        if not often.any():
+            return m.sd
+        scatter = np.nanmedian(np.nanstd(still[:, often], axis=0, ddof=1))
     else:
         bend = np.abs(np.diff(m.x, n=4, axis=0))
         bend = bend[np.isfinite(bend)]

@@ -107,11 +107,16 @@ def march(
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     at = at[at < done]
-    x = None if points is None else np.array(walk.points).reshape(done, -1, u.shape[2])
+    x = None if points is None else _stacked(walk.points, done, points, u)
     return Run(
         method, t[:done], at, u, traces, outcome, setup_s, times, sd, seconds, tuple(walk.said),
         points=x,
     )  # fmt: skip
+
+
+def _stacked(found: list[Floats], done: int, points: Rows, u: Floats) -> Floats:
+    """(nt, p, d), of no steps too."""
+    return np.array(found).reshape(done, points.weights.shape[0], u.shape[2])
 
 
 @dataclass(frozen=True)

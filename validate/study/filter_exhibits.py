@@ -7,9 +7,10 @@ import numpy as np
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.study.chosen_exhibits import chosen_exhibits
 from validate.study.filter_maps import over_axes
+from validate.study.filter_plan import CASE
 from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
-from validate.study.score import WORDS
+from validate.study.score import LOG_LOSS, WORDS
 from validate.study.shown import shown_unit
 from validate.study.sweep import named
 
@@ -111,6 +112,8 @@ def best_exhibit(study: FilterStudy) -> Exhibit:
             f"{study.by} {factor * r.score.mean:.4g}{half} {unit} over {over(study)}{doubts}."
         )
         rows.append((named(r.cell.condition), best.line))
+    if any(CASE in dict(best.ranked.cell.condition) for best in study.best):
+        words.append("A run of the experiment shows all its cases in one report.")
     head = ("condition", "command")
     table = NumberTable("best", "The best settings as commands", head, tuple(rows))
     return Exhibit("best", "Best settings", tuple(words), tables=(table,))
@@ -183,6 +186,8 @@ def _overlapping(r: Ranked) -> str:
 def _tied(r: Ranked) -> str:
     if r.place == 1:
         return "best"
+    if r.from_best.half is None:
+        return "no interval"
     return "cannot tell" if r.tied else "worse"
 
 
@@ -237,8 +242,9 @@ def _dominated(ranking: Ranking) -> Iterator[str]:
 
 
 def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
-    rows = [r for r in ranking.rows if r.result.step_s and r.score.mean > 0]
-    exact = sum(r.score.mean <= 0 for r in ranking.rows)
+    signed = study.by == LOG_LOSS  # may be negative
+    rows = [r for r in ranking.rows if r.result.step_s and (signed or r.score.mean > 0)]
+    exact = 0 if signed else sum(r.score.mean <= 0 for r in ranking.rows)
     none = f" Not drawn: {exact} without any error." if exact else ""
     future = sum(r.result.step_s is None for r in ranking.rows)
     none += f" Not drawn: {future} without times (smoothed, or solved whole)." if future else ""
@@ -256,7 +262,7 @@ def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
         "time of one step / ms",
         f"{study.by} / {unit}",
         tuple(series),
-        log="xy",
+        log="x" if signed else "xy",
         caption=f"A point is one cell: a method with one set of values.{none}",
     )
 

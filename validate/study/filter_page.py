@@ -42,7 +42,7 @@ def sentence(study: FilterStudy) -> str:
         else ""
     )
     return (
-        f"{cells} cells over {over(study)}{failed}; best by {study.by}{more}: "
+        f"{cells} cells over {over(study)}{failed}; best filter by {study.by}{more}: "
         f"{best.ranked.cell.method}, {factor * best.ranked.score.mean:.4g}{spread} {unit}{doubts}."
         f"{truth}"
     )
@@ -152,7 +152,8 @@ def cells_table(study: FilterStudy) -> CellsTable:
             continue
         score, seen = r.score, r.result.consistency
         rows.append(
-            (*what, r.place, score.mean, score.half, score.count, r.tied,
+            (*what, r.place, score.mean, score.half, score.count,
+             None if r.from_best.half is None else r.tied,
              seen.mean if seen else None, seen.verdict if seen else None, r.result.step_s,
              r.result.step_p99_s, r.result.frozen, None)
         )  # fmt: skip

@@ -129,6 +129,8 @@ def plan(
         hold_out=hold_out,
         tracker=mine[0],
     )
+    if not options.methods and not experiment.repeats:
+        methods = tuple(dict.fromkeys((*methods, *_plain(experiment, methods))))
     of_methods = [replace(own, method=m) for m in methods]
     cells = [c for one in of_methods for c in _cells(experiment, job, one, axes)]
     beside = [replace(own, method=mine[0], baseline="persistence")]
@@ -193,6 +195,17 @@ def _methods(
         )
     swept = [a.path.split(".")[1] for a in axes if a.path.startswith(METHODS)]
     return chosen or tuple(n for n in whole if n in swept) or usual
+
+
+def _plain(experiment: Experiment, methods: Sequence[str]) -> tuple[str, ...]:
+    """A plain solver beside filters: the one that inputs are varied by, else one that is accepted;
+    none where there is one already, or none at all."""
+    known = experiment.methods
+    if any(not known[m].markers for m in methods):
+        return ()
+    by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    names = (by, experiment.reference, *experiment.accepted)
+    return tuple(n for n in names if n in known and not known[n].markers)[:1]
 
 
 def _usual(experiment: Experiment) -> set[str]:

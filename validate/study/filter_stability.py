@@ -110,11 +110,14 @@ def _changes(cell: FilterCell, method: Method, *, quick: bool) -> list[FilterCha
     for what in ("process", "measurement", "start"):
         name = getattr(noise, what)
         if name and getattr(method.settings, name) != 0:
-            found += [FilterChange(cell, what, name, f) for f in _factors(method.settings, name)]
+            found += [
+                FilterChange(cell, f"{what} noise", name, f)
+                for f in _factors(method.settings, name)
+            ]
     if quick:
         return found
     found += [FilterChange(cell, "step", "", f) for f in _STEPS]
-    return found + [FilterChange(cell, "dropped", "", share) for share in _DROPPED]
+    return found + [FilterChange(cell, "dropped samples", "", share) for share in _DROPPED]
 
 
 def _factors(settings: Any, name: str) -> tuple[float, float]:
@@ -133,7 +136,7 @@ def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
 
 def _changed(ready: Ready, change: FilterChange) -> Ready:
     method, factor = ready.method, change.factor
-    if change.what == "dropped":
+    if change.what == "dropped samples":
         return replace(ready, seen=_dropped(ready, factor))
     if change.what == "step":
         split, stride = (round(1 / factor), 1) if factor < 1 else (1, round(factor))
@@ -188,9 +191,10 @@ def sentence(endings: FilterEndings) -> str:
     states = [e.state for _, e in endings.rows]
     counted = ", ".join(f"{states.count(s)} {s}" for s in dict.fromkeys(sorted(states)))
     bugs = f"; {len(endings.bugs)} ended in an error: {endings.bugs[0]}" if endings.bugs else ""
+    changed = [w for w in dict.fromkeys(c.what for c, _ in endings.rows) if w != "as declared"]
     return (
-        f"{len(states)} runs of filters with step, process, measurement or start noise changed, or "
-        f"samples dropped: {counted}{bugs}."
+        f"{len(states)} runs of filters as declared, or with {', '.join(changed)} changed: "
+        f"{counted}{bugs}."
     )
 
 

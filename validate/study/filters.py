@@ -32,19 +32,21 @@ KIND = "filters"
 @dataclass(frozen=True)
 class Best:
     """The best filter of one condition, the command that runs it, and how many filters' cells
-    cannot be told from it; `edges` are the swept paths whose first or last value it has."""
+    cannot be told from it; `edges` are the swept paths whose first or last value it has; `better`
+    names what is first where that is no filter."""
 
     ranked: Ranked
     line: str
     ties: int
     edges: tuple[str, ...]
+    better: str = ""
 
     @property
     def doubts(self) -> str:
         """What speaks against taking it as it is; "" for nothing."""
-        found = []
+        found = [f"place {self.ranked.place}: {self.better} is first"] if self.better else []
         if self.ranked.score.half is None:
-            found.append("one sample tells no two settings apart")
+            found.append("without an interval no two settings can be told apart")
         elif self.ties:
             others = "1 other" if self.ties == 1 else f"{self.ties} others"
             found.append(f"{others} cannot be told from it")
@@ -114,9 +116,22 @@ def study(
     planned = plan(found, options, axes(sweeps), seeds, hold_out)
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
     done = finish(work, study_folder(found, KIND, out) / CELLS, where, report)
+    _require_filters(planned, done)
     by = by or usual_score(done, in_turn=hold_out == EACH)
     _require_score(done, by)
     return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
+
+
+def _require_filters(planned: FilterPlan, done: Finished[FilterScores]) -> None:
+    """Raises `ComparisonError` with the first reason where every filter failed."""
+    known = planned.experiment.methods
+    cells = [c for c in planned.cells if known[c.method].markers and not c.baseline]
+    failed = [c for c in cells if done.records[c.key].value is None]
+    if cells and len(failed) == len(cells):
+        first = done.records[failed[0].key].why
+        raise ComparisonError(
+            f"all {len(cells)} settings of filters failed; the first, {failed[0].label}: {first}"
+        )
 
 
 def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
@@ -145,8 +160,10 @@ def _best(planned: FilterPlan, ranking: Ranking, by: str) -> Best:
     filters = [r for r in ranking.rows if r.result.nis is not None and not r.cell.baseline]
     rows = filters or list(ranking.rows)
     apart = [score_difference(r.result, rows[0].result, by, ranking.blocks) for r in rows[1:]]
-    ties, cell = sum(tied(a) for a in apart), rows[0].cell
-    return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell))
+    ties, cell = sum(tied(a) for a in apart if a.half is not None), rows[0].cell
+    first = ranking.rows[0]
+    better = "" if first is rows[0] else first.cell.name
+    return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell), better)
 
 
 def _edges(planned: FilterPlan, cell: FilterCell) -> tuple[str, ...]:

@@ -129,8 +129,8 @@ def _comparable(found: Found, by: str) -> tuple[Found, list[tuple[FilterCell, st
 
 
 def _why_not(value: FilterScores, by: str, mine: frozenset[str], most: frozenset[str]) -> str:
-    if by not in value.scores and not most:
-        return f"it has no {by}"
+    if by == LOG_LOSS or (by not in value.scores and not most):
+        return f"no innovations, so no {by}"
     return (
         f"scored on {', '.join(sorted(mine)) or 'nothing'}, the others on "
         f"{', '.join(sorted(most))}: give it two markers or more, or name --hold-out"
