@@ -18,6 +18,7 @@ from validate.replay.road import compare
 from validate.report.store import schema
 
 SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11,-1", "--sweep", "twin.noise=1e-11,1e-10")
+CELLS = 6 + 4  # of the sweep, and two baselines for each of two noises
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
     folder = swept(made)
     content = json.loads((folder / "results.json").read_text("utf-8"))
     jsonschema.validate(content, schema())
-    assert len(list((folder.parent / "study-filters" / "cells").glob("*.json"))) == 6
+    assert len(list((folder.parent / "study-filters" / "cells").glob("*.json"))) == CELLS
     with (folder / "tables" / "cells.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [bool(r["all.rmse_m"]) for r in rows] == [not r["failed"] for r in rows]
@@ -64,7 +65,7 @@ def test_the_best_line_is_the_best_cell(made: Path) -> None:
     words = shlex.split(best["command"])
     values = dict(w.split("=", 1) for w in words if "=" in w)
     noise = values["twin.noise"]
-    scored = [c for c in told["cells"] if not c["failed"]]
+    scored = [c for c in told["cells"] if not c["failed"] and not c["baseline"]]
     cells = [c for c in scored if c["values"]["twin.noise"] == noise]
     first = min(cells, key=lambda c: c["scores"]["all.rmse"]["mean"])
     assert first["values"] == values
@@ -97,7 +98,7 @@ def test_a_finished_study_is_not_run_again(
     file = str(made / "experiments" / "pulled.py")
     assert run(["study", "filters", file, *SWEEPS, "--seeds", "3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["study"]
-    assert told["reused"] == len(told["cells"]) == 6  # failed cells are finished ones
+    assert told["reused"] == len(told["cells"]) == CELLS  # failed cells are finished ones
 
 
 def test_bad_input_is_one_line(

@@ -146,6 +146,7 @@ class _Sent:
     future: Any
     batch: tuple[Any, ...]
     workers: frozenset[str]
+    alone: bool
 
 
 class _Drain:
@@ -180,7 +181,7 @@ class _Drain:
                 else:  # also where it was finished: its result is gone with its workers
                     self._sent.remove(one)
                     one.future.cancel()
-                    self._bury(one.batch)
+                    self._bury(one)
 
     def _wait(self, futures: list[Any]) -> None:
         """Until one of them ends, or a moment, after which who is there is looked at again."""
@@ -194,10 +195,15 @@ class _Drain:
         most = max(1, self._ahead * len(workers))
         size = self._size(most)
         while workers and self._waiting and len(self._sent) < most:
+            suspect = self._waiting[-1][0].key in self._deaths
+            if suspect and self._sent:
+                return  # it runs alone, so that its death is no other cell's
             batch = self._waiting.pop()
             while len(batch) < size and self._waiting and not self._deaths:
                 batch += self._waiting.pop()
-            self._send(batch, workers)
+            self._send(batch, workers, alone=suspect)
+            if suspect:
+                return
 
     def _there(self) -> list[str]:
         return sorted(self._client.scheduler_info(n_workers=-1)["workers"])
@@ -249,21 +255,21 @@ class _Drain:
         size = int(TASK_S * self._finished / self._spent)
         return max(1, min(size, len(self._waiting) // most))
 
-    def _send(self, batch: tuple[Any, ...], workers: Sequence[str]) -> None:
+    def _send(self, batch: tuple[Any, ...], workers: Sequence[str], *, alone: bool) -> None:
         """In turn: on the first worker while it is there, so that one machine measures all."""
         on = list(workers if self._ahead else workers[:1])
         future = self._client.submit(
             run_batch, self._plan.open, self._plan.run, self._plan.job, batch, pure=False,
             workers=on, allow_other_workers=False,
         )  # fmt: skip
-        self._sent.append(_Sent(future, batch, frozenset(on)))
+        self._sent.append(_Sent(future, batch, frozenset(on), alone))
 
     def _collect(self, one: _Sent) -> bool:
         """Takes the records that proven code made; others are asked for again, of all workers.
         False where they do not come: their worker may be gone."""
         error = one.future.exception() if one.future.status == "error" else None
         if isinstance(error, KilledWorker):
-            self._bury(one.batch)
+            self._bury(one)
             return True
         if error is not None:
             raise error
@@ -280,11 +286,11 @@ class _Drain:
             self._done(cell, record)
         return True
 
-    def _bury(self, batch: tuple[Any, ...]) -> None:
-        """The workers of a batch died: its cells are sent again one by one, and one that dies
-        `_DEATHS` times is a failure."""
-        for cell in batch:
-            self._deaths[cell.key] += len(batch) == 1
+    def _bury(self, one: "_Sent") -> None:
+        """The workers of a batch died: its cells are sent again, each alone, and one under which
+        workers die `_DEATHS` times is a failure."""
+        for cell in one.batch:
+            self._deaths[cell.key] += one.alone
             if self._deaths[cell.key] < _DEATHS:
                 self._waiting.append((cell,))
                 continue
