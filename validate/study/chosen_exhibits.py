@@ -8,7 +8,7 @@ from validate.study.blocks import Nested
 from validate.study.filters import FilterStudy
 from validate.study.ranking import Ranking
 from validate.study.score import WITHHELD
-from validate.study.shown import shown_unit
+from validate.study.score_units import shown_unit
 from validate.study.sweep import named
 
 _MM = 1e3

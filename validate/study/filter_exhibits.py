@@ -11,7 +11,7 @@ from validate.study.filter_plan import CASE
 from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
 from validate.study.score import LOG_LOSS, WORDS
-from validate.study.shown import shown_unit
+from validate.study.score_units import shown_unit
 from validate.study.sweep import named
 
 _MS = 1e3

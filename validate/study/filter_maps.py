@@ -8,7 +8,7 @@ from validate.compare.exhibit import Chart, Exhibit, Heat, Series
 from validate.study.filter_plan import METHODS, FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.score import NIS
-from validate.study.shown import shown_unit
+from validate.study.score_units import shown_unit
 from validate.study.sweep import Axis, named, short
 
 

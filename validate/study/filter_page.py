@@ -9,7 +9,7 @@ from validate.study.filter_plan import FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.interval import interval
 from validate.study.score import FilterScores
-from validate.study.shown import shown_unit
+from validate.study.score_units import shown_unit
 from validate.study.store import Record
 from validate.study.study_page import CellsTable, Findings, Row
 
